@@ -32,6 +32,7 @@ from hypothesis import Phase, settings
 from soak import time_limit
 from virtual_loop import VirtualLoop, run_virtually
 
+import steptwin.services  # noqa: F401  descriptions are checked for their tables, too
 from steptwin.live.cell import Cell
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device

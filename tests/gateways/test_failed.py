@@ -11,12 +11,13 @@ import pytest
 from gateway_rig import GatewayWorld
 
 from steptwin import World
-from steptwin.gateways import make_gateway
 from steptwin.gateways.contract import Gateway
 from steptwin.gateways.epics.controller import EpicsController
+from steptwin.gateways.kinds import make_gateway, read_gateways
 from steptwin.gateways.mqtt.jsonface import JsonFace
 from steptwin.gateways.sampling import Sampler
 from steptwin.history.keeper import HistoryKeeper
+from steptwin.history.options import read_history
 
 HALL = '[[mic488]]\nname = "table"\n'
 OPCUA = '[gateway.opcua]\nlisten = "127.0.0.1:0"\n'
@@ -59,7 +60,7 @@ def told_by(part: Gateway | HistoryKeeper, break_it: Callable[[], None], *, at_f
 
 
 def opened(table: str, subject: GatewayWorld, folder: Path) -> Gateway:
-    (spec,) = World.from_toml(HALL + table).spec.gateways
+    (spec,) = read_gateways(World.from_toml(HALL + table).spec.text)
     return make_gateway(spec, subject, folder)
 
 
@@ -114,7 +115,7 @@ def test_an_error_in_the_reading_of_a_device_ends_what_is_published(monkeypatch:
 
 def test_an_error_that_ends_the_history_is_told_and_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     subject = GatewayWorld(HALL)
-    spec = World.from_toml(HALL + '[history]\ndatabase = "sqlite:///past.sqlite"\n').spec.history
+    spec = read_history(World.from_toml(HALL + '[history]\ndatabase = "sqlite:///past.sqlite"\n').spec.text)
     assert spec is not None
     keeper = HistoryKeeper(spec, subject, tmp_path)
     assert told_by(keeper, lambda: monkeypatch.setattr(subject.samples, "see_events", broken))[0] == f"history: {ERROR}"

@@ -15,12 +15,12 @@ from steptwin.access.roles import Role
 from steptwin.errors import Refusal
 from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.contract import GatewaySubject
-from steptwin.gateways.modbus import MasterGateway
+from steptwin.gateways.modbus.gateway import MasterGateway
+from steptwin.gateways.modbus.options import ModbusSpec
 from steptwin.machine import SECOND
 from steptwin.mic488.registermap import DataType
 from steptwin.mic488.registers import register_map
 from steptwin.mic488.values import encoded, named
-from steptwin.simulation.describe.gateways import ModbusSpec
 from steptwin.simulation.script.steps import Request, Write
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Command
@@ -111,7 +111,7 @@ async def raw(rig: BridgeRig, asked: str) -> tuple[str, list[str]]:
     logged: list[str] = []
     known: Any = rig.subject
     known.audit = lambda who, do, fields, outcome: logged.append(outcome)
-    gateway = MasterGateway(ModbusSpec(kind="modbus", listen="127.0.0.1:0", units={}, role=None), rig.subject, Path())
+    gateway = MasterGateway(ModbusSpec(listen="127.0.0.1:0", units={}, role=None), rig.subject, Path())
     (part,) = rig.subject.description.machines
     return (await gateway.ask(ME, part, bytes.fromhex(asked))).hex(), logged
 

@@ -15,9 +15,9 @@ from gateway_rig import GatewayWorld
 from steptwin.access.roles import Role
 from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.gateways.clients import GatewayClient
-from steptwin.gateways.devicefile import read_device_file
-from steptwin.gateways.modbus import MOST_READS, MasterGateway
-from steptwin.simulation.describe.gateways import ModbusSpec
+from steptwin.gateways.modbus.gateway import MOST_READS, MasterGateway
+from steptwin.gateways.modbus.options import ModbusSpec
+from steptwin.live.devicefile import read_device_file
 from steptwin.simulation.script.steps import Request
 from steptwin.subject.contract import Description, LinePart, Result
 
@@ -72,7 +72,7 @@ def played(
 
 
 def spec(keys: str = "") -> ModbusSpec:
-    (found,) = read_device_file("cell.toml", CELL + keys).gateways
+    (found,) = read_device_file("cell.toml", CELL + keys).services.gateways
     assert isinstance(found, ModbusSpec)
     return found
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from gateway_rig import GatewayWorld
 
-from steptwin.gateways.metrics import Metrics
+from steptwin.gateways.prometheus.metrics import Metrics
 
 PLANT = Path(__file__).parents[2] / "examples/plant"
 WORLD = '[[mic488]]\nname = "table"\n[[m1486]]\nname = "drum"\n'

@@ -30,12 +30,11 @@ from steptwin.access.tokens import AccessGate
 from steptwin.errors import SteptwinError
 from steptwin.eventloop import result_of
 from steptwin.gateways.clients import GatewayClient
-from steptwin.gateways.devicefile import read_device_file
 from steptwin.gateways.epics.controller import EpicsController
 from steptwin.gateways.epics.records import Putter
 from steptwin.gateways.epics.recordset import make_records
 from steptwin.gateways.leases import JogLeases
-from steptwin.gateways.modbus import MasterGateway
+from steptwin.gateways.modbus.gateway import MasterGateway
 from steptwin.gateways.mqtt.jsoncommands import Doorkeeper, JsonCommands, JsonRequest
 from steptwin.gateways.mqtt.sparkplug import SparkplugFace
 from steptwin.gateways.mqtt.sparkplugcodec import SparkplugMetric, SparkplugPayload, SparkplugType, decode_payload, encode_payload
@@ -44,6 +43,7 @@ from steptwin.gateways.opcua.addressspace import node_id
 from steptwin.gateways.opcua.gateway import OpcUaGateway
 from steptwin.gateways.points import CLOCK
 from steptwin.gateways.sampling import Sampler
+from steptwin.live.devicefile import read_device_file
 from steptwin.machine import SECOND
 from steptwin.mic488.registermap import DataType
 from steptwin.mic488.registers import register_map
@@ -491,7 +491,7 @@ async def epics(rig: AnyRig) -> AsyncGenerator[Way]:
 
 
 def _spec(table: str) -> Any:
-    (found,) = read_device_file("cell.toml", f'[[device]]\nname = "table"\naddress = "/dev/ttyUSB0"\n{table}').gateways
+    (found,) = read_device_file("cell.toml", f'[[device]]\nname = "table"\naddress = "/dev/ttyUSB0"\n{table}').services.gateways
     return found
 
 

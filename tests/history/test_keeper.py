@@ -11,6 +11,7 @@ from history_rig import head
 
 from steptwin.files.world import World
 from steptwin.history.keeper import HistoryKeeper
+from steptwin.history.options import read_history
 from steptwin.history.rows import RowBatch, RunHead
 from steptwin.history.spool import Spool
 
@@ -23,7 +24,7 @@ database = "sqlite:///h.db"
 
 
 def test_a_run_that_begins_on_a_full_disk_has_its_head_before_its_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    spec = World.from_toml(CELL).spec.history
+    spec = read_history(World.from_toml(CELL).spec.text)
     assert spec is not None
     keeper = HistoryKeeper(spec, GatewayWorld(CELL), tmp_path)
     spool = Spool(tmp_path / "s")

@@ -8,9 +8,9 @@ from typing import Any, cast
 import pytest
 
 from steptwin.errors import LineFailure, Misuse, SteptwinError
-from steptwin.gateways.devicefile import DeviceSpec
 from steptwin.live.bridge import open_device
 from steptwin.live.cell import Cell
+from steptwin.live.devicefile import DeviceSpec
 from steptwin.live.server import Server
 
 TABLE = DeviceSpec("table", "/dev/ttyUSB0")

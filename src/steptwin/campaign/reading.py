@@ -8,6 +8,7 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
+import steptwin.services  # noqa: F401  their tables are checked, too
 from steptwin.campaign.checks import CAMPAIGN, FAULT, MATRIX, MEASURE, PROPERTY, STEP, VARY, CampaignChecks
 from steptwin.campaign.description import (
     DESIGNS,

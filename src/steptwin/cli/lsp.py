@@ -10,6 +10,7 @@ import typer
 
 def command() -> None:
     """Serve an editor on standard input and output (Language Server Protocol): programs, tables, configurations, worlds."""
+    import steptwin.services  # noqa: F401  their tables are checked, too
     from steptwin.lsp import serve_stdio
 
     raise typer.Exit(serve_stdio())

@@ -69,6 +69,7 @@ def command(
 
 def sections() -> list[PageSection]:
     """The tables of a description, for people."""
+    import steptwin.services  # noqa: F401  their tables are among them
     from steptwin.simulation.describe.steptable import ACTIONS, REPEAT, STEPS
     from steptwin.simulation.describe.tables import written_tables
 

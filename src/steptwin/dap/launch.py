@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import steptwin.services  # noqa: F401  their tables are checked, too
 from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.languages import LANGUAGES, ability

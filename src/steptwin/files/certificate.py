@@ -13,13 +13,13 @@ from steptwin.access.roles import ROLES
 from steptwin.errors import Misuse
 from steptwin.extras import missing
 from steptwin.files.writing import PRIVATE, new_content
-from steptwin.simulation.describe.gateways import APPLICATION_URI
 from steptwin.system import reason
 
 CERTIFICATE, KEY = "certificate.pem", "key.pem"
 ALWAYS = ("localhost", "127.0.0.1", "::1")
 DAYS = (1, 7300)
-
+APPLICATION_URI = "urn:steptwin:opcua"
+"""A certificate of an OPC UA server names the application that it is for (OPC 10000-6, 6.2.2)."""
 
 LONGEST_NAME = 64
 """Characters of a common name (X.520)."""

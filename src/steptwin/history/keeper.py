@@ -14,13 +14,14 @@ from steptwin.eventloop import endless
 from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.points import registers_by_machine
 from steptwin.history.database import read_url, shown
+from steptwin.history.options import HistorySpec
 from steptwin.history.past import KeptValues
 from steptwin.history.recorder import Recorder, WallAndSteady
 from steptwin.history.rows import RowBatch, RunHead
 from steptwin.history.spool import Spool
 from steptwin.history.writer import HistoryWriter
 from steptwin.machine import SECOND
-from steptwin.simulation.describe.historytable import HISTORY, HistorySpec
+from steptwin.simulation.describe.servicetables import HISTORY
 from steptwin.system import reason
 
 

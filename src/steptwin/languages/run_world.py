@@ -11,6 +11,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import steptwin.services  # noqa: F401  their tables are checked, too
 from steptwin.campaign.properties import Verdict, read_property, watch_together
 from steptwin.controllerstate import ControllerState
 from steptwin.durations import duration

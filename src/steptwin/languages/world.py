@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import steptwin.services  # noqa: F401  their tables are checked, too
 from steptwin.diagnostics import SourceText
 from steptwin.files.world import read_beside
 from steptwin.languages.contract import CheckReport, FileLanguage, GivenOptions

@@ -16,10 +16,10 @@ from steptwin.errors import LineFailure
 from steptwin.eventloop import result_of
 from steptwin.files.auditfile import audit_into, wall_clock
 from steptwin.gateways.contract import PastValues
-from steptwin.gateways.devicefile import DeviceFile, DeviceSpec, read_device_file
 from steptwin.gateways.sampling import SharedSamples
 from steptwin.inputfiles import read_bytes
 from steptwin.later import start
+from steptwin.live.devicefile import DeviceFile, DeviceSpec, read_device_file
 from steptwin.live.gateways import open_gateways, recording
 from steptwin.live.keptsettings import keep_settings
 from steptwin.live.options import LogOptions
@@ -40,7 +40,7 @@ from steptwin.textcodec import decode
 def bridge(file: Path, *, listen_any: bool, ready_file: Path | None, audit: Path | None, log: LogOptions) -> None:
     """Serve the devices of ``file`` until SIGINT, SIGTERM or SIGHUP. Raises `SteptwinError` with a text for the user."""
     wanted = read_device_file(str(file), decode(read_bytes(file), str(file)).text)
-    check_addresses([gateway.listen for gateway in wanted.gateways], listen_any=listen_any)
+    check_addresses([gateway.listen for gateway in wanted.services.gateways], listen_any=listen_any)
 
     with audit_into(audit) as commands:
 
@@ -66,10 +66,10 @@ async def _open(server: Server, wanted: DeviceFile, file: Path, audit: Audit | N
     for device in wanted.devices:
         await open_device(connections, device.beside(file.parent), server.notice)
     devices = _Devices(wanted.name, subject, connections)
-    if audit is None and wanted.history is not None:
+    if audit is None and wanted.services.history is not None:
         audit = Audit(wall_clock)
     devices.audit = recording(audit, now)
-    await open_gateways(server, wanted.gateways, wanted.history, file.parent, devices, audit, listen_any=listen_any)
+    await open_gateways(server, wanted.services, file.parent, devices, audit, listen_any=listen_any)
 
 
 def connections_of(subject: CompositeSubject, on_internal: Callable[[Exception], object]) -> DeviceConnections:

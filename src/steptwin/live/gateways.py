@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from steptwin.access.audit import Audit, CommandLog
 from steptwin.extras import libraries_of, missing
-from steptwin.gateways import make_gateway
 from steptwin.gateways.contract import GatewaySubject, OpenGateway, PastValues
+from steptwin.gateways.kinds import make_gateway
 from steptwin.gateways.sampling import SharedSamples
+from steptwin.history.options import HistorySpec
 from steptwin.live.server import EndPoint, Server
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import Nanos
-from steptwin.simulation.describe.gateways import GatewaySpec
-from steptwin.simulation.describe.historytable import HISTORY, HistorySpec
+from steptwin.services import Services
+from steptwin.simulation.describe.servicetables import HISTORY
 from steptwin.simulation.kinds.lines import LineTraffic
 from steptwin.subject.commands import Command, Jog, type_of
 from steptwin.subject.contract import Description, Reading, Result
@@ -38,28 +39,27 @@ class KeptSubject(GatewaySubject, Protocol):
 
 async def open_gateways(
     server: Server,
-    specs: Iterable[GatewaySpec],
-    history: HistorySpec | None,
+    services: Services,
     folder: Path,
     subject: KeptSubject,
     audit: Audit | None,
     *,
     listen_any: bool,
 ) -> list[OpenGateway]:
-    """Open those of a file in ``folder``. The history keeps what ``audit`` is told.
+    """Open those of a description in ``folder``. The history keeps what ``audit`` is told.
 
     Raises `Misuse` or `LineFailure` for one that cannot be opened.
     """
     opened: list[OpenGateway] = []
-    if history is not None:
-        keeper = _make_keeper(history, subject, folder)
+    if services.history is not None:
+        keeper = _make_keeper(services.history, subject, folder)
         details = await keeper.open(listen_any=listen_any, notice=server.notice)
         server.join(keeper, EndPoint(HISTORY, str(details["url"]), keeper.protocol, details))
         opened.append(OpenGateway(HISTORY, str(details["url"]), keeper))
         subject.past = keeper.past
         if audit is not None:
             audit.watchers.append(keeper.note)
-    for spec in specs:
+    for spec in services.gateways:
         gateway = make_gateway(spec, subject, folder)
         details = await gateway.open(listen_any=listen_any, notice=server.notice)
         place = str(details.get("url") or f"{details['host']}:{details['port']}")

@@ -39,6 +39,7 @@ from steptwin.live.transports import TRANSPORTS, VISION
 from steptwin.live.world import LiveWorld, PlacePort, VisionPort, announced
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import Nanos, SendingPort
+from steptwin.services import read_services
 from steptwin.simulation.kinds.kind import LineSpec, LinkKind
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.kinds.registry import line_kinds
@@ -107,7 +108,8 @@ def up_with(world: World, options: UpOptions, addition: Addition | None = None) 
     if speed == inf and outside:
         raise Misuse(f"--speed max: line {outside[0].name!r} has external clients, which need real time; use 'steptwin run'")
     addresses = [address for line in world.spec.lines for key, address in line.links.items() if TRANSPORTS[key].is_address]
-    addresses += [gateway.listen for gateway in world.spec.gateways]
+    addresses += [gateway.listen for gateway in read_services(world.spec.text).gateways]
+    world.spec.text.check()  # the description may have been read before the tables of services were known
     check_addresses((*addresses, *(address for _, address in world.spec.vision_addresses())), listen_any=options.live.listen_any)
     if isinstance(kept, Path):
         check_target(kept)
@@ -237,7 +239,8 @@ async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions,
     name = options.live.name or live.world.spec.name
     control = WorldControl(server.cell, live, pace, server.announcement)
     server.introduce(name, partial(announced, live.world), options.world)
-    if options.audit is None and live.world.spec.history is not None:
+    services = read_services(live.world.spec.text)
+    if options.audit is None and services.history is not None:
         options = replace(options, audit=Audit(wall_clock))
     server.audit = recording(options.audit, lambda: live.world.now)
     if not options.is_closed:
@@ -249,12 +252,11 @@ async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions,
         await addition(running)
     if not options.is_closed:
         folder = Path() if options.world is None else options.world.parent
-        spec, subject = live.world.spec, LiveWorldSubject(control, live)
+        subject = LiveWorldSubject(control, live)
         subject.audit = server.audit
-        opened = await open_gateways(
-            server, spec.gateways, spec.history, folder, subject, options.audit, listen_any=options.live.listen_any
+        running.gateways.extend(
+            await open_gateways(server, services, folder, subject, options.audit, listen_any=options.live.listen_any)
         )
-        running.gateways.extend(opened)
     if options.ready_file is not None:
         server.write_ready_file(options.ready_file)
 

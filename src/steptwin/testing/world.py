@@ -9,6 +9,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeVar
 
+import steptwin.services  # noqa: F401  their tables are checked, too
 from steptwin.drivers import Mic488
 from steptwin.drivers.address import parse_device
 from steptwin.drivers.place import parse_line_address

@@ -16,8 +16,9 @@ from tests.gateways.opcua.test_bridge import free_port
 
 from steptwin import World
 from steptwin.gateways.epics import gateway as epics
+from steptwin.gateways.epics.options import EpicsSpec
+from steptwin.gateways.kinds import read_gateways
 from steptwin.simulation.describe.description import read_world
-from steptwin.simulation.describe.gateways import EpicsSpec
 from steptwin.simulation.toml.reader import WorldError
 
 CLIENTS = Path(__file__).parents[1] / "clients"
@@ -134,7 +135,7 @@ def test_records_for_pvapy(tmp_path: Path) -> None:
 def test_clients_of_pv_access_are_listed() -> None:
     """By their address, with the channels that they have."""
     text = f'{TABLE}pva = "127.0.0.1:0"\n'
-    (spec,) = World.from_toml(text).spec.gateways
+    (spec,) = read_gateways(World.from_toml(text).spec.text)
     assert isinstance(spec, EpicsSpec)
     gateway = epics.make(spec, GatewayWorld(text), Path())
     program = (

@@ -8,14 +8,15 @@ import pytest
 from tls_files import Authority
 
 from steptwin.errors import Misuse
+from steptwin.gateways.kinds import read_gateways
 from steptwin.gateways.mqtt.gateway import broker_of
+from steptwin.gateways.mqtt.options import MqttSpec
 from steptwin.simulation.describe.description import read_world
-from steptwin.simulation.describe.gateways import MqttSpec
 from steptwin.simulation.toml.reader import WorldError
 
 
 def mqtt(keys: str) -> MqttSpec:
-    (found,) = read_world("hall.toml", f'[[mic488]]\nname = "table"\n[gateway.mqtt]\n{keys}').gateways
+    (found,) = read_gateways(read_world("hall.toml", f'[[mic488]]\nname = "table"\n[gateway.mqtt]\n{keys}').text)
     assert isinstance(found, MqttSpec)
     return found
 

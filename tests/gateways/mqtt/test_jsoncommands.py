@@ -13,16 +13,17 @@ from tokens import tokens_file
 
 from steptwin.access.audit import Audit
 from steptwin.errors import Misuse
+from steptwin.gateways.kinds import read_gateways
 from steptwin.gateways.mqtt.jsoncommands import REPEATED_S, Doorkeeper, JsonCommands, JsonRequest
+from steptwin.gateways.mqtt.options import MqttSpec
 from steptwin.simulation.describe.description import read_world
-from steptwin.simulation.describe.gateways import MqttSpec
 
 WORLD = '[[mic488]]\nname = "table"\n'
 OPERATOR = "0123456789abcdef"
 
 
 def mqtt(keys: str = "") -> MqttSpec:
-    (found,) = read_world("hall.toml", f"{WORLD}[gateway.mqtt]\n{keys}").gateways
+    (found,) = read_gateways(read_world("hall.toml", f"{WORLD}[gateway.mqtt]\n{keys}").text)
     assert isinstance(found, MqttSpec)
     return found
 

@@ -15,11 +15,12 @@ from gateway_rig import GatewayWorld
 from virtual_loop import run_virtually
 
 from steptwin.gateways.contract import PastValue
+from steptwin.gateways.kinds import read_gateways
 from steptwin.gateways.opcua.addressspace import node_id
 from steptwin.gateways.opcua.gateway import OpcUaGateway
 from steptwin.gateways.opcua.limits import MOST_READ
+from steptwin.gateways.opcua.options import OpcUaSpec
 from steptwin.simulation.describe.description import read_world
-from steptwin.simulation.describe.gateways import OpcUaSpec
 
 WORLD = """
 [[mic488]]
@@ -45,7 +46,7 @@ class Past:
 
 
 def spec(text: str = WORLD) -> OpcUaSpec:
-    (found,) = read_world("hall.toml", text).gateways
+    (found,) = read_gateways(read_world("hall.toml", text).text)
     assert isinstance(found, OpcUaSpec)
     return found
 

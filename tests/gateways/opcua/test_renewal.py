@@ -14,9 +14,10 @@ from gateway_rig import GatewayWorld
 
 from steptwin import World
 from steptwin.files.certificate import make_certificate
+from steptwin.gateways.kinds import read_gateways
 from steptwin.gateways.opcua import gateway as opcua
 from steptwin.gateways.opcua import security
-from steptwin.simulation.describe.gateways import OpcUaSpec
+from steptwin.gateways.opcua.options import OpcUaSpec
 
 HALL = '[[mic488]]\nname = "table"\n[gateway.opcua]\nlisten = "127.0.0.1:0"\nsecurity = "sign"\n'
 KEYS = 'certificate = "own/certificate.pem"\nkey = "own/key.pem"\n'
@@ -38,7 +39,7 @@ def test_it_expires_and_is_renewed(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     (tmp_path / "new").mkdir()
     second, second_key = make_certificate(tmp_path / "new", [], 2)
     told: list[str] = []
-    (spec,) = World.from_toml(HALL + KEYS).spec.gateways
+    (spec,) = read_gateways(World.from_toml(HALL + KEYS).spec.text)
     assert isinstance(spec, OpcUaSpec)
     gateway = opcua.make(spec, GatewayWorld(HALL), tmp_path)
 
@@ -76,7 +77,7 @@ def test_one_that_is_valid_is_left_alone(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(opcua, "LOOK_S", 0.01)
     make_certificate(tmp_path / "own", [], 2)
     told: list[str] = []
-    (spec,) = World.from_toml(HALL + KEYS).spec.gateways
+    (spec,) = read_gateways(World.from_toml(HALL + KEYS).spec.text)
     assert isinstance(spec, OpcUaSpec)
     gateway = opcua.make(spec, GatewayWorld(HALL), tmp_path)
 

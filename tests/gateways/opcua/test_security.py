@@ -17,15 +17,16 @@ from tokens import tokens_file
 
 from steptwin.errors import Misuse
 from steptwin.files.certificate import make_certificate
+from steptwin.gateways.kinds import read_gateways
+from steptwin.gateways.opcua.options import OpcUaSpec
 from steptwin.gateways.opcua.security import Security
 from steptwin.simulation.describe.description import read_world
-from steptwin.simulation.describe.gateways import OpcUaSpec
 
 OWN = 'certificate = "certificate.pem"\nkey = "key.pem"\n'
 
 
 def security(folder: Path, keys: str, *, is_local: bool = True) -> Security:
-    (spec,) = read_world("hall.toml", f'[[mic488]]\nname = "table"\n[gateway.opcua]\n{keys}').gateways
+    (spec,) = read_gateways(read_world("hall.toml", f'[[mic488]]\nname = "table"\n[gateway.opcua]\n{keys}').text)
     assert isinstance(spec, OpcUaSpec)
     return Security(spec, folder, is_local=is_local)
 

@@ -13,6 +13,7 @@ from steptwin.extras import libraries_of, missing
 from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.epics.channels import PvDatabase
 from steptwin.gateways.epics.controller import EpicsController
+from steptwin.gateways.epics.options import EpicsSpec
 from steptwin.gateways.epics.records import Record
 from steptwin.gateways.epics.recordset import make_records
 from steptwin.gateways.epics.server import ChannelAccessServer
@@ -20,7 +21,6 @@ from steptwin.gateways.leases import JogLeases
 from steptwin.gateways.points import CLOCK, registers_by_machine
 from steptwin.gateways.sampling import Sampler
 from steptwin.machine import SECOND
-from steptwin.simulation.describe.gateways import EpicsSpec
 from steptwin.simulation.toml.addresses import Address, is_loopback, parse_address
 
 if TYPE_CHECKING:

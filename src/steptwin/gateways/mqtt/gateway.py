@@ -17,13 +17,13 @@ from steptwin.gateways.mqtt.connection import Broker, BrokerConnection
 from steptwin.gateways.mqtt.jsoncommands import Doorkeeper, JsonCommands
 from steptwin.gateways.mqtt.jsonface import JsonFace
 from steptwin.gateways.mqtt.jsontopics import Topics
+from steptwin.gateways.mqtt.options import MqttSpec, SparkplugSpec
 from steptwin.gateways.mqtt.sparkplug import SparkplugFace
 from steptwin.gateways.mqtt.sparkplugmetrics import Namespace, rows_of
 from steptwin.gateways.points import registers_by_machine
 from steptwin.gateways.sampling import Sampler
 from steptwin.inputfiles import read_bytes
 from steptwin.machine import SECOND
-from steptwin.simulation.describe.gateways import MqttSpec, SparkplugSpec
 from steptwin.simulation.toml.addresses import parse_address
 from steptwin.system import reason
 from steptwin.textcodec import decode
@@ -130,11 +130,11 @@ def _tls(spec: MqttSpec, folder: Path) -> ssl.SSLContext:
         found = ssl.create_default_context(cafile=None if spec.ca is None else str(folder / spec.ca))
     except (OSError, ssl.SSLError) as error:
         raise Misuse(f"[gateway.mqtt]: ca: {spec.ca}: {reason(error)}") from None
-    if spec.certificate is not None and spec.key is not None:
+    if spec.certificate is not None and spec.its_key is not None:
         try:
-            found.load_cert_chain(folder / spec.certificate, folder / spec.key, password="")
+            found.load_cert_chain(folder / spec.certificate, folder / spec.its_key, password="")
         except (OSError, ssl.SSLError, ValueError) as error:
-            raise Misuse(f"[gateway.mqtt]: {spec.certificate}, {spec.key}: {reason(error)}") from None
+            raise Misuse(f"[gateway.mqtt]: {spec.certificate}, {spec.its_key}: {reason(error)}") from None
     return found
 
 

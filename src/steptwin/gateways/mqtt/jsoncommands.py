@@ -16,7 +16,7 @@ from steptwin.files.tokenfiles import tokens_in
 from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.leases import JogLeases
-from steptwin.simulation.describe.gateways import MqttSpec
+from steptwin.gateways.mqtt.options import MqttSpec
 from steptwin.subject.commands import Command, Jog, StopAxes, type_of
 from steptwin.subject.contract import Result
 from steptwin.subject.dispatch import JsonObject, failure, read_message, respond

@@ -25,10 +25,10 @@ from steptwin.gateways.mqtt.jsontopics import (
     Topics,
     encode,
 )
+from steptwin.gateways.mqtt.options import MqttSpec
 from steptwin.gateways.points import CLOCK
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.machine import SECOND
-from steptwin.simulation.describe.gateways import MqttSpec
 from steptwin.subject.dispatch import failure
 from steptwin.subject.following import Filter
 

@@ -19,10 +19,11 @@ from typing import Any
 from steptwin.errors import Misuse
 from steptwin.gateways.points import CLOCK, CLOCK_POINTS, GatewayPoint, PointValue, points_of, values_of
 from steptwin.gateways.sampling import Sample
-from steptwin.simulation.describe.gateways import UNNAMED
 from steptwin.subject.contract import Description
 
 ONLINE, INSTANCE, DESCRIPTION, EVENTS, DO, ANSWER = "online", "instance", "description", "events", "do", "answer"
+UNNAMED = ("world", "devices")
+"""Names of worlds and device files that have been given none."""
 OWN = (ONLINE, INSTANCE, DESCRIPTION, EVENTS, DO, ANSWER, CLOCK)
 """Topics below BASE that are not controllers."""
 ANSWERS, AT = "answers", "at"

@@ -12,10 +12,12 @@ from asyncua import Server
 from steptwin import __version__
 from steptwin.errors import LineFailure, SteptwinError
 from steptwin.eventloop import endless
+from steptwin.files.certificate import APPLICATION_URI
 from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.opcua.addressspace import NAMESPACE, NAMESPACE_URI, AddressSpaceBuilder
 from steptwin.gateways.opcua.limits import tell_limits
 from steptwin.gateways.opcua.notifications import Notifications
+from steptwin.gateways.opcua.options import OpcUaSpec
 from steptwin.gateways.opcua.past import PastNodes
 from steptwin.gateways.opcua.security import Security
 from steptwin.gateways.opcua.service import NodeService
@@ -23,7 +25,6 @@ from steptwin.gateways.opcua.session import GatewayServer
 from steptwin.gateways.points import registers_by_machine
 from steptwin.gateways.sampling import Sampler
 from steptwin.machine import SECOND
-from steptwin.simulation.describe.gateways import APPLICATION_URI, OpcUaSpec
 from steptwin.simulation.toml.addresses import Address, is_loopback, parse_address
 from steptwin.system import reason
 

@@ -19,9 +19,9 @@ from steptwin.access.tokens import AccessGate
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.tokenfiles import tokens_in
 from steptwin.gateways.clients import GatewayClient
+from steptwin.gateways.opcua.options import OpcUaSpec
 from steptwin.gateways.opcua.session import GatewayUser
 from steptwin.inputfiles import read_bytes
-from steptwin.simulation.describe.gateways import OpcUaSpec
 
 _SIGNED = (
     ua.SecurityPolicyType.Basic256Sha256_Sign,
@@ -71,7 +71,7 @@ class Security(UserManager):
     def _files(self) -> tuple[bytes, ...]:
         """Raises `Misuse`."""
         return tuple(
-            read_bytes(self._folder / name) for name in (self._options.certificate, self._options.key) if name is not None
+            read_bytes(self._folder / name) for name in (self._options.certificate, self._options.its_key) if name is not None
         )
 
     def is_renewed(self) -> bool:
@@ -80,7 +80,7 @@ class Security(UserManager):
         found = self._files()
         if found == self._loaded:
             return False
-        names = f"[gateway.opcua]: {self._options.certificate}, {self._options.key}: "
+        names = f"[gateway.opcua]: {self._options.certificate}, {self._options.its_key}: "
         try:
             own = load_pem_private_key(found[1], None).public_key()
             certified = load_pem_x509_certificate(found[0]).public_key()
@@ -103,14 +103,14 @@ class Security(UserManager):
         server.set_security_policy(list(self.policies))
         asks = self._gate.asks
         server.set_identity_tokens([ua.UserNameIdentityToken] if asks else [ua.AnonymousIdentityToken, ua.UserNameIdentityToken])
-        if options.certificate is not None and options.key is not None:
+        if options.certificate is not None and options.its_key is not None:
             try:
                 self._loaded = self._files()
                 await server.load_certificate(self._loaded[0], "PEM")
                 await server.load_private_key(self._loaded[1], format="PEM")
                 self.valid_until = load_pem_x509_certificate(self._loaded[0]).not_valid_after_utc
             except (ValueError, TypeError) as error:  # TypeError: a key that is encrypted
-                raise Misuse(f"[gateway.opcua]: {options.certificate}, {options.key}: {error}") from None
+                raise Misuse(f"[gateway.opcua]: {options.certificate}, {options.its_key}: {error}") from None
         checks = CertificateValidatorOptions.BASIC_VALIDATION | CertificateValidatorOptions.PEER_CLIENT
         trusted: TrustStore | None = None
         if options.trusted is not None:

@@ -12,7 +12,7 @@ from steptwin.eventloop import later
 from steptwin.gateways.contract import OpenGateway
 from steptwin.machine import SECOND
 from steptwin.messages import Message
-from steptwin.simulation.describe.historytable import HISTORY
+from steptwin.simulation.describe.servicetables import HISTORY
 from steptwin.studio.plantrequests import MOST_POINTS, MOST_WRITES
 
 if TYPE_CHECKING:

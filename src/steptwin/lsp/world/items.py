@@ -11,7 +11,7 @@ from steptwin.lsp.world.outline import TableOutline, WorldOutline
 from steptwin.lsp.world.signals import WorldSignals
 from steptwin.lsp.world.snippets import table_snippet, value_snippet
 from steptwin.simulation.components.registry import ELEMENTS
-from steptwin.simulation.describe.gateways import GATEWAY, GATEWAYS
+from steptwin.simulation.describe.servicetables import SERVICE_TABLES, inner_tables
 from steptwin.simulation.describe.steptable import ACTIONS
 from steptwin.simulation.describe.tables import all_keys, written
 from steptwin.simulation.kinds.registry import KINDS
@@ -44,8 +44,9 @@ def keys_of(table: TableOutline) -> Sequence[Key]:
     if len(table.names) > 1 and table.names[0] in KINDS:
         kind = KINDS[table.names[0]]
         return kind.inner_keys(table.names[1]) if table.names[1] in kind.inner_tables else ()
-    if len(table.names) > 1 and table.names[0] == GATEWAY:
-        return GATEWAYS[table.names[1]].keys if table.names[1] in GATEWAYS else ()
+    if len(table.names) > 1 and table.names[0] in SERVICE_TABLES:
+        inner = SERVICE_TABLES[table.names[0]].inner
+        return inner[table.names[1]].keys if table.names[1] in inner else ()
     return all_keys().get(table.kind, ())
 
 
@@ -142,12 +143,12 @@ def _tables(span: Span) -> Iterator[Completion]:
 
 
 def _inner_tables() -> Iterator[tuple[str, Sequence[Key]]]:
-    """Tables in those of elements, which may have them from another one, of gateways and controllers, with their keys."""
+    """Tables in those of elements, which may have them from another one, of services and controllers, with their keys."""
     for element in ELEMENTS.values():
         for key, rows in element.inner.items():
             name = f"[{element.name}.{key}]"
             yield f"[{name}]" if rows.written.startswith("[[") else name, rows.keys
-    yield from ((rows.written, rows.keys) for rows in GATEWAYS.values())
+    yield from ((name, rows.keys) for name, rows in inner_tables().items())
     for kind in KINDS.values():
         yield from ((f"[{kind.name}.{inner}]", ()) for inner in kind.inner_tables)
 

@@ -11,10 +11,9 @@ from steptwin.simulation.components.element import AnyElement
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.describe.arrangement import DRAWING, check_places, read_places
-from steptwin.simulation.describe.gateways import GATEWAY, read_gateways
-from steptwin.simulation.describe.historytable import read_history
 from steptwin.simulation.describe.overrides import NO_OVERRIDES, Overrides, override
 from steptwin.simulation.describe.pieces import PARAMETERS, USE, Pieces, ReadFile, is_piece, no_files
+from steptwin.simulation.describe.servicetables import SERVICE_TABLES, SERVICES
 from steptwin.simulation.describe.spec import ScriptSpec, WorldSpec
 from steptwin.simulation.describe.steptable import STEPS, read_steps
 from steptwin.simulation.describe.tables import KEYS, SEED, tables
@@ -62,7 +61,7 @@ def describe(
     pieces.put_into(toml)
     override(data, late)
     inner = {key for element in ELEMENTS.values() for key in element.inner}
-    known = [*(key for key in tables() if key not in inner), "fault", GATEWAY]
+    known = list(dict.fromkeys([*(key for key in tables() if key not in inner), "fault", *SERVICES]))
     for key in data:
         if key not in known:
             near = toml.near(key, known)
@@ -81,14 +80,14 @@ def describe(
         ),
         elements=ElementSpecs({element.name: tuple(_elements(toml, element)) for element in ELEMENTS.values()}),
         scripts=(*_events(toml), *_scripts(toml)),
-        gateways=tuple(read_gateways(toml)),
-        history=read_history(toml),
         drawing=read_places(placed),
         faults=tuple(_faults(toml)),
         text=toml,
         overrides=dict(overrides),
         pieces=pieces.files,
     )
+    for service in SERVICE_TABLES.values():
+        service.check(toml)
     named_elements = [one for element in ELEMENTS.values() for one in element.named(spec.elements[element.name])]
     _check_names(spec, named_elements)
     check_places(toml, placed, [one.name for one in named_elements])

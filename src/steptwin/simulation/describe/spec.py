@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from steptwin.machine import Nanos
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.describe.arrangement import DrawnPlace
-from steptwin.simulation.describe.gateways import GatewaySpec
-from steptwin.simulation.describe.historytable import HistorySpec
 from steptwin.simulation.describe.overrides import Overrides
 from steptwin.simulation.faults import Fault
 from steptwin.simulation.kinds.kind import ControllerSpec, LineSpec
@@ -33,7 +31,8 @@ class ScriptSpec:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WorldSpec:
-    """A world as its file describes it. ``text`` is the file."""
+    """A world as its file describes it. ``text`` is the file, which also keeps the tables of services beside the world
+    (`steptwin.simulation.describe.servicetables`)."""
 
     name: str
     seed: int
@@ -45,8 +44,6 @@ class WorldSpec:
     controllers: tuple[ControllerSpec, ...]
     elements: ElementSpecs
     scripts: tuple[ScriptSpec, ...]
-    gateways: tuple[GatewaySpec, ...]
-    history: HistorySpec | None
     drawing: tuple[DrawnPlace, ...]
     faults: tuple[Fault | None, ...]
     """None for one with errors, which are in ``text``."""

@@ -16,9 +16,8 @@ from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.describe.arrangement import DRAWING, DRAWING_TABLE
-from steptwin.simulation.describe.gateways import GATEWAYS
-from steptwin.simulation.describe.historytable import HISTORY, HISTORY_TABLE
 from steptwin.simulation.describe.pieces import USE, USES
+from steptwin.simulation.describe.servicetables import SERVICE_TABLES, inner_tables
 from steptwin.simulation.describe.steptable import STEPS
 from steptwin.simulation.kinds.kind import AnyKind
 from steptwin.simulation.kinds.links import LINK_KEYS, TLS_KEYS, TLS_NEED
@@ -99,8 +98,8 @@ SCRIPT = TableRows(written="[[script]]", keys=KEYS["script"])
 
 
 def tables() -> Mapping[str, TableRows]:
-    """Every table, in the order of a description: its name and seed, lines, controllers, elements, scripts, history, drawing."""
-    return _tables_with(tuple(map(id, (*KINDS.values(), *ELEMENTS.values(), *LINK_KEYS.values()))))
+    """Every table, in the order of a description: its name and seed, lines, controllers, elements, scripts, services, drawing."""
+    return _tables_with(tuple(map(id, (*KINDS.values(), *ELEMENTS.values(), *LINK_KEYS.values(), *SERVICE_TABLES.values()))))
 
 
 @lru_cache(maxsize=4)
@@ -115,7 +114,8 @@ def _tables_with(registered: tuple[int, ...]) -> Mapping[str, TableRows]:
         found[kind.name] = TableRows(written=f"[[{kind.name}]]", keys=kind.keys, exclude=kind.exclusive)
     for element in ELEMENTS.values():
         found |= {element.name: element.rows, **element.inner}
-    return found | {"event": EVENT, "script": SCRIPT, HISTORY: HISTORY_TABLE, DRAWING: DRAWING_TABLE}
+    services = {name: table.rows for name, table in SERVICE_TABLES.items() if table.rows is not None}
+    return found | {"event": EVENT, "script": SCRIPT} | services | {DRAWING: DRAWING_TABLE}
 
 
 def _line_keys() -> tuple[Key, ...]:
@@ -137,13 +137,13 @@ def written(table: str) -> str:
 
 
 def written_tables() -> dict[str, tuple[Key, ...]]:
-    """The rows of every table by how it is written, those in tables of controllers and those of gateways too."""
+    """The rows of every table by how it is written, those in tables of controllers and services too."""
     found: dict[str, tuple[Key, ...]] = {}
     for name, keys in all_keys().items():
         found[written(name)] = keys
         if name in KINDS:
             found |= _inner_tables(KINDS[name])
-    return found | {rows.written: rows.keys for rows in GATEWAYS.values()}
+    return found | {name: rows.keys for name, rows in inner_tables().items()}
 
 
 def _inner_tables(kind: AnyKind) -> dict[str, tuple[Key, ...]]:

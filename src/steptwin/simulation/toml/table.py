@@ -113,7 +113,12 @@ def key(read: Callable[[Any], Any], meaning: str, *, default: Any = MISSING, ord
     """A key of a table, required without a default. ``read`` gives its value, or raises `Misuse` with what is permitted."""
     name = rules.pop("name", "")
     made = Key(name, read, meaning, **({} if default is MISSING else {"default": default}), **rules)
-    return field(default=default, metadata={_KEY: made, "order": order})
+    metadata = {_KEY: made, "order": order}
+    return (
+        field(default_factory=default.copy, metadata=metadata)
+        if isinstance(default, dict)
+        else field(default=default, metadata=metadata)
+    )
 
 
 def table_in(name: str, spec: type[S]) -> S | None:
@@ -159,17 +164,17 @@ def read_row(text: TomlText, path: Path, rows: TableRows, given: object, also: t
     return values if is_whole else None
 
 
-def read_spec(text: TomlText, path: Path, spec: type[S], given: object) -> S | None:
-    """The value of a table; None without a required key. Errors are added to ``text``."""
-    return _read(text, path, spec, given, None)
+def read_spec(text: TomlText, path: Path, spec: type[S], given: object, **others: object) -> S | None:
+    """The value of a table; None without a required key. Errors are added to ``text``. ``others``: fields that are no keys."""
+    return _read(text, path, spec, given, None, **others)
 
 
-def _read(text: TomlText, path: Path, spec: type[S], given: object, kind: object) -> S | None:
+def _read(text: TomlText, path: Path, spec: type[S], given: object, kind: object, **others: object) -> S | None:
     row = read_row(text, path, spec.rows, given)
     if row is None:
         return None
     check_sense(text, path, spec.rows, given, kind)
-    return make_spec(text, spec, row | {"path": path}, given if isinstance(given, Mapping) else {})
+    return make_spec(text, spec, row | {"path": path, **others}, given if isinstance(given, Mapping) else {})
 
 
 def make_spec(text: TomlText, spec: type[S], row: Row, given: Table) -> S:

@@ -2,45 +2,49 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from importlib import import_module
+from importlib.metadata import packages_distributions
+
 import pytest
 
+from steptwin.extras import libraries_of
+from steptwin.gateways.epics.options import EpicsSpec
+from steptwin.gateways.kinds import KINDS, read_gateways
+from steptwin.gateways.modbus.options import ModbusSpec
+from steptwin.gateways.mqtt.options import MqttSpec, SparkplugSpec
+from steptwin.gateways.opcua.options import OpcUaSpec
+from steptwin.gateways.options import GatewaySpec, name_of
+from steptwin.gateways.prometheus.options import PrometheusSpec
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.simulation.describe.description import describe, read_world
-from steptwin.simulation.describe.gateways import (
-    EpicsSpec,
-    GatewaySpec,
-    ListeningSpec,
-    ModbusSpec,
-    MqttSpec,
-    OpcUaSpec,
-    SparkplugSpec,
-)
 from steptwin.simulation.toml.reader import WorldError
 
 HALL = '[[mic488]]\nname = "table"\n'
 
 
 def test_a_gateway_is_described() -> None:
-    (gateway,) = read_world("hall.toml", HALL + '[gateway.prometheus]\nlisten = "127.0.0.1:9100"\n').gateways
+    (gateway,) = read_gateways(read_world("hall.toml", HALL + '[gateway.prometheus]\nlisten = "127.0.0.1:9100"\n').text)
     assert (gateway.kind, gateway.listen) == ("prometheus", "127.0.0.1:9100")
 
 
 PLAIN = (
-    ListeningSpec(kind="prometheus", listen="127.0.0.1:9488", file="hall.toml"),
+    PrometheusSpec(path=("gateway", "prometheus"), listen="127.0.0.1:9488", file="hall.toml"),
     OpcUaSpec(
-        kind="opcua",
+        path=("gateway", "opcua"),
         listen="127.0.0.1:4840",
         file="hall.toml",
         interval=100 * MILLISECOND,
         registers=(),
         security="none",
         certificate=None,
-        key=None,
+        its_key=None,
         trusted=None,
         tokens=None,
     ),
     EpicsSpec(
-        kind="epics",
+        path=("gateway", "epics"),
         listen="127.0.0.1:5064",
         file="hall.toml",
         prefix="",
@@ -51,9 +55,9 @@ PLAIN = (
         registers=(),
         role=None,
     ),
-    ModbusSpec(kind="modbus", listen="127.0.0.1:5020", file="hall.toml", units={}, role=None),
+    ModbusSpec(path=("gateway", "modbus"), listen="127.0.0.1:5020", file="hall.toml", units={}, role=None),
     MqttSpec(
-        kind="mqtt",
+        path=("gateway", "mqtt"),
         listen=None,
         file="hall.toml",
         broker="127.0.0.1:1883",
@@ -68,7 +72,7 @@ PLAIN = (
         tls=False,
         ca=None,
         certificate=None,
-        key=None,
+        its_key=None,
         tokens=None,
         role=None,
         discovery=None,
@@ -79,7 +83,7 @@ PLAIN = (
 
 @pytest.mark.parametrize("plain", PLAIN, ids=[plain.kind for plain in PLAIN])
 def test_without_keys_it_is_as_documented(plain: GatewaySpec) -> None:
-    (gateway,) = read_world("hall.toml", HALL + f"[gateway.{plain.kind}]\n").gateways
+    (gateway,) = read_gateways(read_world("hall.toml", HALL + f"[gateway.{plain.kind}]\n").text)
     assert gateway == plain
 
 
@@ -153,7 +157,7 @@ def test_what_keys_just_take() -> None:
     [gateway.modbus]
     units = { table = 1, other = 247 }
     """
-    mqtt, epics, modbus = read_world("hall.toml", HALL + text).gateways
+    mqtt, epics, modbus = read_gateways(read_world("hall.toml", HALL + text).text)
     assert isinstance(mqtt, MqttSpec)
     assert isinstance(epics, EpicsSpec)
     assert isinstance(modbus, ModbusSpec)
@@ -161,7 +165,7 @@ def test_what_keys_just_take() -> None:
     assert mqtt.sparkplug == SparkplugSpec(group="g", node="n", host="h")
     assert (epics.beacons, epics.pva, epics.prefix) == ("127.0.0.1:1", "127.0.0.1:65534", "")
     assert modbus.units == {"table": 1, "other": 247}
-    (mqtt,) = read_world("hall.toml", HALL + '[gateway.mqtt]\ntopic = "a/b$"\n').gateways
+    (mqtt,) = read_gateways(read_world("hall.toml", HALL + '[gateway.mqtt]\ntopic = "a/b$"\n').text)
     assert isinstance(mqtt, MqttSpec)
     assert mqtt.topic == "a/b$"
 
@@ -184,7 +188,7 @@ def test_mistakes_are_reported(table: str, message: str) -> None:
 
 
 def test_a_world_without_gateways_has_none() -> None:
-    assert describe("hall.toml", HALL).gateways == ()
+    assert read_gateways(describe("hall.toml", HALL).text) == ()
 
 
 def test_an_opc_ua_gateway_with_all_keys() -> None:
@@ -192,8 +196,24 @@ def test_an_opc_ua_gateway_with_all_keys() -> None:
         '[gateway.opcua]\nlisten = "127.0.0.1:0"\ninterval = "250 ms"\nregisters = ["table.USER_REGISTER[5]"]\n'
         'security = "sign"\ncertificate = "c.pem"\nkey = "k.pem"\ntrusted = "clients"\ntokens = "t.txt"\n'
     )
-    (whole,) = read_world("hall.toml", HALL + text).gateways
+    (whole,) = read_gateways(read_world("hall.toml", HALL + text).text)
     assert isinstance(whole, OpcUaSpec)
     assert (whole.listen, whole.interval, whole.security) == ("127.0.0.1:0", 250 * MILLISECOND, "sign")
     assert whole.registers == ("table.USER_REGISTER[5]",)
-    assert (whole.certificate, whole.key, whole.trusted, whole.tokens) == ("c.pem", "k.pem", "clients", "t.txt")
+    assert (whole.certificate, whole.its_key, whole.trusted, whole.tokens) == ("c.pem", "k.pem", "clients", "t.txt")
+
+
+def test_options_need_no_library() -> None:
+    """So that descriptions are checked and edited without the extras."""
+    code = "import sys; before = {*sys.modules}; import steptwin.services; print(*{*sys.modules} - before)"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert {f"steptwin.gateways.{name}.options" for name in KINDS} <= {*ran.stdout.split()}
+    loaded = {name.partition(".")[0] for name in ran.stdout.split()}
+    assert loaded & {*packages_distributions()} <= {"steptwin"}
+    assert not {"asyncio", "socket", "ssl"} & loaded
+
+
+@pytest.mark.parametrize("kind", KINDS.values(), ids=list(KINDS))
+def test_each_has_what_serves_it_and_its_extra(kind: type[GatewaySpec]) -> None:
+    assert callable(import_module(f"steptwin.gateways.{name_of(kind)}.gateway").make)
+    assert bool(kind.extra) == bool(libraries_of(kind.extra))

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import parse_qsl, urlencode, urlsplit
 
-from steptwin.simulation.describe.gateways import GATEWAY, GatewaySpec, read_gateways
-from steptwin.simulation.describe.historytable import HISTORY, HistorySpec, read_history
+from steptwin.services import Services, read_services
+from steptwin.simulation.describe.servicetables import GATEWAY, HISTORY
 from steptwin.simulation.toml.reader import Key, TomlText, optional, read_table
 from steptwin.simulation.toml.values import name_value, text_value
 
@@ -40,8 +40,7 @@ class DeviceSpec:
 class DeviceFile:
     name: str
     devices: tuple[DeviceSpec, ...]
-    gateways: tuple[GatewaySpec, ...]
-    history: HistorySpec | None
+    services: Services
 
 
 def read_device_file(name: str, text: str) -> DeviceFile:
@@ -55,12 +54,12 @@ def read_device_file(name: str, text: str) -> DeviceFile:
                 (key,), "D004", f"the file has no [{key}]{toml.near(key, list(known))}", f"permitted: {', '.join(known)}", fix
             )
     whole = read_table(toml, (BRIDGE,), toml.data.get(BRIDGE, {}), BRIDGE_KEYS)
-    devices, gateways, history = tuple(_devices(toml)), tuple(read_gateways(toml)), read_history(toml)
-    for what, is_there in ((f"[[{DEVICE}]]", devices), (f"[{GATEWAY}.NAME] or [{HISTORY}]", gateways or history)):
+    devices, services = tuple(_devices(toml)), read_services(toml)
+    for what, is_there in ((f"[[{DEVICE}]]", devices), (f"[{GATEWAY}.NAME] or [{HISTORY}]", services != Services((), None))):
         if not is_there and not toml.findings:
             toml.wrong((), "D005", f"{what} is missing")
     toml.check()
-    return DeviceFile(whole["name"], devices, gateways, history)
+    return DeviceFile(whole["name"], devices, services)
 
 
 def _devices(toml: TomlText) -> Iterator[DeviceSpec]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from steptwin.gateways.devicefile import DeviceSpec, read_device_file
+from steptwin.live.devicefile import DeviceSpec, read_device_file
 from steptwin.simulation.toml.reader import WorldError
 
 DEVICE = '[[device]]\nname = "table"\naddress = "/dev/ttyUSB0,unit=2"\n'
@@ -16,7 +16,7 @@ GATEWAY = '[gateway.prometheus]\nlisten = "127.0.0.1:9100"\n'
 def test_devices_and_gateways() -> None:
     found = read_device_file("cell.toml", '[bridge]\nname = "cell"\n' + DEVICE + GATEWAY)
     assert (found.name, found.devices) == ("cell", (DeviceSpec("table", "/dev/ttyUSB0,unit=2"),))
-    assert [(gateway.kind, gateway.listen) for gateway in found.gateways] == [("prometheus", "127.0.0.1:9100")]
+    assert [(gateway.kind, gateway.listen) for gateway in found.services.gateways] == [("prometheus", "127.0.0.1:9100")]
     assert read_device_file("cell.toml", DEVICE + GATEWAY).name == "devices"
 
 

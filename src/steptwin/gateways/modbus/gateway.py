@@ -18,8 +18,8 @@ from steptwin.access.roles import ROLES, Role
 from steptwin.errors import LineFailure, Misuse, SteptwinError
 from steptwin.gateways.clients import GatewayClient, NotPermitted, address_text
 from steptwin.gateways.contract import ClientState, GatewayState, GatewaySubject
+from steptwin.gateways.modbus.options import ModbusSpec
 from steptwin.machine import SECOND
-from steptwin.simulation.describe.gateways import ModbusSpec
 from steptwin.simulation.script.steps import Request
 from steptwin.simulation.toml.addresses import is_loopback, parse_address
 from steptwin.subject.contract import MachinePart, Result

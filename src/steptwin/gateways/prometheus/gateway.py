@@ -16,9 +16,9 @@ from prometheus_client.exposition import choose_encoder
 
 from steptwin.access.roles import Role
 from steptwin.gateways.contract import ClientState, GatewayState, GatewaySubject
-from steptwin.gateways.metrics import PREFIX, Metrics
+from steptwin.gateways.prometheus.metrics import PREFIX, Metrics
+from steptwin.gateways.prometheus.options import PrometheusSpec
 from steptwin.httpservice import HttpService, listen
-from steptwin.simulation.describe.gateways import ListeningSpec
 from steptwin.simulation.toml.addresses import Address, parse_address
 
 _Send: TypeAlias = Callable[[MutableMapping[str, Any]], Awaitable[None]]
@@ -33,7 +33,7 @@ class PrometheusGateway:
 
     protocol = "metrics"
 
-    def __init__(self, spec: ListeningSpec, subject: GatewaySubject, folder: Path) -> None:
+    def __init__(self, spec: PrometheusSpec, subject: GatewaySubject, folder: Path) -> None:
         self._spec = spec
         self._subject = subject
         self._metrics: Metrics | None = None

@@ -1,0 +1,1 @@
+"""``[gateway.prometheus]``: metrics, health and readiness over HTTP (docs/gateways.md)."""
