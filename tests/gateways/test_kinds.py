@@ -129,7 +129,7 @@ def test_what_a_key_does_not_take(table: str, told: str) -> None:
 def test_what_is_no_table_of_gateways() -> None:
     with pytest.raises(WorldError) as error:
         read_world("hall.toml", "gateway = 1\n" + HALL)
-    kinds = ", ".join(f"[gateway.{plain.kind}]" for plain in PLAIN)
+    kinds = ", ".join(f"[gateway.{name}]" for name in KINDS)
     lines = str(error.value).splitlines()
     assert (lines[0], lines[-1].strip()) == ("hall.toml:1:1: error D002: [gateway] is 1", f"= expected tables: {kinds}")
 
@@ -137,11 +137,14 @@ def test_what_is_no_table_of_gateways() -> None:
 def test_what_is_no_gateway() -> None:
     with pytest.raises(WorldError) as error:
         read_world("hall.toml", "[gateway.modbsu]\n" + HALL)
-    kinds = ", ".join(f"[gateway.{plain.kind}]" for plain in PLAIN)
+    kinds = ", ".join(f"[gateway.{name}]" for name in KINDS)
     told = "hall.toml:1:1: error D004: there is no [gateway.modbsu] (did you mean 'modbus'?)"
     lines = [line.strip() for line in str(error.value).splitlines()]
     assert lines[0] == told
     assert f"= permitted: {kinds}" in lines
+    (finding,) = error.value.findings
+    assert finding.fix is not None
+    assert (finding.fix.span.start, finding.fix.text) == (len("[gateway."), "modbus")
 
 
 def test_what_keys_just_take() -> None:

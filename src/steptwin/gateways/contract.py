@@ -94,7 +94,8 @@ class GatewayState(NamedTuple):
     """In words, such as why it is not up."""
     shown: int | None = None
     """How many values it shows; None where that is no fixed number."""
-    clients: tuple[ClientState, ...] = ()
+    clients: tuple[ClientState, ...] | None = None
+    """None where they are those of a broker or database, which alone knows them."""
 
 
 class Gateway(Protocol):

@@ -157,7 +157,7 @@ def test_clients_of_pv_access_are_listed() -> None:
         assert client.stdout is not None
         assert client.stdin is not None
         assert await client.stdout.readline() == b"put\n"
-        (found,) = gateway.state().clients
+        (found,) = gateway.state().clients or ()
         assert (found.follows, found.role) == (("ST:table:M1.VELO",), "engineer")
         assert found.place.startswith("127.0.0.1:")
         assert found.name

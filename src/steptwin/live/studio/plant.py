@@ -40,8 +40,8 @@ class WorldPlant:
         for kind, place, gateway in self._opened:
             state = gateway.state()
             head = {"kind": kind, "protocol": gateway.protocol, "place": place}
-            clients = [{**client._asdict(), "follows": list(client.follows)} for client in state.clients]
-            found.append({**head, **state._asdict(), "clients": clients})
+            clients = [{**client._asdict(), "follows": list(client.follows)} for client in state.clients or ()]
+            found.append({**head, **state._asdict(), "has_clients": state.clients is not None, "clients": clients})
         return found
 
     async def history(self) -> Mapping[str, object] | None:

@@ -4,7 +4,7 @@ export const t = texts(
   {
     title: "Gateways",
     none: "This machine has no gateway. A table in its description opens one, such as:",
-    noneMore: "Others are [gateway.mqtt], [gateway.epics], [gateway.prometheus] and [history].",
+    noneMore: "steptwin up --keys lists the tables of all gateways, and [history].",
     noWorld: "Gateways belong to a world with ports: there is none here.",
     protocol: "Protocol",
     address: "Address",
@@ -26,7 +26,7 @@ export const t = texts(
   {
     title: "Bramki",
     none: "Ta maszyna nie ma bramki. Otwiera ją tabela w opisie, na przykład:",
-    noneMore: "Inne to [gateway.mqtt], [gateway.epics], [gateway.prometheus] i [history].",
+    noneMore: "steptwin up --keys wymienia tabele wszystkich bramek oraz [history].",
     noWorld: "Bramki należą do świata z portami: tu go nie ma.",
     protocol: "Protokół",
     address: "Adres",
