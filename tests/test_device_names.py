@@ -1,11 +1,17 @@
-"""Which modules above the kinds of controllers know a device: registered values, and tools that are for one device by nature."""
+"""Which modules above the kinds of controllers know a device: registered values, and tools that are for one device by nature.
+
+The page of the studio asks for capabilities, which the service names.
+"""
 
 from __future__ import annotations
 
 import ast
+import re
 from pathlib import Path
 
-SOURCE = Path(__file__).parents[1] / "src" / "steptwin"
+ROOT = Path(__file__).parents[1]
+SOURCE = ROOT / "src" / "steptwin"
+PAGE = ROOT / "studio-web" / "src"
 DEVICES = ("mic488", "m1486", "wbc")
 BELOW = (*DEVICES, "calc", "explain", "drivers", "verify", "simulation/kinds")
 """Packages of devices, and those with a folder or a module for each device and a table of them."""
@@ -73,3 +79,17 @@ def test_modules_above_the_kinds_that_know_a_device_have_a_reason() -> None:
         name for name, path in above.items() if not name.startswith(tuple(f"{one}/" for one in own)) and knows_a_device(path)
     }
     assert found == {*TOOLS}
+
+
+NAMED = re.compile(rf"\b({'|'.join(DEVICES)})\b|[\"'`](?i:{'|'.join(DEVICES)})[\"'`]")
+PAGE_REASONS = {"text/findings.ts": "where its sentences come from"}
+"""Modules of the page that name a device all the same."""
+
+
+def test_modules_of_the_page_that_know_a_device_have_a_reason() -> None:
+    """Names in sentences for people, such as M1486 in a help text, are none."""
+    modules = {path.relative_to(PAGE).as_posix(): path for path in PAGE.rglob("*") if path.suffix in (".ts", ".svelte")}
+    modules.pop("lib/protocol/types.ts", None)  # generated
+    found = {name for name, path in modules.items() if not name.endswith(".test.ts") and NAMED.search(path.read_text("utf-8"))}
+    assert "panels/program/Program.svelte" in modules
+    assert found == {*PAGE_REASONS}

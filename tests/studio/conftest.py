@@ -64,6 +64,7 @@ class StudioWorld(NamedTuple):
 
     text: str = WORLD
     files: Mapping[str, str] = MappingProxyType({})
+    command: tuple[str, ...] = (STEPTWIN,)
 
 
 @pytest.fixture
@@ -97,7 +98,7 @@ class Process:
         if not {"--with-token", "--tokens", "0.0.0.0:0", "[::]:0"} & {*options}:
             rest.append("--open-to-local-users")
         self.process = subprocess.Popen(
-            [STEPTWIN, "studio", *given, *http, "--no-browser", "--ready-file", str(self.ready_file), *rest],
+            [*served.command, "studio", *given, *http, "--no-browser", "--ready-file", str(self.ready_file), *rest],
             stdout=self._out,
             stderr=self._err,
             env=self.environment,

@@ -44,6 +44,11 @@ def test_texts_are_listed_with_the_line_of_the_one_that_runs() -> None:
         "program",
     ]
     assert not any(one["running"] or one["line"] for one in listed)
+    assert {(one["language"], one["suffix"], one["has_statements"], one["is_typed"]) for one in listed} == {
+        ("wbc", ".prg", True, False),
+        ("csv", ".csv", False, False),
+        ("m1486", ".m1486", True, True),
+    }
     tab.ok("program", machine="table", action="start")
     studio.run(200)
     assert [one["place"] for one in tab.ok("programs") if one["running"]] == ["program 0"]

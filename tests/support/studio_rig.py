@@ -97,6 +97,8 @@ class NoWork:
 class NoConnections:
     """To devices."""
 
+    kinds = ({"kind": "mic488", "model": "MIC488", "options": "unit=N", "is_searched": True},)
+
     async def ports(self) -> Sequence[Mapping[str, object]]:
         return ({"address": "/dev/ttyUSB0", "what": "serial port"},)
 

@@ -67,6 +67,19 @@ class DeviceConnections:
         self._devices: dict[str, _Connected] = {}
         self._turn = asyncio.Lock()
 
+    @property
+    def kinds(self) -> Sequence[Mapping[str, object]]:
+        return [
+            {
+                "kind": kind.name,
+                "model": kind.title.partition(" ")[2],
+                "options": kind.selection.forms,
+                "is_searched": kind.search is not None,
+            }
+            for kind in DRIVERS.values()
+            if kind.offers(kind.part)
+        ]
+
     async def ports(self) -> Sequence[Mapping[str, object]]:
         return await later(asyncio.to_thread(self._computer.ports))
 

@@ -84,6 +84,18 @@ _ROWS = (
                     "type": "boolean",
                     "description": "Whether all machines are twins; a device gives samples, not plans.",
                 },
+                "device_kinds": {
+                    "type": "array",
+                    "items": members(
+                        {
+                            "kind": {**TEXT, "description": "As in an address: kind=m1486."},
+                            "model": TEXT,
+                            "options": {**TEXT, "description": "Of an address, such as unit=N, config=FILE."},
+                            "is_searched": {"type": "boolean", "description": "Whether scan can search for it."},
+                        }
+                    ),
+                    "description": "Kinds of devices that connect and scan take; an address without a kind is of the first one.",
+                },
                 "description": {"$ref": "#/$defs/(description)"},
                 **_PRESENT,
             }

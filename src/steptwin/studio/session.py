@@ -444,6 +444,7 @@ class ViewerSession:
             "time_ns": str(moment.time),
             "pace": {key: value for key, value in moment.plain().items() if key != "time_ns"},
             "virtual": hub.is_virtual,
+            "device_kinds": list(hub.around.connections.kinds),
             **present,
         }
         text = json.dumps(whole, separators=(",", ":"))

@@ -74,6 +74,12 @@ class Served(Protocol):
 class Connections(Protocol):
     """Connects and disconnects devices of the subject. Awaits only `steptwin.later.Later`."""
 
+    @property
+    def kinds(self) -> Sequence[Mapping[str, object]]:
+        """Kinds of devices that can be connected, that of an address without ``kind`` first: ``kind``, ``model``, ``options`` of
+        their addresses, and whether they can be searched for."""
+        ...
+
     async def ports(self) -> Sequence[Mapping[str, object]]:
         """``address`` and ``what`` of the serial ports of this computer."""
         ...

@@ -25,6 +25,10 @@ class TextLanguage(NamedTuple):
     """Whether the value of the key is a table with the number of the bank of each."""
     is_shared: bool = False
     """Whether one file that is alone in its key is that of all banks."""
+    has_statements: bool = False
+    """Whether a text is a program, in whose statements a debugger stops."""
+    is_typed: bool = False
+    """Whether a host types a text into the memory over the line of the controller, as a user at a terminal could."""
 
 
 def bank_text(bank: int) -> str:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from steptwin.explain.model import MemoryPart
 
 PLACE = "program"
-COMMANDS = TextLanguage("m1486", ".m1486", "program")
+COMMANDS = TextLanguage("m1486", ".m1486", "program", has_statements=True, is_typed=True)
 _AT_WORK = (ProgramActivity.RUNNING, ProgramActivity.WAITING)
 
 

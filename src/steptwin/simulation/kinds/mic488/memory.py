@@ -22,7 +22,7 @@ from steptwin.wbc.positions import PositionTable, parse_positions
 if TYPE_CHECKING:
     from steptwin.explain.model import MemoryPart
 
-WBC = TextLanguage("wbc", ".prg", "programs", in_banks=True)
+WBC = TextLanguage("wbc", ".prg", "programs", in_banks=True, has_statements=True)
 TABLES = TextLanguage("csv", ".csv", "positions", in_banks=True, is_shared=True)
 PROGRAM, POSITIONS = "program", "positions"
 

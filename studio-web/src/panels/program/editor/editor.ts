@@ -57,6 +57,12 @@ export interface EditorEvents {
   display(uri: string): Promise<void>;
 }
 
+/** Of a text, as the service lists it. */
+export interface TextKind {
+  readonly language: string;
+  readonly has_statements: boolean;
+}
+
 const SEVERITIES = ["error", "warning", "info", "hint"] as const;
 const SYNC_MS = 150;
 
@@ -131,19 +137,12 @@ export class ProgramEditor {
   }
 
   /** Opens a text; `draft` is what it was changed to before. */
-  add(
-    uri: string,
-    language: string,
-    label: string,
-    inTwin: string,
-    draft: string | null,
-    isEditable: boolean,
-  ): OpenText {
+  add(uri: string, kind: TextKind, label: string, inTwin: string, draft: string | null, isEditable: boolean): OpenText {
     const state = EditorState.create({
       doc: textOf(draft ?? inTwin),
-      extensions: [this.extensions(uri, language, label, isEditable), lineEnds(inTwin)],
+      extensions: [this.extensions(uri, kind, label, isEditable), lineEnds(inTwin)],
     });
-    const file = new OpenText(uri, language, textOf(inTwin), state);
+    const file = new OpenText(uri, kind.language, textOf(inTwin), state);
     this.documents.add(file);
     return file;
   }
@@ -221,8 +220,8 @@ export class ProgramEditor {
     else end();
   }
 
-  private extensions(uri: string, language: string, label: string, isEditable: boolean): Extension {
-    const gutter = language === "wbc" || language === "m1486" ? this.events.gutter : null;
+  private extensions(uri: string, kind: TextKind, label: string, isEditable: boolean): Extension {
+    const gutter = kind.has_statements ? this.events.gutter : null;
     return [
       breakpoints(gutter),
       runningLine(handlersOf(gutter)),
@@ -258,7 +257,7 @@ export class ProgramEditor {
         this.events.changed();
       }),
       look,
-      this.client.plugin(uri, language),
+      this.client.plugin(uri, kind.language),
     ];
   }
 
