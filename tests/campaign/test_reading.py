@@ -8,7 +8,7 @@ import pytest
 from campaigns import CAMPAIGN, campaign_file
 
 from steptwin.campaign.description import CampaignDescription
-from steptwin.campaign.reading import ROWS, load_campaign, read_campaign
+from steptwin.campaign.reading import TABLES, load_campaign, read_campaign
 from steptwin.campaign.variation import Between, Choice, Normal
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND
@@ -184,7 +184,7 @@ def test_what_is_wrong_is_named_with_its_place(tmp_path: Path, text: str, messag
     assert message in wrong(tmp_path, text)
 
 
-@pytest.mark.parametrize(("table", "key"), [(table, key.name) for table, rows in ROWS.items() for key in rows.keys])
+@pytest.mark.parametrize(("table", "key"), [(table, key.name) for table, spec in TABLES.items() for key in spec.rows.keys])
 def test_each_key_refuses_what_it_cannot_be(tmp_path: Path, table: str, key: str) -> None:
     """No key takes a table of tables, and what is wrong is shown at the key."""
     lines = {

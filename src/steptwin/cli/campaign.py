@@ -314,9 +314,10 @@ MOST_CELLS = 20
 
 def _faults(file: Path, out: Path | None, write: Print, *, jobs: int | None, phases: int | None, as_json: bool) -> bool:
     """Make the matrix. Returns whether nothing was unsafe. Raises `Misuse`."""
+    from steptwin.campaign.description import MOST_PHASES
     from steptwin.campaign.effects import FaultEffect
     from steptwin.campaign.faultmatrix import fault_matrix
-    from steptwin.campaign.reading import MOST_PHASES, load_campaign
+    from steptwin.campaign.reading import load_campaign
     from steptwin.campaign.report.matrixpage import write_matrix
     from steptwin.system import reason
 

@@ -40,8 +40,9 @@ from steptwin.live.world import LiveWorld, PlacePort, VisionPort, announced
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import Nanos, SendingPort
 from steptwin.services import read_services
-from steptwin.simulation.kinds.kind import LineSpec, LinkKind
+from steptwin.simulation.kinds.kind import LinkKind
 from steptwin.simulation.kinds.lines import SCRIPTS
+from steptwin.simulation.kinds.links import LineSpec
 from steptwin.simulation.kinds.registry import line_kinds
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.toml.addresses import check_addresses, parse_address

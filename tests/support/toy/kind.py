@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -33,8 +32,8 @@ from steptwin.simulation.scheduler.kernel import Kernel
 from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.control import Halt, Move, StopAxes
-from steptwin.simulation.toml.reader import Key, Row, TomlText, optional
-from steptwin.simulation.toml.values import name_value, whole
+from steptwin.simulation.toml.table import key, table
+from steptwin.simulation.toml.values import whole
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection as Way
 from toy.faults import ToyBody
@@ -45,9 +44,9 @@ if TYPE_CHECKING:
     pass
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@table("[[toy]]")
 class ToySpec(ControllerSpec):
-    steps: int
+    steps: int = key(whole(1, 10), "for nothing", default=10)
 
 
 class ToyView(MachineView):
@@ -87,10 +86,6 @@ def _make_line(spec: LineSpec, members: Sequence[Member], kernel: Kernel, record
     if len(members) != 1:
         raise Misuse("a toy is alone on its line")
     return ToyLine(kernel, spec.name, members[0].machine, faults, record)
-
-
-def _read(text: TomlText, row: Row, table: Mapping[str, Any]) -> ToySpec:
-    return ToySpec(**row)
 
 
 def _build(spec: ToySpec, context: BuildContext) -> Callable[[bytes | None], Toy]:
@@ -191,12 +186,7 @@ TOYS = LineKind(
 TOY: ControllerKind[ToySpec, Toy, ToyView] = ControllerKind(
     name="toy",
     model="toy",
-    keys=(
-        Key("name", name_value, "how the rest of the file names it"),
-        optional(name_value, "line", "the line it is on"),
-        optional(whole(1, 10), "steps", "for nothing", 10),
-    ),
-    read=_read,
+    spec=ToySpec,
     files=lambda spec: (),
     build=_build,
     watch_events=_watch_events,

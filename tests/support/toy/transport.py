@@ -13,7 +13,7 @@ from steptwin.live.links import Feed
 from steptwin.live.transports import LinkArguments, OpenLink, Transport, forget, register
 from steptwin.machine import Port
 from steptwin.simulation.kinds.links import LinkKey
-from steptwin.simulation.toml.reader import optional
+from steptwin.simulation.toml.reader import Key
 from steptwin.simulation.toml.values import text_value
 
 
@@ -69,7 +69,7 @@ async def _open(opening: LinkArguments) -> OpenLink:
 
 
 UNIX = Transport(kind="unix", is_address=False, has_several=True, open=_open)
-UNIX_KEY = LinkKey(optional(text_value, "unix", "path of a Unix domain socket"), like="pty")
+UNIX_KEY = LinkKey(Key("unix", text_value, "path of a Unix domain socket", None), like="pty")
 
 
 @contextmanager

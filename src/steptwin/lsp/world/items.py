@@ -43,7 +43,7 @@ def keys_of(table: TableOutline) -> Sequence[Key]:
     """The permitted keys of a table."""
     if len(table.names) > 1 and table.names[0] in KINDS:
         kind = KINDS[table.names[0]]
-        return kind.inner_keys(table.names[1]) if table.names[1] in kind.inner_tables else ()
+        return kind.inner_tables.get(table.names[1], ())
     if len(table.names) > 1 and table.names[0] in SERVICE_TABLES:
         inner = SERVICE_TABLES[table.names[0]].inner
         return inner[table.names[1]].keys if table.names[1] in inner else ()

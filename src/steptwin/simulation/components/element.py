@@ -18,7 +18,7 @@ from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.drawing import Drawing
 from steptwin.simulation.mechanics.lanes import MovedLane
-from steptwin.simulation.toml.table import TableRows, TableSpec
+from steptwin.simulation.toml.table import InnerTable, TableRows, TableSpec
 from steptwin.tables import IncompleteTable
 
 
@@ -55,7 +55,7 @@ class Element(ElementTable[S, B]):
     @property
     def inner(self) -> Mapping[str, TableRows]:
         """The tables in its table, by key."""
-        return {one.key: one.rows for one in self.rows.inner}
+        return {one.key: one.rows for one in self.rows.inner if isinstance(one, InnerTable)}
 
     @property
     def needs_name(self) -> bool:

@@ -9,8 +9,9 @@ from typing import Any, cast
 from steptwin.motioncontroller import MotionController
 from steptwin.simulation.components.elementspec import B, ElementSpecs, ElementTable, NamedSpec, S
 from steptwin.simulation.faults import Faults
-from steptwin.simulation.kinds.kind import AnyKind, LineSpec, Terminals
+from steptwin.simulation.kinds.kind import AnyKind, Terminals
 from steptwin.simulation.kinds.lines import Line
+from steptwin.simulation.kinds.links import LineSpec
 from steptwin.simulation.logic.contacts import Circuit
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.scheduler.kernel import Kernel

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 from steptwin.errors import Misuse, Refusal
 from steptwin.simulation.toml.names import Unknown
-from steptwin.simulation.toml.reader import Key, TomlText
-from steptwin.simulation.toml.table import TableRows
+from steptwin.simulation.toml.reader import TomlText
+from steptwin.simulation.toml.table import TableSpec, key, table
 from steptwin.simulation.toml.values import permitting, text_value, whole
 
 DRAWING = "drawing"
@@ -39,24 +39,19 @@ def _corner(value: Any) -> tuple[int, int]:
     return x, y
 
 
-DRAWING_TABLE = TableRows(
-    written=f"[[{DRAWING}]]",
-    keys=(
-        Key("of", text_value, f"an axis, an element, {' or '.join(map(repr, OTHERS))}"),
-        Key("at", _corner, "its upper left corner in the machine panel of the studio, [x, y] in pixels; the studio writes it"),
-    ),
-)
+@table(f"[[{DRAWING}]]")
+class PlaceSpec(TableSpec):
+    of: str = key(text_value, f"an axis, an element, {' or '.join(map(repr, OTHERS))}")
+    at: tuple[int, int] = key(
+        _corner, "its upper left corner in the machine panel of the studio, [x, y] in pixels; the studio writes it"
+    )
 
 
-def read_places(rows: Iterable[Mapping[str, Any]]) -> tuple[DrawnPlace, ...]:
-    return tuple(DrawnPlace(row["of"], *row["at"]) for row in rows)
-
-
-def check_places(text: TomlText, rows: Iterable[Mapping[str, Any]], names: Iterable[str]) -> None:
+def check_places(text: TomlText, places: Iterable[PlaceSpec], names: Iterable[str]) -> None:
     """Report places of what is not there, and second ones. ``names``: of axes and elements."""
     known, seen = {*names, *OTHERS}, set[str]()
-    for row in rows:
-        of, path = row["of"], (*row["path"], "of")
+    for one in places:
+        of, path = one.of, (*one.path, "of")
         if of not in known:
             near = text.near(of, known)
             text.wrong_reference(path, Unknown(of, f"no axis or element is called {of!r}{near}"))

@@ -14,7 +14,8 @@ from steptwin.errors import Misuse, SourceErrors
 from steptwin.simulation.components.buildmemo import BuildMemo
 from steptwin.simulation.describe.pieces import beside
 from steptwin.simulation.describe.spec import WorldSpec
-from steptwin.simulation.kinds.kind import ControllerSpec, LineSpec
+from steptwin.simulation.kinds.kind import ControllerSpec
+from steptwin.simulation.kinds.links import LineSpec
 
 FileContents: TypeAlias = Mapping[str, bytes]
 """Contents of the files a description names, and of non-volatile memories (`memory_file`)."""

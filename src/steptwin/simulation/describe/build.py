@@ -17,7 +17,8 @@ from steptwin.simulation.describe.blueprint import Blueprint, memory_file
 from steptwin.simulation.describe.joined import joined_names
 from steptwin.simulation.faults import Faults
 from steptwin.simulation.faults.element import FaultyElement
-from steptwin.simulation.kinds.kind import ControllerSpec, LineSpec, Member, Terminals
+from steptwin.simulation.kinds.kind import ControllerSpec, Member, Terminals
+from steptwin.simulation.kinds.links import LineSpec
 from steptwin.simulation.kinds.registry import line_kinds
 from steptwin.simulation.scheduler.kernel import Board, Kernel
 from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord

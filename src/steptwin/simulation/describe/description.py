@@ -10,16 +10,15 @@ from steptwin.errors import Misuse
 from steptwin.simulation.components.element import AnyElement
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec
 from steptwin.simulation.components.registry import ELEMENTS
-from steptwin.simulation.describe.arrangement import DRAWING, check_places, read_places
+from steptwin.simulation.describe.arrangement import DRAWING, DrawnPlace, PlaceSpec, check_places
 from steptwin.simulation.describe.overrides import NO_OVERRIDES, Overrides, override
 from steptwin.simulation.describe.pieces import PARAMETERS, USE, Pieces, ReadFile, is_piece, no_files
 from steptwin.simulation.describe.servicetables import SERVICE_TABLES, SERVICES
-from steptwin.simulation.describe.spec import ScriptSpec, WorldSpec
+from steptwin.simulation.describe.spec import SEED, EventSpec, ScriptSpec, WorldSpec, WorldTable
 from steptwin.simulation.describe.steptable import STEPS, read_steps
-from steptwin.simulation.describe.tables import KEYS, SEED, tables
+from steptwin.simulation.describe.tables import tables
 from steptwin.simulation.faults import Fault, FaultMistake, parse
-from steptwin.simulation.kinds.kind import LineSpec
-from steptwin.simulation.kinds.links import LINK_KEYS, TLS_KEYS, TlsFiles
+from steptwin.simulation.kinds.links import LINK_KEYS, LineSpec
 from steptwin.simulation.kinds.registry import KINDS
 from steptwin.simulation.toml.names import RESERVED
 from steptwin.simulation.toml.reader import TomlText, read_table
@@ -68,19 +67,19 @@ def describe(
             fix = toml.key_replacement((key,) if isinstance(data[key], dict) else (key, 0), key, known)
             toml.wrong((key,), "D004", f"the file has no [{key}]{near}", f"permitted: {', '.join(known)}", fix)
             toml.leave_out_all(key)
-    placed = _rows(toml, DRAWING)
-    world = read_table(toml, ("world",), data.get("world", {}), KEYS["world"])
+    placed = [make_spec(toml, PlaceSpec, row, table) for row, table in _tables(toml, DRAWING)]
+    world = read_table(toml, ("world",), data.get("world", {}), WorldTable.rows.keys)
     spec = WorldSpec(
         **world,
-        lines=tuple(map(_line, _rows(toml, "line"))),
+        lines=tuple(_lines(toml)),
         controllers=tuple(
-            kind.read(toml, row | {"kind": kind}, table)
+            make_spec(toml, kind.spec, row | {"kind": kind}, table)
             for kind in KINDS.values()
-            for row, table in _tables(toml, kind.name, kind.inner_tables)
+            for row, table in _tables(toml, kind.name)
         ),
         elements=ElementSpecs({element.name: tuple(_elements(toml, element)) for element in ELEMENTS.values()}),
-        scripts=(*_events(toml), *_scripts(toml)),
-        drawing=read_places(placed),
+        scripts=(*_scripts(toml, "event", EventSpec), *_scripts(toml, "script", ScriptSpec)),
+        drawing=tuple(DrawnPlace(one.of, *one.at) for one in placed),
         faults=tuple(_faults(toml)),
         text=toml,
         overrides=dict(overrides),
@@ -101,7 +100,7 @@ def _seed(value: object) -> int:
         raise Misuse(f"seed {error}") from None
 
 
-def _tables(toml: TomlText, kind: str, also: tuple[str, ...] = ()) -> list[tuple[dict[str, Any], Mapping[str, Any]]]:
+def _tables(toml: TomlText, kind: str) -> list[tuple[dict[str, Any], Mapping[str, Any]]]:
     """Values of every ``[[kind]]`` that has all it needs, and the table itself."""
     found: list[tuple[dict[str, Any], Mapping[str, Any]]] = []
     given = toml.data.get(kind)
@@ -114,7 +113,7 @@ def _tables(toml: TomlText, kind: str, also: tuple[str, ...] = ()) -> list[tuple
     names: set[str] = set()
     for number_, table in enumerate(given):
         path = (kind, number_)
-        values = read_row(toml, path, rows, table, also)
+        values = read_row(toml, path, rows, table)
         if values is None:
             continue
         check_sense(toml, path, rows, table)
@@ -125,40 +124,24 @@ def _tables(toml: TomlText, kind: str, also: tuple[str, ...] = ()) -> list[tuple
     return found
 
 
-def _rows(toml: TomlText, kind: str) -> list[dict[str, Any]]:
-    return [row for row, _ in _tables(toml, kind)]
-
-
 def _elements(toml: TomlText, element: AnyElement) -> Iterator[TableSpec]:
     for row, table in _tables(toml, element.name):
         yield make_spec(toml, element.spec, row, table)
 
 
-def _line(row: dict[str, Any]) -> LineSpec:
-    found = {name: row.pop(name) for name in LINK_KEYS}
-    files = [row.pop(key.name) for key in TLS_KEYS]
-    tls = None if None in files else TlsFiles(*files)
-    return LineSpec(**row, links={name: value for name, value in found.items() if value is not None}, tls=tls)
+def _lines(toml: TomlText) -> Iterator[LineSpec]:
+    for row, table in _tables(toml, "line"):
+        links = {name: row.pop(name) for name in LINK_KEYS}
+        row["links"] = {name: value for name, value in links.items() if value is not None}
+        yield make_spec(toml, LineSpec, row, table)
 
 
-def _events(toml: TomlText) -> list[ScriptSpec]:
-    found: list[ScriptSpec] = []
-    for row, table in _tables(toml, "event"):
+def _scripts(toml: TomlText, kind: str, spec: type[ScriptSpec]) -> Iterator[ScriptSpec]:
+    for row, table in _tables(toml, kind):
         path = row["path"]
-        name = row.pop("name") or f"event-{path[1] + 1}"
-        steps = read_steps(toml, (*path, STEPS.name), row.pop(STEPS.name))
-        if sum(key in table for key in ("at", "every", "when")) != 1:
-            toml.wrong(path, "D007", "an event needs one of at, every and when")
-        found.append(ScriptSpec(name=name, repeat=1, steps=steps, **row))
-    return found
-
-
-def _scripts(toml: TomlText) -> list[ScriptSpec]:
-    found: list[ScriptSpec] = []
-    for row in _rows(toml, "script"):
-        steps = read_steps(toml, (*row["path"], STEPS.name), row.pop(STEPS.name))
-        found.append(ScriptSpec(**row, every=None, when=None, once=True, steps=steps))
-    return found
+        row["name"] = row["name"] or f"{kind}-{path[1] + 1}"
+        row[STEPS.name] = read_steps(toml, (*path, STEPS.name), row[STEPS.name])
+        yield make_spec(toml, spec, row, table)
 
 
 def _faults(toml: TomlText) -> list[Fault | None]:

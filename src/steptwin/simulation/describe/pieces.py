@@ -13,8 +13,8 @@ from typing import Any, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.simulation.kinds.registry import KINDS
-from steptwin.simulation.toml.reader import Key, TomlText, WorldError, read_table
-from steptwin.simulation.toml.table import TableRows
+from steptwin.simulation.toml.reader import TomlText, WorldError, read_table
+from steptwin.simulation.toml.table import TableRows, TableSpec, key, table
 from steptwin.simulation.toml.tomlplaces import Path
 from steptwin.simulation.toml.values import NameOf, PinOf, name_value, text_value
 
@@ -29,13 +29,12 @@ MOST_NESTED = 8
 FILE_KEYS = frozenset({"config", "program", "programs", "positions"})
 """Keys of controllers whose values are names of files."""
 
-USES = TableRows(
-    written="[[use]]",
-    keys=(
-        Key("name", name_value, "stands before the names in the file: x of left is left_x"),
-        Key("file", text_value, "a file of tables, with defaults of its parameters in [parameters]; values are in [use.with]"),
-    ),
-)
+
+@table("[[use]]")
+class UseSpec(TableSpec):
+    name: str = key(name_value, "stands before the names in the file: x of left is left_x")
+    file: str = key(text_value, "a file of tables, with defaults of its parameters in [parameters]; values are in [use.with]")
+
 
 _REFERRING = frozenset(
     {"line", "drive", "to", "from", "follows", "when", "until", "expect", "set", "press", "release", "write", "send"}
@@ -92,7 +91,7 @@ class Pieces:
             return
         for number, use in enumerate(uses):
             path: Path = (USE, number)
-            values = read_table(text, path, use, USES.keys, (WITH,))
+            values = read_table(text, path, use, UseSpec.rows.keys, (WITH,))
             if all(name in values for name in ("name", "file")):
                 self._use(text, path, values["name"], values["file"], use.get(WITH, {}), above)
 
@@ -241,8 +240,8 @@ class _Instance:
 def _names(data: Mapping[str, Any]) -> Iterator[str]:
     """The names that tables give."""
     for tables in data.values():
-        for table in tables if isinstance(tables, list) else ():
-            name = table.get("name") if isinstance(table, dict) else None
+        for given in tables if isinstance(tables, list) else ():
+            name = given.get("name") if isinstance(given, dict) else None
             if isinstance(name, str) and _PLACEHOLDER.search(name) is None:
                 yield name
 

@@ -9,37 +9,64 @@ from steptwin.machine import Nanos
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.describe.arrangement import DrawnPlace
 from steptwin.simulation.describe.overrides import Overrides
+from steptwin.simulation.describe.steptable import STEPS
 from steptwin.simulation.faults import Fault
-from steptwin.simulation.kinds.kind import ControllerSpec, LineSpec
+from steptwin.simulation.kinds.kind import ControllerSpec
+from steptwin.simulation.kinds.links import LineSpec
 from steptwin.simulation.script.steps import Step
 from steptwin.simulation.toml.reader import Path, TomlText
+from steptwin.simulation.toml.table import TableSpec, key, table
+from steptwin.simulation.toml.values import flag, name_value, positive_time, text_value, time_value, whole
+
+SEED = whole(0, 2**63 - 1)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ScriptSpec:
-    """An event or a script: its start and its steps."""
+@table("[[script]]")
+class ScriptSpec(TableSpec):
+    """A script or an event: its start and its steps."""
 
-    name: str
-    at: Nanos | None
-    every: Nanos | None
-    when: str | None
-    once: bool
-    repeat: int
-    steps: tuple[Step, ...]
-    path: Path = ()
+    name: str = key(name_value, "for the trace")
+    at: Nanos | None = key(time_value, "when it begins", default=0)
+    repeat: int = key(whole(1, 10**9), "how often all of it is done", default=1)
+    steps: tuple[Step, ...] = key(STEPS.read, STEPS.meaning, order=1)
+    every: Nanos | None = None
+    when: str | None = None
+    once: bool = True
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WorldSpec:
+@table("[[event]]")
+class EventSpec(ScriptSpec):
+    name: str = key(name_value, "for the trace", default="")
+    at: Nanos | None = key(time_value, "when", default=None)
+    every: Nanos | None = key(positive_time, "again and again", default=None)
+    when: str | None = key(text_value, "a condition, such as 'x.position > 100'", default=None)
+    once: bool = key(flag, "when: only the first time the condition comes true", default=False, needs="when")
+    repeat: int = 1
+
+    def check(self, text: TomlText) -> None:
+        if sum(text.is_given((*self.path, name)) for name in ("at", "every", "when")) != 1:
+            text.wrong(self.path, "D007", "an event needs one of at, every and when")
+
+
+@table("[world]")
+class WorldTable(TableSpec):
+    """What a world is called, and what it keeps."""
+
+    name: str = key(text_value, "a name for people", default="world")
+    seed: int = key(SEED, "where all chance comes from", default=0)
+    trace: str = key(
+        text_value, "what 'up' keeps of what happens: a FILE that grows, 'ring N' (records), or 'off'", default="off"
+    )
+    state: str | None = key(
+        text_value, "directory that keeps non-volatile memory; without it, memory ends with the world", default=None
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorldSpec(WorldTable):
     """A world as its file describes it. ``text`` is the file, which also keeps the tables of services beside the world
     (`steptwin.simulation.describe.servicetables`)."""
 
-    name: str
-    seed: int
-    state: str | None
-    """Directory of the non-volatile memories."""
-    trace: str | None
-    """Trace of a live run: a file, ``ring N``, ``off``."""
     lines: tuple[LineSpec, ...]
     controllers: tuple[ControllerSpec, ...]
     elements: ElementSpecs
@@ -64,5 +91,5 @@ class WorldSpec:
         """Names of the files the description refers to, and the keys that do."""
         yield from self.pieces.items()
         for spec in self.controllers:
-            for name, key in spec.kind.files(spec):
-                yield name, (*spec.path, key)
+            for name, at in spec.kind.files(spec):
+                yield name, (*spec.path, at)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from steptwin.diagnostics import Diagnostic, SourceText
-from steptwin.simulation.kinds.kind import LineSpec
+from steptwin.simulation.kinds.links import LineSpec
 
 
 class GivenFiles:

@@ -14,14 +14,15 @@ from steptwin.machine import MachineEvent, Nanos
 from steptwin.messages import Message
 from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss
-from steptwin.simulation.kinds.links import LINK_KEYS, TlsFiles
+from steptwin.simulation.kinds.links import LINK_KEYS, LineSpec
 from steptwin.simulation.mechanics.mechanics import EncoderReader
 from steptwin.simulation.mechanics.scale import DriveScale, GivenScale
 from steptwin.simulation.scheduler.kernel import Kernel
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.toml.names import WrongTerminal
-from steptwin.simulation.toml.reader import Key, Path, Row, Table, TomlText
-from steptwin.simulation.toml.values import ANALOG_INPUT, DIGITAL_INPUT, OUTPUT
+from steptwin.simulation.toml.reader import Key
+from steptwin.simulation.toml.table import TableSpec, key, table
+from steptwin.simulation.toml.values import ANALOG_INPUT, DIGITAL_INPUT, OUTPUT, name_value
 from steptwin.textcodec import decode
 
 if TYPE_CHECKING:
@@ -42,33 +43,13 @@ if TYPE_CHECKING:
     from steptwin.wire.frameline import FrameLine
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LineSpec:
-    name: str
-    kind: str
-    baud: int | None
-    timing: str
-    gap: Nanos | None
-    links: Mapping[str, str]
-    """Addresses of its external links, by key."""
-    tls: TlsFiles | None = None
-    """Of encrypted ones, relative to the description."""
-    path: Path = ()
-
-    @property
-    def is_open(self) -> bool:
-        """Whether it has external links."""
-        return bool(self.links)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ControllerSpec:
+@table()
+class ControllerSpec(TableSpec):
     """The common part of all controllers' tables; each kind adds its own."""
 
     kind: AnyKind
-    name: str
-    line: str | None
-    path: Path = ()
+    name: str = key(name_value, "how the rest of the file names it")
+    line: str | None = key(name_value, "the line it is on", default=None)
 
 
 S = TypeVar("S", bound=ControllerSpec)
@@ -230,16 +211,8 @@ class ControllerKind(Generic[S, M, V]):
     model: str
     """For people: ``MIC488``."""
     article: str = "a"
-    keys: tuple[Key, ...]
-    """Of its table; ``name`` and ``line`` are among them."""
-    inner_tables: tuple[str, ...] = ()
-    """Tables in its table, which ``read`` reads."""
-    inner_keys: Callable[[str], tuple[Key, ...]] = lambda table: ()
-    """The keys of a nested table."""
-    exclusive: tuple[tuple[str, str], ...] = ()
-    """Pairs of keys that exclude each other."""
-    read: Callable[[TomlText, Row, Table], S]
-    """The spec of a table; what is wrong is reported to the text. The mapping is the table itself."""
+    spec: type[S]
+    """Its table, with the keys."""
     files: Callable[[S], Iterable[tuple[str, str]]]
     """Names of the files that a spec refers to, and the keys that do."""
     build: Callable[[S, BuildContext], Callable[[bytes | None], M]]
@@ -323,6 +296,16 @@ class ControllerKind(Generic[S, M, V]):
     encoders: EncoderInputs[M] | None = None
     registers: NamedRegisters[M] | None = None
     vision: Vision[S, M] | None = None
+
+    @property
+    def keys(self) -> tuple[Key, ...]:
+        """The keys of its table."""
+        return self.spec.rows.keys
+
+    @property
+    def inner_tables(self) -> Mapping[str, tuple[Key, ...]]:
+        """The tables in its table, with their keys."""
+        return {name: one.keys for one in self.spec.rows.inner for name in one.names}
 
     @property
     def title(self) -> str:

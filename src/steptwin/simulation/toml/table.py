@@ -32,7 +32,7 @@ class TableRows:
     written: str
     """Its header: ``[[axis.switch]]``."""
     keys: tuple[Key, ...]
-    inner: tuple[InnerTable, ...] = ()
+    inner: tuple[InnerTable | NumberedTables, ...] = ()
     need: Mapping[str, str] = field(default_factory=dict)
     """Keys that mean nothing without another."""
     exclude: tuple[tuple[str, str], ...] = ()
@@ -68,7 +68,7 @@ class TableSpec:
     """A table of a description as a value. ``path``: its place in the text."""
 
     rows: ClassVar[TableRows]
-    path: Path = ()
+    path: Path = field(default=(), repr=False, compare=False)
 
     def check(self, text: TomlText) -> None:
         """Report keys that do not fit together."""
@@ -86,6 +86,49 @@ class InnerTable:
     rows: TableRows
     is_list: bool
     attribute: str = ""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Its keys in the table around it."""
+        return (self.key,)
+
+    @property
+    def keys(self) -> tuple[Key, ...]:
+        return self.rows.keys
+
+    def read(self, text: TomlText, path: Path, owner: Table, kind: object) -> object:
+        """The value of its field. ``path`` and ``kind``: of the table around it."""
+        found = tuple(self._those(text, path, owner, kind))
+        return found if self.is_list else next(iter(found), None)
+
+    def _those(self, text: TomlText, path: Path, owner: Table, kind: object) -> Iterator[TableSpec]:
+        """Those that have all they need."""
+        given = owner.get(self.key, [])
+        places: Iterable[tuple[Path, object]] = [((*path, self.key), given)] if self.key in owner else []
+        if self.is_list:
+            places = (((*path, self.key, n), its) for n, its in enumerate(given if isinstance(given, list) else [given]))
+        for place, its in places:
+            if (found := _read(text, place, self.spec, its, kind)) is not None:
+                yield found
+
+
+@dataclass(frozen=True, slots=True)
+class NumberedTables:
+    """Tables ``[OWNER.M1]``, ``[OWNER.M2]`` and so on. Their value: by number, the values that are given."""
+
+    prefix: str
+    count: int
+    keys: tuple[Key, ...]
+    attribute: str = ""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(f"{self.prefix}{n}" for n in range(1, self.count + 1))
+
+    def read(self, text: TomlText, path: Path, owner: Table, kind: object) -> Mapping[int, Mapping[str, object]]:
+        there = [(n, name) for n, name in enumerate(self.names, start=1) if name in owner]
+        found = {n: read_table(text, (*path, name), owner[name], self.keys) for n, name in there}
+        return {n: {name: value for name, value in its.items() if value is not None} for n, its in found.items()}
 
 
 # ---------------------------------------------------------------------- fields
@@ -132,7 +175,12 @@ def tables_in(name: str, spec: type[S], written: str = "") -> tuple[S, ...]:
     return field(default=(), metadata={_INNER: InnerTable(name, spec, rows, is_list=True)})  # type: ignore[return-value]
 
 
-@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(key, table_in, tables_in))
+def numbered_tables_in(prefix: str, count: int, keys: Iterable[Key]) -> Mapping[int, Mapping[str, Any]]:
+    """The tables ``[OWNER.prefix1]`` to ``count``, which may be left out, as may their ``keys``: default None."""
+    return field(default_factory=dict, metadata={_INNER: NumberedTables(prefix, count, tuple(keys))})
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(key, table_in, tables_in, numbered_tables_in))
 def table(written: str = "") -> Callable[[type[T]], type[T]]:
     """Make the frozen dataclass of a table of its fields, with its ``rows``. ``written``: its header, none for a base class."""
 
@@ -157,9 +205,9 @@ def _inner(spec: type[Any]) -> tuple[InnerTable, ...]:
 # ---------------------------------------------------------------------- reading
 
 
-def read_row(text: TomlText, path: Path, rows: TableRows, given: object, also: tuple[str, ...] = ()) -> dict[str, Any] | None:
-    """The values of the keys of a table by field; None without a required one. Keys in ``also`` are read elsewhere."""
-    values = read_table(text, path, given, rows.keys, (*(one.key for one in rows.inner), *also))
+def read_row(text: TomlText, path: Path, rows: TableRows, given: object) -> dict[str, Any] | None:
+    """The values of the keys of a table by field; None without a required one."""
+    values = read_table(text, path, given, rows.keys, tuple(name for one in rows.inner for name in one.names))
     is_whole = all((its.attribute or its.name) in values for its in rows.keys)
     return values if is_whole else None
 
@@ -180,24 +228,11 @@ def _read(text: TomlText, path: Path, spec: type[S], given: object, kind: object
 def make_spec(text: TomlText, spec: type[S], row: Row, given: Table) -> S:
     """The value of a table whose keys are read already. The tables in it are read, and what does not fit together is reported."""
     kind = given.get("kind", spec.rows.usual)
-    values = dict(row)
-    for one in spec.rows.inner:
-        found = tuple(_read_inner(text, row["path"], one, given, kind))
-        values[one.attribute] = found if one.is_list else next(iter(found), None)
+    inner = {one.attribute: one.read(text, row["path"], given, kind) for one in spec.rows.inner}
+    values: dict[str, Any] = {**row, **inner}
     made = spec(**values)
     made.check(text)
     return made
-
-
-def _read_inner(text: TomlText, path: Path, one: InnerTable, owner: Table, kind: object) -> Iterator[TableSpec]:
-    """The tables in a table that have all they need."""
-    given = owner.get(one.key, [])
-    places: Iterable[tuple[Path, object]] = [((*path, one.key), given)] if one.key in owner else []
-    if one.is_list:
-        places = (((*path, one.key, n), its) for n, its in enumerate(given if isinstance(given, list) else [given]))
-    for place, its in places:
-        if (found := _read(text, place, one.spec, its, kind)) is not None:
-            yield found
 
 
 def check_sense(text: TomlText, path: Path, rows: TableRows, given: object, kind: object = None) -> None:

@@ -11,8 +11,9 @@ from steptwin.m1486.line import SerialChain
 from steptwin.machine import Nanos, Port
 from steptwin.simulation.faults import Faults
 from steptwin.simulation.faults import LineProtocol as FaultLine
-from steptwin.simulation.kinds.kind import LineSpec, Member
+from steptwin.simulation.kinds.kind import Member
 from steptwin.simulation.kinds.lines import SCRIPTS, Line, LineEndPoint, LineTraffic
+from steptwin.simulation.kinds.links import LineSpec
 from steptwin.simulation.scheduler.kernel import Kernel
 from steptwin.simulation.scheduler.trace import RecordSink
 from steptwin.state import Plain

@@ -2,28 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import Any
 
 from steptwin.m1486.lines import INTERFACES
 from steptwin.m1486.variants import VARIANTS
 from steptwin.machine import Nanos
 from steptwin.simulation.kinds.kind import ControllerSpec
-from steptwin.simulation.toml.reader import Key, Row, TomlText, optional
-from steptwin.simulation.toml.values import name_value, permitting, text_value, time_value, whole, word
+from steptwin.simulation.toml.table import key, table
+from steptwin.simulation.toml.values import permitting, text_value, time_value, whole, word
 
 DEFAULT_VARIANT = "B"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class M1486Spec(ControllerSpec):
-    variant: str
-    address: int
-    interface: str
-    baud: int | None
-    statement_time: Nanos | None
-    program: str | None
 
 
 @permitting(", ".join(v.name for v in VARIANTS))
@@ -40,20 +29,16 @@ def _address(value: Any) -> int:
     return whole(0, 15)(value)
 
 
-KEYS = (
-    Key("name", name_value, "how the rest of the file names it"),
-    optional(name_value, "line", "the line it is on"),
-    optional(_variant, "variant", "which type", DEFAULT_VARIANT),
-    optional(_address, "address", "0 to 15, or a hexadecimal digit as text", 15),
-    optional(word(*(i.name for i in INTERFACES)), "interface", "driver interface", "sd"),
-    optional(whole(300, 1_000_000), "baud", "bit/s; default the highest"),
-    optional(time_value, "statement_time", "what a command takes; default 1 ms"),
-    optional(text_value, "program", "a program it is switched on with; types with RAM lose it when they are switched off"),
-)
-
-
-def read(toml: TomlText, row: Row, table: Mapping[str, Any]) -> M1486Spec:
-    return M1486Spec(**row)
+@table("[[m1486]]")
+class M1486Spec(ControllerSpec):
+    variant: str = key(_variant, "which type", default=DEFAULT_VARIANT)
+    address: int = key(_address, "0 to 15, or a hexadecimal digit as text", default=15)
+    interface: str = key(word(*(i.name for i in INTERFACES)), "driver interface", default="sd")
+    baud: int | None = key(whole(300, 1_000_000), "bit/s; default the highest", default=None)
+    statement_time: Nanos | None = key(time_value, "what a command takes; default 1 ms", default=None)
+    program: str | None = key(
+        text_value, "a program it is switched on with; types with RAM lose it when they are switched off", default=None
+    )
 
 
 def files(spec: M1486Spec) -> Iterator[tuple[str, str]]:

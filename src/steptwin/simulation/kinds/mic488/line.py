@@ -13,8 +13,9 @@ from steptwin.mic488.device import Mic488Device, pause_observer
 from steptwin.mic488.vision import Com1Port, uses_vision
 from steptwin.simulation.faults import Faults
 from steptwin.simulation.faults import LineProtocol as FaultLine
-from steptwin.simulation.kinds.kind import LineSpec, Member
+from steptwin.simulation.kinds.kind import Member
 from steptwin.simulation.kinds.lines import SCRIPTS, Line, LineEndPoint
+from steptwin.simulation.kinds.links import LineSpec
 from steptwin.simulation.kinds.master import Master
 from steptwin.simulation.scheduler.kernel import Kernel
 from steptwin.simulation.scheduler.trace import RecordSink

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
-from functools import cache
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 from steptwin.errors import Misuse
@@ -12,12 +11,12 @@ from steptwin.machine import Nanos
 from steptwin.mic488.config import AXIS_KEYS, INPUT_KEYS, INPUTS, NO_INPUT, ConfigKey, ControllerConfig
 from steptwin.mic488.registers import AXES, FIRMWARES
 from steptwin.simulation.kinds.kind import ControllerSpec
-from steptwin.simulation.toml.reader import Key, Path, Row, TomlText, optional, read_table
+from steptwin.simulation.toml.reader import Key
+from steptwin.simulation.toml.table import key, numbered_tables_in, table
 from steptwin.simulation.toml.values import (
     ValueReader,
     address_value,
     flag,
-    name_value,
     permitting,
     text_value,
     time_value,
@@ -28,29 +27,6 @@ from steptwin.wire.rtu import MAX_UNIT
 
 BankFiles: TypeAlias = tuple[tuple[int, str], ...]
 """Numbers of banks and the files that are for them."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Mic488Spec(ControllerSpec):
-    unit: int | None
-    firmware: str
-    config: str | None
-    program: str | None
-    programs: BankFiles
-    positions: BankFiles
-    start: bool
-    statement_time: Nanos | None
-    lenient: bool
-    vision: str | None
-    trigger_keeps: bool | None
-    axes: Mapping[int, Mapping[str, Any]]
-    """Changed attributes of `AxisConfig`, by axis from 1."""
-    inputs: Mapping[int, Mapping[str, Any]]
-
-    @property
-    def all_programs(self) -> BankFiles:
-        """``programs``, and ``program`` in bank 0."""
-        return self.programs if self.program is None else ((0, self.program), *self.programs)
 
 
 @permitting(", ".join(FIRMWARES))
@@ -74,45 +50,6 @@ def banks_value(value: Any) -> tuple[tuple[int, str], ...]:
         if not (bank.isascii() and bank.isdecimal() and len(bank) < 4) or (len(bank) > 1 and bank[0] == "0"):
             raise Misuse(f"{bank!r} is not a bank: expected a number from 0 on")
     return tuple(sorted((int(bank), text_value(name)) for bank, name in value.items()))
-
-
-KEYS = (
-    Key("name", name_value, "how the rest of the file names it"),
-    optional(name_value, "line", "the line it is on"),
-    optional(whole(1, MAX_UNIT), "unit", "slave address; default that of its configuration"),
-    optional(_firmware, "firmware", "its firmware", "1.70"),
-    optional(text_value, "config", "the vendor tool's .cfg file"),
-    optional(text_value, "program", "a WBC program for bank 0"),
-    optional(banks_value, "programs", "WBC programs by bank: ['a.prg', 'b.prg'] for 0 and 1, or { 3 = 'd.prg' }", ()),
-    optional(banks_value, "positions", "position tables by bank, as programs; 'a.csv' alone is for bank 0", ()),
-    optional(flag, "start", "whether the program starts at power-on", False),
-    optional(time_value, "statement_time", "what a statement of the program takes"),
-    optional(flag, "lenient", "holes of the register map read 0", False),
-    optional(address_value, "vision", "HOST:PORT for records of a vision system ('N1 X12.5 Y-3 A90' and a line end)"),
-    optional(flag, "trigger_keeps", "whether a trigger keeps the values it uses; default that of its configuration, no"),
-)
-INNER_TABLES = (*(f"M{n}" for n in range(1, AXES + 1)), *(f"IN{n}" for n in range(1, INPUTS + 1)))
-
-
-def read(toml: TomlText, row: Row, table: Mapping[str, Any]) -> Mic488Spec:
-    path = row["path"]
-    axes = {n: _config(toml, (*path, f"M{n}"), table) for n in range(1, AXES + 1) if f"M{n}" in table}
-    inputs = {n: _config(toml, (*path, f"IN{n}"), table) for n in range(1, INPUTS + 1) if f"IN{n}" in table}
-    return Mic488Spec(**row, axes=axes, inputs=inputs)
-
-
-def _config(toml: TomlText, path: Path, table: Mapping[str, Any]) -> dict[str, Any]:
-    """A table such as ``[mic488.M1]``: keys are attributes of the configuration, choices are numbers or their words."""
-    name = str(path[-1])
-    values = read_table(toml, path, table[name], inner_keys(name))
-    return {name: value for name, value in values.items() if value is not None}
-
-
-@cache
-def inner_keys(table: str) -> tuple[Key, ...]:
-    """The rows of ``[mic488.M1]`` and of ``[mic488.IN1]``."""
-    rows = AXIS_KEYS if table.startswith("M") else INPUT_KEYS
-    return tuple(Key(row.attribute, ValueReader(_configured(row), _values(row)), row.meaning, None) for row in rows)
 
 
 _SWITCHES = f"IN1 to IN{INPUTS} or 'none', or the number of the vendor's file, 0 for IN1 to {NO_INPUT} for none"
@@ -139,6 +76,43 @@ def _configured(row: ConfigKey) -> Callable[[Any], Any]:
         return int(number) if row.whole else number
 
     return read
+
+
+def _changed(rows: Iterable[ConfigKey]) -> Iterator[Key]:
+    """Keys of ``[mic488.M1]`` and of ``[mic488.IN1]``: attributes of the configuration, choices by number or by word."""
+    return (Key(row.attribute, ValueReader(_configured(row), _values(row)), row.meaning, None) for row in rows)
+
+
+@table("[[mic488]]")
+class Mic488Spec(ControllerSpec):
+    unit: int | None = key(whole(1, MAX_UNIT), "slave address; default that of its configuration", default=None)
+    firmware: str = key(_firmware, "its firmware", default="1.70")
+    config: str | None = key(text_value, "the vendor tool's .cfg file", default=None)
+    program: str | None = key(text_value, "a WBC program for bank 0", default=None)
+    programs: BankFiles = key(
+        banks_value,
+        "WBC programs by bank: ['a.prg', 'b.prg'] for 0 and 1, or { 3 = 'd.prg' }",
+        default=(),
+        excludes=("program",),
+    )
+    positions: BankFiles = key(banks_value, "position tables by bank, as programs; 'a.csv' alone is for bank 0", default=())
+    start: bool = key(flag, "whether the program starts at power-on", default=False)
+    statement_time: Nanos | None = key(time_value, "what a statement of the program takes", default=None)
+    lenient: bool = key(flag, "holes of the register map read 0", default=False)
+    vision: str | None = key(
+        address_value, "HOST:PORT for records of a vision system ('N1 X12.5 Y-3 A90' and a line end)", default=None
+    )
+    trigger_keeps: bool | None = key(
+        flag, "whether a trigger keeps the values it uses; default that of its configuration, no", default=None
+    )
+    axes: Mapping[int, Mapping[str, Any]] = numbered_tables_in("M", AXES, _changed(AXIS_KEYS))
+    """Changed attributes of `AxisConfig`, by axis from 1."""
+    inputs: Mapping[int, Mapping[str, Any]] = numbered_tables_in("IN", INPUTS, _changed(INPUT_KEYS))
+
+    @property
+    def all_programs(self) -> BankFiles:
+        """``programs``, and ``program`` in bank 0."""
+        return self.programs if self.program is None else ((0, self.program), *self.programs)
 
 
 def files(spec: Mic488Spec) -> Iterator[tuple[str, str]]:
