@@ -13,7 +13,7 @@ from steptwin.live.cell import Cell
 from steptwin.live.devicefile import DeviceSpec
 from steptwin.live.server import Server
 
-TABLE = DeviceSpec("table", "/dev/ttyUSB0")
+TABLE = DeviceSpec(name="table", address="/dev/ttyUSB0")
 
 
 class Connections:

@@ -15,7 +15,7 @@ GATEWAY = '[gateway.prometheus]\nlisten = "127.0.0.1:9100"\n'
 
 def test_devices_and_gateways() -> None:
     found = read_device_file("cell.toml", '[bridge]\nname = "cell"\n' + DEVICE + GATEWAY)
-    assert (found.name, found.devices) == ("cell", (DeviceSpec("table", "/dev/ttyUSB0,unit=2"),))
+    assert (found.name, found.devices) == ("cell", (DeviceSpec(name="table", address="/dev/ttyUSB0,unit=2"),))
     assert [(gateway.kind, gateway.listen) for gateway in found.services.gateways] == [("prometheus", "127.0.0.1:9100")]
     assert read_device_file("cell.toml", DEVICE + GATEWAY).name == "devices"
 
@@ -51,4 +51,4 @@ def test_mistakes_are_reported(text: str, message: str) -> None:
     ],
 )
 def test_files_of_an_address_are_beside_the_file(address: str, found: str) -> None:
-    assert DeviceSpec("table", address).beside(Path("/cell")).address == found
+    assert DeviceSpec(name="table", address=address).beside(Path("/cell")).address == found

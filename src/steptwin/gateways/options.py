@@ -6,16 +6,15 @@ edited where it is not installed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.simulation.describe.servicetables import GATEWAY
-from steptwin.simulation.toml.table import TableSpec, key
+from steptwin.simulation.toml.table import TableSpec, key, table
 from steptwin.simulation.toml.values import address_value, positive_time, texts
 
 
-@dataclass(frozen=True, kw_only=True)
+@table()
 class GatewaySpec(TableSpec):
     """A table ``[gateway.NAME]`` with its values. What serves it is ``make`` in ``gateways/NAME/gateway.py``."""
 

@@ -377,11 +377,6 @@ class Key:
         return getattr(self.read, "permitted", "")
 
 
-def optional(read: Callable[[Any], Any], name: str, meaning: str, default: Any = None, attribute: str = "") -> Key:
-    """A key that may be left out."""
-    return Key(name, read, meaning, default, attribute)
-
-
 COMMON_WORDS: Mapping[str, tuple[str, ...]] = {
     "lead": ("pitch",),
     "screw": ("pitch",),

@@ -33,18 +33,23 @@ class TableRows:
     """Its header: ``[[axis.switch]]``."""
     keys: tuple[Key, ...]
     inner: tuple[InnerTable | NumberedTables, ...] = ()
-    need: Mapping[str, str] = field(default_factory=dict)
+    need: Mapping[str, str] = field(init=False)
     """Keys that mean nothing without another."""
-    exclude: tuple[tuple[str, str], ...] = ()
+    exclude: tuple[tuple[str, str], ...] = field(init=False)
     """Keys that exclude each other: two ways of giving the same value."""
-    only: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    only: Mapping[str, tuple[str, ...]] = field(init=False)
     """Keys that some kinds only have: those whose ``kind`` has one of these values."""
+    required: tuple[str, ...] = field(init=False)
+    """Fields without a default."""
+    inner_names: tuple[str, ...] = field(init=False)
+    """Keys of tables in it."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "need", {**{its.name: its.needs for its in self.keys if its.needs}, **self.need})
-        object.__setattr__(self, "only", {**{its.name: its.kinds for its in self.keys if its.kinds}, **self.only})
-        excluded = ((other, its.name) for its in self.keys for other in its.excludes)
-        object.__setattr__(self, "exclude", (*excluded, *self.exclude))
+        object.__setattr__(self, "need", {its.name: its.needs for its in self.keys if its.needs})
+        object.__setattr__(self, "only", {its.name: its.kinds for its in self.keys if its.kinds})
+        object.__setattr__(self, "exclude", tuple((other, its.name) for its in self.keys for other in its.excludes))
+        object.__setattr__(self, "required", tuple(its.attribute or its.name for its in self.keys if its.is_required))
+        object.__setattr__(self, "inner_names", tuple(name for one in self.inner for name in one.names))
         known = {its.name for its in self.keys}
         named = {*self.need, *self.need.values(), *self.only, *(name for pair in self.exclude for name in pair)}
         if strange := sorted(named - known):
@@ -207,9 +212,8 @@ def _inner(spec: type[Any]) -> tuple[InnerTable, ...]:
 
 def read_row(text: TomlText, path: Path, rows: TableRows, given: object) -> dict[str, Any] | None:
     """The values of the keys of a table by field; None without a required one."""
-    values = read_table(text, path, given, rows.keys, tuple(name for one in rows.inner for name in one.names))
-    is_whole = all((its.attribute or its.name) in values for its in rows.keys)
-    return values if is_whole else None
+    values = read_table(text, path, given, rows.keys, rows.inner_names)
+    return values if all(name in values for name in rows.required) else None
 
 
 def read_spec(text: TomlText, path: Path, spec: type[S], given: object, **others: object) -> S | None:
@@ -227,9 +231,10 @@ def _read(text: TomlText, path: Path, spec: type[S], given: object, kind: object
 
 def make_spec(text: TomlText, spec: type[S], row: Row, given: Table) -> S:
     """The value of a table whose keys are read already. The tables in it are read, and what does not fit together is reported."""
-    kind = given.get("kind", spec.rows.usual)
-    inner = {one.attribute: one.read(text, row["path"], given, kind) for one in spec.rows.inner}
-    values: dict[str, Any] = {**row, **inner}
+    values = dict(row)
+    if spec.rows.inner:
+        kind = given.get("kind", spec.rows.usual)
+        values |= {one.attribute: one.read(text, row["path"], given, kind) for one in spec.rows.inner}
     made = spec(**values)
     made.check(text)
     return made
