@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
+
+from compositions import PARTS
+
 from steptwin.files.world import World
+from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.wire.crc import with_crc
 
 READ = with_crc(bytes.fromhex("01 03 27 24 00 04"))
@@ -252,7 +258,18 @@ steps = [
 PROGRAM = b"M1 = ON\nA:\nPABS M1 20\nWAITPOS\nOUT1 = ON\nDELAY 0.05\nPABS M1 -3,5\nWAITPOS\nOUT1 = OFF\nJUMP A\n"
 
 
+def _further() -> Iterator[str]:
+    """The parts of random compositions with elements that are not above, at the controller and the axes of this world."""
+    for part in PARTS:
+        if _elements(part) - _elements(WORLD):
+            yield re.sub(r"\bc(?=['.])", "table", part).replace("'y'", "'left'")
+
+
+def _elements(text: str) -> set[str]:
+    return {kind for kind in re.findall(r"^\[\[([a-z]+)\]\]", text, re.MULTILINE) if kind in ELEMENTS}
+
+
 def everything() -> World:
-    world = World.from_toml(WORLD, {"p.prg": PROGRAM})
+    world = World.from_toml("\n".join((WORLD, *_further())), {"p.prg": PROGRAM})
     world.line["bus"].send(READ)
     return world

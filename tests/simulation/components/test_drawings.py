@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from steptwin.files.world import World
-from steptwin.simulation.components.registry import ELEMENTS, failing, fault_kinds
+from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.mechanics.drawing import Drawing, SensorZone, rail
 
 WORLD = """
@@ -134,10 +134,3 @@ def test_rails() -> None:
     assert rail(None) == Drawing("slide", 2.0, ("position",), low=-1.0)
     assert rail(None, (zone,)) == Drawing("slide", 44.0, ("position",), sensors=(zone,), low=-42.0)
     assert rail(None, (zone,), beyond=1.0) == Drawing("slide", 42.0, ("position",), sensors=(zone,), low=-41.0)
-
-
-def test_elements_that_have_a_fault() -> None:
-    assert failing(fault_kinds()["leak"]) == ("vacuum",)
-    assert set(failing(fault_kinds()["stuck-output"])) == {
-        "gate", "latch", "timer", "counter", "relay", "cylinder", "vacuum", "gripper", "brake", "collision", "gantry", "supply",
-    }  # fmt: skip
