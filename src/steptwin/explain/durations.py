@@ -86,8 +86,8 @@ class Durations:
     def _disturb(self, handlers: Collection[int]) -> bool:
         """Whether an interrupt moves or changes drives."""
         found = [self._steps[number] for number in handlers if number < len(self._steps)]
-        moving = (s.MotionStep, s.HaltStep, s.RowMotionStep, s.EndStep, s.ProgResetStep)
-        return any(isinstance(step, moving) or _register(step) in _DISTURBING for step in found) or len(self._steps) in handlers
+        moves = any(step.effect().on_drives or _register(step) in _DISTURBING for step in found)
+        return moves or len(self._steps) in handlers
 
     @staticmethod
     def _changes(step: s.ProgramStep, number: int) -> bool:
@@ -134,26 +134,27 @@ class Durations:
 
     def _step(self, step: s.ProgramStep, state: _State, passed: Nanos) -> tuple[Timing, _State]:
         """Its timing, and what is known after it. ``passed``: since the beginning of the block."""
-        own = Timing(self._statement_time)
-        match step:
-            case s.DelayStep(seconds=s.Literal(value=seconds)):
+        own, effect = Timing(self._statement_time), step.effect()
+        if step.waits is s.StepWait.TIME:
+            return self._delay(step, state)
+        if step.waits is s.StepWait.CONDITION:
+            return Timing(self._statement_time, "its condition"), _moments_lost(state)
+        if step.waits is s.StepWait.MOTION:
+            return self._wait(state, passed)
+        if effect.everything:
+            return own, _UNKNOWN
+        if effect.on_drives:
+            return own, self._moved(step, state, passed)
+        if isinstance(step, s.SetStep) and isinstance(step.target, s.RegisterOperand) and step.target.row.key in ("M", "POSM"):
+            return own, self._set(step, step.target.row.key, step.target.number, state)
+        return own, state
+
+    def _delay(self, step: s.ProgramStep, state: _State) -> tuple[Timing, _State]:
+        match step.sources():
+            case (s.Literal(value=seconds),):
                 whole = round(max(seconds, s.SHORTEST_DELAY_S) * 1000.0) * MILLISECOND
                 return Timing(max(self._statement_time, whole)), state
-            case s.DelayStep():
-                return Timing(None, "the time of DELAY"), _moments_lost(state)
-            case s.WaitStep():
-                return Timing(self._statement_time, "its condition"), _moments_lost(state)
-            case s.WaitPosStep():
-                return self._wait(state, passed)
-            case s.EndStep() | s.ProgResetStep():
-                return own, _UNKNOWN
-            case s.SetStep(target=s.RegisterOperand(row=row, number=number)) if row.key in ("M", "POSM"):
-                return own, self._set(step, row.key, number, state)
-            case s.MotionStep() | s.HaltStep() | s.RowMotionStep():
-                return own, self._moved(step, state, passed)
-            case s.JumpStep():
-                return own, state
-        return own, state
+        return Timing(None, "the time of DELAY"), _moments_lost(state)
 
     def _wait(self, state: _State, passed: Nanos) -> tuple[Timing, _State]:
         rested = tuple(axis._replace(at_rest=axis.on, end=None) for axis in state)
@@ -188,14 +189,11 @@ class Durations:
                 return [(number, value, keyword == "PREL")]
             case s.MotionStep(keyword="HOME", axis=number, value=s.Literal(value=value)) if value:
                 return [(number, None, True)]
-            case s.MotionStep(axis=number) | s.HaltStep(axis=number):
-                return [(number, None, False)]
             case s.RowMotionStep(keyword="MOVEPTP", row=s.Literal(value=index)) if self._knows_row(index):
                 values = () if self._positions is None else self._positions.rows[int(index)].values
                 return [(number, value, False) for number, value in zip(AXES, values, strict=True) if value is not None]
-            case s.RowMotionStep():
-                return [(number, None, False) for number in AXES]
-        return []
+        effect = step.effect()
+        return [(number, None, False) for number in AXES if effect.any_drive or number == effect.drive]
 
     def _knows_row(self, index: float) -> bool:
         if index == 0 and self._row_0_is_written:

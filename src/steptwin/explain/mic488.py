@@ -21,7 +21,6 @@ from steptwin.wbc.dialect import DEFAULT, Dialect
 from steptwin.wbc.events import HARD_PREFIX, PREFIX
 from steptwin.wbc.flow import flow_of, reached
 from steptwin.wbc.positions import PositionTable
-from steptwin.wbc.usage import acts_on, sources
 
 STATEMENT_BYTES = 16
 POSITION_BYTES = 18
@@ -151,7 +150,7 @@ def _sections(names: Mapping[int, Sequence[str]], statements: Sequence[Explained
 
 
 def _operands(step: s.ProgramStep) -> list[s.ValueSource]:
-    return [*sources(step), *([step.target] if isinstance(step, s.SetStep) else [])]
+    return [*step.sources(), *([step.target] if isinstance(step, s.SetStep) else [])]
 
 
 def _usage(steps: Sequence[s.ProgramStep], statements: Sequence[ExplainedStatement], there: set[int]) -> dict[str, list[Usage]]:
@@ -163,12 +162,12 @@ def _usage(steps: Sequence[s.ProgramStep], statements: Sequence[ExplainedStateme
         if number not in there:
             continue
         line = statements[number].line
-        for source in sources(step):
+        for source in step.sources():
             if isinstance(source, s.RegisterOperand):
                 read[_group(source)].setdefault(source, set()).add(line)
         if isinstance(step, s.SetStep) and isinstance(step.target, s.RegisterOperand):
             written[_group(step.target)].setdefault(step.target, set()).add(line)
-        output, drive = acts_on(step)
+        output, drive = step.effect()[:2]
         if output is not None:
             pulses.setdefault(f"OUT{output}", set()).add(line)
         if drive is not None:
@@ -222,7 +221,7 @@ def _loops(executable: s.Executable, flow: ControlFlow, there: set[int]) -> list
     starts = [0, *executable.entries.values()]
     found: list[EndlessLoop] = []
     for loop in flow.without_way_out(starts):
-        read = {source.name for n in loop for source in sources(executable.steps[n]) if isinstance(source, s.RegisterOperand)}
+        read = {source.name for n in loop for source in executable.steps[n].sources() if isinstance(source, s.RegisterOperand)}
         motion = ["motion"] if any(isinstance(executable.steps[n], s.WaitPosStep) for n in loop) else []
         leaving = interrupts.leaving(executable, flow, set(loop))
         found.append(EndlessLoop(tuple(loop), (*sorted(read), *motion), tuple(leaving)))

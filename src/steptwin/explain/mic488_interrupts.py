@@ -13,7 +13,7 @@ from steptwin.wbc import steps as s
 from steptwin.wbc.events import BY_REGISTER, HARD_PREFIX, PREFIX
 
 _ONE_WAITS = "one waits, the others are lost"
-_WAITS = (s.WaitStep, s.WaitPosStep)
+_LONG = frozenset({s.StepWait.TIME, s.StepWait.CONDITION, s.StepWait.MOTION})
 
 
 def label(executable: s.Executable, entry: int) -> str:
@@ -38,9 +38,7 @@ def _leaves(executable: s.Executable, flow: ControlFlow, number: int) -> bool:
     if number >= len(executable.steps):
         return True
     step = executable.steps[number]
-    if isinstance(step, s.EndStep | s.ProgResetStep):
-        return True
-    return not flow.comes_back(number)
+    return step.effect().everything or not flow.comes_back(number)
 
 
 def lost(
@@ -83,7 +81,7 @@ def _held(source: SourceText, executable: s.Executable, flow: ControlFlow, entry
     """Waits of unknown length, with their lines."""
     for number in sorted(_handling(executable, flow, entry)):
         step = executable.steps[number]
-        if isinstance(step, (*_WAITS, s.DelayStep)):
+        if step.waits in _LONG:
             yield source.position(step.start)[0], " ".join(source.text[step.start : step.end].split())
 
 
@@ -120,7 +118,7 @@ def _switched_off(source: SourceText, executable: s.Executable, there: Collectio
 def _hard(source: SourceText, executable: s.Executable, there: Collection[int]) -> Iterator[LostInterrupt]:
     """HARDINT_ labels wait for the end of the statement in progress: the first long one."""
     hard = [entry for entry in executable.entries.values() if label(executable, entry).startswith(HARD_PREFIX)]
-    longest = next((n for n in sorted(there) if n < len(executable.steps) and _is_long(executable.steps[n])), None)
+    longest = next((n for n in sorted(there) if n < len(executable.steps) and executable.steps[n].waits in _LONG), None)
     if longest is None:
         return
     step = executable.steps[longest]
@@ -131,10 +129,6 @@ def _hard(source: SourceText, executable: s.Executable, there: Collection[int]) 
             line,
             f"it comes after the statement in progress: of the events that come during {text}, {_ONE_WAITS}",
         )
-
-
-def _is_long(step: s.ProgramStep) -> bool:
-    return isinstance(step, (*_WAITS, s.DelayStep))
 
 
 def _ms(duration: Nanos) -> str:

@@ -11,7 +11,6 @@ from steptwin.explain.loops import TextLoop, executed, text_loops
 from steptwin.explain.model import LongWait
 from steptwin.wbc import steps as s
 from steptwin.wbc.conditions import outcome
-from steptwin.wbc.usage import sources
 
 _OUTSIDE = frozenset({"IN", "INPUTS", "AIN", "VISIONNEW", "VISIONNO", "VISIONX", "VISIONY", "VISIONA", "$I", "$D", "$R"})
 """What inputs, a vision system or a master change, and otherwise only the program."""
@@ -110,7 +109,7 @@ def _of_loop(executable: s.Executable, flow: ControlFlow, loop: TextLoop, by_int
         branch = steps[number]
         if not isinstance(branch, s.IfStep | s.WhileStep):
             return None
-        sides = [side for side in sources(branch) if not isinstance(side, s.Literal)]
+        sides = [side for side in branch.sources() if not isinstance(side, s.Literal)]
         if not sides or any(side in changed for side in sides):
             return None
         registers = [side for side in sides if isinstance(side, s.RegisterOperand)]
@@ -130,7 +129,7 @@ def _ends(executable: s.Executable, flow: ControlFlow, number: int) -> bool:
     if number >= len(executable.steps):
         return True
     step = executable.steps[number]
-    return isinstance(step, s.EndStep | s.ProgResetStep) or (isinstance(step, s.JumpStep) and not flow.comes_back(number))
+    return step.effect().everything or (isinstance(step, s.JumpStep) and not flow.comes_back(number))
 
 
 def _in_mode(
@@ -158,9 +157,7 @@ def _homing_after(step: s.ProgramStep, homing: set[int]) -> Iterator[int]:
     match step:
         case s.MotionStep(keyword="HOME", axis=axis) if not (isinstance(step.value, s.Literal) and step.value.value == 0):
             yield from {*homing, axis}
-        case s.WaitPosStep():
-            return
-        case _:
+        case _ if step.waits is not s.StepWait.MOTION:
             yield from _running_after(step, homing, starts=frozenset())
 
 
@@ -171,10 +168,10 @@ def _running_after(step: s.ProgramStep, running: set[int], starts: frozenset[str
             changed = axis
             if keyword in starts and not (isinstance(step.value, s.Literal) and step.value.value == 0 and keyword == "VABS"):
                 yield axis
-        case s.HaltStep(axis=axis):
-            changed = axis
         case s.SetStep(target=s.RegisterOperand(row=row, number=number)) if row.key == "M":
             changed = number if isinstance(step.value, s.Literal) and step.value.value == 0 else None
-        case s.RowMotionStep() | s.EndStep() | s.ProgResetStep():
+        case _ if step.effect().any_drive or step.effect().everything:
             return
+        case _:
+            changed = step.effect().drive
     yield from (axis for axis in running if axis != changed)

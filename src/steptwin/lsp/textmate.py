@@ -14,7 +14,7 @@ from typing import TypeAlias
 from steptwin.files.textfiles import write_bytes
 from steptwin.m1486.commands import LETTERS, TABLE, ArgType, takes_number
 from steptwin.wbc.registers import PREDEFINED, REGISTERS
-from steptwin.wbc.statements import CLOSING, FUNCTIONS, HALTS, KEYWORDS, MOTIONS, OPENING, ROW_MOTIONS
+from steptwin.wbc.statements import CLOSING, FLOW, FUNCTIONS, KEYWORDS, OPENING
 
 Pattern: TypeAlias = Mapping[str, object]
 Grammar: TypeAlias = Mapping[str, object]
@@ -31,7 +31,6 @@ _NAMED = frozenset({ArgType.LINE, ArgType.FUNCTION, ArgType.FLAG, ArgType.REGIST
 
 
 def wbc_grammar() -> Grammar:
-    flow = KEYWORDS - MOTIONS - HALTS - ROW_MOTIONS - {"SET", "PULSE"}
     families = [row.name for row in REGISTERS if row.last or row.words]
     single = [row.name for row in REGISTERS if not (row.last or row.words)]
     first = f"(?i)^{_BLANKS}*"
@@ -47,7 +46,7 @@ def wbc_grammar() -> Grammar:
             _groups(rf"{first}({_START}{_INSIDE}*){_BLANKS}*(:)", "entity.name.label.wbc", "punctuation.separator.label.wbc"),
             _groups(rf"{first}(JUMP){_END}{_BLANKS}*({_START}{_INSIDE}*)?", "keyword.control.flow.wbc", "entity.name.label.wbc"),
             _groups(f"{first}({_any(OPENING | CLOSING | {'ELSE'})}){_END}", "keyword.control.block.wbc"),
-            _groups(f"{first}({_any(flow)}){_END}", "keyword.control.flow.wbc"),
+            _groups(f"{first}({_any(FLOW)}){_END}", "keyword.control.flow.wbc"),
             _groups(f"{first}({_any(KEYWORDS)}){_END}", "keyword.other.wbc"),
             _groups(
                 rf"(@){_BLANKS}*({_START}{_INSIDE}*)",

@@ -20,7 +20,7 @@ from steptwin.wbc.compile import Code, compile_program
 from steptwin.wbc.dialect import Dialect
 from steptwin.wbc.positions import PositionTable, parse_positions
 from steptwin.wbc.registers import ROW_0
-from steptwin.wbc.usage import Setup, sources
+from steptwin.wbc.usage import Setup
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,7 +141,7 @@ def _uses_positions(steps: Sequence[s.ProgramStep]) -> bool:
     rows = [step.row for step in steps if isinstance(step, s.RowMotionStep)]
     if any(isinstance(step, s.SetStep) and _is_row_0(step.target) for step in steps):
         return any(row != s.Literal(0.0) for row in rows)
-    return bool(rows) or any(_is_row_0(source) for step in steps for source in sources(step))
+    return bool(rows) or any(_is_row_0(source) for step in steps for source in step.sources())
 
 
 def _is_row_0(source: s.ValueSource) -> bool:

@@ -12,7 +12,6 @@ from steptwin.machine import Nanos
 from steptwin.mic488.program_banks import LoadedProgram
 from steptwin.state import Stateful
 from steptwin.wbc import steps as s
-from steptwin.wbc.usage import sources
 from steptwin.wire.slave import FrameDirection, RtuSlavePort
 from steptwin.wire.timed import TimedRtuSlavePort
 
@@ -127,6 +126,6 @@ class Com1Port(Stateful):
 
 def uses_vision(program: LoadedProgram) -> bool:
     """Whether a program reads or writes a register of the vision system."""
-    used = [source for step in program.steps for source in sources(step)]
+    used = [source for step in program.steps for source in step.sources()]
     used += [step.target for step in program.steps if isinstance(step, s.SetStep)]
     return any(isinstance(source, s.RegisterOperand) and source.row.key.startswith(VISION) for source in used)

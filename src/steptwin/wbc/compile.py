@@ -16,7 +16,6 @@ from steptwin.wbc.real import COMPARISONS, FUNCTIONS, OPERATIONS, ProgramFault, 
 from steptwin.wbc.registers import REAL, REAL_MAX, RegisterRow
 from steptwin.wbc.statements import COMPARISONS as SIGNS
 from steptwin.wbc.straight import straight_of
-from steptwin.wbc.usage import sources
 
 ValueCode: TypeAlias = Callable[[Execution, Cells], float]
 
@@ -147,7 +146,7 @@ class _Compiler:
                 return []
             left, right = self._seen(condition.left), self._seen(condition.right)
             return [WatchedValue(_side(left, right), tendencies[0] if len(tendencies) == 1 else None)]
-        return [WatchedValue(self._seen(source), t) for source in sources(step) if (t := self._tendency(source)) is not None]
+        return [WatchedValue(self._seen(source), t) for source in step.sources() if (t := self._tendency(source)) is not None]
 
     def _tendency(self, source: s.ValueSource) -> Tendency | None:
         if not isinstance(source, s.RegisterOperand):

@@ -5,12 +5,8 @@ JUMP is a call: it remembers the next line, which is reached when the code at th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any
-
 from steptwin.controlflow import ControlFlow
 from steptwin.diagnostics import Diagnostic
-from steptwin.tables import complete
 from steptwin.wbc import findings as f
 from steptwin.wbc import steps as s
 from steptwin.wbc.conditions import outcome
@@ -31,34 +27,9 @@ def reached(flow: ControlFlow, executable: s.Executable) -> set[int]:
 
 
 def _after(number: int, step: s.ProgramStep) -> tuple[int, ...]:
-    """The successors of a step. For JUMP: the next line, which is reached only if the target can return."""
-    return _AFTER[type(step)](number, step)
-
-
-def _branch(number: int, step: s.IfStep | s.WhileStep) -> tuple[int, ...]:
-    failed = step.otherwise if isinstance(step, s.IfStep) else step.close + 1
-    known = outcome(step.condition)
-    if known is None:
-        return number + 1, failed
-    return (number + 1,) if known else (failed,)
-
-
-_AFTER: Mapping[type[s.ProgramStep], Callable[[int, Any], tuple[int, ...]]] = complete(
-    "step",
-    s.STEPS,
-    "successors",
-    {
-        **dict.fromkeys((s.IfStep, s.WhileStep), _branch),
-        s.ElseStep: lambda number, step: (step.close,),
-        s.EndWhileStep: lambda number, step: (step.open,),
-        **dict.fromkeys((s.ReturnStep, s.EndStep, s.ProgResetStep), lambda number, step: ()),
-        **dict.fromkeys(
-            (s.SetStep, s.EndIfStep, s.WaitStep, s.WaitPosStep, s.DelayStep, s.JumpStep), lambda number, step: (number + 1,)
-        ),
-        **dict.fromkeys((s.MotionStep, s.HaltStep, s.RowMotionStep, s.PulseStep), lambda number, step: (number + 1,)),
-        **dict.fromkeys((s.InterruptStep, s.IllegalStep), lambda number, step: (number + 1,)),
-    },
-)
+    ways = step.after(number)
+    known = outcome(step.condition) if isinstance(step, s.IfStep | s.WhileStep) else None
+    return ways if known is None else ways[:1] if known else ways[1:]
 
 
 def interrupt_ends(flow: ControlFlow, executable: s.Executable) -> list[Diagnostic]:

@@ -11,7 +11,6 @@ from steptwin.wbc import steps as s
 from steptwin.wbc.dialect import Dialect
 from steptwin.wbc.registers import ROWS
 from steptwin.wbc.scope import ProgramScope
-from steptwin.wbc.usage import sources
 
 _FAMILIES: Mapping[str, str] = {
     "OUTPUT": "OUT",
@@ -41,7 +40,7 @@ def register_meant(key: str, dialect: Dialect, families: Iterable[str] = _FAMILI
 
 def unused_variables(executable: s.Executable, scope: ProgramScope, dialect: Dialect) -> list[Diagnostic]:
     """Variables that are set and never read, and those whose names leave no doubt that a register was meant."""
-    read = {source.index for step in executable.steps for source in sources(step) if isinstance(source, s.Variable)}
+    read = {source.index for step in executable.steps for source in step.sources() if isinstance(source, s.Variable)}
     found: list[Diagnostic] = []
     for index, name in enumerate(scope.variables.values()):
         if index not in read:

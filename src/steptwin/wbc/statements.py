@@ -101,9 +101,21 @@ ASSIGNMENTS = (
 NOT_SUPPORTED = frozenset({"SWITCH", "CASE"})
 
 KEYWORDS = frozenset(STATEMENTS) | {SET}
-MOTIONS = frozenset({"HOME", "VABS", "VREL", "PABS", "PREL"})
-HALTS = frozenset({"BRAKE", "STOP"})
-ROW_MOTIONS = frozenset({"MOVEPTP", "MOVELIN", "MOVELIN_REL", "MOVETOCIRC", "DOCIRC", "DOARC"})
+
+
+def _taking(*kinds: OperandKind) -> frozenset[str]:
+    return frozenset(row.keyword for row in _ROWS if tuple(operand.kind for operand in row.operands) == kinds)
+
+
+MOTIONS = _taking(OperandKind.AXIS, OperandKind.VALUE)
+HALTS = _taking(OperandKind.AXIS)
+ROW_MOTIONS = _taking(OperandKind.ROW)
+FLOW = frozenset(
+    row.keyword
+    for row in _ROWS
+    if not {operand.kind for operand in row.operands} & {OperandKind.AXIS, OperandKind.OUTPUT, OperandKind.ROW}
+)
+"""What acts on neither drives nor outputs."""
 LINES = frozenset({"MOVELIN", "MOVELIN_REL"})
 CIRCLES = frozenset({"MOVETOCIRC", "DOCIRC", "DOARC"})
 OPENING = frozenset({"IF", "WHILE"})

@@ -6,9 +6,10 @@ Step numbers are the slot numbers of the compiled image: labels take no step, in
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import ClassVar, NamedTuple, TypeAlias
 
 from steptwin.wbc.events import InterruptEvent
 from steptwin.wbc.registers import RegisterRow
@@ -69,16 +70,79 @@ class FunctionOperation:
     arguments: tuple[ValueSource, ...]
 
 
+class StepWait(enum.Enum):
+    """What a step waits for besides the time of a statement."""
+
+    NOTHING = "nothing"
+    TIME = "a time"
+    CONDITION = "a condition"
+    MOTION = "the end of all motions"
+    EVENT = "an event"
+
+
+class StepEffect(NamedTuple):
+    """What a step acts on besides the target of SET: an output or a drive, from 1, or any drive, or everything of the program."""
+
+    output: int | None = None
+    drive: int | None = None
+    any_drive: bool = False
+    everything: bool = False
+    """All drives and outputs: the program is over, or begins again."""
+
+    @property
+    def on_drives(self) -> bool:
+        return self.drive is not None or self.any_drive or self.everything
+
+
+NO_EFFECT = StepEffect()
+_FACTS = ("waits", "sources", "effect", "after")
+
+
 @dataclass(frozen=True, slots=True)
 class ProgramStep:
+    """Each class of step says by itself what it waits for, reads and acts on, and what comes after it: one that does not is a
+    type error at import."""
+
     start: int = field(compare=False)
     end: int = field(compare=False)
+    waits: ClassVar[StepWait]
+
+    def __init_subclass__(cls) -> None:
+        # Not super(): with slots, dataclass makes the class a second time.
+        lacking = [fact for fact in _FACTS if fact not in vars(cls)]
+        if lacking:
+            raise TypeError(f"step {cls.__name__} lacks its {', '.join(lacking)}")
+
+    def sources(self) -> tuple[ValueSource, ...]:
+        """Everything it reads."""
+        raise NotImplementedError
+
+    def effect(self) -> StepEffect:
+        raise NotImplementedError
+
+    def after(self, number: int) -> tuple[int, ...]:
+        """Where the step with this number goes on: a branch at two, of which the first is that of a true condition; JUMP at the
+        next line, which is reached only if the target can return."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True, slots=True)
 class SetStep(ProgramStep):
     target: AssignmentTarget
     value: ValueSource | Operation | FunctionOperation
+    waits: ClassVar[StepWait] = StepWait.NOTHING
+
+    def sources(self) -> tuple[ValueSource, ...]:
+        value = self.value
+        if isinstance(value, Operation):
+            return value.left, value.right
+        return value.arguments if isinstance(value, FunctionOperation) else (value,)
+
+    def effect(self) -> StepEffect:
+        return NO_EFFECT
+
+    def after(self, number: int) -> tuple[int, ...]:
+        return (number + 1,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,23 +158,63 @@ class IfStep(ProgramStep):
         """The step that follows if the condition is false."""
         return (self.close if self.middle is None else self.middle) + 1
 
+    waits: ClassVar[StepWait] = StepWait.NOTHING
+
+    def sources(self) -> tuple[ValueSource, ...]:
+        return self.condition.left, self.condition.right
+
+    def effect(self) -> StepEffect:
+        return NO_EFFECT
+
+    def after(self, number: int) -> tuple[int, ...]:
+        return number + 1, self.otherwise
+
 
 @dataclass(frozen=True, slots=True)
 class ElseStep(ProgramStep):
     """Reached only from the lines above it: goes on at ``close``, the ENDIF."""
 
     close: int
+    waits: ClassVar[StepWait] = StepWait.NOTHING
+
+    def sources(self) -> tuple[ValueSource, ...]:
+        return ()
+
+    def effect(self) -> StepEffect:
+        return NO_EFFECT
+
+    def after(self, number: int) -> tuple[int, ...]:
+        return (self.close,)
 
 
 @dataclass(frozen=True, slots=True)
 class EndIfStep(ProgramStep):
-    pass
+    waits: ClassVar[StepWait] = StepWait.NOTHING
+
+    def sources(self) -> tuple[ValueSource, ...]:
+        return ()
+
+    def effect(self) -> StepEffect:
+        return NO_EFFECT
+
+    def after(self, number: int) -> tuple[int, ...]:
+        return (number + 1,)
 
 
 @dataclass(frozen=True, slots=True)
 class WhileStep(ProgramStep):
     condition: StepCondition
     close: int
+    waits: ClassVar[StepWait] = StepWait.NOTHING
+
+    def sources(self) -> tuple[ValueSource, ...]:
+        return self.condition.left, self.condition.right
+
+    def effect(self) -> StepEffect:
+        return NO_EFFECT
+
+    def after(self, number: int) -> tuple[int, ...]:
+        return number + 1, self.close + 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,11 +223,31 @@ class EndWhileStep(ProgramStep):
 
     condition: StepCondition
     open: int
+    waits: ClassVar[StepWait] = StepWait.NOTHING
+
+    def sources(self) -> tuple[ValueSource, ...]:
+        return ()
+
+    def effect(self) -> StepEffect:
+        return NO_EFFECT
+
+    def after(self, number: int) -> tuple[int, ...]:
+        return (self.open,)
 
 
 @dataclass(frozen=True, slots=True)
 class WaitStep(ProgramStep):
     condition: StepCondition
+    waits: ClassVar[StepWait] = StepWait.CONDITION
+
+    def sources(self) -> tuple[ValueSource, ...]:
+        return self.condition.left, self.condition.right
+
+    def effect(self) -> StepEffect:
+        return NO_EFFECT
+
+    def after(self, number: int) -> tuple[int, ...]:
+        return (number + 1,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,26 +255,73 @@ class DelayStep(ProgramStep):
     """At least `SHORTEST_DELAY_S` (WBC-7)."""
 
     seconds: ValueSource
+    waits: ClassVar[StepWait] = StepWait.TIME
+
+    def sources(self) -> tuple[ValueSource, ...]:
+        return (self.seconds,)
+
+    def effect(self) -> StepEffect:
+        return NO_EFFECT
+
+    def after(self, number: int) -> tuple[int, ...]:
+        return (number + 1,)
 
 
 @dataclass(frozen=True, slots=True)
 class JumpStep(ProgramStep):
     target: int
+    waits: ClassVar[StepWait] = StepWait.NOTHING
+
+    def sources(self) -> tuple[ValueSource, ...]:
+        return ()
+
+    def effect(self) -> StepEffect:
+        return NO_EFFECT
+
+    def after(self, number: int) -> tuple[int, ...]:
+        return (number + 1,)
 
 
 @dataclass(frozen=True, slots=True)
 class ReturnStep(ProgramStep):
-    pass
+    waits: ClassVar[StepWait] = StepWait.NOTHING
+
+    def sources(self) -> tuple[ValueSource, ...]:
+        return ()
+
+    def effect(self) -> StepEffect:
+        return NO_EFFECT
+
+    def after(self, number: int) -> tuple[int, ...]:
+        return ()
 
 
 @dataclass(frozen=True, slots=True)
 class EndStep(ProgramStep):
-    pass
+    waits: ClassVar[StepWait] = StepWait.NOTHING
+
+    def sources(self) -> tuple[ValueSource, ...]:
+        return ()
+
+    def effect(self) -> StepEffect:
+        return StepEffect(everything=True)
+
+    def after(self, number: int) -> tuple[int, ...]:
+        return ()
 
 
 @dataclass(frozen=True, slots=True)
 class ProgResetStep(ProgramStep):
-    pass
+    waits: ClassVar[StepWait] = StepWait.NOTHING
+
+    def sources(self) -> tuple[ValueSource, ...]:
+        return ()
+
+    def effect(self) -> StepEffect:
+        return StepEffect(everything=True)
+
+    def after(self, number: int) -> tuple[int, ...]:
+        return ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,6 +331,16 @@ class MotionStep(ProgramStep):
     keyword: str
     axis: int
     value: ValueSource
+    waits: ClassVar[StepWait] = StepWait.NOTHING
+
+    def sources(self) -> tuple[ValueSource, ...]:
+        return (self.value,)
+
+    def effect(self) -> StepEffect:
+        return StepEffect(drive=self.axis)
+
+    def after(self, number: int) -> tuple[int, ...]:
+        return (number + 1,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,6 +349,16 @@ class HaltStep(ProgramStep):
 
     keyword: str
     axis: int
+    waits: ClassVar[StepWait] = StepWait.NOTHING
+
+    def sources(self) -> tuple[ValueSource, ...]:
+        return ()
+
+    def effect(self) -> StepEffect:
+        return StepEffect(drive=self.axis)
+
+    def after(self, number: int) -> tuple[int, ...]:
+        return (number + 1,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,11 +367,31 @@ class RowMotionStep(ProgramStep):
 
     keyword: str
     row: ValueSource
+    waits: ClassVar[StepWait] = StepWait.NOTHING
+
+    def sources(self) -> tuple[ValueSource, ...]:
+        return (self.row,)
+
+    def effect(self) -> StepEffect:
+        # The drives of a row are those of its values.
+        return StepEffect(any_drive=True)
+
+    def after(self, number: int) -> tuple[int, ...]:
+        return (number + 1,)
 
 
 @dataclass(frozen=True, slots=True)
 class WaitPosStep(ProgramStep):
-    pass
+    waits: ClassVar[StepWait] = StepWait.MOTION
+
+    def sources(self) -> tuple[ValueSource, ...]:
+        return ()
+
+    def effect(self) -> StepEffect:
+        return NO_EFFECT
+
+    def after(self, number: int) -> tuple[int, ...]:
+        return (number + 1,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,6 +400,16 @@ class PulseStep(ProgramStep):
 
     output: int
     seconds: ValueSource
+    waits: ClassVar[StepWait] = StepWait.NOTHING
+
+    def sources(self) -> tuple[ValueSource, ...]:
+        return (self.seconds,)
+
+    def effect(self) -> StepEffect:
+        return StepEffect(output=self.output)
+
+    def after(self, number: int) -> tuple[int, ...]:
+        return (number + 1,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,6 +418,16 @@ class InterruptStep(ProgramStep):
 
     event: InterruptEvent
     hard: bool
+    waits: ClassVar[StepWait] = StepWait.EVENT
+
+    def sources(self) -> tuple[ValueSource, ...]:
+        return ()
+
+    def effect(self) -> StepEffect:
+        return NO_EFFECT
+
+    def after(self, number: int) -> tuple[int, ...]:
+        return (number + 1,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,6 +439,16 @@ class IllegalStep(ProgramStep):
 
     data: bytes
     opaque: bool
+    waits: ClassVar[StepWait] = StepWait.NOTHING
+
+    def sources(self) -> tuple[ValueSource, ...]:
+        return ()
+
+    def effect(self) -> StepEffect:
+        return NO_EFFECT
+
+    def after(self, number: int) -> tuple[int, ...]:
+        return (number + 1,)
 
 
 STEPS: tuple[type[ProgramStep], ...] = tuple(
@@ -215,7 +456,7 @@ STEPS: tuple[type[ProgramStep], ...] = tuple(
     for found in list(globals().values())
     if isinstance(found, type) and issubclass(found, ProgramStep) and found is not ProgramStep
 )
-"""Every class of step; each needs its code, its sources and its successors."""
+"""Every class of step; each needs its code and its record in the image."""
 
 
 BLOCK_MARKS = (ElseStep, EndIfStep, EndWhileStep)

@@ -10,7 +10,6 @@ from steptwin.wbc import steps as s
 from steptwin.wbc.code import StepCode, StraightSteps
 from steptwin.wbc.flow import flow_of
 from steptwin.wbc.registers import REAL_MAX
-from steptwin.wbc.usage import sources
 
 CellOf: TypeAlias = Callable[[s.ValueSource], int | None]
 """None for a register."""
@@ -46,7 +45,7 @@ def _entered(steps: Sequence[s.ProgramStep]) -> Collection[int]:
 def _line(step: s.ProgramStep, number: int, cell_of: CellOf) -> str | None:
     """A step in Python, whose cells are ``c``; the next one follows, unless it returns another. None for what depends on more
     than cells, or can fail."""
-    cells = [cell_of(source) for source in sources(step)]
+    cells = [cell_of(source) for source in step.sources()]
     if None in cells:
         return None
     operands = [f"c[{cell}]" for cell in cells]

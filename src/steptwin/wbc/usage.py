@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import copysign, floor, inf, log10
-from typing import Any, NamedTuple
 
 from steptwin.diagnostics import Diagnostic, Fix, Span
-from steptwin.tables import complete
 from steptwin.wbc import findings as f
 from steptwin.wbc import steps as s
 from steptwin.wbc.conditions import outcome
@@ -37,72 +35,6 @@ class Setup:
     input_interrupts: tuple[int, ...]
     homing_ends: tuple[tuple[bool, bool], ...] = ((True, True),) * 4
     most_speed_p: float = inf
-
-
-def sources(step: s.ProgramStep) -> Iterable[s.ValueSource]:
-    """Everything a step reads."""
-    return _SOURCES[type(step)](step)
-
-
-def _of_value(step: s.SetStep) -> tuple[s.ValueSource, ...]:
-    value = step.value
-    if isinstance(value, s.Operation):
-        return value.left, value.right
-    return value.arguments if isinstance(value, s.FunctionOperation) else (value,)
-
-
-def _of_condition(step: s.IfStep | s.WhileStep | s.WaitStep) -> tuple[s.ValueSource, ...]:
-    return step.condition.left, step.condition.right
-
-
-_SOURCES: Mapping[type[s.ProgramStep], Callable[[Any], tuple[s.ValueSource, ...]]] = complete(
-    "step",
-    s.STEPS,
-    "sources",
-    {
-        s.SetStep: _of_value,
-        **dict.fromkeys((s.IfStep, s.WhileStep, s.WaitStep), _of_condition),
-        s.MotionStep: lambda step: (step.value,),
-        **dict.fromkeys((s.DelayStep, s.PulseStep), lambda step: (step.seconds,)),
-        s.RowMotionStep: lambda step: (step.row,),
-        **dict.fromkeys(
-            (s.ElseStep, s.EndIfStep, s.EndWhileStep, s.JumpStep, s.ReturnStep, s.EndStep, s.ProgResetStep), lambda step: ()
-        ),
-        **dict.fromkeys((s.HaltStep, s.WaitPosStep, s.InterruptStep, s.IllegalStep), lambda step: ()),
-    },
-)
-
-
-class ActsOn(NamedTuple):
-    """What a step acts on besides the target of SET: an output or a drive, from 1."""
-
-    output: int | None = None
-    drive: int | None = None
-
-
-def _on_nothing(step: s.ProgramStep) -> ActsOn:
-    return ActsOn()
-
-
-_ACTS: Mapping[type[s.ProgramStep], Callable[[Any], ActsOn]] = complete(
-    "step",
-    s.STEPS,
-    "output or drive",
-    {
-        s.PulseStep: lambda step: ActsOn(output=step.output),
-        **dict.fromkeys((s.MotionStep, s.HaltStep), lambda step: ActsOn(drive=step.axis)),
-        **dict.fromkeys(
-            (s.SetStep, s.IfStep, s.ElseStep, s.EndIfStep, s.WhileStep, s.EndWhileStep, s.WaitStep, s.DelayStep), _on_nothing
-        ),
-        **dict.fromkeys((s.JumpStep, s.ReturnStep, s.EndStep, s.ProgResetStep, s.WaitPosStep), _on_nothing),
-        # The drives of a row are those of its values.
-        **dict.fromkeys((s.RowMotionStep, s.InterruptStep, s.IllegalStep), _on_nothing),
-    },
-)
-
-
-def acts_on(step: s.ProgramStep) -> ActsOn:
-    return _ACTS[type(step)](step)
 
 
 def endless_waits(executable: s.Executable) -> list[Diagnostic]:

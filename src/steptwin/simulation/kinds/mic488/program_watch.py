@@ -101,9 +101,9 @@ class ProgramWatch:
                 self._tell(now, "reset", "drives off, the program begins again", number)
             case s.InterruptStep():
                 self._tell(now, "interrupt", f"interrupt of {step.event.name}", number)
-            case s.WaitStep() | s.WaitPosStep():
+            case s.ProgramStep(waits=s.StepWait.CONDITION | s.StepWait.MOTION):
                 self._pending = partial(self._waits, now, number)
-            case s.DelayStep():
+            case s.ProgramStep(waits=s.StepWait.TIME):
                 self._pending = partial(self._delays, now, number)
             case s.SetStep(target=s.RegisterOperand() as register) if register.row.words:
                 read = ACCESS[register.row.key].read(register.number)
@@ -179,9 +179,10 @@ class ProgramWatch:
         """Report a changed status or motion of an axis; ``before``: its status at the last report."""
         step = self._caused(now)
         kind = None if step is None or step >= len(self.program.steps) else self.program.steps[step]
-        moves = isinstance(kind, s.MotionStep | s.HaltStep | s.RowMotionStep)
+        effect = s.NO_EFFECT if kind is None else kind.effect()
+        moves = effect.on_drives and not effect.everything
         if axis.status is not before or moves or (axis.status is AxisStatus.VELOCITY and axis.velocity_p != velocity_p):
-            caused = moves or isinstance(kind, s.SetStep | s.EndStep | s.ProgResetStep)
+            caused = effect.on_drives or isinstance(kind, s.SetStep)
             self._tell(now, "axis", _words(axis, before, now), step if caused else None)
 
     def copy_state(self) -> Plain:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Sequence
 
 from steptwin.mic488.program_registers import ACCESS
 from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementUse
-from steptwin.tables import complete
 from steptwin.wbc import steps as s
-from steptwin.wbc.usage import sources
 
 _PINS = frozenset({"OUT", "IN", "AIN"})
 _OF_AXIS = frozenset({"M", "STATM", "VACTM", "POSM", "ACCM", "DECM", "VMAXM", "LIMLM", "LIMRM", "ENC", "XENC", "CFGINT_M"})
@@ -22,10 +19,52 @@ def use_of(steps: Sequence[s.ProgramStep], number: int) -> StatementUse:
     if number >= len(steps):
         return StatementUse()
     step = steps[number]
-    use = _USES[type(step)](step, number)
-    if type(step) is s.InterruptStep:
-        use = use._replace(governs=range(number + 1, _return_after(steps, number) + 1))
-    return use._replace(reads=(*use.reads, *_operands(sources(step))))
+    writes, keeps = _set_by(step) if isinstance(step, s.SetStep) else (tuple(_acted_on(step.effect())), False)
+    return StatementUse(
+        (*_awaited(step), *_operands(step.sources())),
+        writes,
+        waits=step.waits is not s.StepWait.NOTHING,
+        governs=_governed(steps, number),
+        is_loop=isinstance(step, s.WhileStep | s.EndWhileStep),
+        jumps=step.target if isinstance(step, s.JumpStep) else None,
+        keeps=keeps,
+    )
+
+
+def _acted_on(effect: s.StepEffect) -> Iterable[Resource]:
+    if effect.output is not None:
+        yield Resource(ResourceKind.PIN, f"OUT{effect.output}")
+    if effect.drive is not None:
+        yield Resource(ResourceKind.AXIS, str(effect.drive))
+    if effect.any_drive or effect.everything:
+        yield _ANY_AXIS
+    if effect.everything:
+        yield _ANY_PIN
+
+
+def _awaited(step: s.ProgramStep) -> Iterable[Resource]:
+    """What decides besides the operands."""
+    match step:
+        case s.InterruptStep(event=event) if event.input:
+            return (Resource(ResourceKind.PIN, f"IN{event.input}"),)
+        case s.InterruptStep(event=event):
+            return (Resource(ResourceKind.AXIS, str(event.axis)),) if event.axis else ()
+        case s.EndWhileStep(condition=condition):
+            return _operands((condition.left, condition.right))
+    return (_ANY_AXIS,) if step.waits is s.StepWait.MOTION else ()
+
+
+def _governed(steps: Sequence[s.ProgramStep], number: int) -> range:
+    match steps[number]:
+        case s.IfStep(close=close) | s.WhileStep(close=close):
+            return range(number + 1, close)
+        case s.EndWhileStep(open=begin):
+            return range(begin + 1, number)
+        case s.InterruptStep():
+            return range(number + 1, _return_after(steps, number) + 1)
+        case step:
+            # A branch without a rule here decides about all that comes after it.
+            return range(number + 1, len(steps)) if len(step.after(number)) > 1 else range(0)
 
 
 def _return_after(steps: Sequence[s.ProgramStep], number: int) -> int:
@@ -33,54 +72,13 @@ def _return_after(steps: Sequence[s.ProgramStep], number: int) -> int:
     return next((later for later in range(number, len(steps)) if type(steps[later]) is s.ReturnStep), len(steps))
 
 
-def _interrupt(step: s.InterruptStep, number: int) -> StatementUse:
-    event = step.event
-    if event.input:
-        return StatementUse((Resource(ResourceKind.PIN, f"IN{event.input}"),), waits=True)
-    return StatementUse((Resource(ResourceKind.AXIS, str(event.axis)),) if event.axis else (), waits=True)
-
-
-def _end_of_while(step: s.EndWhileStep, number: int) -> StatementUse:
-    reads = tuple(_operands((step.condition.left, step.condition.right)))
-    return StatementUse(reads, governs=range(step.open + 1, number), is_loop=True)
-
-
-def _sets(step: s.SetStep, number: int) -> StatementUse:
+def _set_by(step: s.SetStep) -> tuple[tuple[Resource, ...], bool]:
+    """What SET changes, and whether that is only kept."""
     (target,) = _operands((step.target,))
     if isinstance(step.target, s.Variable) or not ACCESS[step.target.row.key].quiet:
-        return StatementUse(writes=(target,))
+        return (target,), False
     register = Resource(ResourceKind.VALUE, step.target.name)
-    return StatementUse(writes=(target,) if target == register else (target, register), keeps=True)
-
-
-def _of_axis(step: s.MotionStep | s.HaltStep, number: int) -> StatementUse:
-    return StatementUse(writes=(Resource(ResourceKind.AXIS, str(step.axis)),))
-
-
-def _nothing(step: s.ProgramStep, number: int) -> StatementUse:
-    return StatementUse()
-
-
-_USES: Mapping[type[s.ProgramStep], Callable[[Any, int], StatementUse]] = complete(
-    "step",
-    s.STEPS,
-    "use",
-    {
-        s.SetStep: _sets,
-        s.PulseStep: lambda step, number: StatementUse(writes=(Resource(ResourceKind.PIN, f"OUT{step.output}"),)),
-        **dict.fromkeys((s.MotionStep, s.HaltStep), _of_axis),
-        s.RowMotionStep: lambda step, number: StatementUse(writes=(_ANY_AXIS,)),
-        s.IfStep: lambda step, number: StatementUse(governs=range(number + 1, step.close)),
-        s.WhileStep: lambda step, number: StatementUse(governs=range(number + 1, step.close), is_loop=True),
-        s.EndWhileStep: _end_of_while,
-        **dict.fromkeys((s.WaitStep, s.DelayStep), lambda step, number: StatementUse(waits=True)),
-        s.WaitPosStep: lambda step, number: StatementUse((_ANY_AXIS,), waits=True),
-        s.InterruptStep: _interrupt,
-        s.JumpStep: lambda step, number: StatementUse(jumps=step.target),
-        **dict.fromkeys((s.EndStep, s.ProgResetStep), lambda step, number: StatementUse(writes=(_ANY_AXIS, _ANY_PIN))),
-        **dict.fromkeys((s.ElseStep, s.EndIfStep, s.ReturnStep, s.IllegalStep), _nothing),
-    },
-)
+    return (target,) if target == register else (target, register), True
 
 
 def _operands(values: Iterable[s.ValueSource]) -> Iterable[Resource]:
