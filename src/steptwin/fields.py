@@ -10,10 +10,12 @@ Moments and durations are whole nanoseconds as decimal text, which every JSON re
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from inspect import Parameter, signature
 from math import inf
+from operator import attrgetter
 from types import NoneType
 from typing import Annotated, Any, TypeAlias, get_args, get_origin, get_type_hints
 
@@ -137,15 +139,15 @@ WRONG_FIELD = Message("fields.wrong-field", "{place}: {name}: {problem}")
 
 def read_fields(place: str, fields: tuple[Field, ...], given: Mapping[str, object]) -> dict[str, Any]:
     """The values that are given, by attribute. Raises `Misuse` for unknown, missing and wrong fields, with ``place``."""
-    known = [field.name for field in fields]
+    known = list(map(attrgetter("name"), fields))
     for name in given:
         if name not in known:
             hint = NearMiss().hint(name, known)
-            raise Misuse(UNKNOWN_FIELD(place=place, name=shown(name), hint=hint, names=list(known) or NONE()))
+            raise Misuse(UNKNOWN_FIELD(place=place, name=shown(name), hint=hint, names=known or NONE()))
     values: dict[str, Any] = {}
     for field in fields:
         value = given.get(field.name)
-        if value is None and field.is_required:
+        if value is None and field.default is MISSING:
             raise Misuse(FIELD_IS_MISSING(place=place, name=field.name, what=field.form.what, meaning=field.meaning))
         if value is None and (field.name not in given or field.default is None):
             continue
@@ -166,6 +168,7 @@ def wrong(value: object, form: str) -> Misuse:
 # ---------------------------------------------------------------------- forms
 
 
+_NUL_OR_SURROGATE, _SURROGATE = re.compile("[\0\ud800-\udfff]"), re.compile("[\ud800-\udfff]")
 TEXT_TOO_LONG = Message("fields.text-too-long", "a text of {count} characters: permitted are at most {most}")
 TEXT_HAS_NUL_OR_SURROGATES = Message("fields.text-has-nul-or-surrogates", "{value}: a text takes neither NUL nor surrogates")
 
@@ -174,7 +177,7 @@ def check_text(value: str) -> str:
     """Raises `Misuse` for a text that is too long, or has characters which no file name and no line takes."""
     if len(value) > LONGEST_TEXT:
         raise Misuse(TEXT_TOO_LONG(count=len(value), most=LONGEST_TEXT))
-    if any(c == "\0" or "\ud800" <= c <= "\udfff" for c in value):
+    if _NUL_OR_SURROGATE.search(value):
         raise Misuse(TEXT_HAS_NUL_OR_SURROGATES(value=shown(value)))
     return value
 
@@ -201,7 +204,7 @@ def _program(value: Any) -> str:
         raise wrong(value, PROGRAM.what)
     if len(value) > LONGEST_PROGRAM:
         raise Misuse(TEXT_TOO_LONG(count=len(value), most=LONGEST_PROGRAM))
-    if any("\ud800" <= c <= "\udfff" for c in value):
+    if _SURROGATE.search(value):
         raise Misuse(TEXT_HAS_SURROGATES())
     return value
 

@@ -298,17 +298,23 @@ class Axis(Stateful):
 
     def move_to(self, coordinate_p: int, now: Nanos) -> None:
         """Position mode to ``coordinate_p``: ACC up, DEC down, VMAX cruise; stops on a soft limit (MIC-12)."""
-        self.move_by(coordinate_p - self.coordinate_p(now), now)
+        if self.ready("position command", now):
+            state = self.state(now)
+            self._move(state, coordinate_p - self.offset_p)
 
     def move_by(self, distance_p: int, now: Nanos) -> None:
-        if not self.ready("position command", now):
-            return
+        if self.ready("position command", now):
+            state = self.state(now)
+            self._move(state, state.count + distance_p)
+
+    def _move(self, state: MotionState, target_p: int) -> None:
+        """Position mode to the motor position ``target_p``."""
         self._forget()
-        self.target_p = self.profile.count(now) + distance_p
-        self.speed_p = self._clamped(self.vmax_p, now)
+        self.target_p = target_p
+        self.speed_p = self._clamped(self.vmax_p, state.now)
         self._take_ramps()
-        self._go(now)
-        self.control.watch(self, now)
+        self._go(state)
+        self.control.watch(self, state.now)
 
     def move_velocity(self, velocity_p: float, now: Nanos) -> None:
         """Velocity mode: ACC for speeding up and slowing down; ramped to 0 it ends with status 1 (MIC-11)."""
@@ -390,7 +396,7 @@ class Axis(Stateful):
         self.target_p = count + min(max(target_p - count, -STRIDE_P), STRIDE_P)
         self.speed_p = self.cruise_p
         self._take_ramps()
-        self._go(now)
+        self._go(self.state(now))
 
     def creep(self, distance_p: int, now: Nanos) -> None:
         """A step of the correction of the position. Soft limits do not apply, since its target is within them."""
@@ -425,7 +431,7 @@ class Axis(Stateful):
         if self.path is not None:
             self.host.path_limited(now)
         elif self.status is AxisStatus.POSITION:
-            self._go(now)
+            self._go(self.state(now))
         elif self.status in (AxisStatus.VELOCITY, AxisStatus.HOMING):
             self._steer(self.status, now)
 
@@ -448,9 +454,8 @@ class Axis(Stateful):
             profile = self._to_edge(state, edge, direction, ramp_p, abs(velocity_p))
             self._begin(profile, status, LIMIT[direction])
 
-    def _go(self, now: Nanos) -> None:
+    def _go(self, state: MotionState) -> None:
         """Position mode to ``target_p``, at most to the soft limit on the way."""
-        state = self.state(now)
         dec_p = self._braking(state, self.fall_p)
         target, velocity = self.target_p, state.velocity
         rest = _rest_p(state, dec_p)

@@ -315,11 +315,12 @@ class ProgramControl(Stateful):
 
     def disturbed(self, now: Nanos, *, inside: bool) -> None:
         """An event at ``now`` that the program did not cause; ``inside``: before its statement of this moment."""
+        if self.state is STOPPED and not self.together:
+            return
         first = now if inside else self.interpreter.after(now)
         if self.state is RUNNING:
             self.interpreter.disturb(first)
-        if self.together or self.state is not STOPPED:
-            self._check_drives(now, first)
+        self._check_drives(now, first)
 
     def _check_drives(self, now: Nanos, first: Nanos) -> None:
         axes = self.device.axes

@@ -176,16 +176,19 @@ def encoded_words(item: RegisterItem, value: RegisterValue, data_type: DataType,
     """The words of ``value`` in a holding register, as of `encoded`. Raises `Misuse` for a value that it does not take."""
     register = item.register
     kind = _kind(item, data_type)
-    shown = f"{item.name} = {value:g} {register.unit(data_type, unit)}".rstrip()
+    wrong = ""
     if kind is not Type.REAL and not (isfinite(value) and value == int(value)):
-        raise Misuse(f"{shown}: a whole number is needed")
-    if register.type is Type.MEMORY:
+        wrong = "a whole number is needed"
+    elif register.type is Type.MEMORY:
         if item.view is UserFormat.INT and -0x8000 <= value <= 0x7FFF:
             return (int(value) & 0xFFFF,)
         if item.view in (UserFormat.INT, UserFormat.WORD) and (item.view is UserFormat.INT or not 0 <= value <= 0xFFFF):
-            raise Misuse(f"{shown}: permitted {item.view.range}")
-    elif not register.permits(value):
-        raise Misuse(f"{shown}: permitted {register.permitted} {register.unit(data_type, unit)}".rstrip())
+            wrong = f"permitted {item.view.range}"
+    elif value not in register.permitted:
+        wrong = f"permitted {register.permitted} {register.unit(data_type, unit)}".rstrip()
+    if wrong:
+        shown = f"{item.name} = {value:g} {register.unit(data_type, unit)}".rstrip()
+        raise Misuse(f"{shown}: {wrong}")
     if kind is Type.REAL:
         return real_to_words(value)
     return dint_to_words(int(value)) if kind is Type.DINT else (int(value),)

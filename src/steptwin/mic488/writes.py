@@ -149,16 +149,16 @@ class _ControlPlan:
 
 def _check(register: Register, data_type: DataType) -> WriteCheck:
     """The check of a written value (MIC-7), which returns the stored value."""
-    permits = register.permits
+    permitted = register.permitted
     if register.type is not Type.VALUE:
-        return lambda device, value: value if permits(value) else None
+        return lambda device, value: value if value in permitted else None
     number = (register.axis or 1) - 1
     held = _position_p if register.kind is QuantityKind.POSITION else _rate_p if register.permitted.above else _velocity_p
     if data_type is DataType.DINT:
-        return lambda device, value: held(value) if permits(value) else None
+        return lambda device, value: held(value) if value in permitted else None
     if register.key in ("POSLIM_L", "POSLIM_R"):
         held = _limit_of_real_p
-    return lambda device, value: held(value * device.axes[number].gear) if permits(value) else None
+    return lambda device, value: held(value * device.axes[number].gear) if value in permitted else None
 
 
 def _position_p(pulses: float) -> int | None:

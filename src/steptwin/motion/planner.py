@@ -29,10 +29,7 @@ class MotionState(NamedTuple):
 
     @classmethod
     def of(cls, profile: Profile, now: Nanos) -> MotionState:
-        if not profile.moving(now):
-            rests = profile.counts[-1]
-            return cls(now, profile.base + rests, profile.final_p - rests, 0.0)
-        return cls(now, profile.count(now), profile.phase(now), profile.velocity(now))
+        return cls(now, *profile.state(now))
 
 
 def plan_position(state: MotionState, target: float, acc: float, dec: float, vmax: float) -> Profile:

@@ -203,13 +203,19 @@ class Profile:
             return int(first)
         return n if n < self.ends[index] else int(self.ends[index])
 
-    def phase(self, now: Nanos) -> float:
-        """Real position minus counted position at ``now``, strictly between −1 and +1 but for rounding errors."""
+    def state(self, now: Nanos) -> tuple[int, float, float]:
+        """Counted position, phase and velocity (pulses/s) at ``now``. The phase is the real position minus the counted one,
+        strictly between −1 and +1 but for rounding errors."""
         n = now - self.start
-        for i, end in enumerate(self.ends):
+        for s, end in zip(self.segments, self.ends, strict=True):
             if n < end:
-                return self.segments[i].position(n / 1e9) - (self.count(now) - self.base)
-        return self.final_p - self.counts[-1]
+                count, t_s = self.count(now), n / 1e9
+                return count, s.position(t_s) - (count - self.base), s.velocity(t_s)
+        rests = self.counts[-1]
+        return self.base + rests, self.final_p - rests, 0.0
+
+    def phase(self, now: Nanos) -> float:
+        return self.state(now)[1]
 
     def legs(self, now: Nanos) -> Iterator[tuple[Nanos, int]]:
         """(moment, direction) of the segment in progress at ``now``, then of each later one as it begins."""

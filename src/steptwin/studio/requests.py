@@ -352,10 +352,12 @@ OF_CONNECTION = frozenset({"follow", "unfollow", *(one.name for one in REQUESTS.
 UNKNOWN_REQUEST = Message("studio.unknown-request", "no request {name}{hint}; requests are {names}")
 
 
-def check_name(name: str) -> None:
+def request_called(name: str) -> RequestType:
     """Raises `Misuse` for what is no request."""
-    if name not in ALL:
+    found = ALL.get(name)
+    if found is None:
         raise Misuse(UNKNOWN_REQUEST(name=shown(name), hint=NearMiss().hint(name, ALL), names=list(ALL)))
+    return found
 
 
 def permit_of(name: str) -> Permit:

@@ -34,11 +34,11 @@ from steptwin.studio.hub import Hub
 from steptwin.studio.looking import OF_A_MOMENT, Looking
 from steptwin.studio.messages import VERSION
 from steptwin.studio.programs import ProgramTexts
-from steptwin.studio.requests import IN_THE_PAST, OF_CONNECTION, REQUESTS, WITH_TOKEN, check_name, permit_of
+from steptwin.studio.requests import IN_THE_PAST, OF_CONNECTION, REQUESTS, WITH_TOKEN, permit_of, request_called
 from steptwin.studio.streams import Batch, StreamPosition
 from steptwin.studio.watches import Watched
 from steptwin.subject import commands as command
-from steptwin.subject.commands import Command, read_command
+from steptwin.subject.commands import Command
 from steptwin.subject.contract import Result
 from steptwin.subject.dispatch import LONGEST_REQUEST, JsonObject, answer, code_of, failure, fields_of, id_of, read_message
 from steptwin.subject.following import Filter, filter_of
@@ -63,11 +63,11 @@ MOST_LEFT_OVER = 4
 
 
 class Wanted(NamedTuple):
-    """A parsed request. ``act`` executes it and takes the id of the message."""
+    """A parsed request."""
 
     name: str
     fields: Mapping[str, object]
-    act: Callable[[Identity], Awaitable[Result]]
+    request: ask.StudioRequest | Command
 
 
 TOO_MANY_REQUESTS = Message("studio.too-many-requests", "too many requests: permitted are {rate:g} a second")
@@ -173,21 +173,17 @@ class ViewerSession:
         name = str(message["do"])
         if not (self._stops if name in STOPS else self._limit).allows(self._now):
             raise Refusal(TOO_MANY_REQUESTS(rate=RATE))
-        check_name(name)
+        kind = request_called(name)
         fields = fields_of(message)
-        row = REQUESTS.get(name)
-        if row is not None:
-            request = row.read(fields)
-            return Wanted(name, fields, lambda _: self._asked(request))
-        wanted = read_command(name, fields)
-        return Wanted(name, fields, lambda identity: self._command(wanted, identity))
+        return Wanted(name, fields, kind.read(fields))
 
-    async def _asked(self, request: ask.StudioRequest) -> Result:
-        value = self._ACTIONS[type(request)](self, request)
-        return self._hub.subject.result_of(await value if isawaitable(value) else value)
-
-    async def _command(self, wanted: Command, identity: Identity) -> Result:
-        if self._looking.is_back and type(wanted) in OF_A_MOMENT:
+    async def _act(self, wanted: Any, identity: Identity) -> Result:
+        """Execute a request, or a command of the subject."""
+        own = self._ACTIONS.get(type(wanted))
+        if own is not None:
+            value = own(self, wanted)
+            return self._hub.subject.result_of(await value if isawaitable(value) else value)
+        if type(wanted) in OF_A_MOMENT and self._looking.is_back:
             return await self._looking.do(wanted)
         action = self._of_subject.get(type(wanted))
         return await (self._hub.subject.do(wanted) if action is None else action(wanted, identity))
@@ -210,7 +206,7 @@ class ViewerSession:
             raise Refusal(HELLO_IS_FIRST_REQUEST(request=name))
         if self.is_refused and name not in STOPS:
             self._hub.around.gate.enter(None)
-        if name in self.with_token:
+        if name in WITH_TOKEN and name in self.with_token:
             raise Refusal(NEEDS_A_TOKEN(request=name))
         if self.is_rest and name in OF_CONNECTION:
             raise Refusal(ABOUT_A_CONNECTION(request=name))
@@ -231,7 +227,7 @@ class ViewerSession:
         if takes:
             hub.control.take(self.viewer, over=False)  # so that no other viewer acts while a device is asked
         try:
-            result = await wanted.act(identity)
+            result = await self._act(wanted.request, identity)
         except Exception:
             if takes:
                 hub.control.release(self.viewer)

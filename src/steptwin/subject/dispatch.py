@@ -43,7 +43,9 @@ class Dispatcher:
 
     def do(self, command: Command) -> Result:
         """Execute a command. Raises `Misuse`, `Refusal`, `LineFailure`."""
-        action = self._action(command)
+        action = self._actions.get(type(command))
+        if action is None:
+            raise self._unsupported(command)
         number = self._begin()
         try:
             value = action(command)
@@ -53,13 +55,13 @@ class Dispatcher:
 
     def look(self, command: Command) -> object:
         """The answer to a command from which nothing follows. Raises as `do`."""
-        return self._action(command)(command)
-
-    def _action(self, command: Command) -> Action:
         action = self._actions.get(type(command))
         if action is None:
-            raise Refusal(COMMAND_NOT_SUPPORTED(command=type_of(command).name, names=list(self.names)))
-        return action
+            raise self._unsupported(command)
+        return action(command)
+
+    def _unsupported(self, command: Command) -> Refusal:
+        return Refusal(COMMAND_NOT_SUPPORTED(command=type_of(command).name, names=list(self.names)))
 
 
 # ---------------------------------------------------------------------- messages
@@ -101,7 +103,10 @@ def fields_of(message: Mapping[str, object]) -> dict[str, object]:
     version = message.get("version", VERSION)
     if version != VERSION or isinstance(version, bool):
         raise Misuse(OTHER_VERSION(version=shown(version), own=VERSION))
-    return {name: value for name, value in message.items() if name not in ("do", "id", "version")}
+    fields = dict(message)
+    for name in ("do", "id", "version"):
+        fields.pop(name, None)
+    return fields
 
 
 def answer(result: Result) -> JsonObject:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import count
 from typing import Any
 
 from steptwin.machine import SECOND, Nanos
@@ -219,22 +220,23 @@ class Numbering:
     ``line_of`` gives the line of a machine: what arrives there can be the cause of what its machines do.
     """
 
-    __slots__ = ("_command", "_last", "_line_of", "_next")
+    __slots__ = ("_command", "_last", "_line_of", "_numbers")
 
     def __init__(self, line_of: Mapping[str, str]) -> None:
-        self._next = 1
+        self._numbers = count(1)
         self._command: tuple[Nanos, int] | None = None
         self._last: dict[str, tuple[Nanos, int]] = {}
         self._line_of = line_of
 
     def command(self, now: Nanos) -> int:
         """The number of a command that is done now: the cause of what follows at this moment, until `done`."""
-        self._command = now, self._take()
-        return self._command[1]
+        number = next(self._numbers)
+        self._command = now, number
+        return number
 
     def look(self) -> int:
         """The number of a command from which nothing follows."""
-        return self._take()
+        return next(self._numbers)
 
     def done(self) -> None:
         self._command = None
@@ -246,16 +248,11 @@ class Numbering:
             self._command = now, self._command[1]
 
     def event(self, time: Nanos, machine: str, payload: Payload) -> Event:
-        number = self._take()
+        number = next(self._numbers)
         event = Event(number, time, machine, payload, self._cause(time, machine))
         if isinstance(payload, _CAUSES) or (isinstance(payload, FramePayload) and payload.direction == "in"):
             self._last[machine] = time, number
         return event
-
-    def _take(self) -> int:
-        number = self._next
-        self._next += 1
-        return number
 
     def _cause(self, time: Nanos, machine: str) -> int | None:
         cause = 0

@@ -154,7 +154,7 @@ class WorldSubject:
         self._apply_input(step)
         world = self.world
         for name, values in world.by_machine(step):
-            for pdu in world.requests(name, world.registers(name), values):
+            for pdu in world.requests(name, values):
                 self._publish_stops(name, pdu)
 
     def _publish_stops(self, name: str, pdu: bytes) -> None:

@@ -187,16 +187,20 @@ def _within(what: str, value: int, least: int, most: int) -> int:
 
 
 def _check_span(address: int, count: int, most: int, what: str) -> None:
-    _within("address", address, 0, 0xFFFF)
-    _within(f"number of {what}", count, 1, most)
+    if not (0 <= address <= 0xFFFF and 1 <= count <= most):
+        _within("address", address, 0, 0xFFFF)
+        _within(f"number of {what}", count, 1, most)
     if address + count > 0x10000:
         raise Misuse(f"{count} {what} from address {address} end above 65535")
 
 
 def _register_bytes(values: Sequence[int]) -> bytes:
-    for value in values:
-        _within("register value", value, 0, 0xFFFF)
-    return struct.pack(f">{len(values)}H", *values)
+    try:
+        return struct.pack(f">{len(values)}H", *values)
+    except struct.error:
+        for value in values:
+            _within("register value", value, 0, 0xFFFF)
+        raise
 
 
 def encode_request(request: ModbusRequest) -> bytes:

@@ -70,8 +70,8 @@ class ToyLine(Line):
         return ToyPort(self._toy)
 
     def exchange(self, place: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
-        self._report(now, place, FrameDirection.IN, data)
+        self._report(place, now, FrameDirection.IN, data)
         answer = super().exchange(place, found, data, now)
         if answer:
-            self._report(now, place, FrameDirection.OUT, answer)
+            self._report(place, now, FrameDirection.OUT, answer)
         return answer

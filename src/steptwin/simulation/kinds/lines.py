@@ -304,6 +304,8 @@ class Line(Stateful, ABC):
                 self._busy.pop(name, None)
 
     def deadline(self) -> Nanos | None:
+        if not self._busy:
+            return None
         dues = [due for place in self._busy.values() if (due := place.port.deadline()) is not None]
         return min(dues, default=None)
 
@@ -311,7 +313,7 @@ class Line(Stateful, ABC):
         """Record no frames from now on."""
         self._record = None
 
-    def _report(self, now: Nanos, place: str, direction: FrameDirection, data: bytes) -> None:
+    def _report(self, place: str, now: Nanos, direction: FrameDirection, data: bytes) -> None:
         if self._record is not None:
             self._record(TraceRecord(now, self.name, "frame", f"{place}/{direction.value}", data))
         for follower in self._followers:

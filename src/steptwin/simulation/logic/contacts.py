@@ -235,11 +235,7 @@ class Button(Contact):
     def pressed(self) -> bool:
         return self.closed is not self.normally_closed
 
-    def update(self, now: Nanos) -> None:
-        self.bounce(now)
-
-    def deadline(self) -> Nanos | None:
-        return self.bounce_due()
+    update, deadline = Contact.bounce, Contact.bounce_due
 
 
 class Switch(Contact):

@@ -103,16 +103,15 @@ def _move_button(model: Model, scripts: Scripts, name: str, *, pressed: bool) ->
 def _write(model: Model, scripts: Scripts, step: do.Write) -> None:
     parts, now = model.parts, model.now
     for name, values in model.by_machine(step):
-        registers = model.registers(name)
         kernel = model.touch(name)  # as `_now` does: every write of every script comes here
         machine, on = parts.machines[name], parts.line_of.get(name)
-        for pdu in model.requests(name, registers, values):
+        for pdu in model.requests(name, values):
             if on is not None:
                 line, unit = on
                 line.master.ask(encode_frame(unit, pdu), ANSWER_NS, now)
             else:
                 _record(model, name, "request", pdu)
-                registers.execute(machine, pdu, now)
+                model.registers(name).execute(machine, pdu, now)
         kernel.mark(name if on is None else on[0].name)
         kernel.settle()
 

@@ -5,7 +5,7 @@ Steps, checks and texts of programs need no more of a world. `steptwin.simulatio
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from itertools import groupby
 from operator import itemgetter
@@ -149,7 +149,7 @@ class Model:
 
     def machine(self, name: str) -> MotionController:
         """The machine called ``name``. Raises `Misuse` with the existing ones."""
-        machine = self.machines.get(name)
+        machine = self.parts.machines.get(name)
         if machine is None:
             raise self.unknown("machine", name, self.machines)
         return machine
@@ -190,14 +190,16 @@ class Model:
         return kind.vision
 
     @staticmethod
-    def by_machine(step: do.Write) -> Iterator[tuple[str, NewValues]]:
+    def by_machine(step: do.Write) -> list[tuple[str, NewValues]]:
         """The values that a step writes, grouped by machine."""
+        groups: list[tuple[str, NewValues]] = []
         for name, group in groupby(step.values, key=itemgetter(0)):
-            yield name, tuple([(register, value) for _, register, value in group])
+            groups.append((name, tuple(map(itemgetter(1, 2), group))))
+        return groups
 
-    def requests(self, name: str, registers: NamedRegisters[Any], values: NewValues) -> tuple[bytes, ...]:
+    def requests(self, name: str, values: NewValues) -> tuple[bytes, ...]:
         """The PDUs that write ``values`` to `registers` of a machine. Raises `Misuse` for values that one does not accept."""
-        machine = self.parts.machines[name]
+        registers, machine = self.registers(name), self.parts.machines[name]
         key = (self.parts.kind_of[name].name, registers.dialect(machine), values)
         found = self._encoded.get(key)
         if found is None:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, overload
+from typing import Any, TypeAlias, overload
 
 from steptwin.errors import Misuse
 from steptwin.simulation.kinds.kind import AnyKind, MotionEnds, lacks
 from steptwin.simulation.script.control import ControllerCommand, Halt, Home, Move, Seek
 from steptwin.simulation.script.steps import Step
 from steptwin.simulation.world.model import Model
+
+Maker: TypeAlias = Callable[[Any, str | None, Any], Step | Halt]
+"""The step for a command, of a machine and the name of its line."""
 
 
 @overload
@@ -23,17 +26,13 @@ def ordered(model: Model, command: ControllerCommand | Seek) -> Step | Halt:
     """
     name = command.machine
     kind, machine = model.kind(name), model.machine(name)
-    make = _maker(kind, command)
+    make: Maker | None = kind.seek if isinstance(command, Seek) else kind.control.get(type(command))
     if make is None:
         raise _lacks(name, kind, command)
     model.touch(name)
     machine.advance(model.now)
     on = model.parts.line_of.get(name)
     return make(machine, None if on is None else on[0].name, command)
-
-
-def _maker(kind: AnyKind, command: ControllerCommand | Seek) -> Callable[[Any, str | None, Any], Step | Halt] | None:
-    return kind.seek if isinstance(command, Seek) else kind.control.get(type(command))
 
 
 def _lacks(name: str, kind: AnyKind, command: ControllerCommand | Seek) -> Misuse:

@@ -129,7 +129,7 @@ def _button(model: Model, step: do.Press | do.Release) -> None:
 
 def _write(model: Model, step: do.Write) -> None:
     for name, values in model.by_machine(step):
-        model.requests(name, model.registers(name), values)
+        model.requests(name, values)
 
 
 def _request(model: Model, step: do.Request) -> None:

@@ -54,7 +54,7 @@ class ChipLine(Line):
 
     def exchange(self, place: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
         if data:
-            self._report(now, place, FrameDirection.IN, data)
+            self._report(place, now, FrameDirection.IN, data)
             self._commands += data.count(b"\r")
         return super().exchange(place, found, data, now)
 
@@ -69,7 +69,7 @@ class ChipLine(Line):
     def _came(self, place: str, found: LineEndPoint, pieces: list[tuple[Nanos, bytes]]) -> None:
         if place == SCRIPTS:  # output is recorded here; scripts do not read it
             for moment, data in pieces:
-                self._report(moment, "chips", FrameDirection.OUT, data)
+                self._report("chips", moment, FrameDirection.OUT, data)
         else:
             super()._came(place, found, pieces)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from operator import itemgetter
 from typing import ClassVar
 
 from steptwin.errors import Misuse
@@ -23,7 +24,7 @@ from steptwin.wire.gateway import ModbusGateway, ScriptPort, TcpGatewayPort
 from steptwin.wire.line import SerialLine
 from steptwin.wire.pdu import READS
 from steptwin.wire.rtu import BROADCAST, BURSTY_GAP_NS, UART_GAP_NS
-from steptwin.wire.slave import FrameDirection, FrameObserver, RtuSlavePort, SlaveDevice, SlavePort, TcpSlavePort
+from steptwin.wire.slave import FrameObserver, RtuSlavePort, SlaveDevice, SlavePort, TcpSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 
 SILENT_CHARACTERS = 4
@@ -66,7 +67,7 @@ class ModbusBus(Line):
         if timing is not None:
             units = TimedUnits(devices, timing)
             self._timed = units, ModbusGateway(units)
-        self._master = Master(self._ask, 0 if timing is None else timing.line.duration(SILENT_CHARACTERS))
+        self._master = Master(partial(self.receive, SCRIPTS), 0 if timing is None else timing.line.duration(SILENT_CHARACTERS))
 
     @property
     def master(self) -> Master:
@@ -83,13 +84,6 @@ class ModbusBus(Line):
             if place.framed is not None:
                 place.framed.on_write = None if observer is None else partial(observer, name)
 
-    def connect(self, place: str, kind: str | None = None) -> LineEndPoint:
-        is_new = place not in self.places
-        found = super().connect(place, kind)
-        if is_new and self._on_write is not None and found.framed is not None:
-            found.framed.on_write = partial(self._on_write, place)
-        return found
-
     def is_idle_read(self, place: LineEndPoint, data: bytes) -> bool:
         # With timing a request takes the line and the controller; faults count requests.
         is_free = self._timed is None and not self._faults.interfere and place.framed is place.inner
@@ -100,12 +94,9 @@ class ModbusBus(Line):
             self.leave(SCRIPTS)  # what is on its way there is lost with the connection
         self._master.update(now)  # requests for others go on
 
-    def _ask(self, frame: bytes, now: Nanos) -> None:
-        self.receive(SCRIPTS, frame, now)
-
     def _came(self, place: str, found: LineEndPoint, pieces: list[tuple[Nanos, bytes]]) -> None:
         if place == SCRIPTS:
-            self._master.answered(b"".join(data for _, data in pieces), pieces[-1][0])
+            self._master.answered(b"".join(map(itemgetter(1), pieces)), pieces[-1][0])
         else:
             super()._came(place, found, pieces)
 
@@ -122,12 +113,17 @@ class ModbusBus(Line):
         return tuple(self.devices)
 
     def _observer(self, place: str) -> FrameObserver | None:
-        def report(now: Nanos, direction: FrameDirection, data: bytes) -> None:
-            self._report(now, place, direction, data)
-
-        return report if self._is_followed else None
+        return partial(self._report, place) if self._is_followed else None
 
     def _port(self, place: str, kind: str) -> Port:
+        port = self._slave_port(place, kind)
+        if self._on_write is not None:
+            port.on_write = partial(self._on_write, place)
+        if self._seeing is not None and place != SCRIPTS and isinstance(port, RtuSlavePort | TimedRtuSlavePort):
+            return Com1Port(self._seeing, port)
+        return port
+
+    def _slave_port(self, place: str, kind: str) -> RtuSlavePort | TimedRtuSlavePort | TcpSlavePort | TcpGatewayPort | ScriptPort:
         observe = self._observer(place)
         if self._timed is None and kind == "tcp":
             return TcpSlavePort(self._served, on_frame=observe)
@@ -138,14 +134,11 @@ class ModbusBus(Line):
         usual = UART_GAP_NS if kind == "serial" else BURSTY_GAP_NS
         gap = usual if self._gap is None else self._gap
         on_pause = pause_observer(self.devices)
-        port: RtuSlavePort | TimedRtuSlavePort
         if self._timed is not None:
-            port = TimedRtuSlavePort(self._timed[0], gap_ns=gap, on_frame=observe, on_pause=on_pause)
-        else:
-            devices = self.devices if place == SCRIPTS else self._served
-            wire = SerialLine(self._baud) if kind == "serial" else None
-            port = RtuSlavePort(devices, gap_ns=gap, line=wire, on_frame=observe, on_pause=on_pause)
-        return port if self._seeing is None or place == SCRIPTS else Com1Port(self._seeing, port)
+            return TimedRtuSlavePort(self._timed[0], gap_ns=gap, on_frame=observe, on_pause=on_pause)
+        devices = self.devices if place == SCRIPTS else self._served
+        wire = SerialLine(self._baud) if kind == "serial" else None
+        return RtuSlavePort(devices, gap_ns=gap, line=wire, on_frame=observe, on_pause=on_pause)
 
     @property
     def baud(self) -> int:
