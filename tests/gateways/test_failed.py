@@ -100,7 +100,7 @@ def test_an_error_in_the_reading_of_a_device_ends_what_is_published(monkeypatch:
     subject.silent.add("table")
 
     async def scene() -> None:
-        sampler = Sampler(subject, {})
+        sampler = Sampler(subject.samples, {})
         sampler.watch(["table"])
 
         async def sample() -> None:

@@ -30,7 +30,7 @@ REGISTERS = ["USER_REGISTER[5]", "M1_VMAX", "M1_POS_ABS"]
 
 def values(world: GatewayWorld, machine: str, registers: list[str] | None = None) -> dict[str, PointValue]:
     part = next(part for part in world.description.machines if part.name == machine)
-    sample = asyncio.run(Sampler(world, {machine: registers or []}).take(machine))
+    sample = asyncio.run(Sampler(world.samples, {machine: registers or []}).take(machine))
     assert sample.state is not None
     return {point.name: point.read(sample.state) for point in points_of(part, world.description, registers or [])}
 
@@ -63,7 +63,7 @@ def test_the_points_of_a_group_are_read_at_once(machine: str, registers: list[st
     world.inner.do(command.Move("table", 1, to=40.0))
     world.inner.do(command.Advance(duration=600_000_000))
     part = next(part for part in world.description.machines if part.name == machine)
-    state = asyncio.run(Sampler(world, {machine: registers}).take(machine)).state
+    state = asyncio.run(Sampler(world.samples, {machine: registers}).take(machine)).state
     assert state is not None
     groups: dict[str, list[GatewayPoint]] = {}
     for point in points_of(part, world.description, registers):

@@ -28,7 +28,7 @@ class Gateway:
     def __init__(self, world: GatewayWorld, *, interval_s: float = INTERVAL_S, registers: Iterable[str] = ()) -> None:
         self.world = world
         interval = round(interval_s * 1000) * MILLISECOND
-        self.sampler = Sampler(world, {"other": registers}, interval)
+        self.sampler = Sampler(world.samples, {"other": registers}, interval)
         self.seen: list[tuple[float, str]] = []
         """When samples have come, s."""
         self.states: dict[str, State | None] = {}
@@ -198,7 +198,7 @@ def test_a_gateway_that_is_late_gets_the_latest_values() -> None:
     """Nothing waits for it but the names of controllers, each once."""
 
     async def act(gateway: Gateway) -> None:
-        sampler = Sampler(gateway.world, {})
+        sampler = Sampler(gateway.world.samples, {})
         sampler.watch(MACHINES)
         for number in range(50):
             set_pin(gateway, number % 2)
@@ -216,7 +216,7 @@ def test_a_gateway_that_is_late_gets_the_latest_values() -> None:
 def test_many_controllers_come_in_parts() -> None:
     async def act() -> None:
         world = GatewayWorld("".join(f'[[mic488]]\nname = "t{number}"\n' for number in range(AT_ONCE + 6)))
-        sampler = Sampler(world, {})
+        sampler = Sampler(world.samples, {})
         sampler.watch(part.name for part in world.description.machines)
         assert [len(await sampler.changed(INTERVAL_S)) for _ in range(2)] == [AT_ONCE, 6]
         sampler.close()
@@ -238,7 +238,7 @@ def test_the_clock() -> None:
     async def act() -> None:
         world = GatewayWorld(TEXT)
         world.inner.do(command.Advance(duration=3 * SECOND))
-        sample = await Sampler(world, {}).take(CLOCK)
+        sample = await Sampler(world.samples, {}).take(CLOCK)
         assert sample.state is not None
         assert [point.read(sample.state) for point in CLOCK_POINTS] == [3.0, True, None]
 
@@ -247,7 +247,7 @@ def test_the_clock() -> None:
 
 def test_nothing_is_followed_after_the_end() -> None:
     world = GatewayWorld(TEXT)
-    samplers = [Sampler(world, {}) for _ in range(2)]
+    samplers = [Sampler(world.samples, {}) for _ in range(2)]
     samplers[0].close()
     assert world.inner.followers
     samplers[1].close()
@@ -296,7 +296,7 @@ def test_a_read_that_ends_after_the_last_gateway_has_left_is_no_sample_for_the_n
             await answers.wait()
             return await do(wanted)
 
-        first = Sampler(world, {})
+        first = Sampler(world.samples, {})
         await first.take("table")
         await do(command.Enable("table", 1))
         world.do = slow  # type: ignore[method-assign]
@@ -306,7 +306,7 @@ def test_a_read_that_ends_after_the_last_gateway_has_left_is_no_sample_for_the_n
         answers.set()
         await reading
         await do(Set((("table", "IN3", 1.0),)))
-        state = (await Sampler(world, {}).present("table")).state
+        state = (await Sampler(world.samples, {}).present("table")).state
         assert state is not None
         assert state["pins"]["IN3"] == 1.0
 

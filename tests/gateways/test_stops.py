@@ -376,7 +376,7 @@ class EdgeNode:
             Namespace("plant", "cell", None),
             rows,
             rig.subject,
-            Sampler(rig.subject, {}),
+            Sampler(rig.subject.samples, {}),
             client,
             interval=SECOND // 10,
             store=1000,
@@ -440,7 +440,7 @@ async def sparkplug(rig: AnyRig) -> AsyncGenerator[Way]:
 class Records:
     def __init__(self, rig: AnyRig, leases: JogLeases) -> None:
         self._numbers = rig.numbers
-        sampler = Sampler(rig.subject, {})
+        sampler = Sampler(rig.subject.samples, {})
         controllers = {name: EpicsController(name, rig.subject, sampler, leases, Role.ENGINEER) for name in ("table", CLOCK)}
         self._controller = controllers["table"]
         self._records = make_records("ST:", rig.subject, controllers, {"table": []})

@@ -133,7 +133,7 @@ def test_a_jog_that_somebody_holds_is_not_begun_again_after_a_stop_by_somebody_e
     jogs = WorldJogs(subject)
     subject.do(command.Enable("a", 1))
     world.advance(100 * MILLISECOND)
-    held = finish(jogs.begin(command.Jog("a", 1, 10.0)))
+    held = finish(jogs.begin_jog(command.Jog("a", 1, 10.0)))
     world.advance(world.now + 2 * MILLISECOND)
     subject.do(stop)
     for _ in range(10):

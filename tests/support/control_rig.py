@@ -15,7 +15,7 @@ from steptwin.motion.profile import at_rest
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.toml.addresses import Address
 from steptwin.subject import commands as command
-from steptwin.subject.contract import Result
+from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Followers, Following
 from steptwin.subject.payloads import EdgePayload, PlanPayload
@@ -25,6 +25,7 @@ class Desk:
     """A subject that is only asked: notes come back, one of them later, some are refused, one breaks it."""
 
     def __init__(self) -> None:
+        self.description = Description("desk", ())
         self.later = Later[None]()
         self.followers = Followers()
         self.done = 0
@@ -43,6 +44,9 @@ class Desk:
             case command.Pause():
                 return Result("x" * 1_000_000, 5, self.done)
         return Result(None, 5, self.done)
+
+    def read(self, *points: str) -> tuple[Reading, ...]:
+        return tuple(Reading(point, None, "", UNKNOWN) for point in points)
 
     async def answer(self, wanted: command.Command) -> Result:
         if wanted == do.Note("later"):

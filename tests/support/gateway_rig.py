@@ -55,7 +55,7 @@ class GatewayWorld:
         return self.inner.do(wanted)
 
     async def begin_jog(self, wanted: command.Jog, /) -> Held:
-        return await self.jogs.begin(wanted)
+        return await self.jogs.begin_jog(wanted)
 
     def follow(self, what: Filter, bound: int) -> Following:
         return self.inner.follow(what, bound)

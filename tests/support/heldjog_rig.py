@@ -53,7 +53,7 @@ class Rig:
         self.followed = self.subject.follow(filter_of(["plan", "frame"]), 100_000)
 
     def begin(self, wanted: Jog) -> Held:
-        return start(self.jogs.begin(wanted)).result()
+        return start(self.jogs.begin_jog(wanted)).result()
 
     def run(self, for_ms: float) -> None:
         end = self.world.now + round(for_ms * MILLISECOND)

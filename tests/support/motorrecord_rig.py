@@ -58,7 +58,7 @@ LONGEST_S = 60.0
 def first_record(subject: GatewaySubject, leases: JogLeases, role: Role) -> tuple[EpicsController, MotorRecord]:
     """Of the first axis of the first controller."""
     part = subject.description.machines[0]
-    controller = EpicsController(part.name, subject, Sampler(subject, {}), leases, role)
+    controller = EpicsController(part.name, subject, Sampler(subject.samples, {}), leases, role)
     record = MotorRecord("ST:x", part, part.datasheet.axes[0], controller)
     controller.records.append(record)
     return controller, record

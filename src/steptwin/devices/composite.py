@@ -129,6 +129,8 @@ class CompositeSubject:
 
     def _part_of(self, wanted: Command) -> SubjectPart:
         """Raises `Misuse`, and `Refusal` if no part can execute it."""
+        if self._world is not None and len(self._parts) == 1:
+            return self._world
         found: list[SubjectPart] = []
         if isinstance(wanted, steps.Request) and (there := self._of_unit.get((wanted.line, wanted.unit))) is not None:
             return there  # several devices share the line
@@ -260,5 +262,5 @@ class CompositeSubject:
 
     # ------------------------------------------------------------------ as `Jogs`
 
-    async def begin(self, wanted: command.Jog) -> Held:
+    async def begin_jog(self, wanted: command.Jog) -> Held:
         return await self._part_called(wanted.machine).begin_jog(wanted)

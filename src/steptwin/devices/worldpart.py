@@ -2,25 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 from steptwin.subject import commands as command
-from steptwin.subject.commands import Command
-from steptwin.subject.contract import Description, Reading, Result
-from steptwin.subject.events import Event
-from steptwin.subject.following import Filter, Followers
+from steptwin.subject.contract import Description, PlannedSubject, Reading, Result
+from steptwin.subject.following import Followers
 from steptwin.subject.jogs import Jogs
-
-
-class PlannedSubject(Protocol):
-    """A subject in this process with plans: `steptwin.subject.world.WorldSubject`, or what lets its time go on."""
-
-    @property
-    def description(self) -> Description: ...
-    def read(self, *points: str) -> tuple[Reading, ...]: ...
-    def do(self, wanted: Command, /) -> Result: ...
-    async def answer(self, wanted: Command, /) -> Result: ...
-    def plans(self, what: Filter) -> list[Event]: ...
 
 
 def present_of(world: PlannedSubject) -> dict[str, Any]:
@@ -37,7 +24,7 @@ class WorldPart:
     def __init__(self, world: PlannedSubject, followers: Followers, jogs: Jogs) -> None:
         self._world = world
         self.followers = followers
-        self.begin_jog = jogs.begin
+        self.do, self.plans, self.begin_jog = world.answer, world.plans, jogs.begin_jog
 
     @property
     def description(self) -> Description:
@@ -45,9 +32,6 @@ class WorldPart:
 
     def read(self, *points: str) -> tuple[Reading, ...]:
         return self._world.read(*points)
-
-    async def do(self, wanted: Command, /) -> Result:
-        return await self._world.answer(wanted)
 
     def result_of(self, value: object) -> Result:
         """The result of a request that is not a command of the world, at its present moment."""
@@ -58,6 +42,3 @@ class WorldPart:
 
     def selected(self, data: bytes) -> None:
         """Its lines take characters as they are."""
-
-    def plans(self, what: Filter) -> list[Event]:
-        return self._world.plans(what)

@@ -7,12 +7,10 @@ from datetime import datetime
 from typing import NamedTuple, Protocol
 
 from steptwin.access.audit import CommandLog
-from steptwin.gateways.sampling import SampledSubject
+from steptwin.gateways.sampling import SharedSamples
 from steptwin.simulation.kinds.lines import LineTraffic
 from steptwin.subject.commands import Jog
-from steptwin.subject.contract import Reading
-from steptwin.subject.events import Event
-from steptwin.subject.following import Filter
+from steptwin.subject.contract import AsyncSubject
 from steptwin.subject.jogs import Held
 
 
@@ -44,8 +42,13 @@ class PastValues(Protocol):
         ...
 
 
-class GatewaySubject(SampledSubject, Protocol):
+class GatewaySubject(AsyncSubject, Protocol):
     """Subject of gateways: a world, or devices. Answers of devices come later."""
+
+    @property
+    def samples(self) -> SharedSamples:
+        """Shared part of the samplers of its gateways."""
+        ...
 
     @property
     def past(self) -> PastValues | None:
@@ -57,20 +60,12 @@ class GatewaySubject(SampledSubject, Protocol):
         """None where commands are not recorded."""
         ...
 
-    def read(self, *points: str) -> tuple[Reading, ...]:
-        """Values known at present. `Misuse` for points that are not there."""
-        ...
-
     async def begin_jog(self, wanted: Jog, /) -> Held:
         """A jog that goes on while it is extended (`Held.lasts_ns`). Raises as `do`."""
         ...
 
     def traffic(self) -> Mapping[str, LineTraffic]:
         """Traffic on each line, by its name; that of a device by ``NAME.line``."""
-        ...
-
-    def plans(self, what: Filter) -> list[Event]:
-        """The present plans of the axes of twins that ``what`` selects."""
         ...
 
 

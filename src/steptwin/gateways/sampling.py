@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from math import inf
-from typing import Any, Protocol, cast
+from typing import Any, cast
 from zlib import crc32
 
 from steptwin.errors import LineFailure, Refusal
@@ -22,7 +22,7 @@ from steptwin.gateways.heldstate import HeldState, is_resting, merged, parts_onl
 from steptwin.gateways.points import CLOCK, State
 from steptwin.machine import SECOND, Nanos
 from steptwin.subject import commands as command
-from steptwin.subject.contract import Description, Result
+from steptwin.subject.contract import AsyncSubject
 from steptwin.subject.events import Event
 from steptwin.subject.following import USUAL, Filter, Following
 from steptwin.subject.payloads import RestoredPayload
@@ -57,29 +57,11 @@ class Sample:
     answer, and of the `CLOCK`."""
 
 
-class SampledSubject(Protocol):
-    """A world or devices, as samplers see it. Answers of devices come later."""
-
-    @property
-    def description(self) -> Description: ...
-
-    @property
-    def samples(self) -> SharedSamples:
-        """Shared part of the samplers of its gateways."""
-        ...
-
-    async def do(self, wanted: command.Command, /) -> Result:
-        """Execute a command. Raises `SteptwinError` for a refusal or a failure of a line."""
-        ...
-
-    def follow(self, what: Filter, bound: int) -> Following: ...
-
-
 class SharedSamples:
     """Shared part of the samplers of ``subject``: events, and samples that one of them has just taken."""
 
-    def __init__(self, subject: SampledSubject) -> None:
-        self._subject = subject
+    def __init__(self, subject: AsyncSubject) -> None:
+        self.subject = subject
         self._samplers: list[Sampler] = []
         self._following: Following | None = None
         self._latest: dict[str, tuple[float, Sample]] = {}
@@ -96,9 +78,9 @@ class SharedSamples:
 
     def join(self, sampler: Sampler) -> None:
         if self._following is None:
-            self._following = self._subject.follow(Filter(KINDS), MOST_EVENTS)
+            self._following = self.subject.follow(Filter(KINDS), MOST_EVENTS)
             self._following.on_event = self._wake
-            for part in self._subject.description.machines:
+            for part in self.subject.description.machines:
                 if not part.is_real:
                     self._held[part.name] = HeldState(part)
                 if part.line is not None:
@@ -188,7 +170,7 @@ class SharedSamples:
         now: Nanos | None = None
         try:
             if wanted:
-                answer = await self._subject.do(command.ReadState(machine, wanted))
+                answer = await self.subject.do(command.ReadState(machine, wanted))
                 parts, now = answer.value, answer.time
             if is_due and machine in self._registers:
                 parts = {**parts, "registers": await self._read(machine)}
@@ -207,10 +189,10 @@ class SharedSamples:
     async def take(self, machine: str) -> Sample:
         """The present values of a controller, read as a whole, or of the `CLOCK`."""
         if machine == CLOCK:
-            return Sample(CLOCK, cast("State", (await self._subject.do(command.Time())).value), datetime.now(UTC))
+            return Sample(CLOCK, cast("State", (await self.subject.do(command.Time())).value), datetime.now(UTC))
         self._past.discard(machine)
         try:
-            answer = await self._subject.do(command.ReadState(machine))
+            answer = await self.subject.do(command.ReadState(machine))
             state = parts_only(cast("State", answer.value), await self._read(machine))
         except (LineFailure, Refusal):  # a device may refuse a register
             return self._keep(Sample(machine, None, datetime.now(UTC)))
@@ -231,16 +213,16 @@ class SharedSamples:
         if not names:
             return {}
         points = tuple(f"{machine}.{name}" for name in names)
-        readings = cast("list[Mapping[str, Any]]", (await self._subject.do(command.ReadPoints(points))).value)
+        readings = cast("list[Mapping[str, Any]]", (await self.subject.do(command.ReadPoints(points))).value)
         return {name: reading["value"] for name, reading in zip(names, readings, strict=True)}
 
 
 class Sampler:
-    """Samples of the controllers of ``subject`` for one gateway, with the registers that are named by controller."""
+    """Samples of controllers for one gateway, with the registers that are named by controller."""
 
-    def __init__(self, subject: SampledSubject, registers: Mapping[str, Iterable[str]], interval: Nanos = INTERVAL) -> None:
+    def __init__(self, shared: SharedSamples, registers: Mapping[str, Iterable[str]], interval: Nanos = INTERVAL) -> None:
         self.registers = {name: tuple(of) for name, of in registers.items()}
-        self._shared = subject.samples
+        self._shared = shared
         self._slots = max(round(interval / SECOND / TICK_S), 1)
         """Slots of an interval, as long as `TICK_S` each; moments are numbers of slots of the event loop's time."""
         self._last: dict[str, int] = {}
@@ -258,7 +240,7 @@ class Sampler:
         """Samples of devices, whose answers come later."""
         self._failed: BaseException | None = None
         """Error that has ended the reading of a device."""
-        self._real = frozenset(part.name for part in subject.description.machines if part.is_real)
+        self._real = frozenset(part.name for part in shared.subject.description.machines if part.is_real)
         self._shared.join(self)
 
     def close(self) -> None:

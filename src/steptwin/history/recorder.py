@@ -91,7 +91,7 @@ class Recorder:
         self._subject = subject
         self._clock = clock
         self._dead_band = dead_band
-        self._sampler = Sampler(subject, registers)
+        self._sampler = Sampler(subject.samples, registers)
         self._machines = {part.name: part for part in subject.description.machines}
         self._has_devices = any(part.is_real for part in self._machines.values())
         kinds = SHOWN_KINDS if self._has_devices else TWIN_KINDS

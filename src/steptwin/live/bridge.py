@@ -122,7 +122,7 @@ class _Devices:
         return await result_of(start(self._subject.do(wanted)))
 
     async def begin_jog(self, wanted: Jog, /) -> Held:
-        return await result_of(start(self._subject.begin(wanted)))
+        return await result_of(start(self._subject.begin_jog(wanted)))
 
     def follow(self, what: Filter, bound: int) -> Following:
         return self._subject.follow(what, bound)

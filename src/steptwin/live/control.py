@@ -14,7 +14,7 @@ import os
 import secrets
 import socket
 from pathlib import Path
-from typing import Protocol, cast
+from typing import cast
 
 from steptwin.errors import LineFailure, Misuse
 from steptwin.files.ownership import InUse, Ownership
@@ -24,10 +24,9 @@ from steptwin.live.directory import private_directory, runtime_directory
 from steptwin.messages import Message
 from steptwin.simulation.toml.addresses import Address
 from steptwin.subject.commands import Command, Follow, Time, Unfollow
-from steptwin.subject.contract import Result
+from steptwin.subject.contract import PlannedSubject, Result
 from steptwin.subject.dispatch import FORM, LONGEST_REQUEST, JsonObject, failure, read_message, respond
-from steptwin.subject.events import Event
-from steptwin.subject.following import Filter, Following, filter_of
+from steptwin.subject.following import Following, filter_of
 from steptwin.system import reason
 
 HAS_LOCAL_SOCKETS = hasattr(socket, "AF_UNIX")
@@ -45,15 +44,6 @@ SOCKET, ANNOUNCEMENT = ".control", ".twin"
 TOKEN_BYTES = 16
 
 
-class Controlled(Protocol):
-    """The subject behind an endpoint."""
-
-    def do(self, wanted: Command) -> Result: ...
-    async def answer(self, wanted: Command) -> Result: ...
-    def follow(self, what: Filter, bound: int) -> Following: ...
-    def plans(self, what: Filter) -> list[Event]: ...
-
-
 TWIN_IS_RUNNING = Message(
     "live.twin-is-running", "a twin named {name!r} is running already ({owner}): give this one another --name"
 )
@@ -63,7 +53,7 @@ CONTROL_IS_NOT_OPENED = Message("live.control-is-not-opened", "cannot open the c
 class ControlEndpoint:
     """Listens for requests and passes them to ``subject``; over TCP if there is an ``address`` or no local socket."""
 
-    def __init__(self, name: str, subject: Controlled, address: Address | None = None) -> None:
+    def __init__(self, name: str, subject: PlannedSubject, address: Address | None = None) -> None:
         self.name = name
         directory = runtime_directory()
         self.path = directory / f"{name}{SOCKET}"
@@ -143,7 +133,7 @@ TOO_MANY_FOLLOWED = Message("live.too-many-followed", "follow: there are {most} 
 class _Conversation(asyncio.Protocol):
     """One client: its requests in order, their answers, and the events of its subscriptions."""
 
-    def __init__(self, subject: Controlled, clients: set[_Conversation], token: str) -> None:
+    def __init__(self, subject: PlannedSubject, clients: set[_Conversation], token: str) -> None:
         self._subject = subject
         self._clients = clients
         self._token = token

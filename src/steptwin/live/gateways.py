@@ -111,7 +111,7 @@ class LiveWorldSubject:
     async def begin_jog(self, wanted: Jog, /) -> Held:
         if not isinstance(self._live.companion, WorldJogs):
             self._live.companion = WorldJogs(self._live.subject, self._control.at_present)
-        return await self._live.companion.begin(wanted)
+        return await self._live.companion.begin_jog(wanted)
 
     def follow(self, what: Filter, bound: int) -> Following:
         return self._control.follow(what, bound)

@@ -20,7 +20,7 @@ from steptwin.files.writing import new_text
 from steptwin.inputfiles import read_bytes
 from steptwin.live.cell import Cell
 from steptwin.live.clients import Clients
-from steptwin.live.control import ControlEndpoint, Controlled
+from steptwin.live.control import ControlEndpoint
 from steptwin.live.filelimit import allow_many_files
 from steptwin.live.links import Link
 from steptwin.live.rfc2217 import TwinLine
@@ -29,6 +29,7 @@ from steptwin.live.transports import LinkArguments, Transport
 from steptwin.machine import SECOND, Nanos, Port
 from steptwin.simulation.kinds.links import TlsFiles
 from steptwin.simulation.toml.addresses import Address
+from steptwin.subject.contract import PlannedSubject
 from steptwin.system import process_exists, reason
 
 OTHER_FILES = 32
@@ -138,7 +139,7 @@ class Server:
         """Name the twin, made from ``file``, in its announcement."""
         self._name, self._controllers, self._file = name, controllers, file
 
-    async def open_control(self, subject: Controlled, address: Address | None = None) -> None:
+    async def open_control(self, subject: PlannedSubject, address: Address | None = None) -> None:
         """Open the control endpoint of ``subject``; also over TCP if there is an ``address``."""
         endpoint = ControlEndpoint(self._name, subject, address)
         await endpoint.open()

@@ -266,7 +266,7 @@ class Hub:
             self._end(lease, lease.held.release)
         if len(self._leases) >= MOST_LEASES:
             raise Refusal(TOO_MANY_JOGS(most=MOST_LEASES))
-        held = await self._jogs.begin(wanted)
+        held = await self._jogs.begin_jog(wanted)
         if viewer.number not in self.viewers and viewer.number not in self._asked:
             held.drop()
             raise Refusal(VIEWER_HAS_GONE())

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Mapping
 from typing import Protocol, TypeVar
 
-from steptwin.devices.worldpart import PlannedSubject, present_of
+from steptwin.devices.worldpart import present_of
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.later import Later
 from steptwin.machine import SECOND, Nanos
@@ -14,7 +14,7 @@ from steptwin.messages import Message
 from steptwin.studio.programs import ProgramTexts
 from steptwin.studio.watches import Watched
 from steptwin.subject.commands import Command, Encoders, ListFaults, ReadPins, ReadPoints, ReadState
-from steptwin.subject.contract import Result
+from steptwin.subject.contract import PlannedSubject, Result
 from steptwin.subject.following import EventBatch, Filter, filter_of
 
 T = TypeVar("T")

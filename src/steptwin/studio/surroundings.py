@@ -18,10 +18,7 @@ from steptwin.studio.looking import KeptPast
 from steptwin.studio.plantrequests import PlantRecords
 from steptwin.studio.programs import ProgramTexts
 from steptwin.studio.recordingrequests import Recordings
-from steptwin.subject.commands import Command
-from steptwin.subject.contract import Description, Reading, Result
-from steptwin.subject.events import Event
-from steptwin.subject.following import Filter, Following
+from steptwin.subject.contract import AsyncSubject, Result
 
 
 class PresentMoment(NamedTuple):
@@ -35,25 +32,12 @@ class PresentMoment(NamedTuple):
         return {"time_ns": str(self.time), "running": self.running, "speed": "max" if self.speed == inf else self.speed}
 
 
-class Served(Protocol):
-    """The subject of the studio. Reading returns the values known now; commands may be answered later."""
-
-    @property
-    def description(self) -> Description:
-        """A new object after devices were connected or disconnected."""
-        ...
+class Served(AsyncSubject, Protocol):
+    """The subject of the studio. `do` awaits only `steptwin.later.Later`."""
 
     @property
     def lost(self) -> str | None:
         """The reason why a device does not respond; None while all devices respond."""
-        ...
-
-    def read(self, *points: str) -> tuple[Reading, ...]:
-        """The newest known values. Points that are read repeatedly are polled from devices. Raises `Misuse`."""
-        ...
-
-    async def do(self, wanted: Command, /) -> Result:
-        """Execute a command; awaits only `steptwin.later.Later`. Raises `Misuse`, `Refusal`, `LineFailure`."""
         ...
 
     def result_of(self, value: object) -> Result:
@@ -62,12 +46,6 @@ class Served(Protocol):
 
     def present(self) -> dict[str, Any]:
         """``state`` by machine and ``faults``, if known."""
-        ...
-
-    def follow(self, what: Filter, bound: int) -> Following: ...
-
-    def plans(self, what: Filter) -> list[Event]:
-        """The present plans of axes as events of now, and the newest samples of those that have none."""
         ...
 
 

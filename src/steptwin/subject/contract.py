@@ -16,6 +16,7 @@ from steptwin.machine import Nanos
 from steptwin.messages import read_message_text, with_messages
 from steptwin.subject.commands import VERSION, Command
 from steptwin.subject.controls import ControlDescription
+from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Following
 
 GOOD, UNKNOWN = "good", "unknown"
@@ -277,7 +278,7 @@ def _read_control(data: Mapping[str, Any]) -> ControlDescription:
 
 
 class Subject(Protocol):
-    """What faces hold; they do not know what is behind it."""
+    """What faces hold; they do not know what is behind it. Commands are answered at once."""
 
     @property
     def description(self) -> Description: ...
@@ -290,4 +291,39 @@ class Subject(Protocol):
 
     def follow(self, what: Filter, bound: int) -> Following:
         """Events from now on, at most ``bound`` of them waiting. `Following.close` ends it."""
+        ...
+
+
+class PlannedSubject(Subject, Protocol):
+    """A world in this process, or what lets its time go on."""
+
+    async def answer(self, wanted: Command, /) -> Result:
+        """As `do`, also for commands that are answered later. Awaits only `steptwin.later.Later`."""
+        ...
+
+    def plans(self, what: Filter) -> list[Event]:
+        """The present plan of every axis that ``what`` selects, as events of now."""
+        ...
+
+
+class AsyncSubject(Protocol):
+    """A world, devices, or both. Reading returns the values known now; commands may be answered later."""
+
+    @property
+    def description(self) -> Description:
+        """A new object after devices were connected or disconnected."""
+        ...
+
+    def read(self, *points: str) -> tuple[Reading, ...]:
+        """The newest known values. Points that are read repeatedly are polled from devices. Raises `Misuse`."""
+        ...
+
+    async def do(self, wanted: Command, /) -> Result:
+        """Execute a command. Raises `Misuse`, `Refusal`, `LineFailure`."""
+        ...
+
+    def follow(self, what: Filter, bound: int) -> Following: ...
+
+    def plans(self, what: Filter) -> list[Event]:
+        """The present plans of axes as events of now, and the newest samples of those that have none."""
         ...

@@ -44,7 +44,7 @@ class Held(Protocol):
 
 
 class Jogs(Protocol):
-    async def begin(self, wanted: Jog) -> Held:
+    async def begin_jog(self, wanted: Jog) -> Held:
         """Raises `Misuse`, `Refusal` and `LineFailure`. Waits for nothing but a `steptwin.later.Later`."""
         ...
 
@@ -67,7 +67,7 @@ class WorldJogs:
         self._at_present = at_present
         self._held: list[_Held] = []
 
-    async def begin(self, wanted: Jog) -> Held:
+    async def begin_jog(self, wanted: Jog) -> Held:
         return self._at_present(lambda: self._begin(wanted))
 
     def _begin(self, wanted: Jog) -> Held:

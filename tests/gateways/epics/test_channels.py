@@ -98,7 +98,7 @@ def test_a_point_refuses_what_is_no_value_of_it(value: float) -> None:
     async def act() -> None:
         world = GatewayWorld(PLAIN)
         part = world.description.machines[0]
-        controller = EpicsController("table", world, Sampler(world, {}), JogLeases(world), Role.ENGINEER)
+        controller = EpicsController("table", world, Sampler(world.samples, {}), JogLeases(world), Role.ENGINEER)
         points = points_of(part, world.description, ["M1_VMAX"])
         record = PointRecord("ST:velocity", points[-1], controller)
         with pytest.raises(Misuse, match=r"ST:velocity: .*(expected a number|permitted are numbers above 0)$"):
@@ -119,7 +119,7 @@ def test_a_controller_that_does_not_answer_holds_up_no_other() -> None:
             return await do(wanted)
 
         world.do = slow  # type: ignore[method-assign]
-        sampler = Sampler(world, {})
+        sampler = Sampler(world.samples, {})
         table, other = (EpicsController(name, world, sampler, JogLeases(world), Role.ENGINEER) for name in ("table", "other"))
         looking = other.look()
         await table.refresh()
@@ -145,7 +145,7 @@ def test_who_asks_while_only_news_are_read_gets_a_whole_sample() -> None:
                     await answers.wait()
             return await do(wanted)
 
-        sampler = Sampler(world, {})
+        sampler = Sampler(world.samples, {})
         table = EpicsController("table", world, sampler, JogLeases(world), Role.ENGINEER)
         await table.refresh()
         world.do = slow  # type: ignore[method-assign]

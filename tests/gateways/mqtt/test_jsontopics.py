@@ -33,7 +33,7 @@ def topics(text: str = TEXT, file: str = "cells/hall.toml") -> tuple[GatewayWorl
 
 
 def sample(world: GatewayWorld, machine: str) -> Sample:
-    return asyncio.run(Sampler(world, REGISTERS).take(machine))
+    return asyncio.run(Sampler(world.samples, REGISTERS).take(machine))
 
 
 def test_groups_have_topics_of_their_own() -> None:

@@ -63,7 +63,7 @@ class Rig:
             Namespace("plant", "hall", host),
             rows,
             self.world,
-            Sampler(self.world, {}),
+            Sampler(self.world.samples, {}),
             GatewayClient("anybody", Role.ENGINEER, "MQTT, Sparkplug B"),
             interval=round(INTERVAL_S * 1000) * MILLISECOND,
             store=store,

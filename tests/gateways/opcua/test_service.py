@@ -29,7 +29,7 @@ class Seen:
 class Rig:
     def __init__(self) -> None:
         self.world = GatewayWorld('[[mic488]]\nname = "table"\n')
-        self.sampler = Sampler(self.world, {})
+        self.sampler = Sampler(self.world.samples, {})
         self.nodes = WatchedNodes()
         points = {point.name: point for point in points_of(self.world.description.machines[0], self.world.description)}
         self.all_of = {name: PointNode(node_id(f"table.{name}"), points[name]) for name in WATCHED}
@@ -81,7 +81,7 @@ def test_who_follows_a_variable_is_told_what_it_is_after_somebody_has_read_it() 
         await server.register_namespace(NAMESPACE_URI)
         builder = AddressSpaceBuilder(world.description, {})
         await builder.add_to(server)
-        service = NodeService(server, world, Sampler(world, {}), builder, None)
+        service = NodeService(server, world, Sampler(world.samples, {}), builder, None)
         await service.refresh_all()
         node = node_id("table.pins.IN3")
         subscription = await server.create_subscription(0, cast("Any", seen))

@@ -62,7 +62,7 @@ class EpicsGateway:
         open_to = Role.ENGINEER if all(map(is_loopback, hosts)) else Role.VIEWER
         role = self._role = open_to if spec.role is None else ROLES[spec.role]
         registers = registers_by_machine("[gateway.epics]", spec.registers, self._subject.description)
-        self._sampler = Sampler(self._subject, registers, spec.interval)
+        self._sampler = Sampler(self._subject.samples, registers, spec.interval)
         for name in (*(part.name for part in self._subject.description.machines), CLOCK):
             self._controllers[name] = EpicsController(name, self._subject, self._sampler, self._leases, role)
         records = make_records(spec.prefix, self._subject, self._controllers, registers)

@@ -49,7 +49,7 @@ class MqttGateway:
         broker = broker_of(spec, self._folder)
         door = Doorkeeper(spec, self._folder)
         registers = registers_by_machine("[gateway.mqtt]", spec.registers, self._subject.description)
-        self._sampler = Sampler(self._subject, registers, spec.interval)
+        self._sampler = Sampler(self._subject.samples, registers, spec.interval)
         if spec.sparkplug is None:
             topics = Topics(spec.topic, spec.file, self._subject.description, registers)
             topic = topics.base

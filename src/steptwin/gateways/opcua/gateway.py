@@ -77,7 +77,7 @@ class OpcUaGateway:
         await security.apply(server)
         builder = AddressSpaceBuilder(self._subject.description, registers, is_kept=self._subject.past is not None)
         await builder.add_to(server)
-        self._sampler = Sampler(self._subject, registers, self._spec.interval)
+        self._sampler = Sampler(self._subject.samples, registers, self._spec.interval)
         past = None if self._subject.past is None else PastNodes(self._subject.past, builder.nodes())
         service = NodeService(server, self._subject, self._sampler, builder, past)
         inside.service = self._service = service
