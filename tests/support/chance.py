@@ -1,4 +1,4 @@
-"""Chance with a seed, for records of machines whose inputs come by chance, and their digests.
+"""Chance with a seed, for tests whose inputs come by chance.
 
 Texts have gaps: ``⟨2..9⟩`` becomes a number, ``⟨#2..9⟩`` a whole one, ``⟨a|b⟩`` one of these. All comes from
 `random.Random.random`, which is the same in every Python. Where the seed is even, numbers are on a coarse grid, so that moments
@@ -8,12 +8,9 @@ and places coincide; otherwise they have decimals.
 from __future__ import annotations
 
 import re
-import sys
-from collections.abc import Callable, Sequence
-from hashlib import blake2b
-from pathlib import Path
+from collections.abc import Sequence
 from random import Random
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 T = TypeVar("T")
 
@@ -57,30 +54,3 @@ class Chance:
 
     def filled(self, text: str) -> str:
         return GAP.sub(lambda found: self.gap(found[1]), text)
-
-
-def digest(lines: list[str]) -> str:
-    return blake2b("\n".join(lines).encode(), digest_size=6).hexdigest()
-
-
-class GoldenDigests(NamedTuple):
-    """Digests of what is ``seen`` with each seed, by its kind, and the golden file with a line of them for each seed."""
-
-    seen: Callable[[int], dict[str, list[str]]]
-    file: Path
-    seeds: Sequence[int]
-
-    def of(self, seed: int) -> str:
-        return f"{seed} " + " ".join(f"{what}={digest(lines)}" for what, lines in self.seen(seed).items())
-
-    def recorded(self, seed: int) -> str:
-        return self.file.read_text().splitlines()[seed]
-
-    def main(self) -> None:
-        """Show what is behind the digests of the seed that the command line names; without one, make the file anew."""
-        if sys.argv[1:]:
-            for what, lines in self.seen(int(sys.argv[1])).items():
-                print(f"--- {what}", *lines, sep="\n")
-        else:
-            self.file.parent.mkdir(exist_ok=True)
-            self.file.write_text("".join(f"{self.of(seed)}\n" for seed in self.seeds))

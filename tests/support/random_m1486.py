@@ -7,21 +7,17 @@ from itertools import islice
 
 from chance import Chance
 
-from steptwin.diagnostics import Diagnostic, SourceText, render
 from steptwin.errors import Misuse
 from steptwin.m1486.characterlog import CharacterLog, LineSplitter, changes_nothing
-from steptwin.m1486.check import check
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.eeprom import image_of
 from steptwin.m1486.line import SerialChain
-from steptwin.m1486.lines import DUAL_DAC, INTERFACES, STEP_DIRECTION, Interface
-from steptwin.m1486.migration import differences, findings
+from steptwin.m1486.lines import DUAL_DAC, INTERFACES
 from steptwin.m1486.points import POINTS, live_point
 from steptwin.m1486.present import state_of
 from steptwin.m1486.signals import strobes
-from steptwin.m1486.symbols import uses
-from steptwin.m1486.syntax import format_program, parse
-from steptwin.m1486.variants import VARIANTS, Variant, variant
+from steptwin.m1486.syntax import parse
+from steptwin.m1486.variants import Variant, variant
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.motion.divisions import StepTrain
 
@@ -92,10 +88,10 @@ def stored(chance: Chance, member: Variant) -> bytes:
 class RandomChips:
     """Chips of one type on a line, treated by chance. ``found`` is what is seen of them, by kind."""
 
-    def __init__(self, seed: int, *, stepwise: bool | None = None) -> None:
+    def __init__(self, seed: int, *, stepwise: bool) -> None:
         chance = self.chance = Chance("m1486", seed)
         self.stepwise = stepwise
-        """Whether time goes from event to event, or on to what comes next at once; None: by chance."""
+        """Whether time goes from event to event, or on to what comes next at once."""
         member = variant(MEMBERS[seed % len(MEMBERS)])
         interface = chance.one(INTERFACES)
         addresses = (1, 4, 9)[: 1 + chance.below(3)]
@@ -246,9 +242,8 @@ class RandomChips:
             self.now = max(min(dues) - chance.below(2), self.now)
         else:
             self.now += int(float(chance.filled("⟨1|1..9|5..60|20..400|200..900⟩")) * MILLISECOND)
-        stepwise = chance.below(2) == 0 if self.stepwise is None else self.stepwise
         for chip in self.chips:
-            while stepwise and (due := chip.deadline()) is not None and due <= self.now:
+            while self.stepwise and (due := chip.deadline()) is not None and due <= self.now:
                 chip.advance_to_change(self.now)
             chip.advance(self.now)
         sent = self.port.to_send(self.now)
@@ -277,46 +272,8 @@ def way_u(trains: list[tuple[int, StepTrain]], end: int) -> int:
     return sum(way_of_train(train, begin, end) for (begin, train), end in zip(trains, ends, strict=True))
 
 
-def session(seed: int, *, stepwise: bool | None = None) -> dict[str, list[str]]:
+def session(seed: int, *, stepwise: bool) -> dict[str, list[str]]:
     """What chips send and do."""
     chips = RandomChips(seed, stepwise=stepwise)
     chips.run()
     return chips.found
-
-
-def said(seed: int) -> list[str]:
-    """What is said of a program, for types and interfaces by chance; how it is written, and what its names are."""
-    chance = Chance("text", seed)
-    lines = file(chance, odd=chance.below(3) == 0)
-    if chance.below(2):
-        lines = ["[", *lines, "]", command(chance)]
-    if chance.below(4) == 0:
-        lines = [chance.filled("X⟨#0..9⟩"), *lines, "XG", *file(chance)]
-    if chance.below(2):
-        lines[chance.below(len(lines))] = command(chance, ("odd",))
-        lines.insert(chance.below(len(lines)), command(chance, ("flow", "now", "odd")))
-    lines = [one for line in lines for one in line.split("\r")]
-    text = "".join(f"{line}{chance.one(('', '', '', ' ', '  ;what it does', ' ; x'))}\n" for line in lines)
-    program = parse(text)[0]
-    found: list[Diagnostic] = []
-    told: list[str] = []
-    for _ in range(3):
-        member, interface = _kind(chance)
-        checked = check(text, member, interface)
-        found += checked.diagnostics
-        told += [repr(one) for one in checked.memory]
-        other, _ = _kind(chance)
-        found += findings(text, member, other, interface)
-        told += differences(member, other)
-    return [
-        text,
-        render(SourceText("p", text), found),
-        *map(repr, found),
-        *told,
-        format_program(program),
-        *map(repr, uses(program)),
-    ]
-
-
-def _kind(chance: Chance) -> tuple[Variant, Interface]:
-    return chance.one(VARIANTS), chance.one((STEP_DIRECTION, *INTERFACES))

@@ -86,9 +86,9 @@ def configured(chance: Chance) -> ControllerConfig:
 class RandomMic488:
     """A controller that is treated by chance. ``found`` is what is seen of it, by kind."""
 
-    def __init__(self, seed: int, *, stepwise: bool | None = None) -> None:
+    def __init__(self, seed: int, *, stepwise: bool) -> None:
         self.stepwise = stepwise
-        """Whether time goes from event to event, or on to the next request at once; None: by chance."""
+        """Whether time goes from event to event, or on to the next request at once."""
         chance = self.chance = Chance("mic488", seed)
         self.firmware = FIRMWARES[seed % 3]
         self.base = OFFSETS[self.firmware]
@@ -204,8 +204,7 @@ class RandomMic488:
         else:
             ms = float(chance.filled("⟨1|5..60|20..400|200..900⟩"))
             self.now += int(ms * MILLISECOND) // (1 if self.device.program.interpreter.statement_time >= MILLISECOND else 30)
-        stepwise = chance.below(2) == 0 if self.stepwise is None else self.stepwise
-        if stepwise:
+        if self.stepwise:
             while (due := self.device.deadline()) is not None and due <= self.now:
                 self.device.advance_to_change(self.now)
         self.device.advance(self.now)
@@ -383,7 +382,7 @@ def shown_profile(profile: Profile) -> str:
     return f"{profile.start} {profile.base} {profile.end} {profile.final_p:.9g} [{'; '.join(parts)}]"
 
 
-def session(seed: int, *, stepwise: bool | None = None) -> dict[str, list[str]]:
+def session(seed: int, *, stepwise: bool) -> dict[str, list[str]]:
     """What a controller answers and does."""
     controller = RandomMic488(seed, stepwise=stepwise)
     controller.run()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from chance import Chance
 
@@ -83,58 +83,6 @@ WORDS: Mapping[str, Sequence[str]] = {
     ),
     "statement": ("⟨assignment⟩", "⟨assignment⟩", "⟨action⟩", "⟨action⟩", "⟨action⟩"),
 }
-FOREIGN = (
-    "OUT1 = ON ⟨;|; |;OUT2 = ON|; x = ⟩",
-    "(* ⟨text|two words *)| *)⟩",
-    "/* ⟨a|a b */⟩",
-    "⟨REM|--|!|/|'⟩ ⟨note|OUT1 = ON⟩",
-    "# ⟨one|a b|a b c|a b 3⟩",
-    "#define ⟨fast 60|fast|f 1 2⟩",
-    "OUT1 = ON : ⟨OUT2 = ON|x|WAITPOS : M1 = ON⟩",
-    "⟨ELSEIF|ELSIF|ELIF|ELSE IF⟩ IN1 = ON",
-    "END ⟨IF|WHILE|if|IF x|x⟩",
-    "IF IN1 = ON THEN⟨| OUT1 = ON| THEN⟩",
-    "WHILE ⟨x < 2|IN1 = 1⟩ DO⟨| x = 1⟩",
-    "⟨|LABEL |SUB |PROC |GOTO |x y ⟩⟨BLINK|MAIN|nowhere⟩",
-    "⟨ENABLE|DISABLE|RESET|RESET⟩ ⟨M1|M2|OUT3|x|M1 M2⟩",
-    "⟨ACC|Vmax|DEC|LIMR|POS|VEL⟩ ⟨M1|M4|M5|x⟩ ⟨20|ON|x|20 3⟩",
-    "LET ⟨x = 2|x|OUT1 = ON⟩",
-    "⟨CONST|DEFINE|const⟩ ⟨fast = 60|fast 60|fast|fast =⟩",
-    "⟨VAR|INT|DIM|FLOAT|BOOL|REAL⟩ ⟨n|n = 3|3|n : INT⟩",
-    "FOR n = 1 TO ⟨3|x⟩",
-    "⟨GOTO|CALL|PRINT|NEXT|GOSUB|STOPALL|G01|M30|MOVE|SLEEP|BREAK|PAUSE⟩ ⟨MAIN|x|X10|M1 20|0.5|⟩",
-    "WAITPOS ⟨M1|M1 M2|x|m3 y⟩",
-    "⟨IF|WHILE|WAIT⟩ (⟨IN1 = ON|x < 2|x|⟩)",
-    "⟨IF|WHILE|WAIT⟩ ⟨NOT|!|not⟩ ⟨IN1|x|OUT2 = ON|M1|⟩",
-    "⟨IF|WAIT⟩ ⟨IN1|x|OUT1|M1⟩ ⟨<>|!=⟩ ⟨ON|OFF|1|0|2|x⟩⟨|| + 1⟩",
-    "⟨IF|WAIT|WHILE⟩ IN1 = ON ⟨AND|OR|&&|XOR|and|&⟩ ⟨IN2 = ON|x⟩",
-    "⟨IF|WHILE|WAIT⟩ ⟨x + 1 > 2|x > y * 2|PosM1 - 2|x + 1 = y - 1|= 2|x =|x > 2 +|2 + x⟩",
-    "⟨IF|WHILE|WAIT⟩ ⟨IN1|x|OUT2|1|TRUE|ON|true|0.5|M1|x 2|IN1 ON|x y|x -|PosM1 3⟩",
-    "⟨DELAY|PULSE(OUT1,⟩ ⟨500 ms|2s|2 min|0,5 s|3 h|10 mm|5 us⟩⟨|)⟩",
-    "PABS M1 ⟨20 mm|20mm|3 s|90 deg|5 °|2,5 cm|1 rev|3 %|20 imp⟩",
-    "x = ⟨0xFF|$FF|&H1F|16#A0|0b101|2#11|0FH|12H|$I5|0x|1010b⟩",
-    "x = ⟨1e3|2.5E-2|1E10|3e|1,5e2⟩",
-    "x = ⟨1 000|10.000|1,000,000|1'000|12 34|1.000,5|1000 000⟩",
-    "⟨OUT 1|OUT[1]|OUT(2)|OUT 1 2|out [ 3 ]⟩ = ⟨ON|IN 2|IN[3]|x⟩",
-    "x = ⟨$I 5|$R[4]|PosM 1|PosM(1)|IN 3 + IN 4|x 5|AIN [1]⟩",
-    "⟨PABS|VABS|HOME|PREL⟩ ⟨(M1, 20)|M1, 20|M1 = 20|1 20|2 x|5 20|M1,|(M1 20)|M1 (20)|(1, 20)|M1 20 30⟩",
-    "⟨STOP|BRAKE⟩ ⟨1|(M1)|M1, M2|M1 M2|4|= M1⟩",
-    "MOVEPTP ⟨(@P0)|= @P0|@P0, @TOP|P0|(3)|@|@ P0⟩",
-    "PULSE ⟨OUT1, 2|OUT1 2|(OUT1 2)|(1, 2)|(OUT1, 2, 3)⟩",
-    "DELAY ⟨(2)|= 2|2, 3|2 3|()⟩",
-    "⟨|SET ⟩⟨x|OUT1|count⟩ ⟨++|--|+= 2|-= y|*= 3|/= 2 + 1|+ 1|:= 2|== 2|=|= =⟩",
-    "⟨SET|SET ⟩ ⟨OUT1|x|M1|IN1|OUT1 OUT2|⟩",
-    "x = ⟨(y)|(y + 1)|y * (z + 1)|sin x|(y) + 1|sin(x|max(x)|max x, y⟩",
-    "IF x ⟨y|+|- y|y z⟩ > ⟨2|2 3|x y|+ 2⟩",
-    "x = y ⟨MOD|AND|OR|XOR|DIV|SHL|mod|NOT|^|**⟩ ⟨2|z|2 + 1⟩",
-    "⟨TRUE|M1|OUT1|IN1|x|20|@P0|,|)⟩⟨| M1| 2|()⟩",
-    "JUMP ⟨MAIN:|(MAIN)|= MAIN|MAIN, x|TO MAIN|main now⟩",
-    "RETURN ⟨x|;|0|()⟩",
-    "⟨SWITCH|CASE⟩ ⟨x|1:⟩",
-    "ELSE⟨:| x = 1| IF⟩",
-    "⟨ENDIF|ENDWHILE|END⟩⟨;| x|:|()⟩",
-    "#⟨fast|fast =|fast = 60|6 fast|fast 60 70|fast fast|M1 2|ON 3⟩",
-)
 """Lines as people bring them along from other languages."""
 CONSTANTS = ("#fast 60", "#back -7,5", "#pump OUT3", "#start IN6")
 ROWS = (
@@ -148,29 +96,6 @@ ROWS = (
 )
 SUBROUTINES = ("BLINK", "grip", "Move_2")
 EVENTS = ("IN1", "IN2", "IN7", "MODBUS", "TICK", "TICK100", "TICK1000", "M1", "M2")
-STRANGE = (
-    ":",
-    "=",
-    "(",
-    ")",
-    ",",
-    "@",
-    "#",
-    ";",
-    "//",
-    "$",
-    ".",
-    "-",
-    "§",
-    "ON",
-    "END",
-    "ENDIF",
-    "IF",
-    "1e5",
-    "99999",
-    "M5",
-    "OUT9",
-)
 
 
 def written(chance: Chance, text: str) -> str:
@@ -221,53 +146,6 @@ def program(chance: Chance) -> str:
     for event in events:
         lines += [f"{chance.one(('INT_', 'HARDINT_'))}{event}:", *_block(chance, 1, ()), "RETURN"]
     return "\n".join(lines) + "\n"
-
-
-def restyled(chance: Chance, text: str) -> str:
-    """The same program, written without care."""
-    styles: tuple[Callable[[str], str], ...] = (
-        str.upper,
-        str.lower,
-        lambda line: line.replace(" = ", "=").replace(" ", "\t "),
-        lambda line: f"   {line}  // {chance.one(('what it does', '', ' x = 1'))}",
-        lambda line: f"{line}\n",
-        *(str,) * 7,
-    )
-    return "\n".join(chance.one(styles)(line) for line in text.splitlines()) + chance.one(("\n", "", "\n\n"))
-
-
-def mistaken(chance: Chance, text: str, mistakes: int = 4) -> str:
-    """The program with mistakes: words and lines that are left out, doubled, exchanged, misspelt, or strange."""
-    lines = text.splitlines()
-    for _ in range(mistakes):
-        at = chance.below(len(lines))
-        words = lines[at].split()
-        kind = chance.below(7)
-        if kind == 0:
-            del lines[at]
-        elif kind == 1:
-            lines.insert(at, chance.one(lines))
-        elif words:
-            place = chance.below(len(words))
-            word = words[place]
-            if kind == 2:
-                del words[place]
-            elif kind == 3:
-                words.insert(place, chance.one(STRANGE))
-            elif kind == 4:
-                words[place] = chance.one(STRANGE)
-            else:
-                cut = chance.below(len(word))
-                letter = chance.one(("", word[cut] * 2, "_", "0", "ä"))
-                words[place] = word[:cut] + letter + word[cut + 1 :]
-            lines[at] = " ".join(words)
-    return "\n".join(lines) + "\n"
-
-
-def foreign(chance: Chance, lines: int = 60) -> str:
-    """Lines of other languages between those of a program."""
-    found = ["MAIN:", *(written(chance, chance.one(FOREIGN)) for _ in range(lines)), "BLINK:", "JUMP MAIN", "JUMP BLINK"]
-    return "".join(f"{line.lower() if chance.below(6) == 0 else line}\n" for line in found)
 
 
 def sound(text: str, table: PositionTable, firmware: str = "1.70") -> str:
