@@ -149,7 +149,7 @@ class MatrixRules(TableSpec):
 
 @table("[[vary]]")
 class VaryTable(TableSpec):
-    """What varies, by the path of a value of the world or by a name, and how."""
+    """A value that varies, by its path in the world or by a name, and how."""
 
     of: str | None = key(text_value, "of a value of the world, as --with has it", default=None, name="path")
     name: str | None = key(name_value, "a name that other tables refer to as {name}", default=None, excludes=("path",))

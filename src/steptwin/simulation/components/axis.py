@@ -40,7 +40,7 @@ from steptwin.simulation.toml.values import (
 )
 
 MECHANICS = ("position", "lost", "stalled")
-"""What there is of the mechanics of an axis."""
+"""Signals of the mechanics of an axis."""
 
 
 @table("[[axis]]")

@@ -65,7 +65,7 @@ class Brake(BoardPart):
         self.is_stuck = False
         """Fault: it does not let go."""
         self.share = 1.0
-        """Of its torque that it has; less while it is worn."""
+        """Share of its torque that it has; less while it is worn."""
         if not board.kernel.is_blank:
             mechanism.brake(spec.torque, board.kernel.now)
 

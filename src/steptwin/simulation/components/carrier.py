@@ -1,4 +1,4 @@
-"""What suction cups and grippers have in common: where they pick workpieces up, and where they put them down."""
+"""Common part of suction cups and grippers: where they pick workpieces up, and where they put them down."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class CarrierSpec(BoardSpec):
     @property
     @abstractmethod
     def own_joint(self) -> Joint | None:
-        """What its own key joins, besides the places."""
+        """Joint of its own key, besides the places."""
 
     @property
     def joints(self) -> Iterable[Joint]:

@@ -1,4 +1,4 @@
-"""What all contacts have in their tables."""
+"""Common keys of contacts."""
 
 from __future__ import annotations
 

@@ -337,7 +337,7 @@ def _connect(spec: ConveyorSpec, conveyor: Conveyor, site: Site) -> None:
 
 
 def find_conveyor(name: str, site: Site) -> Conveyor:
-    """What is built of the conveyor ``name``."""
+    """The conveyor ``name`` as it is built."""
     found = site.parts.built(CONVEYOR).get(name)
     if found is None:
         raise Unknown(name, f"no conveyor is called {name!r}")

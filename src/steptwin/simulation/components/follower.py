@@ -172,7 +172,7 @@ def _wear(active: ActiveFault, follower: Follower, begins: bool, now: Nanos) -> 
 
 
 def _machine(spec: FollowerSpec, described: ElementSpecs) -> str:
-    """What drives the axis of its shaft; otherwise the name that does not exist."""
+    """The machine that drives the axis of its shaft; otherwise the name that does not exist."""
     axes = {shaft.name: shaft.axis for shaft in described.of(SHAFT)}
     drives = {axis.name: axis.drive[0] for axis in described.of(AXIS)}
     axis = axes.get(spec.shaft)

@@ -32,7 +32,7 @@ from steptwin.simulation.toml.values import number as number_value
 SKEWED = "SKEWED"
 SKEW = "skew"
 SHARES = {SKEW: (1.0, -1.0), "position": (0.5, 0.5)}
-"""Of the ends, in how far the one on its axis is ahead, and in where the middle is."""
+"""Shares of the ends in how far the one on its axis is ahead, and in where the middle is."""
 
 
 @table("[[gantry]]")

@@ -46,7 +46,7 @@ class GateSpec(BoardSpec):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of its inputs."""
+        """Names of its inputs."""
         return tuple(f"IN{n + 1}" for n in range(self.inputs if isinstance(self.inputs, int) else len(self.inputs)))
 
     @property

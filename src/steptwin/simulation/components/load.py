@@ -118,7 +118,7 @@ class FurtherLoad(BoardPart):
 
     @property
     def watches(self) -> tuple[str, ...] | None:
-        """What its condition and its curve are over may be anything."""
+        """All, with a condition or a curve: they may be over anything."""
         return super().watches if self._condition is None and self._curve is None else None
 
     @property

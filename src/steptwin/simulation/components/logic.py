@@ -1,4 +1,4 @@
-"""What elements with terminals have in common: a board, keys that join outputs of others to it, its levels as signals,
+"""Common part of elements with terminals: a board, keys that join outputs of others to it, its levels as signals,
 and the faults of terminals that are stuck."""
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class BoardSpec(NamedSpec, ABC):
     @property
     @abstractmethod
     def joints(self) -> Iterable[Joint]:
-        """What its keys join to its inputs."""
+        """Outputs that its keys join to its inputs."""
 
     def others(self, described: ElementSpecs) -> Iterable[tuple[str, str]]:
         """Keys that name other elements, and the names of these or of what they are in one kernel with."""
@@ -130,7 +130,7 @@ STUCK_OUTPUT = FaultKind(
     effect=ElementEffect(_stick, holds="output"),
     check=_check_output,
 )
-"""Of elements with outputs."""
+"""For elements with outputs."""
 STUCK_INPUT = FaultKind(
     "stuck-input",
     Layer.ELEMENT,
@@ -143,9 +143,9 @@ STUCK_INPUT = FaultKind(
     effect=ElementEffect(_stick, holds="input"),
     check=_check_input,
 )
-"""Of elements with inputs."""
+"""For elements with inputs."""
 STUCK = (STUCK_OUTPUT, STUCK_INPUT)
-"""Of elements with both."""
+"""For elements with both."""
 
 
 # ---------------------------------------------------------------------- an element
@@ -193,7 +193,7 @@ def with_terminals(
 
 
 def _references(found: BoardSpec, described: ElementSpecs) -> Iterator[Reference]:
-    """Of the terminals and keys of an element."""
+    """References of the terminals and keys of an element."""
     yield Reference(found.name, found.name, found.path)
     for joint in found.joints:
         yield Reference(found.name, joint.source[0], (*found.path, joint.key))

@@ -128,7 +128,7 @@ class GearedShaft(Stateful):
 
     @property
     def pulses_per_turn(self) -> Fraction:
-        """Of the axis; negative where the shaft turns backwards."""
+        """Pulses of the axis in a turn; negative where the shaft turns backwards."""
         return self.axis.scale.pulses_per_unit / exact_fraction(self.spec.ratio)
 
     def place_of(self, degrees: float) -> Fraction:

@@ -25,7 +25,7 @@ from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, flag, name_val
 
 ON, GOOD = "ON", "GOOD"
 USUAL_SHARE = 0.75
-"""Of the voltage, from which on controllers are on by default."""
+"""Share of the voltage from which on controllers are on by default."""
 MOST_FED = 1000
 
 

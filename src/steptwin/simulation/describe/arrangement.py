@@ -17,7 +17,7 @@ from steptwin.simulation.toml.values import permitting, text_value, whole
 
 DRAWING = "drawing"
 OTHERS = ("tool path", "all buttons")
-"""What is drawn besides axes and elements. With a space, which no name has."""
+"""Drawn parts besides axes and elements. With a space, which no name has."""
 MOST_PX = 20_000
 MOST_PLACED = 1000
 _PIXELS = whole(0, MOST_PX)

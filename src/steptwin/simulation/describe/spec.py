@@ -50,7 +50,7 @@ class EventSpec(ScriptSpec):
 
 @table("[world]")
 class WorldTable(TableSpec):
-    """What a world is called, and what it keeps."""
+    """Name of a world, and what it keeps."""
 
     name: str = key(text_value, "a name for people", default="world")
     seed: int = key(SEED, "where all chance comes from", default=0)

@@ -1,4 +1,4 @@
-"""What the TOML file of a world may contain: every table has rows, those of controllers and
+"""Tables that the TOML file of a world may contain: every one has rows, those of controllers and
 elements in their kinds.
 
 The reader, the messages and the reference page take them from here.
@@ -41,7 +41,7 @@ def _tables_with(registered: tuple[int, ...]) -> Mapping[str, TableRows]:
 
 
 def _line_rows() -> TableRows:
-    """What kinds of lines and links there are is known when all are registered."""
+    """Keys of lines with the kinds of lines and links that are registered."""
     meaning = " or ".join(kind.meaning for kind in line_kinds().values())
     only = _only_of_lines()
     own = [replace(key, read=word(*line_kinds()), meaning=meaning) if key.name == "kind" else key for key in LineSpec.rows.keys]

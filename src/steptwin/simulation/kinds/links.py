@@ -47,7 +47,7 @@ TLS_NEED = {"tls_tcp": "trusted", "trusted": "certificate", "certificate": "key"
 
 
 class TlsFiles(NamedTuple):
-    """What encrypted connections need: PEM files, and a folder of them."""
+    """Files for encrypted connections: PEM files, and a folder of them."""
 
     certificate: str
     key: str

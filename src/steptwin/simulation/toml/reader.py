@@ -24,7 +24,7 @@ MOST_FINDINGS = 100
 _LONGEST_MESSAGE = 400
 _WHOLE = range(-(1 << 63), 1 << 63)
 _MANY_DIGITS = re.compile(r"(?:[0-9A-Fa-f]_?){16}")
-"""What a number of more than 64 bits has."""
+"""Digits that a number of more than 64 bits has."""
 
 
 FILE_ERRORS = "D010"
@@ -78,7 +78,7 @@ class TomlText:
         """Errors in the order of their reports; tables of these are not looked at further."""
         self._left_out: set[str] = set()
         self._left_out_uses: tuple[str, ...] = ()
-        """What names from uses with errors begin with."""
+        """Beginnings of names from uses with errors."""
         self._adopted: dict[Path, Adopted] = {}
         self._used: tuple[TomlText, Path] | None = None
         """The text that uses this one, and where."""
@@ -128,7 +128,7 @@ class TomlText:
         self.wrong_at(self._spans.get(path, Span(0, 0)), code, message, hint, fix)
 
     def unless_wrong(self, path: Path, action: Callable[[], T]) -> T | None:
-        """What ``action`` gives for the table at ``path``; None if that has an error already, or now. Errors are reported at the
+        """Result of ``action`` for the table at ``path``; None if that has an error already, or now. Errors are reported at the
         path."""
         if self.is_wrong(path):
             return None
@@ -157,7 +157,7 @@ class TomlText:
         self._adopted[here] = Adopted(other, there, use)
 
     def leave_out_use(self, name: str) -> None:
-        """What a use gives is not there, because of what is wrong with it."""
+        """Note that names of a use are not there, because of what is wrong with it."""
         self._left_out_uses = (*self._left_out_uses, f"{name}_")
 
     def _tell_user(self, shown: str) -> None:
@@ -176,7 +176,7 @@ class TomlText:
         user._tell_user(shown)
 
     def wrong_reference(self, path: Path, error: Misuse, place: str = "") -> None:
-        """What is at ``path`` does not fit the rest. Not reported where it only follows from something else that
+        """Report that the value at ``path`` does not fit the rest. Not reported where it only follows from something else that
         is wrong; then what the table would have been is not there either."""
         named = error if isinstance(error, Unknown | UnknownSignal | WrongTerminal) else None
         if not (isinstance(error, Unknown) and self.may_be_broken(error.name)):
@@ -228,7 +228,7 @@ class TomlText:
         return any(wrong[0] in kinds for wrong in self._wrong if wrong)
 
     def leave_out(self, name: str) -> None:
-        """What has this name is not built because of what is wrong elsewhere."""
+        """Note that nothing with this name is built, because of what is wrong elsewhere."""
         self._left_out.add(name)
 
     def leave_out_all(self, kind: str) -> None:
@@ -373,7 +373,7 @@ class Key:
 
     @property
     def permitted(self) -> str:
-        """What its value may be, in words; empty where what reads it does not say."""
+        """Permitted values in words; empty where what reads it does not say."""
         return getattr(self.read, "permitted", "")
 
 
@@ -394,7 +394,7 @@ COMMON_WORDS: Mapping[str, tuple[str, ...]] = {
     "delay": ("time",),
     "condition": ("when", "until"),
 }
-"""What people call keys that have other names here."""
+"""Usual words for keys that have other names here."""
 
 
 def read_table(text: TomlText, path: Path, value: object, keys: Sequence[Key], also: Iterable[str] = ()) -> dict[str, Any]:
