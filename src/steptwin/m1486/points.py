@@ -148,7 +148,7 @@ POINTS: Mapping[str, Point] = {path: row.point for path, row in _ROWS.items()}
 
 
 def marks(chip: M1486Chip) -> tuple[object, ...]:
-    """See `steptwin.simulation.kinds.kind.PointMarks`."""
+    """See `steptwin.simulation.kinds.kind.ControllerKind.marks`."""
     unit, drive, now = chip.unit, chip.drive, chip.now
     state = chip.is_busy(now), drive.motion, drive.is_valid, _has_room(chip, now), chip.interface
     return state, unit.variable, unit.remainder, chip.memory.registers(), tuple(unit.functions)

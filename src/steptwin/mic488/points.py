@@ -191,7 +191,7 @@ def live_point(device: Mic488Device, text: str) -> LivePoint | None:
 
 
 def marks(device: Mic488Device) -> tuple[object, ...]:
-    """See `steptwin.simulation.kinds.kind.PointMarks`: one for all points."""
+    """See `steptwin.simulation.kinds.kind.ControllerKind.marks`: one for all points."""
     program, (m1, m2, m3, m4) = device.program, device.axes
     # Written out, because it is asked for after each event.
     mark = (

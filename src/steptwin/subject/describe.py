@@ -46,7 +46,7 @@ def _machine(world: Plant, name: str, *, is_moved: bool) -> MachinePart:
     line, unit = (None, None) if on is None else (on[0].name, on[1])
     kind = world.kind(name)
     sheet = kind.datasheet(world.machines[name])
-    return MachinePart(name, sheet, line, unit, controls_of(sheet, kind.control), is_moved=is_moved)
+    return MachinePart(name, sheet, line, unit, controls_of(sheet, kind.commands), is_moved=is_moved)
 
 
 def _mechanics(world: Plant, name: str) -> MechanicsPart:

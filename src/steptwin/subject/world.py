@@ -49,7 +49,6 @@ LOOKS = frozenset({command.ReadPoints, command.ReadState, command.Encoders, comm
 
 
 CANNOT_DO = Message("subject.cannot-do", "{name!r} is {kind}, which cannot do {command}; it can do {known}")
-CANNOT_BE_JOGGED = Message("subject.cannot-be-jogged", "{name!r} is {kind}, which cannot be jogged")
 
 
 class WorldSubject:
@@ -168,8 +167,8 @@ class WorldSubject:
         """Execute a command for a controller as its master does."""
         world, name = self.world, wanted.machine
         kind = world.kind(name)
-        if type(wanted) not in kind.control:
-            known = ", ".join(declared(one).name for one in kind.control)
+        if type(wanted) not in kind.commands:
+            known = ", ".join(declared(one).name for one in kind.commands)
             raise Refusal(CANNOT_DO(name=name, kind=kind.title, command=command.type_of(wanted).name, known=known))
         step = ordered(world, wanted)
         self._apply_input(step)
@@ -204,8 +203,6 @@ class WorldSubject:
         """A jog that lasts only while it is extended; it has not started yet. Raises `Misuse` and `Refusal`."""
         world, name = self.world, wanted.machine
         kind, machine = world.kind(name), world.machine(name)
-        if kind.held_jog is None:
-            raise Refusal(CANNOT_BE_JOGGED(name=name, kind=kind.title))
         world.touch(name)
         on = world.parts.line_of.get(name)
         held = kind.held_jog(machine, None if on is None else on[0].name, wanted)
@@ -368,9 +365,9 @@ class WorldSubject:
             end()
         self._writes.clear()
         for spec in self.world.spec.lines if is_wanted else ():
-            writes = line_kinds()[spec.kind].writes
-            if writes is not None:
-                self._writes.append(writes(self.world.lines[spec.name], partial(self._written, spec.name)))
+            end = line_kinds()[spec.kind].writes(self.world.lines[spec.name], partial(self._written, spec.name))
+            if end is not None:
+                self._writes.append(end)
 
     def _written(self, line: str, seen: LineWrite) -> None:
         machines = [self._machine_of[line, unit] for unit in seen.units]

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Mapping
 from contextlib import nullcontext
-from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from facts import check_facts
@@ -19,8 +20,13 @@ from steptwin.files.world import World
 from steptwin.m1486.events import M1486Event
 from steptwin.m1486.variants import VARIANTS
 from steptwin.mic488.events import EVENTS
+from steptwin.motioncontroller import MotionController
 from steptwin.simulation.faults import read
-from steptwin.simulation.kinds.registry import KINDS, MIC488, register
+from steptwin.simulation.kinds.kind import ControllerKind, ControllerSpec, LinkKind
+from steptwin.simulation.kinds.mic488.kind import Mic488Kind
+from steptwin.simulation.kinds.mic488.linekind import ModbusLines
+from steptwin.simulation.kinds.registry import KINDS, M1486, MIC488, register
+from steptwin.simulation.script.control import ControllerCommand
 from steptwin.simulation.script.steps import Set, SetFault
 
 WORLD = World.from_toml(
@@ -125,6 +131,20 @@ def test_a_name_that_is_taken_is_refused() -> None:
     assert list(KINDS) == before
 
 
+def test_a_kind_that_lacks_a_method_is_refused_when_it_is_made() -> None:
+    class Incomplete(ControllerKind[ControllerSpec, MotionController, object]):
+        name = "incomplete"
+
+    with pytest.raises(TypeError, match=r"abstract methods? .*address.*keep_memory.*view"):
+        Incomplete()  # type: ignore[abstract]
+
+
+def test_commands_of_a_kind_are_those_that_it_does() -> None:
+    assert set(MIC488.commands) == set(get_args(ControllerCommand))
+    assert [command.__name__ for command in M1486.commands] == ["Move", "Jog", "StopAxes", "ControlProgram"]
+    assert (MIC488.offers(ControllerKind.seek), M1486.offers(ControllerKind.seek)) == (False, True)
+
+
 TAKEN = '[[m1486]]\nname = "chip"\ninterface = "two"\n'
 
 
@@ -143,12 +163,23 @@ def test_pins_that_the_driver_interface_has_are_no_inputs_and_no_outputs() -> No
 
 
 def test_a_kind_of_lines_that_no_description_could_open_is_refused() -> None:
-    other, before = replace(MIC488.line, name="other"), list(KINDS)
-    link = next(iter(other.links.values()))
+    class OtherLines(ModbusLines):
+        def __init__(self, name: str, links: Mapping[str, LinkKind]) -> None:
+            self.name = name
+            self.links = dict(links)
+
+    class OtherKind(Mic488Kind):
+        name = "new"
+
+        def __init__(self, line: ModbusLines) -> None:
+            self.line = line
+
+    before, links = list(KINDS), MIC488.line.links
+    link = next(iter(links.values()))
     with pytest.raises(Misuse, match=r"lines of kind 'other' have links that are no keys of \[\[line\]\]: pipe, post"):
-        register(replace(MIC488, name="new", line=replace(other, links={**other.links, "post": link, "pipe": link})))
+        register(OtherKind(OtherLines("other", {**links, "post": link, "pipe": link})))
     with pytest.raises(Misuse, match="a kind of lines called 'modbus' already"):
-        register(replace(MIC488, name="new", line=replace(MIC488.line, links={})))
+        register(OtherKind(OtherLines("modbus", {})))
     assert list(KINDS) == before
 
 

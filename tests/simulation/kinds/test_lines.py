@@ -293,9 +293,8 @@ def test_writes_are_told_of_places_that_are_there_and_of_those_that_come(kind: s
     line, framed = there.lines["bus"], rtu if kind == "rtu" else tcp
     line.connect("early", kind)
     told: list[LineWrite] = []
-    writes = line_kinds()["modbus"].writes
-    assert writes is not None
-    end = writes(line, told.append)
+    end = line_kinds()["modbus"].writes(line, told.append)
+    assert end is not None
     line.connect("late", kind)
     for place, pdu, unit in (("early", ON, 1), ("late", ON, 2), ("late", READ_STATUS, 1), ("early", b"\x06\xff\x00\0\7", 1)):
         line.receive(place, framed(pdu, unit), there.now)

@@ -14,7 +14,7 @@ from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.mic488.config import read_config
 from steptwin.mic488.inifile import IniFile
-from steptwin.simulation.kinds.m1486.build import keep_memory
+from steptwin.simulation.kinds.m1486.kind import M1486
 from steptwin.simulation.kinds.programs import StatementFollower
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.inputs import Download
@@ -294,9 +294,9 @@ def test_a_program_to_switch_on_with_stays_in_an_eeprom(variant: str, kept: bool
     text = f'[[m1486]]\nname = "c"\nvariant = "{variant}"\nprogram = "p"\n'
     chip = World.from_toml(text, {"p": b"[\nf64\nr\n]\n"}).m1486["c"].chip
     images: list[bytes] = []
-    keep_memory(chip, chip.image, images.append)
+    M1486.keep_memory(chip, chip.image, images.append)
     assert images == []
-    keep_memory(chip, None, images.append)
+    M1486.keep_memory(chip, None, images.append)
     assert images == ([chip.image] if kept else [])
 
 

@@ -7,19 +7,19 @@ import pytest
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.lines import interface
 from steptwin.m1486.variants import variant
-from steptwin.simulation.kinds.m1486.lanes import AXIS, lanes
+from steptwin.simulation.kinds.m1486.kind import AXIS, M1486
 from steptwin.simulation.mechanics.lanes import AxisLane, Mechanics, MovedLane, PhaseOutputs, StepOutputs, plain_view
 
 
 def test_a_chip_is_shown_in_full_steps_with_pulses_of_1800_ns() -> None:
     """Low pulses (chapter III); it has DIRECTION itself."""
-    lane = lanes(M1486Chip(variant("B"), interface=interface("sd")))[AXIS]
+    lane = M1486.lanes(M1486Chip(variant("B"), interface=interface("sd")))[AXIS]
     assert lane == AxisLane("axis", "step", 64.0, StepOutputs("STEP", None, True, 1800))
 
 
 @pytest.mark.parametrize("name", ["dual", "two"])
 def test_chips_with_converters_have_phase_currents(name: str) -> None:
-    lane = lanes(M1486Chip(variant("B"), interface=interface(name)))[AXIS]
+    lane = M1486.lanes(M1486Chip(variant("B"), interface=interface(name)))[AXIS]
     assert lane.outputs == PhaseOutputs(("PHASE1", "PHASE2"), 1, "N")
 
 

@@ -8,8 +8,7 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.simulation.kinds.kind import MotionEnds
-from steptwin.simulation.kinds.m1486 import control as m1486
-from steptwin.simulation.kinds.mic488 import control as mic488
+from steptwin.simulation.kinds.registry import M1486, MIC488
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.control import ControllerCommand, ControlProgram, Enable, Halt, Home, Jog, Move, Seek, StopAxes
 
@@ -39,7 +38,7 @@ def controller() -> World:
 )
 def test_registers_that_are_written(command: ControllerCommand, values: list[tuple[str, float]]) -> None:
     device = controller().mic488["a"].device
-    found = mic488.CONTROL[type(command)](device, "bus", command)
+    found = MIC488.step_of(device, "bus", command)
     assert found == do.Write(tuple(("a", name, value) for name, value in values))
 
 
@@ -47,18 +46,18 @@ def test_registers_that_are_written(command: ControllerCommand, values: list[tup
 def test_positions_that_a_controller_ignores(command: Move) -> None:
     device = controller().mic488["a"].device
     with pytest.raises(Misuse) as error:
-        mic488.CONTROL[Move](device, None, command)
+        MIC488.step_of(device, None, command)
     value = command.by if command.to is None else command.to
     assert str(error.value) == f"move: {value:g} mm: permitted are -4294967296…4294967294 mm"
 
 
 def test_when_a_motion_has_ended() -> None:
     over = "a.M2.status != 3 and a.M2.status != 6 and a.M2.status != 8"
-    assert mic488.motion_ends("a.M2", None, None) == MotionEnds(over, "a.M2.status == 4")
-    assert m1486.motion_ends("c.M1", None, None) == MotionEnds("not c.busy", "c.valid")
-    assert m1486.motion_ends("c.M1", "chips", None) == MotionEnds("not c.busy and chips.idle", "c.valid")
+    assert MIC488.motion_ends("a", 2, None, None) == MotionEnds(over, "a.M2.status == 4")
+    assert M1486.motion_ends("c", 1, None, None) == MotionEnds("not c.busy", "c.valid")
+    assert M1486.motion_ends("c", 1, "chips", None) == MotionEnds("not c.busy and chips.idle", "c.valid")
     for pin, level in (("B8", 0), ("B4", 1)):
-        ends = m1486.motion_ends("c.M1", "chips", Seek("c", 1, -1, pin))
+        ends = M1486.motion_ends("c", 1, "chips", Seek("c", 1, -1, pin))
         assert ends == MotionEnds("not c.busy and chips.idle", f"c.valid and c.counter == 0 and c.{pin} == {level}")
 
 
@@ -97,15 +96,15 @@ def chips(*texts: str, variant: str = "A") -> World:
 def test_characters_that_are_typed(command: ControllerCommand, text: str) -> None:
     chip = chips("f1280", "r").m1486["c"].chip
     assert chip.drive.counter_u(chip.now) == 1280
-    assert m1486.CONTROL[type(command)](chip, "chips", command) == do.Send("chips", text.encode())
+    assert M1486.step_of(chip, "chips", command) == do.Send("chips", text.encode())
 
 
 def test_characters_for_a_seek_and_for_a_chip_at_24_mhz() -> None:
     chip = chips().m1486["c"].chip
-    assert m1486.seek(chip, "chips", Seek("c", 1, 1, "B21")) == do.Send("chips", b"xA\r)21\rc100\r")
-    assert m1486.seek(chip, "chips", Seek("c", 1, -1, "B1")) == do.Send("chips", b"xA\r(1\rc100\r")
+    assert M1486.seek(chip, "chips", Seek("c", 1, 1, "B21")) == do.Send("chips", b"xA\r)21\rc100\r")
+    assert M1486.seek(chip, "chips", Seek("c", 1, -1, "B1")) == do.Send("chips", b"xA\r(1\rc100\r")
     fast = chips(variant="A2x").m1486["c"].chip
-    assert m1486.CONTROL[Jog](fast, "chips", Jog("c", 1, 6400.0)) == do.Send("chips", b"xA\rv50\rg+\rr\r")
+    assert M1486.step_of(fast, "chips", Jog("c", 1, 6400.0)) == do.Send("chips", b"xA\rv50\rg+\rr\r")
 
 
 GRID = "no multiple of 64, the microstep of M1"
@@ -127,19 +126,19 @@ GRID = "no multiple of 64, the microstep of M1"
 def test_what_a_chip_does_not_take(command: ControllerCommand, kind: type[Exception], text: str) -> None:
     chip = chips("f1280", "r").m1486["c"].chip
     with pytest.raises(kind) as error:
-        m1486.CONTROL[type(command)](chip, "chips", command)
+        M1486.step_of(chip, "chips", command)
     assert str(error.value).startswith(text)
     with pytest.raises(Refusal, match="c is on no line, so no commands can be sent to it"):
-        m1486.CONTROL[Jog](chip, None, Jog("c", 1, 6400.0))
+        M1486.step_of(chip, None, Jog("c", 1, 6400.0))
 
 
 def test_a_chip_is_stopped_at_itself_and_its_program_cannot_be_started() -> None:
     chip = chips().m1486["c"].chip
-    assert m1486.CONTROL[StopAxes](chip, None, StopAxes("c")) == Halt("c")
-    assert m1486.CONTROL[ControlProgram](chip, None, ControlProgram("c", "stop")) == Halt("c", program="stop")
+    assert M1486.step_of(chip, None, StopAxes("c")) == Halt("c")
+    assert M1486.step_of(chip, None, ControlProgram("c", "stop")) == Halt("c", program="stop")
     for action in ("start", "pause"):
         with pytest.raises(Refusal, match=f"c: an M1486 has no command to {action} its program: only stop can be done"):
-            m1486.CONTROL[ControlProgram](chip, None, ControlProgram("c", action))
+            M1486.step_of(chip, None, ControlProgram("c", action))
 
 
 @pytest.mark.parametrize(("to", "is_taken"), [(80.0, True), (112.0, False), (64.0, False)])
@@ -148,10 +147,10 @@ def test_positions_lie_on_the_grid_from_where_the_chip_is(to: float, is_taken: b
     chip = chips("m4\rq4", "f16", "r", "m1\rq1").m1486["c"].chip
     assert (chip.drive.counter_u(chip.now), chip.drive.grid_u) == (16, 64)
     if is_taken:
-        assert m1486.CONTROL[Move](chip, "chips", Move("c", 1, to=to))
+        assert M1486.step_of(chip, "chips", Move("c", 1, to=to))
         return
     with pytest.raises(Refusal, match=GRID):
-        m1486.CONTROL[Move](chip, "chips", Move("c", 1, to=to))
+        M1486.step_of(chip, "chips", Move("c", 1, to=to))
 
 
 def test_a_chip_that_moves_or_was_stopped_in_a_move_takes_no_move() -> None:
@@ -162,24 +161,24 @@ def test_a_chip_that_moves_or_was_stopped_in_a_move_takes_no_move() -> None:
     commands = (Move("c", 1, by=64.0), Jog("c", 1, 6400.0))
     for command in commands:
         with pytest.raises(Refusal, match=r"c is not at rest .*: wait, or stop it"):
-            m1486.CONTROL[type(command)](chip, "chips", command)
+            M1486.step_of(chip, "chips", command)
     with pytest.raises(Refusal, match="c is not at rest"):
-        m1486.seek(chip, "chips", Seek("c", 1, 1, "B4"))
+        M1486.seek(chip, "chips", Seek("c", 1, 1, "B4"))
     world.line["chips"].send(b"xA\rk\r")
     world.run(for_=2.0)
     with pytest.raises(Refusal, match=r"c was stopped in a move: its counter does not show where it is \(M-16\)"):
-        m1486.CONTROL[Move](chip, "chips", Move("c", 1, to=64.0))
-    assert m1486.CONTROL[Move](chip, "chips", Move("c", 1, by=64.0))
+        M1486.step_of(chip, "chips", Move("c", 1, to=64.0))
+    assert M1486.step_of(chip, "chips", Move("c", 1, by=64.0))
     assert world.now > SECOND
 
 
 @pytest.mark.parametrize("pin", ["B0", "B22", "B100", "b4", "IN1", "B4 "])
 def test_lines_that_cannot_be_sought(pin: str) -> None:
     with pytest.raises(Misuse, match="permitted are B1 to B21, such as '-B8'"):
-        m1486.seek(chips().m1486["c"].chip, "chips", Seek("c", 1, 1, pin))
+        M1486.seek(chips().m1486["c"].chip, "chips", Seek("c", 1, 1, pin))
 
 
 def test_a_distance_of_0_is_no_position_that_is_ignored() -> None:
     world = World.from_toml('[[mic488]]\nname = "a"\n[mic488.M1]\ngear = 1e10\n')
     command = Move("a", 1, by=0.0)
-    assert mic488.CONTROL[Move](world.mic488["a"].device, None, command) == do.Write((("a", "M1_POS_REL", 0.0),))
+    assert MIC488.step_of(world.mic488["a"].device, None, command) == do.Write((("a", "M1_POS_REL", 0.0),))

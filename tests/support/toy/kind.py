@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
-from typing import TYPE_CHECKING, Any
 
 from steptwin.controllerstate import DetailRow, StateAxis, StateProgram, StateReader, StateStatus
 from steptwin.datasheet import Access, AxisDescription, Datasheet, Detail, FactType, Pin, PinDirection, Point, PointEffect
@@ -18,12 +17,13 @@ from steptwin.simulation.kinds.kind import (
     ControllerKind,
     ControllerSpec,
     LineKind,
-    LineSpec,
     LineUnit,
     LinkKind,
     Member,
+    RunningWorld,
     Terminals,
 )
+from steptwin.simulation.kinds.links import LineSpec
 from steptwin.simulation.kinds.machineview import MachineView
 from steptwin.simulation.kinds.registry import KINDS, register
 from steptwin.simulation.mechanics.lanes import AxisLane, plain_view
@@ -40,9 +40,6 @@ from toy.faults import ToyBody
 from toy.line import ToyLine
 from toy.machine import STEP_P, Toy
 
-if TYPE_CHECKING:
-    pass
-
 
 @table("[[toy]]")
 class ToySpec(ControllerSpec):
@@ -50,7 +47,7 @@ class ToySpec(ControllerSpec):
 
 
 class ToyView(MachineView):
-    def __init__(self, plant: Any, name: str, toy: Toy) -> None:
+    def __init__(self, plant: RunningWorld, name: str, toy: Toy) -> None:
         super().__init__(plant, name)
         self._toy = toy
 
@@ -82,56 +79,6 @@ class ToyWords:
         return self._units
 
 
-def _make_line(spec: LineSpec, members: Sequence[Member], kernel: Kernel, record: RecordSink, faults: Faults) -> ToyLine:
-    if len(members) != 1:
-        raise Misuse("a toy is alone on its line")
-    return ToyLine(kernel, spec.name, members[0].machine, faults, record)
-
-
-def _build(spec: ToySpec, context: BuildContext) -> Callable[[bytes | None], Toy]:
-    return lambda memory: Toy()
-
-
-def _watch_events(toy: Toy, call: Callable[[MachineEvent], None]) -> None:
-    """It reports nothing."""
-
-
-def _keep_memory(toy: Toy, memory: bytes | None, keep: Callable[[bytes], None]) -> None:
-    """It keeps nothing."""
-
-
-def _input_pin(pin: str, level: float) -> str:
-    if pin.upper() != "STOP" or level not in (0.0, 1.0):
-        raise Misuse(f"{pin} = {level:g}: the input is STOP, 0 or 1")
-    return "STOP"
-
-
-def _scale(given: GivenScale, toy: Toy, number: int) -> DriveScale:
-    return DriveScale(pulses_per_rev=given.pulses_per_rev or 200, full_steps=FULL_STEPS, text="counts pulses")
-
-
-def _body(toy: Toy, service: LineUnit, shafts: Mapping[int, AxisLoad]) -> ToyBody:
-    return ToyBody(shafts.values())
-
-
-def _axis(toy: Toy, described: AxisDescription, now: Nanos) -> StateAxis:
-    return StateAxis(
-        number=1,
-        name=described.name,
-        unit=described.unit,
-        position=_position(toy, now),
-        velocity=toy.axis.plan.velocity(now),
-        moving=toy.is_busy,
-        enabled=None,
-        encoder=None,
-        status=StateStatus(text="busy" if toy.is_busy else "at rest"),
-    )
-
-
-def _lanes(toy: Toy) -> Mapping[str, AxisLane]:
-    return {"1": plain_view("1")}
-
-
 POSITION = Point(
     path="position",
     meaning="Pulses.",
@@ -155,67 +102,125 @@ DATASHEET = Datasheet(
 )
 
 
-def _point(toy: Toy, name: str) -> LivePoint | None:
-    if name.lower() != "position":
-        return None
-    axis = toy.axis
-    return LivePoint(
-        point=POSITION, read=partial(_position, toy), turns=turns_of(lambda: axis.plan), version=lambda: axis.revision
-    )
-
-
 def _position(toy: Toy, now: Nanos) -> float:
     return float(toy.axis.plan.count(now))
 
 
-def _move(toy: Toy, line: str | None, command: Move) -> do.Send:
-    """M takes a number of `STEP_P` pulses."""
-    number, rest = divmod(0 if command.by is None else command.by, STEP_P)
-    if line is None or command.by is None or rest or not -128 <= number <= 127:
-        raise Refusal(f"{command}: by -1280 to 1270 pulses, in tens, on its line")
-    return do.Send(line, b"M" + int(number).to_bytes(signed=True))
+def _axis(toy: Toy, described: AxisDescription, now: Nanos) -> StateAxis:
+    return StateAxis(
+        number=1,
+        name=described.name,
+        unit=described.unit,
+        position=_position(toy, now),
+        velocity=toy.axis.plan.velocity(now),
+        moving=toy.is_busy,
+        enabled=None,
+        encoder=None,
+        status=StateStatus(text="busy" if toy.is_busy else "at rest"),
+    )
 
 
-TOYS = LineKind(
-    name="toys",
-    meaning="toys",
-    links={"pty": LinkKind("raw", "pty", "toys"), "tcp": LinkKind("raw", "tcp", "toys")},
-    make=_make_line,
-    words=ToyWords,
-)
-TOY: ControllerKind[ToySpec, Toy, ToyView] = ControllerKind(
-    name="toy",
-    model="toy",
-    spec=ToySpec,
-    files=lambda spec: (),
-    build=_build,
-    watch_events=_watch_events,
-    keep_memory=_keep_memory,
-    announced=lambda toy, address: {"kind": "toy"},
-    line=TOYS,
-    address=lambda spec, toy: 0,
-    terminals=Terminals(digital_inputs=("STOP",), analog_inputs=(), outputs=("BUSY",)),
-    input_pin=_input_pin,
-    scale=_scale,
-    is_idle=lambda toy, now: not toy.is_busy,
-    datasheet=lambda toy: DATASHEET,
-    pins=lambda toy: {pin.name: pin for pin in DATASHEET.pins},
-    datasheet_of=lambda variant: DATASHEET,
-    point=_point,
-    control={Move: _move, StopAxes: lambda toy, line, command: Halt(command.machine, command.axis)},
-    halt=lambda toy, wanted, now: toy.halt(now),
-    state=StateReader(
+class ToyLines(LineKind[Toy, ToyLine]):
+    name = "toys"
+    meaning = "toys"
+    links: Mapping[str, LinkKind] = {"pty": LinkKind("raw", "pty", "toys"), "tcp": LinkKind("raw", "tcp", "toys")}
+
+    def make(self, spec: LineSpec, members: Sequence[Member[Toy]], kernel: Kernel, record: RecordSink, faults: Faults) -> ToyLine:
+        if len(members) != 1:
+            raise Misuse("a toy is alone on its line")
+        return ToyLine(kernel, spec.name, members[0].machine, faults, record)
+
+    def words(self, line: ToyLine, prefix: str, sink: Callable[[FrameLine], None]) -> ToyWords:
+        return ToyWords(line, prefix, sink)
+
+
+class ToyKind(ControllerKind[ToySpec, Toy, ToyView]):
+    name = "toy"
+    model = "toy"
+    spec = ToySpec
+    line = ToyLines()
+    terminals = Terminals(digital_inputs=("STOP",), analog_inputs=(), outputs=("BUSY",))
+    state = StateReader(
         datasheet=lambda toy: DATASHEET,
         status=lambda toy, now: StateStatus(text="off" if toy.is_off else "ok"),
         program=lambda toy, now: StateProgram(state=None, text="none", variables={}),
         axis=_axis,
         details=(DetailRow(DATASHEET.details[0], lambda toy, now: toy.taken),),
-    ),
-    view=ToyView,
-    lanes=_lanes,
-    body=_body,
-    keeps_memory=lambda toy: False,
-)
+    )
+
+    def files(self, spec: ToySpec) -> tuple[()]:
+        return ()
+
+    def build(self, spec: ToySpec, context: BuildContext) -> Callable[[bytes | None], Toy]:
+        return lambda memory: Toy()
+
+    def address(self, spec: ToySpec, toy: Toy) -> int:
+        return 0
+
+    def announced(self, toy: Toy, address: int) -> dict[str, object]:
+        return {"kind": "toy"}
+
+    def input_pin(self, pin: str, level: float) -> str:
+        if pin.upper() != "STOP" or level not in (0.0, 1.0):
+            raise Misuse(f"{pin} = {level:g}: the input is STOP, 0 or 1")
+        return "STOP"
+
+    def scale(self, given: GivenScale, toy: Toy, axis: int) -> DriveScale:
+        return DriveScale(pulses_per_rev=given.pulses_per_rev or 200, full_steps=FULL_STEPS, text="counts pulses")
+
+    def lanes(self, toy: Toy) -> Mapping[str, AxisLane]:
+        return {"1": plain_view("1")}
+
+    def body(self, toy: Toy, service: LineUnit, shafts: Mapping[int, AxisLoad]) -> ToyBody:
+        return ToyBody(shafts.values())
+
+    def watch_events(self, toy: Toy, call: Callable[[MachineEvent], None]) -> None:
+        """It reports nothing."""
+
+    def keeps_memory(self, toy: Toy) -> bool:
+        return False
+
+    def keep_memory(self, toy: Toy, memory: bytes | None, keep: Callable[[bytes], None]) -> None:
+        """It keeps nothing."""
+
+    def datasheet(self, toy: Toy) -> Datasheet:
+        return DATASHEET
+
+    def datasheet_of(self, variant: str | None) -> Datasheet:
+        return DATASHEET
+
+    def pins(self, toy: Toy) -> Mapping[str, Pin]:
+        return {pin.name: pin for pin in DATASHEET.pins}
+
+    def point(self, toy: Toy, name: str) -> LivePoint | None:
+        if name.lower() != "position":
+            return None
+        axis = toy.axis
+        return LivePoint(
+            point=POSITION, read=partial(_position, toy), turns=turns_of(lambda: axis.plan), version=lambda: axis.revision
+        )
+
+    def is_idle(self, toy: Toy, now: Nanos) -> bool:
+        return not toy.is_busy
+
+    def view(self, world: RunningWorld, name: str, toy: Toy) -> ToyView:
+        return ToyView(world, name, toy)
+
+    def move(self, toy: Toy, line: str | None, command: Move) -> do.Send:
+        """M takes a number of `STEP_P` pulses."""
+        number, rest = divmod(0 if command.by is None else command.by, STEP_P)
+        if line is None or command.by is None or rest or not -128 <= number <= 127:
+            raise Refusal(f"{command}: by -1280 to 1270 pulses, in tens, on its line")
+        return do.Send(line, b"M" + int(number).to_bytes(signed=True))
+
+    def stop_axes(self, toy: Toy, line: str | None, command: StopAxes) -> Halt:
+        return Halt(command.machine, command.axis)
+
+    def halt(self, toy: Toy, wanted: Halt, now: Nanos) -> None:
+        toy.halt(now)
+
+
+TOY = ToyKind()
 
 
 @contextmanager

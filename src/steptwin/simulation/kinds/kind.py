@@ -1,15 +1,17 @@
-"""The interface between a world and a kind of controller or line: one value for each kind. A missing field is a `TypeError` at
-import. A field that only some controllers have is None in the others, and a step that needs it is refused with a message."""
+"""The interface between a world and a kind of controller or line: one object of one class for each kind. A missing abstract
+member is a `TypeError` at import. A step that needs what only other controllers have is refused with a message."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from string import digits
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
 
-from steptwin.errors import Misuse
+from steptwin.errors import Misuse, Refusal
 from steptwin.machine import MachineEvent, Nanos
 from steptwin.messages import Message
 from steptwin.motioncontroller import MotionController
@@ -19,6 +21,17 @@ from steptwin.simulation.mechanics.mechanics import EncoderReader
 from steptwin.simulation.mechanics.scale import DriveScale, GivenScale
 from steptwin.simulation.scheduler.kernel import Kernel
 from steptwin.simulation.scheduler.wires import PinName
+from steptwin.simulation.script.control import (
+    ControllerCommand,
+    ControlProgram,
+    Enable,
+    Halt,
+    Home,
+    Jog,
+    Move,
+    Seek,
+    StopAxes,
+)
 from steptwin.simulation.toml.names import WrongTerminal
 from steptwin.simulation.toml.reader import Key
 from steptwin.simulation.toml.table import TableSpec, key, table
@@ -37,7 +50,6 @@ if TYPE_CHECKING:
     from steptwin.simulation.kinds.programtexts import Destination, Downloading, ProgramText, TextLanguage
     from steptwin.simulation.mechanics.lanes import AxisLane
     from steptwin.simulation.scheduler.trace import RecordSink
-    from steptwin.simulation.script.control import ControllerCommand, Halt, Jog, Seek
     from steptwin.simulation.script.heldjog import HeldJog
     from steptwin.simulation.script.steps import Step
     from steptwin.wire.frameline import FrameLine
@@ -58,15 +70,6 @@ V = TypeVar("V")
 
 NewValues: TypeAlias = tuple[tuple[str, float], ...]
 """Registers by name, and the values to write."""
-
-
-class PointMarks(NamedTuple, Generic[M]):
-    """Values of which some are others after an event that has changed points which neither move nor are only kept
-    (`steptwin.points.LivePoint`)."""
-
-    values: Callable[[M], tuple[object, ...]]
-    of: Callable[[str], int] = lambda path: 0
-    """The number of the value that is another one if the point with this path is."""
 
 
 class BuildContext(Protocol):
@@ -159,143 +162,110 @@ class LineUnit(NamedTuple):
     """Empty without one."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EncoderInputs(Generic[M]):
+class EncoderInputs(ABC, Generic[M]):
     """The encoder inputs of a controller. Axes count from 1."""
 
-    reader: Callable[[M], EncoderReader]
-    """The receiver of the counts."""
-    counts_per_pulse: Callable[[M, int], Fraction]
-    """As the controller is configured for an axis."""
-    index_input: Callable[[int], str]
-    """The pin of channel C of an axis."""
-    shown: Callable[[M, Nanos], list[dict[str, object]]]
-    """Counts of each axis and what turns its encoder, as plain data."""
-    couple: Callable[[M, int, str, Nanos], None]
-    """Choose what turns the shaft of an axis without mechanics: one of `steptwin.simulation.script.steps.COUPLINGS`."""
-    check_turn: Callable[[int, int], None]
-    """Raises `Misuse` for an axis that is not there, and for counts beyond what is permitted at once."""
+    @abstractmethod
+    def reader(self, machine: M, /) -> EncoderReader:
+        """The receiver of the counts."""
+
+    @abstractmethod
+    def counts_per_pulse(self, machine: M, axis: int, /) -> Fraction:
+        """As the controller is configured for an axis."""
+
+    @abstractmethod
+    def index_input(self, axis: int, /) -> str:
+        """The pin of channel C of an axis."""
+
+    @abstractmethod
+    def shown(self, machine: M, now: Nanos, /) -> list[dict[str, object]]:
+        """Counts of each axis and what turns its encoder, as plain data."""
+
+    @abstractmethod
+    def couple(self, machine: M, axis: int, coupling: str, now: Nanos, /) -> None:
+        """Choose what turns the shaft of an axis without mechanics: one of `steptwin.simulation.script.steps.COUPLINGS`."""
+
+    @abstractmethod
+    def check_turn(self, axis: int, counts: int, /) -> None:
+        """Raises `Misuse` for an axis that is not there, and for counts beyond what is permitted at once."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NamedRegisters(Generic[M]):
+class NamedRegisters(ABC, Generic[M]):
     """Registers that scripts write by name."""
 
-    requests: Callable[[M, NewValues], tuple[bytes, ...]]
-    """The PDUs that write values by name. Raises `Misuse` for what a register does not take."""
-    dialect: Callable[[M], Hashable]
-    """What requests depend on besides names and values."""
-    execute: Callable[[M, bytes, Nanos], bytes]
-    """The answer to a PDU that reaches the controller without a line."""
-    ended_by: Callable[[M, bytes], tuple[int, ...]]
-    """What a PDU ends if it is a stop: the numbers of axes, and 0 for the program."""
+    @abstractmethod
+    def requests(self, machine: M, values: NewValues, /) -> tuple[bytes, ...]:
+        """The PDUs that write values by name. Raises `Misuse` for what a register does not take."""
+
+    @abstractmethod
+    def dialect(self, machine: M, /) -> Hashable:
+        """What requests depend on besides names and values."""
+
+    @abstractmethod
+    def execute(self, machine: M, pdu: bytes, now: Nanos, /) -> bytes:
+        """The answer to a PDU that reaches the controller without a line."""
+
+    @abstractmethod
+    def ended_by(self, machine: M, pdu: bytes, /) -> tuple[int, ...]:
+        """What a PDU ends if it is a stop: the numbers of axes, and 0 for the program."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Vision(Generic[S, M]):
-    """An input for the records of a vision system: number, x, y, angle."""
-
-    address: Callable[[S], str | None]
-    """HOST:PORT where a running world takes records."""
-    see: Callable[[M, tuple[float, float, float, float], Nanos], None]
-    records: Callable[[], Callable[[bytes], Sequence[tuple[float, float, float, float]]]]
-    """For each connection: splits received bytes into records."""
+SeenRecord: TypeAlias = tuple[float, float, float, float]
+"""A record of a vision system: number, x, y, angle."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ControllerKind(Generic[S, M, V]):
-    """A kind of controller: its spec, its machine, and what Python programs see of it."""
+class Vision(ABC, Generic[S, M]):
+    """An input for the records of a vision system."""
 
-    name: str
-    """The name of its table in a description: ``[[name]]``."""
-    model: str
-    """For people: ``MIC488``."""
+    @abstractmethod
+    def address(self, spec: S, /) -> str | None:
+        """HOST:PORT where a running world takes records."""
+
+    @abstractmethod
+    def see(self, machine: M, record: SeenRecord, now: Nanos, /) -> None: ...
+
+    @abstractmethod
+    def records(self) -> Callable[[bytes], Sequence[SeenRecord]]:
+        """For each connection: splits received bytes into records."""
+
+
+HAS_NONE_OF_THESE = Message("simulation.has-none-of-these", "{name!r} is {title}, which has no {what}")
+HOMES_BY_SEEK = Message(
+    "simulation.homes-by-seek",
+    "{name!r} is {title}, which does not know its switch: home it with seek, such as '-B8', not with a velocity",
+)
+HOMES_BY_VELOCITY = Message(
+    "simulation.homes-by-velocity", "{name!r} is {title}, which knows its switches: home it with a velocity, not with seek"
+)
+CANNOT_BE_JOGGED = Message("simulation.cannot-be-jogged", "{name!r} is {kind}, which cannot be jogged")
+
+
+class ControllerKind(ABC, Generic[S, M, V]):
+    """A kind of controller: its spec, its machine, and what Python programs see of it. Each kind is one object of one class, in
+    its folder.
+
+    A missing member that every kind has is a `TypeError` at import. What only some kinds have is refused in the others, or gives
+    what there is without it.
+    """
+
+    # ------------------------------------------------------------------ its table in a description
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """The name of its table in a description: ``[[name]]``."""
+
+    @property
+    @abstractmethod
+    def model(self) -> str:
+        """For people: ``MIC488``."""
+
     article: str = "a"
-    spec: type[S]
-    """Its table, with the keys."""
-    files: Callable[[S], Iterable[tuple[str, str]]]
-    """Names of the files that a spec refers to, and the keys that do."""
-    build: Callable[[S, BuildContext], Callable[[bytes | None], M]]
-    """Reads and checks its files. Gives what makes its machine at time 0, with the saved content of the non-volatile memory, if
-    any, for each world of the description: machines share only what none of them changes. Both raise `Misuse`."""
-    watch_events: Callable[[M, Callable[[MachineEvent], None]], None]
-    """Call a function with every event of the machine from now on."""
-    keep_memory: Callable[[M, bytes | None, Callable[[bytes], None]], None]
-    """Call a function with its non-volatile memory after each change, and at once if it differs from the saved content."""
-    announced: Callable[[M, int], dict[str, object]]
-    """How drivers reach it at present: ``kind``, and the options behind an address that select it there
-    (`steptwin.drivers.kind.AddressSelection`). The number is its address on the line, as it was built."""
-    line: LineKind
-    """The connection of its line."""
-    address: Callable[[S, M], int]
-    """Unit or address on its line."""
-    terminals: Terminals
-    input_pin: Callable[[str, float], str]
-    """The pin that a name means. Raises `Misuse` with the inputs, or for a value that the pin does not take."""
-    refuse_taken: Callable[[M, str], None] = lambda machine, pin: None
-    """Raises `Misuse` for a pin that is neither input nor output as the machine is configured."""
-    scale: Callable[[GivenScale, M, int], DriveScale]
-    """How its axis of a number (from 1) counts. Raises `Misuse`."""
-    is_idle: Callable[[M, Nanos], bool]
-    """Whether all axes stand and no program runs."""
-    datasheet: Callable[[M], Datasheet]
-    """Its static description, the same object for all machines that have the same."""
-    pins: Callable[[M], Mapping[str, Pin]]
-    """Those of its data sheet by name. They do not depend on its configuration, so they are there before the sheet."""
-    datasheet_of: Callable[[str | None], Datasheet]
-    """That of a controller that is not configured: of a variant by its name, or the usual one. Raises `Misuse`."""
-    point: Callable[[M, str], LivePoint | None]
-    """The point of its data sheet that a name or an address means: what conditions, scripts and programs outside read of it. None
-    where there is none; raises `Misuse` for what is half a value."""
-    marks: PointMarks[M] | None = None
-    """Faster than to compare all points after each event, which is done where there is none."""
-    motion_ends: Callable[[str, str | None, Seek | None], MotionEnds] | None = None
-    """Conditions on an axis, which has that name in conditions, of a controller on a line with that name, or at the end of a
-    seek; None where its state does not show how a motion ended."""
-    seek: Callable[[M, str | None, Seek], Step] | None = None
-    """The step that begins a seek, of a controller that does not know its switch; arguments and exceptions as those of
-    ``control``."""
-    control: Mapping[type[ControllerCommand], Callable[[M, str | None, Any], Step | Halt]]
-    """The steps by which its master does the commands for controllers that it can do. The text is the name of its line; the
-    machine is at the present. Raises `Misuse`, and `Refusal` for what cannot be done now."""
-    halt: Callable[[M, Halt, Nanos], None]
-    """Stop the machine, which is at that moment, at once and without its line."""
-    held_jog: Callable[[M, str | None, Jog], HeldJog] | None = None
-    """A jog that lasts only while it is extended; arguments and exceptions as those of ``control``."""
-    state: StateReader[M]
-    """Its present state; the machine is at that moment."""
-    statement: Callable[[M], str | None] = lambda machine: None
-    """The statement that its program is at, while one runs or is paused, as text."""
-    view: Callable[[RunningWorld, str, M], V]
-    """Its view for Python programs in a running world."""
-    lanes: Callable[[M], Mapping[str, AxisLane]]
-    """How its axes are shown in a trace, by the subject of their plans."""
-    body: Callable[[M, LineUnit, Mapping[int, AxisLoad]], Body]
-    """Its parts that faults act on; shafts are those of the mechanics of its axes, by number."""
-    keeps_memory: Callable[[M], bool]
-    """Whether it has non-volatile memory."""
-    watch_program: Callable[[M, Kernel, str], ProgramReport | None] = lambda machine, kernel, name: None
-    """Watch the programs of the machine, which has that name in its kernel; None without any."""
-    languages: Sequence[TextLanguage] = ()
-    """Those of the texts in its program memory."""
-    dialect_keys: Sequence[str] = ()
-    """Keys of its table on which depends what these texts may contain."""
-    texts: Callable[[S, M, TextContext], Sequence[ProgramText]] = lambda spec, machine, context: ()
-    """What is in its program memory, one text for each place there; the machine is at the present."""
-    programs: Callable[[S, M, TextContext], Programs | None] = lambda spec, machine, context: None
-    """Its programs while they are executed; None for a kind without any."""
-    download: Callable[[M, Destination, SourceText], Downloading] | None = None
-    """How a text comes to one of the places of ``texts``. Changes nothing yet. Raises `SourceErrors` for a text with errors, and
-    `Refusal` for what cannot be done now."""
-    configuration: Callable[[S, M, BuildContext], SourceText | None] = lambda spec, machine, context: None
-    """Its configuration file: as it was given, else made of its settings; None for a kind that has none."""
-    configuration_format: ConfigurationFormat | None = None
-    """How this file becomes a form; None for a kind that has none."""
-    remarks: Callable[[str, M], Sequence[str]] = lambda name, machine: ()
-    """Notices for the user who starts it, under a name."""
-    encoders: EncoderInputs[M] | None = None
-    registers: NamedRegisters[M] | None = None
-    vision: Vision[S, M] | None = None
+
+    @property
+    @abstractmethod
+    def spec(self) -> type[S]:
+        """Its table, with the keys."""
 
     @property
     def keys(self) -> tuple[Key, ...]:
@@ -311,6 +281,236 @@ class ControllerKind(Generic[S, M, V]):
     def title(self) -> str:
         """With its article, for messages: ``a MIC488``."""
         return f"{self.article} {self.model}"
+
+    @abstractmethod
+    def files(self, spec: S, /) -> Iterable[tuple[str, str]]:
+        """Names of the files that a spec refers to, and the keys that do."""
+
+    @abstractmethod
+    def build(self, spec: S, context: BuildContext, /) -> Callable[[bytes | None], M]:
+        """Read and check its files. Gives what makes its machine at time 0, with the saved content of the non-volatile memory, if
+        any, for each world of the description: machines share only what none of them changes. Both raise `Misuse`."""
+
+    # ------------------------------------------------------------------ what only some have
+
+    def offers(self, method: Callable[..., object], /) -> bool:
+        """Whether this kind has a method that only some have, such as `ControllerKind.seek`."""
+        return getattr(type(self), method.__name__) is not method
+
+    def lacks(self, name: str, what: str, /) -> Misuse:
+        """Refusal of what only other controllers have, of a machine with that name."""
+        return Misuse(HAS_NONE_OF_THESE(name=name, title=self.title, what=what))
+
+    encoders: EncoderInputs[M] | None = None
+    registers: NamedRegisters[M] | None = None
+    vision: Vision[S, M] | None = None
+
+    # ------------------------------------------------------------------ its line and its surroundings
+
+    @property
+    @abstractmethod
+    def line(self) -> LineKind[M, Any]:
+        """The connection of its line."""
+
+    @abstractmethod
+    def address(self, spec: S, machine: M, /) -> int:
+        """Unit or address on its line."""
+
+    @abstractmethod
+    def announced(self, machine: M, address: int, /) -> dict[str, object]:
+        """How drivers reach it at present: ``kind``, and the options behind an address that select it there
+        (`steptwin.drivers.kind.AddressSelection`). ``address``: on the line, as it was built."""
+
+    @property
+    @abstractmethod
+    def terminals(self) -> Terminals: ...
+
+    @abstractmethod
+    def input_pin(self, pin: str, level: float, /) -> str:
+        """The pin that a name means. Raises `Misuse` with the inputs, or for a value that the pin does not take."""
+
+    def refuse_taken(self, machine: M, pin: str, /) -> None:
+        """Raises `Misuse` for a pin that is neither input nor output as the machine is configured."""
+
+    @abstractmethod
+    def scale(self, given: GivenScale, machine: M, axis: int, /) -> DriveScale:
+        """How its axis of a number (from 1) counts. Raises `Misuse`."""
+
+    @abstractmethod
+    def lanes(self, machine: M, /) -> Mapping[str, AxisLane]:
+        """How its axes are shown in a trace, by the subject of their plans."""
+
+    @abstractmethod
+    def body(self, machine: M, service: LineUnit, shafts: Mapping[int, AxisLoad], /) -> Body:
+        """Its parts that faults act on; shafts are those of the mechanics of its axes, by number."""
+
+    @abstractmethod
+    def watch_events(self, machine: M, call: Callable[[MachineEvent], None], /) -> None:
+        """Call a function with every event of the machine from now on."""
+
+    @abstractmethod
+    def keeps_memory(self, machine: M, /) -> bool:
+        """Whether it has non-volatile memory."""
+
+    @abstractmethod
+    def keep_memory(self, machine: M, memory: bytes | None, keep: Callable[[bytes], None], /) -> None:
+        """Call ``keep`` with its non-volatile memory after each change, and at once if it differs from the saved content
+        ``memory``."""
+
+    # ------------------------------------------------------------------ what there is to read of it
+
+    @abstractmethod
+    def datasheet(self, machine: M, /) -> Datasheet:
+        """Its static description, the same object for all machines that have the same."""
+
+    @abstractmethod
+    def datasheet_of(self, variant: str | None, /) -> Datasheet:
+        """That of a controller that is not configured: of a variant by its name, or the usual one. Raises `Misuse`."""
+
+    @abstractmethod
+    def pins(self, machine: M, /) -> Mapping[str, Pin]:
+        """Those of its data sheet by name. They do not depend on its configuration, so they are there before the sheet."""
+
+    @abstractmethod
+    def point(self, machine: M, name: str, /) -> LivePoint | None:
+        """The point of its data sheet that a name or an address means: what conditions, scripts and programs outside read of it.
+        None where there is none; raises `Misuse` for what is half a value."""
+
+    def marks(self, machine: M, /) -> tuple[object, ...]:
+        """Values of which some are others after an event that has changed points which neither move nor are only kept
+        (`steptwin.points.LivePoint`). It is faster than to compare all points after each event, as is done without it."""
+        return (object(),)
+
+    def mark_of(self, path: str, /) -> int:
+        """The number of the one of `marks` that is another one if the point with this path is."""
+        return 0
+
+    @property
+    @abstractmethod
+    def state(self) -> StateReader[M]:
+        """Its present state; the machine is at that moment."""
+
+    @abstractmethod
+    def is_idle(self, machine: M, now: Nanos, /) -> bool:
+        """Whether all axes stand and no program runs."""
+
+    def statement(self, machine: M, /) -> str | None:
+        """The statement that its program is at, while one runs or is paused, as text."""
+        return None
+
+    @abstractmethod
+    def view(self, world: RunningWorld, name: str, machine: M, /) -> V:
+        """Its view for Python programs in a running world."""
+
+    def remarks(self, name: str, machine: M, /) -> Sequence[str]:
+        """Notices for the user who starts it, under a name."""
+        return ()
+
+    # ------------------------------------------------------------------ commands, as its master does them
+
+    # ``line`` is the name of its line; the machine is at the present. They raise `Misuse`, and `Refusal` for what cannot be done
+    # now.
+
+    def enable(self, machine: M, line: str | None, command: Enable, /) -> Step:
+        raise self._cannot(command)
+
+    def move(self, machine: M, line: str | None, command: Move, /) -> Step:
+        raise self._cannot(command)
+
+    def home(self, machine: M, line: str | None, command: Home, /) -> Step:
+        if not self.offers(ControllerKind.seek):
+            raise self._cannot(command)
+        raise Misuse(HOMES_BY_SEEK(name=command.machine, title=self.title))
+
+    def seek(self, machine: M, line: str | None, command: Seek, /) -> Step:
+        """The beginning of a seek, of a controller that does not know its switch."""
+        raise Misuse(HOMES_BY_VELOCITY(name=command.machine, title=self.title))
+
+    def jog(self, machine: M, line: str | None, command: Jog, /) -> Step:
+        raise self._cannot(command)
+
+    def stop_axes(self, machine: M, line: str | None, command: StopAxes, /) -> Step | Halt:
+        raise self._cannot(command)
+
+    def control_program(self, machine: M, line: str | None, command: ControlProgram, /) -> Step | Halt:
+        raise self._cannot(command)
+
+    def _cannot(self, command: ControllerCommand) -> Misuse:
+        return self.lacks(command.machine, f"command {type(command).__name__.lower()}")
+
+    @cached_property
+    def commands(self) -> Sequence[type[ControllerCommand]]:
+        """The commands that its master can do."""
+        methods: Mapping[type[ControllerCommand], Callable[..., object]] = {
+            Enable: ControllerKind.enable,
+            Move: ControllerKind.move,
+            Home: ControllerKind.home,
+            Jog: ControllerKind.jog,
+            StopAxes: ControllerKind.stop_axes,
+            ControlProgram: ControllerKind.control_program,
+        }
+        return tuple(command for command, method in methods.items() if self.offers(method))
+
+    def step_of(self, machine: M, line: str | None, command: ControllerCommand | Seek, /) -> Step | Halt:
+        """The step by which its master does a command; a stop is done at the controller itself."""
+        match command:
+            case Move():
+                return self.move(machine, line, command)
+            case Jog():
+                return self.jog(machine, line, command)
+            case StopAxes():
+                return self.stop_axes(machine, line, command)
+            case Enable():
+                return self.enable(machine, line, command)
+            case Home():
+                return self.home(machine, line, command)
+            case Seek():
+                return self.seek(machine, line, command)
+            case ControlProgram():
+                return self.control_program(machine, line, command)
+
+    def motion_ends(self, name: str, axis: int, line: str | None, seek: Seek | None, /) -> MotionEnds:
+        """Conditions on an axis (from 1) of a machine with that name in conditions, or at the end of a seek. Refused where its
+        state does not show how a motion ended."""
+        raise self.lacks(name, "status of motions: send its commands, and wait for a condition")
+
+    def held_jog(self, machine: M, line: str | None, wanted: Jog, /) -> HeldJog:
+        """A jog that lasts only while it is extended."""
+        raise Refusal(CANNOT_BE_JOGGED(name=wanted.machine, kind=self.title))
+
+    @abstractmethod
+    def halt(self, machine: M, wanted: Halt, now: Nanos, /) -> None:
+        """Stop the machine, which is at that moment, at once and without its line."""
+
+    # ------------------------------------------------------------------ its programs
+
+    languages: Sequence[TextLanguage] = ()
+    """Languages of the texts in its program memory."""
+    dialect_keys: Sequence[str] = ()
+    """Keys of its table on which depends what these texts may contain."""
+    configuration_format: ConfigurationFormat | None = None
+    """How its configuration file becomes a form; None for a kind that has none."""
+
+    def texts(self, spec: S, machine: M, context: TextContext, /) -> Sequence[ProgramText]:
+        """What is in its program memory, one text for each place there; the machine is at the present."""
+        return ()
+
+    def programs(self, spec: S, machine: M, context: TextContext, /) -> Programs | None:
+        """Its programs while they are executed; None for a kind without any."""
+        return None
+
+    def watch_program(self, machine: M, kernel: Kernel, name: str, /) -> ProgramReport | None:
+        """Watch the programs of the machine, which has that name in its kernel; None without any."""
+        return None
+
+    def download(self, machine: M, to: Destination, source: SourceText, /) -> Downloading:
+        """How a text comes to one of the places of `texts`. Changes nothing yet. Raises `SourceErrors` for a text with errors,
+        and `Refusal` for what cannot be done now."""
+        raise self.lacks(to.machine, "program memory")
+
+    def configuration(self, spec: S, machine: M, context: BuildContext, /) -> SourceText | None:
+        """Its configuration file: as it was given, else made of its settings; None for a kind that has none."""
+        return None
 
 
 class ProgramAct(Protocol):
@@ -342,32 +542,49 @@ AnyKind: TypeAlias = ControllerKind[Any, Any, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Member:
+class Member(Generic[M]):
     """A controller on a line."""
 
     spec: ControllerSpec
-    machine: Any
+    machine: M
     address: int
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LineKind:
-    """A kind of line, ``kind`` of ``[[line]]``."""
+L = TypeVar("L", bound="Line")
 
-    name: str
-    meaning: str
-    """For people: ``modbus (MIC488)``."""
-    links: Mapping[str, LinkKind]
-    """Keys of ``[[line]]`` that open it for programs outside, and what they open. `opened_by` has all."""
+
+class LineKind(ABC, Generic[M, L]):
+    """A kind of line, ``kind`` of ``[[line]]``. Each kind is one object of one class."""
+
+    @property
+    @abstractmethod
+    def name(self) -> str: ...
+
+    @property
+    @abstractmethod
+    def meaning(self) -> str:
+        """For people: ``modbus (MIC488)``."""
+
+    @property
+    @abstractmethod
+    def links(self) -> Mapping[str, LinkKind]:
+        """Keys of ``[[line]]`` that open it for programs outside, and what they open. `opened_by` has all."""
+
     keys: frozenset[str] = frozenset()
     """Other keys of ``[[line]]`` that not all kinds have."""
-    make: Callable[[LineSpec, Sequence[Member], Kernel, RecordSink, Faults], Line]
-    """The line with its members, at least one. Raises `Misuse` if they do not fit together."""
-    words: Callable[[Any, str, Callable[[FrameLine], None]], LineWords]
-    """What goes over a line that was made, in words for a function; the text is put before the name of a place."""
-    writes: Callable[[Any, Callable[[LineWrite], None]], Callable[[], None]] | None = None
-    """Calls a function with what programs write over a line, until the returned function is called; None where that is not told
-    from reads."""
+
+    @abstractmethod
+    def make(self, spec: LineSpec, members: Sequence[Member[M]], kernel: Kernel, record: RecordSink, faults: Faults, /) -> L:
+        """The line with its members, at least one. Raises `Misuse` if they do not fit together."""
+
+    @abstractmethod
+    def words(self, line: L, prefix: str, sink: Callable[[FrameLine], None], /) -> LineWords:
+        """What goes over a line, in words for a function; ``prefix`` is put before the name of a place."""
+
+    def writes(self, line: L, take: Callable[[LineWrite], None], /) -> Callable[[], None] | None:
+        """Call a function with what programs write over a line, until the returned function is called; None where that is not
+        told from reads."""
+        return None
 
     @property
     def opened_by(self) -> Mapping[str, LinkKind]:
@@ -380,6 +597,9 @@ class LineKind:
         return {**self.links, **alike}
 
 
+AnyLineKind: TypeAlias = LineKind[Any, Any]
+
+
 @dataclass(frozen=True, slots=True)
 class LinkKind:
     """What a key of ``[[line]]`` opens."""
@@ -390,11 +610,3 @@ class LinkKind:
     """The name of its places; numbered on links for any number of programs."""
     protocol: str
     """For people: ``Modbus RTU``."""
-
-
-HAS_NONE_OF_THESE = Message("simulation.has-none-of-these", "{name!r} is {title}, which has no {what}")
-
-
-def lacks(name: str, kind: AnyKind, what: str) -> Misuse:
-    """Refuses what only other controllers have."""
-    return Misuse(HAS_NONE_OF_THESE(name=name, title=kind.title, what=what))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from steptwin.errors import Misuse
-from steptwin.simulation.kinds.kind import AnyKind, LineKind
+from steptwin.simulation.kinds.kind import AnyKind, AnyLineKind
 from steptwin.simulation.kinds.links import LINK_KEYS
-from steptwin.simulation.kinds.m1486 import M1486
-from steptwin.simulation.kinds.mic488 import MIC488
+from steptwin.simulation.kinds.m1486.kind import M1486
+from steptwin.simulation.kinds.mic488.kind import MIC488
 
 KINDS: dict[str, AnyKind] = {}
 """By the name of the table in a description, in the order in which controllers are built. `register` adds to it."""
@@ -25,7 +25,7 @@ def register(kind: AnyKind) -> None:
     KINDS[kind.name] = kind
 
 
-def line_kinds() -> dict[str, LineKind]:
+def line_kinds() -> dict[str, AnyLineKind]:
     """The kinds of lines by name: those that controllers of any kind sit on."""
     return {kind.line.name: kind.line for kind in KINDS.values()}
 

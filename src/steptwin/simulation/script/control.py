@@ -1,5 +1,5 @@
 """Commands for controllers, in the units of their data sheets. Each kind of controller determines what a master sends for
-them (`steptwin.simulation.kinds.kind.ControllerKind.control`)."""
+them (`steptwin.simulation.kinds.kind.ControllerKind.step_of`)."""
 
 from __future__ import annotations
 

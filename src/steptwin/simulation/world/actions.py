@@ -8,7 +8,7 @@ from typing import Any, get_args
 
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
-from steptwin.simulation.kinds.kind import lacks
+from steptwin.simulation.kinds.kind import ControllerKind
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.kinds.master import ANSWER_NS
 from steptwin.simulation.kinds.programtexts import Destination
@@ -159,8 +159,8 @@ def _see(model: Model, scripts: Scripts, given: See) -> None:
 
 def _download(model: Model, scripts: Scripts, given: Download) -> None:
     kind = model.kind(given.machine)
-    if kind.download is None:
-        raise lacks(given.machine, kind, "program memory")
+    if not kind.offers(ControllerKind.download):
+        raise kind.lacks(given.machine, "program memory")
     with _now(model, given.machine):
         on = model.parts.line_of.get(given.machine)
         source = SourceText(name_of_text(model, given.machine, given.place), given.text)

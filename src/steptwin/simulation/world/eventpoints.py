@@ -37,8 +37,8 @@ class EventPoints:
         groups: defaultdict[int, dict[str, Callable[[Nanos], float]]] = defaultdict(dict)
         for path, point in points.items():
             if point.read is not None:
-                groups[0 if kind.marks is None else kind.marks.of(path)][path] = point.read
-        self._marks_of = (lambda machine: (object(),)) if kind.marks is None else kind.marks.values
+                groups[kind.mark_of(path)][path] = point.read
+        self._marks_of = kind.marks
         self._machine = machine
         self._groups = dict(groups)
         self.read(world.now)

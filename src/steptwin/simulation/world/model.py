@@ -24,7 +24,7 @@ from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.build import Keep, build
 from steptwin.simulation.faults import Fault
 from steptwin.simulation.kinds.givenfiles import GivenFiles
-from steptwin.simulation.kinds.kind import AnyKind, EncoderInputs, NamedRegisters, NewValues, Vision, lacks
+from steptwin.simulation.kinds.kind import AnyKind, EncoderInputs, NamedRegisters, NewValues, Vision
 from steptwin.simulation.kinds.lines import Line
 from steptwin.simulation.kinds.programs import Programs
 from steptwin.simulation.logic.condition import SignalCondition
@@ -172,21 +172,21 @@ class Model:
         """The registers of a machine. Raises `Misuse` if it has none."""
         kind = self.kind(name)
         if kind.registers is None:
-            raise lacks(name, kind, "registers")
+            raise kind.lacks(name, "registers")
         return kind.registers
 
     def encoders(self, name: str) -> EncoderInputs[Any]:
         """The encoder inputs of a machine. Raises `Misuse` if it has none."""
         kind = self.kind(name)
         if kind.encoders is None:
-            raise lacks(name, kind, "encoder")
+            raise kind.lacks(name, "encoder")
         return kind.encoders
 
     def vision(self, name: str) -> Vision[Any, Any]:
         """The vision registers of a machine. Raises `Misuse` if it has none."""
         kind = self.kind(name)
         if kind.vision is None:
-            raise lacks(name, kind, "vision registers")
+            raise kind.lacks(name, "vision registers")
         return kind.vision
 
     @staticmethod
@@ -212,7 +212,7 @@ class Model:
         """The programs of a machine. Raises `Misuse` for a machine without."""
         kind = self.kind(name)
         if name not in self.programs:
-            raise lacks(name, kind, "program whose text is known")
+            raise kind.lacks(name, "program whose text is known")
         return self.programs[name]
 
     def button(self, name: str) -> tuple[Button, Kernel]:

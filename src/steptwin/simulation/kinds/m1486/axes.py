@@ -3,17 +3,11 @@
 from __future__ import annotations
 
 from steptwin.errors import Misuse
-from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.microsteps import FULL_STEP
-from steptwin.simulation.mechanics.scale import FULL_STEPS, DriveScale, GivenScale
+from steptwin.simulation.mechanics.scale import FULL_STEPS
 
 
-def scale(given: GivenScale, chip: M1486Chip, number: int) -> DriveScale:
-    per_rev, full_steps = _motor(given.pulses_per_rev, given.full_steps)
-    return DriveScale(pulses_per_rev=per_rev, full_steps=full_steps, text="counts minimum microsteps")
-
-
-def _motor(per_rev: int | None, full_steps: int | None) -> tuple[int, int]:
+def motor(per_rev: int | None, full_steps: int | None) -> tuple[int, int]:
     """Minimum microsteps and full steps per revolution: each follows from the other."""
     if per_rev is None:
         full_steps = FULL_STEPS if full_steps is None else full_steps

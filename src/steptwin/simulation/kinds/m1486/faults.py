@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486Chip
@@ -12,7 +12,6 @@ from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.faults.machine import AxisLoad, FaultyMachine
 from steptwin.simulation.faults.table import FaultKind, Need, Occasion
-from steptwin.simulation.kinds.kind import LineUnit
 
 WRONG_LEVEL = Message("simulation.m1486.wrong-level", "{pin} = {level:g}: a digital input is 0 or 1")
 
@@ -60,7 +59,3 @@ def _keep(chip: M1486Chip, store: Callable[[bytes], bytes | None] | None, owner:
     image = image if kept == new else chip.image if kept == old else b""
     stored = store(image) if store is not None else None
     return image if stored is None else stored
-
-
-def body(chip: M1486Chip, service: LineUnit, shafts: Mapping[int, AxisLoad]) -> M1486Body:
-    return M1486Body(chip, shafts.values())

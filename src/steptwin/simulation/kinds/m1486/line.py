@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import ClassVar
 
-from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.line import SerialChain
 from steptwin.machine import Nanos, Port
 from steptwin.simulation.faults import Faults
 from steptwin.simulation.faults import LineProtocol as FaultLine
-from steptwin.simulation.kinds.kind import Member
 from steptwin.simulation.kinds.lines import SCRIPTS, Line, LineEndPoint, LineTraffic
-from steptwin.simulation.kinds.links import LineSpec
 from steptwin.simulation.scheduler.kernel import Kernel
 from steptwin.simulation.scheduler.trace import RecordSink
 from steptwin.state import Plain
@@ -78,10 +75,3 @@ class ChipLine(Line):
 
     def _set_port_state(self, place: LineEndPoint, state: Plain) -> None:
         place.inner.pending = list(state)
-
-
-def make(spec: LineSpec, members: Sequence[Member], kernel: Kernel, record: RecordSink, faults: Faults) -> ChipLine:
-    """The line of a description. Raises `Misuse` for addresses that are taken, and for strict timing."""
-    if spec.timing == "strict":
-        raise Misuse("timing = 'strict' is for lines of kind modbus: an M1486 has no time-out between characters")
-    return ChipLine(kernel, spec.name, record, faults, [member.machine for member in members])

@@ -20,11 +20,8 @@ from steptwin.m1486.syntax import ChipCommand, parse
 from steptwin.m1486.unit import MASK
 from steptwin.machine import Nanos
 from steptwin.messages import Message
-from steptwin.simulation.kinds.kind import TextContext
 from steptwin.simulation.kinds.m1486.memory import PLACE as TEXT
-from steptwin.simulation.kinds.m1486.memory import given_text
 from steptwin.simulation.kinds.m1486.statement_use import use_of
-from steptwin.simulation.kinds.m1486.table import M1486Spec
 from steptwin.simulation.kinds.programs import Frame, Place, Statement, StatementUse
 from steptwin.statements import StatementHook
 
@@ -32,12 +29,6 @@ BEGIN = "program"
 """The name of what is executed before the first label."""
 REGISTER_MAX = 0xFFFF
 RESET = "\\"
-
-
-def programs(spec: M1486Spec, chip: M1486Chip, context: TextContext) -> ChipPrograms:
-    """See `steptwin.simulation.kinds.kind.ControllerKind.programs`."""
-    given = given_text(spec, context)
-    return ChipPrograms(chip, lambda: context.downloaded(spec.name, TEXT) or given)
 
 
 class _Text:

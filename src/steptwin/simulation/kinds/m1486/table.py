@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 from steptwin.m1486.lines import INTERFACES
@@ -39,9 +38,3 @@ class M1486Spec(ControllerSpec):
     program: str | None = key(
         text_value, "a program it is switched on with; types with RAM lose it when they are switched off", default=None
     )
-
-
-def files(spec: M1486Spec) -> Iterator[tuple[str, str]]:
-    """Names of files, and the keys that name them."""
-    if spec.program is not None:
-        yield spec.program, "program"

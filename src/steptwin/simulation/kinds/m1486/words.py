@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from functools import partial
 
-from steptwin.m1486.characterlog import CharacterLog, LineSplitter, changes_nothing
+from steptwin.m1486.characterlog import CharacterLog, LineSplitter
 from steptwin.machine import Nanos
-from steptwin.simulation.kinds.lines import LineWrite
 from steptwin.simulation.kinds.m1486.line import ChipLine
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.wire.frameline import FrameLine
@@ -45,15 +43,3 @@ class ChipLineWords:
         """A chip announces the byte that it sends."""
         if record.kind == "event" and record.subject == "upload":
             self._log.upload(**dict(record.facts))
-
-
-def follow_writes(line: ChipLine, take: Callable[[LineWrite], None]) -> Callable[[], None]:
-    """See `steptwin.simulation.kinds.kind.LineKind.writes`. Every chip receives what a host sends, and none answers."""
-
-    def sent(shown: FrameLine) -> None:
-        if shown.direction is FrameDirection.IN and not changes_nothing(shown.raw):
-            take(LineWrite(shown.time, shown.link, (), shown.meaning, ""))
-
-    words = ChipLineWords(line, "", sent)
-    line.follow_frames(words)
-    return partial(line.unfollow_frames, words)

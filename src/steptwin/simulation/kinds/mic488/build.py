@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import lru_cache
 
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.mic488.config import ControllerConfig, examine_config
-from steptwin.mic488.configtext import config_text
-from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.program_banks import LoadedProgram, load, setup_of
 from steptwin.mic488.registers import firmware
@@ -18,7 +16,6 @@ from steptwin.simulation.kinds.mic488.table import Mic488Spec, config_of
 from steptwin.wbc.check import check
 from steptwin.wbc.decompile import IMAGE, program_of
 from steptwin.wbc.dialect import Dialect, dialect_for
-from steptwin.wbc.interpreter import STATEMENT_TIME
 from steptwin.wbc.positions import PositionTable, parse_positions
 from steptwin.wbc.usage import Setup
 
@@ -26,37 +23,7 @@ REMEMBERED = 16
 """Programs and tables that are kept for the next world with the same."""
 
 
-def build(spec: Mic488Spec, context: BuildContext) -> Callable[[bytes | None], Mic488Device]:
-    """As `steptwin.simulation.kinds.kind.ControllerKind.build`."""
-    config = _config(spec, context)
-    programs, positions = _banks(spec, config, context)
-    statement_time = STATEMENT_TIME if spec.statement_time is None else spec.statement_time
-
-    def make(memory: bytes | None) -> Mic488Device:
-        return Mic488Device(
-            config,
-            spec.firmware,
-            lenient=spec.lenient,
-            memory=memory,
-            programs=programs,
-            positions=positions,
-            statement_time=statement_time,
-        )
-
-    return make
-
-
-def configuration(spec: Mic488Spec, device: Mic488Device, context: BuildContext) -> SourceText:
-    """See `steptwin.simulation.kinds.kind.ControllerKind.configuration`: the file itself unless the description changes some of
-    it."""
-    if spec.config is not None:
-        source = IniFile.parse(context.data(spec.config), spec.config).source
-        if examine_config(IniFile.of_text(source.text), spec.firmware)[0] == device.config:
-            return source
-    return SourceText(f"{spec.name}.cfg", config_text(device.config, device.firmware))
-
-
-def _config(spec: Mic488Spec, context: BuildContext) -> ControllerConfig:
+def configured(spec: Mic488Spec, context: BuildContext) -> ControllerConfig:
     base = ControllerConfig()
     if spec.config is not None:
         file = IniFile.parse(context.data(spec.config), spec.config)
@@ -65,7 +32,7 @@ def _config(spec: Mic488Spec, context: BuildContext) -> ControllerConfig:
     return config_of(spec, base)
 
 
-def _banks(
+def banks(
     spec: Mic488Spec, config: ControllerConfig, context: BuildContext
 ) -> tuple[dict[int, LoadedProgram], dict[int, PositionTable]]:
     """What is in the banks. Names of positions are found in the table of the same bank, or else in the only one there is."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 from steptwin.machine import Nanos
 from steptwin.mic488.core import ControllerCore, check_pin
@@ -11,7 +11,6 @@ from steptwin.mic488.encoder import Coupling
 from steptwin.simulation.faults.answers import NEVER_SENT
 from steptwin.simulation.faults.machine import AxisLoad, FaultyMachine
 from steptwin.simulation.faults.table import FaultKind, Need
-from steptwin.simulation.kinds.kind import LineUnit
 from steptwin.wire.pdu import exception_pdu
 
 
@@ -89,11 +88,3 @@ def _keeping(
         return kept if stored is None else stored
 
     return keep
-
-
-def body(device: Mic488Device, service: LineUnit, shafts: Mapping[int, AxisLoad]) -> Mic488Body:
-    """Mechanics move the axes that have them."""
-    found = Mic488Body(device, *service)
-    for number, shaft in shafts.items():
-        found.shafts[number - 1] = shaft
-    return found

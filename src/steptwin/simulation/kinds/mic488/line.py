@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from operator import itemgetter
 from typing import ClassVar
 
-from steptwin.errors import Misuse
 from steptwin.machine import Nanos, Port
-from steptwin.mic488.config import BAUDS
 from steptwin.mic488.device import Mic488Device, pause_observer
 from steptwin.mic488.vision import Com1Port, uses_vision
 from steptwin.simulation.faults import Faults
 from steptwin.simulation.faults import LineProtocol as FaultLine
-from steptwin.simulation.kinds.kind import Member
 from steptwin.simulation.kinds.lines import SCRIPTS, Line, LineEndPoint
-from steptwin.simulation.kinds.links import LineSpec
 from steptwin.simulation.kinds.master import Master
 from steptwin.simulation.scheduler.kernel import Kernel
 from steptwin.simulation.scheduler.trace import RecordSink
@@ -150,22 +146,6 @@ class ModbusBus(Line):
 
     def _framed(self, port: SlavePort | Com1Port) -> SlavePort | None:
         return port.modbus if isinstance(port, Com1Port) else port
-
-
-def make(spec: LineSpec, members: Sequence[Member], kernel: Kernel, record: RecordSink, faults: Faults) -> ModbusBus:
-    """The line of a description. Raises `Misuse` for units that are taken, and rates that no MIC488 has."""
-    devices: dict[int, Mic488Device] = {}
-    names: dict[int, str] = {}
-    for member in members:
-        if member.address in devices:
-            raise Misuse(f"unit {member.address} is both {names[member.address]!r} and {member.spec.name!r}")
-        devices[member.address] = member.machine
-        names[member.address] = member.spec.name
-    if spec.baud is not None and spec.baud not in BAUDS:
-        raise Misuse(f"baud = {spec.baud}: a MIC488 has {', '.join(map(str, BAUDS))} bit/s")
-    baud = spec.baud or next(iter(devices.values())).config.ports[0].baud
-    timing = None if spec.timing == "off" else timing_of(baud, strict=spec.timing == "strict")
-    return ModbusBus(kernel, spec.name, record, faults, devices=devices, timing=timing, baud=baud, gap=spec.gap)
 
 
 def timing_of(baud: int, *, strict: bool) -> LineTiming:

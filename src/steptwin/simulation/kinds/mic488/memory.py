@@ -6,16 +6,14 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from steptwin.diagnostics import Diagnostic, Severity, SourceText, render
-from steptwin.errors import Refusal, SourceErrors
-from steptwin.messages import Message
+from steptwin.errors import SourceErrors
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.present import place_of
-from steptwin.mic488.program_banks import load, setup_of
+from steptwin.mic488.program_banks import setup_of
 from steptwin.mic488.status import ProgramState
-from steptwin.simulation.kinds.kind import TextContext
 from steptwin.simulation.kinds.mic488.build import table_for
 from steptwin.simulation.kinds.mic488.table import Mic488Spec
-from steptwin.simulation.kinds.programtexts import Destination, Downloading, ProgramText, TextLanguage, bank_text
+from steptwin.simulation.kinds.programtexts import ProgramText, TextLanguage, bank_text
 from steptwin.wbc.check import CheckedProgram, check
 from steptwin.wbc.positions import PositionTable, parse_positions
 
@@ -27,12 +25,7 @@ TABLES = TextLanguage("csv", ".csv", "positions", in_banks=True, is_shared=True)
 PROGRAM, POSITIONS = "program", "positions"
 
 
-def texts(spec: Mic488Spec, device: Mic488Device, context: TextContext) -> list[ProgramText]:
-    """See `steptwin.simulation.kinds.kind.ControllerKind.texts`. A program that was given as an image is the text made of it."""
-    return [*_programs(device), *_positions(spec, device, context)]
-
-
-def _programs(device: Mic488Device) -> Iterator[ProgramText]:
+def program_texts(device: Mic488Device) -> Iterator[ProgramText]:
     control, at = device.program, place_of(device)
     for bank in range(device.firmware.banks):
         place, program = bank_text(bank), control.banks.programs.get(bank)
@@ -42,7 +35,7 @@ def _programs(device: Mic488Device) -> Iterator[ProgramText]:
             place=place,
             language=WBC,
             source=source,
-            check=lambda bank=bank, text=source.text: _checked(device, bank, text).diagnostics,
+            check=lambda bank=bank, text=source.text: checked(device, bank, text).diagnostics,
             memory=lambda text, bank=bank: _program_memory(device, bank, text),
             is_empty=program is None,
             is_running=line is not None and control.state is ProgramState.RUNNING,
@@ -50,7 +43,7 @@ def _programs(device: Mic488Device) -> Iterator[ProgramText]:
         )
 
 
-def _positions(spec: Mic488Spec, device: Mic488Device, context: TextContext) -> Iterator[ProgramText]:
+def position_texts(spec: Mic488Spec, device: Mic488Device) -> Iterator[ProgramText]:
     names = dict(spec.positions)
     for bank in range(device.firmware.banks):
         place, table = f"{POSITIONS} {bank}", device.program.banks.positions.get(bank)
@@ -65,28 +58,7 @@ def _positions(spec: Mic488Spec, device: Mic488Device, context: TextContext) -> 
         )
 
 
-PROGRAM_IS_IN_USE = Message(
-    "simulation.mic488.program-is-in-use", "{place} is in use by the program that runs or is paused: stop it first"
-)
-
-
-def download(device: Mic488Device, to: Destination, source: SourceText) -> Downloading:
-    """See `steptwin.simulation.kinds.kind.ControllerKind.download`. The bank is filled at once, without the line, for how the
-    vendor's program does it is not documented. Its program must be stopped (manual 4.1)."""
-    what, _, number = to.place.partition(" ")
-    bank, control = int(number), device.program
-    if control.runs_program(bank) if what == PROGRAM else control.runs_positions(bank):
-        raise Refusal(PROGRAM_IS_IN_USE(place=to.place))
-    if what == PROGRAM:
-        checked = _checked(device, bank, source.text)
-        _refuse(source, checked.errors)
-        program = load(checked, source.name)
-        return Downloading(lambda now: device.load_program(bank, program))
-    table = _table(source)
-    return Downloading(lambda now: device.load_positions(bank, table))
-
-
-def _checked(device: Mic488Device, bank: int, text: str) -> CheckedProgram:
+def checked(device: Mic488Device, bank: int, text: str) -> CheckedProgram:
     control = device.program
     return check(text, table_for(bank, control.banks.positions), setup_of(device.config), control.dialect)
 
@@ -94,8 +66,8 @@ def _checked(device: Mic488Device, bank: int, text: str) -> CheckedProgram:
 def _program_memory(device: Mic488Device, bank: int, text: str) -> Sequence[MemoryPart]:
     from steptwin.explain.mic488 import memory_of  # only on request
 
-    checked = _checked(device, bank, text)
-    return [] if checked.executable is None else memory_of(checked.executable, checked.positions, device.program.dialect)
+    found = checked(device, bank, text)
+    return [] if found.executable is None else memory_of(found.executable, found.positions, device.program.dialect)
 
 
 def _position_memory(device: Mic488Device, text: str) -> Sequence[MemoryPart]:
@@ -106,12 +78,12 @@ def _position_memory(device: Mic488Device, text: str) -> Sequence[MemoryPart]:
     return [] if has_errors else position_memory(len(table.rows), device.program.dialect)
 
 
-def _table(source: SourceText) -> PositionTable:
+def table_of(source: SourceText) -> PositionTable:
     table, findings = parse_positions(source.text)
-    _refuse(source, [finding for finding in findings if finding.severity is Severity.ERROR])
+    refuse(source, [finding for finding in findings if finding.severity is Severity.ERROR])
     return table
 
 
-def _refuse(source: SourceText, errors: Sequence[Diagnostic]) -> None:
+def refuse(source: SourceText, errors: Sequence[Diagnostic]) -> None:
     if errors:
         raise SourceErrors(render(source, errors))

@@ -51,11 +51,6 @@ class ProgramEvent(NamedTuple):
         return self.step is not None and self.code != "interrupt"
 
 
-def watch_program(device: Mic488Device, kernel: Kernel, name: str) -> ProgramWatch | None:
-    """See `steptwin.simulation.kinds.kind.ControllerKind.watch_program`."""
-    return ProgramWatch(device, kernel, name) if device.program.banks.programs else None
-
-
 class ProgramWatch:
     """Observes the programs in the banks of a controller, as a part of its kernel. ``happened`` is in order of time.
 

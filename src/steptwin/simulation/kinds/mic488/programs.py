@@ -12,9 +12,7 @@ from steptwin.machine import Nanos
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program_banks import LoadedProgram
 from steptwin.mic488.program_registers import ACCESS
-from steptwin.simulation.kinds.kind import TextContext
 from steptwin.simulation.kinds.mic488.statement_use import use_of
-from steptwin.simulation.kinds.mic488.table import Mic488Spec
 from steptwin.simulation.kinds.programs import Frame, Place, Statement, StatementUse
 from steptwin.simulation.kinds.programtexts import bank_text
 from steptwin.statements import StatementHook
@@ -28,11 +26,6 @@ from steptwin.wbc.tree import Identifier, ProgramTree
 
 BEGIN = "program"
 """The name of what is executed before the first label."""
-
-
-def programs(spec: Mic488Spec, device: Mic488Device, context: TextContext) -> WbcPrograms:
-    """See `steptwin.simulation.kinds.kind.ControllerKind.programs`."""
-    return WbcPrograms(device)
 
 
 class WbcPrograms:

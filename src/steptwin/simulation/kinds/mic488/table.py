@@ -115,18 +115,6 @@ class Mic488Spec(ControllerSpec):
         return self.programs if self.program is None else ((0, self.program), *self.programs)
 
 
-def files(spec: Mic488Spec) -> Iterator[tuple[str, str]]:
-    """Names of files, and the keys that name them."""
-    if spec.config is not None:
-        yield spec.config, "config"
-    if spec.program is not None:
-        yield spec.program, "program"
-    for _, name in spec.programs:
-        yield name, "programs"
-    for _, name in spec.positions:
-        yield name, "positions"
-
-
 def config_of(spec: Mic488Spec, base: ControllerConfig) -> ControllerConfig:
     """The configuration of a controller: its file's, and what the description changes."""
     axes = tuple(replace(axis, **spec.axes.get(n, {})) for n, axis in enumerate(base.axes, start=1))

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from functools import partial
 
 from steptwin.machine import Nanos
 from steptwin.mic488.framelog import FrameLog
-from steptwin.simulation.kinds.lines import LineWrite
 from steptwin.simulation.kinds.mic488.line import ModbusBus
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.wire.frameline import FrameLine
-from steptwin.wire.pdu import REFUSED, WRITES
+from steptwin.wire.pdu import WRITES
 from steptwin.wire.slave import FrameDirection, FrameObserver
 
 
@@ -48,18 +46,3 @@ class ModbusWords:
 
     def recorded(self, record: TraceRecord) -> None:
         """Only frames are shown of what goes over the line."""
-
-
-def follow_writes(line: ModbusBus, take: Callable[[LineWrite], None]) -> Callable[[], None]:
-    """See `steptwin.simulation.kinds.kind.LineKind.writes`."""
-    log = FrameLog(line.devices)
-
-    def seen(place: str, now: Nanos, unit: int, request: bytes, response: bytes) -> None:
-        there = line.places.get(place)
-        words = log.request(unit, request, tcp=there is not None and there.kind == "tcp")
-        units = (unit,) if unit in line.devices else line.units
-        outcome = "" if not response else "refusal" if response[0] & REFUSED else "done"
-        take(LineWrite(now, place, units, words, outcome))
-
-    line.watch_writes(seen)
-    return partial(line.watch_writes, None)
