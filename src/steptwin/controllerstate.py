@@ -7,7 +7,8 @@ and what each of the ``details`` means.
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Collection, Iterable, Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeAlias, TypeVar, cast
 
@@ -146,18 +147,30 @@ class DetailRow(Generic[M]):
     read: Callable[[M, Nanos], DetailValue]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StateReader(Generic[M]):
-    """How the state of a kind of controller is read at the present moment of the machine: all of it, or some of its parts, which
-    are ``status``, ``program``, ``pins``, ``details`` and its axes by name."""
+class StateReader(ABC, Generic[M]):
+    """Reads the state of a kind of controller at the present moment of the machine: all of it, or some of its parts, which are
+    ``status``, ``program``, ``pins``, ``details`` and its axes by name."""
 
-    datasheet: Callable[[M], Datasheet]
-    status: Callable[[M, Nanos], StateStatus]
-    program: Callable[[M, Nanos], StateProgram]
-    axis: Callable[[M, AxisDescription, Nanos], StateAxis]
-    details: tuple[DetailRow[M], ...] = ()
-    pins: Callable[[M, Nanos], Mapping[str, float]] = lambda machine, now: machine.pins()
-    pin: Callable[[M, str, Nanos], float] = lambda machine, name, now: machine.pin(name)
+    details: Sequence[DetailRow[M]] = ()
+
+    @abstractmethod
+    def datasheet(self, machine: M, /) -> Datasheet: ...
+
+    @abstractmethod
+    def status(self, machine: M, now: Nanos, /) -> StateStatus: ...
+
+    @abstractmethod
+    def program(self, machine: M, now: Nanos, /) -> StateProgram: ...
+
+    @abstractmethod
+    def axis(self, machine: M, described: AxisDescription, now: Nanos, /) -> StateAxis: ...
+
+    def pins(self, machine: M, now: Nanos, /) -> Mapping[str, float]:
+        """The levels of all pins."""
+        return machine.pins()
+
+    def pin(self, machine: M, name: str, now: Nanos, /) -> float:
+        return machine.pin(name)
 
     def __call__(self, machine: M, now: Nanos) -> ControllerState:
         sheet = self.datasheet(machine)

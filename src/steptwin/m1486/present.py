@@ -10,7 +10,7 @@ from steptwin.controllerstate import (
     StateStatus,
     StatusLevel,
 )
-from steptwin.datasheet import AxisDescription
+from steptwin.datasheet import AxisDescription, Datasheet
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.datasheet import datasheet
 from steptwin.m1486.details import DETAILS, next_command
@@ -46,36 +46,6 @@ def velocity(chip: M1486Chip, now: Nanos) -> float:
     return 0.0 if chip.drive.motion is MotionMode.REST else chip.drive.profile.velocity(now) / FULL_STEP
 
 
-def _status(chip: M1486Chip, now: Nanos) -> StateStatus:
-    if chip.is_shut_down or chip.program.is_held:
-        return StateStatus(text=program_words(chip, now), level=StatusLevel.WARNING)
-    return StateStatus(text="ok")
-
-
-def _pins(chip: M1486Chip, now: Nanos) -> dict[str, float]:
-    """Their levels at ``now``: those of the driver interface follow the pulses, between which the chip has nothing to do."""
-    levels = dict(chip.pins())
-    levels |= {name: float(chip.level(line, now)) for name, line in LINE_PINS.items() if line in chip.interface.occupied}
-    return levels
-
-
-def _pin(chip: M1486Chip, name: str, now: Nanos) -> float:
-    line = LINE_PINS.get(name)
-    if line is None or line not in chip.interface.occupied:
-        return chip.pin(name)
-    return float(chip.level(line, now))
-
-
-def _program(chip: M1486Chip, now: Nanos) -> StateProgram:
-    following = next_command(chip)
-    return StateProgram(
-        state=_activity(chip, now),
-        text=program_words(chip, now),
-        statement=None if following is None else str(following),
-        variables={},
-    )
-
-
 def _activity(chip: M1486Chip, now: Nanos) -> ProgramActivity:
     program = chip.program
     if chip.is_shut_down:
@@ -87,23 +57,54 @@ def _activity(chip: M1486Chip, now: Nanos) -> ProgramActivity:
     return ProgramActivity.STOPPED if program.is_at_end else ProgramActivity.RUNNING
 
 
-def _axis(chip: M1486Chip, described: AxisDescription, now: Nanos) -> StateAxis:
-    """The state of the axis. Whether its drive is on is unknown: the chip does not switch it."""
-    drive = chip.drive
-    return StateAxis(
-        number=described.number,
-        name=described.name,
-        unit=described.unit,
-        position=float(drive.true_u(now)),
-        velocity=velocity(chip, now) * FULL_STEP,
-        moving=drive.motion is not MotionMode.REST,
-        enabled=None,
-        encoder=None,
-        status=StateStatus(text=drive.motion.value),
-    )
+class M1486State(StateReader[M1486Chip]):
+    """The position is the sum of the pulses so far, as the point ``position``; `details` have the counter."""
+
+    details = DETAILS
+
+    def datasheet(self, chip: M1486Chip) -> Datasheet:
+        return datasheet(chip)
+
+    def status(self, chip: M1486Chip, now: Nanos) -> StateStatus:
+        if chip.is_shut_down or chip.program.is_held:
+            return StateStatus(text=program_words(chip, now), level=StatusLevel.WARNING)
+        return StateStatus(text="ok")
+
+    def program(self, chip: M1486Chip, now: Nanos) -> StateProgram:
+        following = next_command(chip)
+        return StateProgram(
+            state=_activity(chip, now),
+            text=program_words(chip, now),
+            statement=None if following is None else str(following),
+            variables={},
+        )
+
+    def axis(self, chip: M1486Chip, described: AxisDescription, now: Nanos) -> StateAxis:
+        """The state of the axis. Whether its drive is on is unknown: the chip does not switch it."""
+        drive = chip.drive
+        return StateAxis(
+            number=described.number,
+            name=described.name,
+            unit=described.unit,
+            position=float(drive.true_u(now)),
+            velocity=velocity(chip, now) * FULL_STEP,
+            moving=drive.motion is not MotionMode.REST,
+            enabled=None,
+            encoder=None,
+            status=StateStatus(text=drive.motion.value),
+        )
+
+    def pins(self, chip: M1486Chip, now: Nanos) -> dict[str, float]:
+        """Their levels at ``now``: those of the driver interface follow the pulses, between which the chip has nothing to do."""
+        levels = dict(chip.pins())
+        levels |= {name: float(chip.level(line, now)) for name, line in LINE_PINS.items() if line in chip.interface.occupied}
+        return levels
+
+    def pin(self, chip: M1486Chip, name: str, now: Nanos) -> float:
+        line = LINE_PINS.get(name)
+        if line is None or line not in chip.interface.occupied:
+            return chip.pin(name)
+        return float(chip.level(line, now))
 
 
-state_of: StateReader[M1486Chip] = StateReader(
-    datasheet=datasheet, status=_status, program=_program, axis=_axis, pins=_pins, pin=_pin, details=DETAILS
-)
-"""The position is the sum of the pulses so far, as the point ``position``; `details` have the counter."""
+state_of = M1486State()

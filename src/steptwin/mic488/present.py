@@ -14,7 +14,7 @@ from steptwin.controllerstate import (
     StateStatus,
     StatusLevel,
 )
-from steptwin.datasheet import AxisDescription
+from steptwin.datasheet import AxisDescription, Datasheet
 from steptwin.diagnostics import visible
 from steptwin.machine import Nanos
 from steptwin.mic488.datasheet import datasheet
@@ -79,39 +79,6 @@ def empty_banks(name: str, device: Mic488Device) -> list[str]:
     return []
 
 
-def _program(device: Mic488Device, now: Nanos) -> StateProgram:
-    place, fault = place_of(device), device.program.fault
-    activity = ACTIVITIES[device.program.state]
-    text = activity.value
-    if place is not None:
-        text += f" at line {place.line}: {place.text}"
-    elif fault is not None:
-        text += f" by an error: {fault.text}"
-    return StateProgram(
-        state=activity,
-        text=text,
-        file=None if place is None else place.file,
-        line=None if place is None else place.line,
-        statement=None if place is None else place.text,
-        variables=device.program.variables(now),
-    )
-
-
-def _axis(device: Mic488Device, described: AxisDescription, now: Nanos) -> StateAxis:
-    axis = device.axes[described.number - 1]
-    return StateAxis(
-        number=axis.number,
-        name=described.name,
-        unit=described.unit,
-        position=axis.coordinate_p(now) / axis.gear,
-        velocity=axis.profile.velocity(now) / axis.gear,
-        moving=axis.profile.moving(now),
-        enabled=axis.enabled,
-        encoder=axis.encoder_counts(now),
-        status=axis_status(axis.status),
-    )
-
-
 @lru_cache(MOST_KEPT)
 def controller_status(code: int) -> StateStatus:
     """The meaning of register M_STATUS."""
@@ -126,11 +93,47 @@ def axis_status(code: int) -> StateStatus:
     return StateStatus(code=int(code), text=text, level=_LEVELS.get(code, StatusLevel.OK))
 
 
-state_of: StateReader[Mic488Device] = StateReader(
-    datasheet=datasheet,
-    status=lambda device, now: controller_status(device.status()),
-    program=_program,
-    axis=_axis,
-    details=DETAILS,
-)
-"""Positions in configured units; user registers that are 0 are left out."""
+class Mic488State(StateReader[Mic488Device]):
+    """Positions in configured units; user registers that are 0 are left out."""
+
+    details = DETAILS
+
+    def datasheet(self, device: Mic488Device) -> Datasheet:
+        return datasheet(device)
+
+    def status(self, device: Mic488Device, now: Nanos) -> StateStatus:
+        return controller_status(device.status())
+
+    def program(self, device: Mic488Device, now: Nanos) -> StateProgram:
+        place, fault = place_of(device), device.program.fault
+        activity = ACTIVITIES[device.program.state]
+        text = activity.value
+        if place is not None:
+            text += f" at line {place.line}: {place.text}"
+        elif fault is not None:
+            text += f" by an error: {fault.text}"
+        return StateProgram(
+            state=activity,
+            text=text,
+            file=None if place is None else place.file,
+            line=None if place is None else place.line,
+            statement=None if place is None else place.text,
+            variables=device.program.variables(now),
+        )
+
+    def axis(self, device: Mic488Device, described: AxisDescription, now: Nanos) -> StateAxis:
+        axis = device.axes[described.number - 1]
+        return StateAxis(
+            number=axis.number,
+            name=described.name,
+            unit=described.unit,
+            position=axis.coordinate_p(now) / axis.gear,
+            velocity=axis.profile.velocity(now) / axis.gear,
+            moving=axis.profile.moving(now),
+            enabled=axis.enabled,
+            encoder=axis.encoder_counts(now),
+            status=axis_status(axis.status),
+        )
+
+
+state_of = Mic488State()

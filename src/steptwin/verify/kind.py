@@ -1,9 +1,9 @@
-"""Checks of a kind of device: one value for each, `steptwin.verify.kinds.CHECKED`."""
+"""The interface of checks to a kind of device: one `CheckedKind` for each, `steptwin.verify.kinds.CHECKED`."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Generic, NamedTuple
 
 from steptwin.drivers.kind import DeviceAddress
@@ -22,13 +22,20 @@ class ReadyChecks(NamedTuple, Generic[T]):
     """For the report: what the device is, after the checks."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CheckedKind(Generic[T]):
-    """A kind of device that can be checked. ``unchecked``: ids of interpretations that no check decides, with the reason."""
+class CheckedKind(ABC, Generic[T]):
+    """A kind of device that can be checked. Each kind is one object of one class."""
 
-    name: str
-    """As in `steptwin.drivers.kinds.DRIVERS`."""
-    unchecked: Mapping[str, str]
-    prepare: Callable[[DeviceAddress, frozenset[CheckNeed], tuple[int, float] | None], ReadyChecks[T]]
-    """The checks with these permissions; the tuple: an axis and how far it may move, in its units. Communicates with the device
-    as far as the address leaves its variant open. Raises `Misuse`, `Refusal`, `LineFailure`."""
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """As in `steptwin.drivers.kinds.DRIVERS`."""
+
+    @property
+    @abstractmethod
+    def unchecked(self) -> Mapping[str, str]:
+        """Ids of interpretations that no check decides, with the reason."""
+
+    @abstractmethod
+    def prepare(self, address: DeviceAddress, permitted: frozenset[CheckNeed], move: tuple[int, float] | None) -> ReadyChecks[T]:
+        """The checks with these permissions. ``move``: an axis and how far it may move, in its units. Communicates with the
+        device as far as the address leaves its variant open. Raises `Misuse`, `Refusal`, `LineFailure`."""

@@ -16,15 +16,21 @@ from steptwin.verify.m1486 import CHECKS, ChipTalk
 from steptwin.verify.unchecked import OF_M1486
 
 
-def _prepare(address: DeviceAddress, permitted: frozenset[CheckNeed], move: tuple[int, float] | None) -> ReadyChecks[ChipTalk]:
-    if move:
-        raise Misuse("no check moves an M1486: leave out --move")
-    chip = _chip(address)
-    if chip.store is Store.EEPROM and CheckNeed.WRITE not in permitted:
-        raise Misuse(f"{chip.title} writes every command into its EEPROM, also those of checks: permit it with --write")
-    about = {"kind": "M1486", "address": address.number, "type": chip.name, "baud": address.baud}
-    talk = ChipTalk(address.number, chip, wait_s=address.timeout)
-    return ReadyChecks(CHECKS, talk, line_endpoint(address.place, address.baud), lambda: about)
+class M1486Checked(CheckedKind[ChipTalk]):
+    name = "m1486"
+    unchecked = OF_M1486
+
+    def prepare(
+        self, address: DeviceAddress, permitted: frozenset[CheckNeed], move: tuple[int, float] | None
+    ) -> ReadyChecks[ChipTalk]:
+        if move:
+            raise Misuse("no check moves an M1486: leave out --move")
+        chip = _chip(address)
+        if chip.store is Store.EEPROM and CheckNeed.WRITE not in permitted:
+            raise Misuse(f"{chip.title} writes every command into its EEPROM, also those of checks: permit it with --write")
+        about = {"kind": "M1486", "address": address.number, "type": chip.name, "baud": address.baud}
+        talk = ChipTalk(address.number, chip, wait_s=address.timeout)
+        return ReadyChecks(CHECKS, talk, line_endpoint(address.place, address.baud), lambda: about)
 
 
 def _chip(address: DeviceAddress) -> Variant:
@@ -48,4 +54,4 @@ def _chip(address: DeviceAddress) -> Variant:
     return variant_named(chips[0].variant)
 
 
-M1486_CHECKED = CheckedKind(name="m1486", unchecked=OF_M1486, prepare=_prepare)
+M1486_CHECKED = M1486Checked()

@@ -18,26 +18,32 @@ from steptwin.verify.modbus import ModbusTalk
 from steptwin.verify.unchecked import OF_MIC488
 
 
-def _prepare(address: DeviceAddress, permitted: frozenset[CheckNeed], move: tuple[int, float] | None) -> ReadyChecks[ModbusTalk]:
-    axis, distance_u = _checked_move(move)
-    firmware = address.variant or _firmware(address)
-    place = parse_line_address(address.place, address.baud)
-    talk = ModbusTalk(
-        unit_of(address),
-        register_map(firmware),
-        framed=place.framed,
-        wait_s=address.timeout,
-        is_detected=address.variant is None,
-        axis=axis,
-        distance_u=distance_u,
-    )
+class Mic488Checked(CheckedKind[ModbusTalk]):
+    name = "mic488"
+    unchecked = OF_MIC488
 
-    def about() -> dict[str, object]:
-        shown = "1.70 or 1.40" if talk.may_be_older else firmware
-        rate = {} if place.serial is None else {"baud": address.baud}
-        return {"kind": "MIC488", "unit": unit_of(address), "firmware": shown, **rate}
+    def prepare(
+        self, address: DeviceAddress, permitted: frozenset[CheckNeed], move: tuple[int, float] | None
+    ) -> ReadyChecks[ModbusTalk]:
+        axis, distance_u = _checked_move(move)
+        firmware = address.variant or _firmware(address)
+        place = parse_line_address(address.place, address.baud)
+        talk = ModbusTalk(
+            unit_of(address),
+            register_map(firmware),
+            framed=place.framed,
+            wait_s=address.timeout,
+            is_detected=address.variant is None,
+            axis=axis,
+            distance_u=distance_u,
+        )
 
-    return ReadyChecks(CHECKS, talk, place.endpoint, about)
+        def about() -> dict[str, object]:
+            shown = "1.70 or 1.40" if talk.may_be_older else firmware
+            rate = {} if place.serial is None else {"baud": address.baud}
+            return {"kind": "MIC488", "unit": unit_of(address), "firmware": shown, **rate}
+
+        return ReadyChecks(CHECKS, talk, place.endpoint, about)
 
 
 def _checked_move(move: tuple[int, float] | None) -> tuple[int, float]:
@@ -60,4 +66,4 @@ def _firmware(address: DeviceAddress) -> str:
         finish(line.close())
 
 
-MIC488_CHECKED = CheckedKind(name="mic488", unchecked=OF_MIC488, prepare=_prepare)
+MIC488_CHECKED = Mic488Checked()

@@ -106,18 +106,30 @@ def _position(toy: Toy, now: Nanos) -> float:
     return float(toy.axis.plan.count(now))
 
 
-def _axis(toy: Toy, described: AxisDescription, now: Nanos) -> StateAxis:
-    return StateAxis(
-        number=1,
-        name=described.name,
-        unit=described.unit,
-        position=_position(toy, now),
-        velocity=toy.axis.plan.velocity(now),
-        moving=toy.is_busy,
-        enabled=None,
-        encoder=None,
-        status=StateStatus(text="busy" if toy.is_busy else "at rest"),
-    )
+class ToyState(StateReader[Toy]):
+    details = (DetailRow(DATASHEET.details[0], lambda toy, now: toy.taken),)
+
+    def datasheet(self, toy: Toy) -> Datasheet:
+        return DATASHEET
+
+    def status(self, toy: Toy, now: Nanos) -> StateStatus:
+        return StateStatus(text="off" if toy.is_off else "ok")
+
+    def program(self, toy: Toy, now: Nanos) -> StateProgram:
+        return StateProgram(state=None, text="none", variables={})
+
+    def axis(self, toy: Toy, described: AxisDescription, now: Nanos) -> StateAxis:
+        return StateAxis(
+            number=1,
+            name=described.name,
+            unit=described.unit,
+            position=_position(toy, now),
+            velocity=toy.axis.plan.velocity(now),
+            moving=toy.is_busy,
+            enabled=None,
+            encoder=None,
+            status=StateStatus(text="busy" if toy.is_busy else "at rest"),
+        )
 
 
 class ToyLines(LineKind[Toy, ToyLine]):
@@ -140,13 +152,7 @@ class ToyKind(ControllerKind[ToySpec, Toy, ToyView]):
     spec = ToySpec
     line = ToyLines()
     terminals = Terminals(digital_inputs=("STOP",), analog_inputs=(), outputs=("BUSY",))
-    state = StateReader(
-        datasheet=lambda toy: DATASHEET,
-        status=lambda toy, now: StateStatus(text="off" if toy.is_off else "ok"),
-        program=lambda toy, now: StateProgram(state=None, text="none", variables={}),
-        axis=_axis,
-        details=(DetailRow(DATASHEET.details[0], lambda toy, now: toy.taken),),
-    )
+    state = ToyState()
 
     def files(self, spec: ToySpec) -> tuple[()]:
         return ()
