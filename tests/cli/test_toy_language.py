@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -48,8 +49,18 @@ def test_what_it_cannot_is_refused(file: str, shell: Shell) -> None:
         assert "--show is not for lists of targets" in shell.errors
 
 
+class Others(FileLanguage):
+    name = "other"
+    title = "others"
+    suffixes = ()
+
+    def __init__(self, suffixes: Sequence[str], *, is_usual: bool = False) -> None:
+        self.suffixes = tuple(suffixes)
+        self.is_usual = is_usual
+
+
 def test_names_and_suffixes_are_unique() -> None:
     with registered_language(), pytest.raises(Misuse, match=r"lists of targets have \.targets already"):
-        register(FileLanguage(name="other", title="others", suffixes=TARGETS.suffixes))
+        register(Others(TARGETS.suffixes))
     with pytest.raises(Misuse, match="M1486 programs have files with unknown suffixes already"):
-        register(FileLanguage(name="other", title="others", suffixes=(".other",), is_usual=True))
+        register(Others([".other"], is_usual=True))

@@ -38,14 +38,14 @@ def command(
     (.cfg), worlds (.toml); all others are M1486 programs."""
     from steptwin.diagnostics import Severity, render, to_json
     from steptwin.files.textfiles import read_text
-    from steptwin.languages import ability
-    from steptwin.languages.contract import count
+    from steptwin.languages import language_for
+    from steptwin.languages.contract import FileLanguage, count
 
-    language, checker = ability(file, "check", lambda one: one.check)
+    language = language_for(file, "check", FileLanguage.check)
     given = given_of(wbc, chip)
     language.refuse_others(given, option_of)
     source = read_text(file).source
-    report = checker(source, given)
+    report = language.check(source, given)
     findings = [(source, report.diagnostics), *report.companions]
     in_files = [where.name for where, found in report.companions if found]
     errors = sum(d.severity is Severity.ERROR for _, found in findings for d in found)

@@ -48,11 +48,12 @@ def explanations(path: Path, given: GivenOptions, option: Callable[[str], str] =
     """One for each controller that the program is for. Raises `Misuse` for what is no program, or has errors, and for an option
     that is not for its language, with the name that users know it by."""
     from steptwin.files.textfiles import read_text
-    from steptwin.languages import ability
+    from steptwin.languages import language_for
+    from steptwin.languages.contract import FileLanguage
 
-    language, explain = ability(path, "explain", lambda one: one.explain)
+    language = language_for(path, "explain", FileLanguage.explain)
     language.refuse_others(given, option)
-    return explain(read_text(path).source, given)
+    return language.explain(read_text(path).source, given)
 
 
 def _show(

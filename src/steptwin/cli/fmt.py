@@ -20,13 +20,14 @@ def command(
 ) -> None:
     """Write WBC programs in one style: blanks, indentation, keywords in capitals. Lines with errors stay as they are."""
     from steptwin.files.textfiles import read_text, write_bytes
-    from steptwin.languages import ability
+    from steptwin.languages import language_for
+    from steptwin.languages.contract import FileLanguage
 
     changed: list[str] = []
     for path in files:
-        _, in_style = ability(path, "format", lambda one: one.format)
+        language = language_for(path, "format", FileLanguage.format)
         file = read_text(path)
-        text = in_style(file.source.text)
+        text = language.format(file.source.text)
         if text == file.source.text:
             continue
         changed.append(str(path))

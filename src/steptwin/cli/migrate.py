@@ -41,12 +41,12 @@ def _migrate(
     Raises `Misuse` for what is no program."""
     from steptwin.diagnostics import SourceText, render, to_json
     from steptwin.files.textfiles import read_text, write_bytes
-    from steptwin.languages import ability
-    from steptwin.languages.contract import count
+    from steptwin.languages import language_for
+    from steptwin.languages.contract import FileLanguage, count
 
-    _, adapt = ability(path, "migrate", lambda one: one.migrate)
+    language = language_for(path, "migrate", FileLanguage.migrate)
     file = read_text(path)
-    found = adapt(file.source, to, old)
+    found = language.migrate(file.source, to, old)
     if output is not None:
         write_bytes(output, file.to_bytes(found.text))
     changes = sum(d.fix is not None for d in found.findings)

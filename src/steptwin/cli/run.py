@@ -162,12 +162,12 @@ def _program_runner(
 ) -> Callable[[_CommonOptions, str | None, ProgramOptions, Mapping[str, Any]], bool]:
     """Function that runs a program. Raises `Misuse` for what is none."""
     from steptwin.languages import LANGUAGES, by_suffix
+    from steptwin.languages.contract import FileLanguage
     from steptwin.languages.program_run import ProgramRun
 
     language = by_suffix(file)
-    run_language = None if language is None else language.run
-    if language is None or run_language is None:
-        suffixes = [suffix for one in LANGUAGES.values() if one.run is not None for suffix in one.suffixes]
+    if language is None or not language.offers(FileLanguage.run):
+        suffixes = [suffix for one in LANGUAGES.values() if one.offers(FileLanguage.run) for suffix in one.suffixes]
         raise Misuse(f"{file}: unknown suffix: permitted are {', '.join((*suffixes, *WORLDS))}")
 
     def run_program(common: _CommonOptions, until: str | None, program: ProgramOptions, given: Mapping[str, Any]) -> bool:
@@ -175,7 +175,7 @@ def _program_runner(
         if until not in (None, "idle"):
             raise Misuse(f"--until {until}: permitted is 'idle'")
         wanted = ProgramRun(program=file, until_idle=until is not None, print_world=program.print_world, **common)
-        return run_language(wanted, given, typer.echo, complain)
+        return language.run(wanted, given, typer.echo, complain)
 
     return run_program
 

@@ -10,8 +10,8 @@ from typing import Any
 import steptwin.services  # noqa: F401  their tables are checked, too
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.languages import LANGUAGES, ability
-from steptwin.languages.contract import GivenOptions, Print
+from steptwin.languages import LANGUAGES, language_for
+from steptwin.languages.contract import FileLanguage, GivenOptions, Print
 from steptwin.nearmiss import NearMiss
 
 OPTIONS: Mapping[str, type] = {"positions": Path, "config": Path, "variant": str}
@@ -52,7 +52,7 @@ def read_launch(arguments: Mapping[str, Any]) -> Launch:
     if "program" not in given and "world" not in given:
         near = NearMiss()
         hints = [f"{name!r}{hint}" for name in arguments if name not in ARGUMENTS and (hint := near.hint(name, ARGUMENTS))]
-        suffixes = [suffix for one in LANGUAGES.values() if one.world is not None for suffix in one.suffixes]
+        suffixes = [suffix for one in LANGUAGES.values() if one.offers(FileLanguage.world) for suffix in one.suffixes]
         needed = f"launch: give 'program' ({', '.join(suffixes)}) or 'world' (.toml)"
         raise Misuse(f"{needed}{': ' + ', '.join(hints) if hints else ''}")
     return Launch(
@@ -74,7 +74,7 @@ def open_world(asked: Launch, show: Print) -> World:
     program = asked.program
     if program is None:
         raise Misuse("launch: there is no program")
-    language, describe = ability(program, "debug", lambda one: one.world)
+    language = language_for(program, "debug", FileLanguage.world)
     language.refuse_others(asked.options, lambda name: f"launch: {name}")
-    text, files = describe(program, asked.options, show)
+    text, files = language.world(program, asked.options, show)
     return World.from_toml(text, files, name=f"debug {program}", keep_trace=False, keep_inputs=False)

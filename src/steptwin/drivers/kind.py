@@ -19,6 +19,7 @@ from steptwin.drivers.subject import DevicePart
 from steptwin.errors import Misuse, Refusal
 from steptwin.machine import Nanos
 from steptwin.messages import Message
+from steptwin.optionalmethods import OptionalMethods
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
 
@@ -278,7 +279,7 @@ class DeviceSearch(ABC):
 FOR_COMMANDS_ONLY = Message("drivers.for-commands-only", "{kind} cannot be connected: its driver is for commands only")
 
 
-class DriverKind(ABC, Generic[D]):
+class DriverKind(OptionalMethods, ABC, Generic[D]):
     """A kind of device, and what its drivers offer. Each kind is one object of one class, in its folder.
 
     A missing member that every kind has is a `TypeError` at import. Methods that only some kinds have raise `Misuse` in the
@@ -324,10 +325,6 @@ class DriverKind(ABC, Generic[D]):
     """Suffixes of its programs."""
     cannot_send: str = ""
     """Why programs cannot be downloaded, and what else can be done."""
-
-    def offers(self, method: Callable[..., object]) -> bool:
-        """Whether this kind has a method that only some have, such as `DriverKind.jog`."""
-        return getattr(type(self), method.__name__) is not method
 
     def lacks(self, what: str) -> Misuse:
         """Refusal of what only other devices have."""

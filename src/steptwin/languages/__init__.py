@@ -1,21 +1,18 @@
 """The languages of files that the commands `check`, `explain`, `migrate`, `fmt`, `run` and the debug adapter take.
 
-No command asks which language a file has: it takes the value that belongs to the end of the name, and what the value has.
+No command asks which language a file has: it takes the one that belongs to the end of the name, and the methods that it offers.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
 
 from steptwin.errors import Misuse
 from steptwin.languages.contract import FileLanguage
 from steptwin.languages.m1486 import M1486_PROGRAMS
 from steptwin.languages.wbc import CONFIGURATIONS, POSITION_TABLES, WBC_IMAGES, WBC_PROGRAMS
 from steptwin.languages.world import WORLDS
-
-T = TypeVar("T")
 
 LANGUAGES: dict[str, FileLanguage] = {}
 """By name. `register` adds to it."""
@@ -35,16 +32,15 @@ def by_suffix(path: Path) -> FileLanguage | None:
     return next((one for one in LANGUAGES.values() if path.suffix.lower() in one.suffixes), None)
 
 
-def ability(path: Path, action: str, of: Callable[[FileLanguage], T | None]) -> tuple[FileLanguage, T]:
-    """The language of a file, and what ``of`` takes from it. Raises `Misuse`, with the files that have it, if that is None;
+def language_for(path: Path, action: str, method: Callable[..., object]) -> FileLanguage:
+    """The language of a file, which offers a method. Raises `Misuse`, with the files whose languages do, if it does not;
     ``action`` is the verb of the message."""
     language = by_suffix(path) or next(one for one in LANGUAGES.values() if one.is_usual)
-    found = of(language)
-    if found is not None:
-        return language, found
+    if language.offers(method):
+        return language
     if language.not_text:
         raise Misuse(f"{path} {language.not_text}")
-    able = [one.shown for one in LANGUAGES.values() if of(one) is not None]
+    able = [one.shown for one in LANGUAGES.values() if one.offers(method)]
     raise Misuse(f"cannot {action} {path}: permitted are {' and '.join(able)}")
 
 

@@ -1,7 +1,8 @@
-"""Actions of commands on the files of a language: one value for each, in `steptwin.languages`."""
+"""The interface of commands to the files of a language: one `FileLanguage` for each, in `steptwin.languages`."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from steptwin.diagnostics import Diagnostic, SourceText
 from steptwin.errors import Misuse
+from steptwin.optionalmethods import OptionalMethods
 
 if TYPE_CHECKING:
     from steptwin.explain.model import Explanation
@@ -50,34 +52,54 @@ class ProgramWorld(NamedTuple):
     files: Mapping[str, bytes]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FileLanguage:
-    """A language of files. What is None, its files cannot; the command refuses them. All functions raise `Misuse`."""
+class FileLanguage(OptionalMethods, ABC):
+    """A language of files: one object of one class. A command refuses files whose language does not offer its method. All methods
+    raise `Misuse`."""
 
-    name: str
-    """In JSON: ``language``."""
-    title: str
-    """Its files, for messages: ``WBC programs``."""
-    suffixes: Sequence[str]
-    """In small letters."""
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """In JSON: ``language``."""
+
+    @property
+    @abstractmethod
+    def title(self) -> str:
+        """Its files, for messages: ``WBC programs``."""
+
+    @property
+    @abstractmethod
+    def suffixes(self) -> Sequence[str]:
+        """In small letters."""
+
     is_usual: bool = False
     """Whether files with unknown suffixes are in this language, too, unless they are run."""
     options: frozenset[str] = frozenset()
     """Names of the options that apply to its files; others are refused."""
     not_text: str = ""
     """Advice on its files, which are no text, as the end of a message."""
-    check: Callable[[SourceText, GivenOptions], CheckReport] | None = None
-    explain: Callable[[SourceText, GivenOptions], list[Explanation]] | None = None
-    """An explanation for each controller that the program is for."""
-    migrate: Callable[[SourceText, str, str | None], Migration] | None = None
-    """To a type or firmware, from another one or the usual one."""
-    format: Callable[[str], str] | None = None
-    """The text in one style."""
-    run: Callable[[ProgramRun, GivenOptions, Print, Print], bool] | None = None
-    """Run a program to its end and print what it did; the second function gets findings of the checker. Whether no error
-    occurred."""
-    world: Callable[[Path, GivenOptions, Print], ProgramWorld] | None = None
-    """The world for a debugger; the function shows what a person should know."""
+
+    def check(self, source: SourceText, options: GivenOptions, /) -> CheckReport:
+        raise NotImplementedError
+
+    def explain(self, source: SourceText, options: GivenOptions, /) -> list[Explanation]:
+        """An explanation for each controller that the program is for."""
+        raise NotImplementedError
+
+    def migrate(self, source: SourceText, to: str, old: str | None, /) -> Migration:
+        """To a type or firmware, from another one or the usual one."""
+        raise NotImplementedError
+
+    def format(self, text: str, /) -> str:
+        """The text in one style."""
+        raise NotImplementedError
+
+    def run(self, given: ProgramRun, options: GivenOptions, out: Print, warn: Print, /) -> bool:
+        """Run a program to its end and print what it did; ``warn`` gets findings of the checker. Whether no error occurred."""
+        raise NotImplementedError
+
+    def world(self, program: Path, options: GivenOptions, show: Print, /) -> ProgramWorld:
+        """The world for a debugger; ``show`` gets what a person should know."""
+        raise NotImplementedError
 
     @property
     def shown(self) -> str:

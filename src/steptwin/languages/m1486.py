@@ -25,22 +25,6 @@ def _interface(options: GivenOptions) -> lines.Interface:
     return lines.interface(options.get("interface", lines.STEP_DIRECTION.name))
 
 
-def _check(source: SourceText, options: GivenOptions) -> CheckReport:
-    variant, interface = _variant(options), _interface(options)
-    checked = check(source.text, variant, interface)
-    shown = [f"{variant.title}, {interface.title} interface"]
-    for chip in checked.memory:
-        shown.append(_memory_summary(chip))
-        if options.get("memory"):
-            shown += _memory_lines(source, chip)
-    data = {
-        "variant": variant.name,
-        "interface": interface.name,
-        "memory": [_memory_data(source, chip) for chip in checked.memory],
-    }
-    return CheckReport(checked.diagnostics, data, shown)
-
-
 def _memory_summary(chip: ChipMemory) -> str:
     name = "command memory" if chip.address is None else f"command memory of chip {chip.address:X}"
     files = ", ".join(f"{bits} of {chip.limit} bits in [ ]" for bits in chip.files)
@@ -74,22 +58,6 @@ def _memory_data(source: SourceText, chip: ChipMemory) -> dict[str, Any]:
     }
 
 
-def _explain(source: SourceText, options: GivenOptions) -> list[Explanation]:
-    from steptwin.explain.m1486 import explain
-
-    return explain(source, _variant(options), _interface(options))
-
-
-def _migrate(source: SourceText, to: str, old: str | None) -> Migration:
-    new = variants.variant(to)
-    before = variants.DEFAULT if old is None else variants.variant(old)
-    found = migration.findings(source.text, before, new)
-    text = fixed(source.text, found)
-    left = [d for d in check(text, new).diagnostics if d.severity is Severity.ERROR]
-    left += [_moved(d, found) for d in found if d.code == migration.NOT_CONVERTED.code]
-    return Migration(f"from {before.title} to {new.title}", list(migration.differences(before, new)), found, text, left)
-
-
 def _moved(one: Diagnostic, found: Sequence[Diagnostic]) -> Diagnostic:
     """A diagnostic at its place in the text with the fixes."""
     fixes = [d.fix for d in found if d.fix is not None and d.fix.span.end <= one.span.start]
@@ -97,33 +65,57 @@ def _moved(one: Diagnostic, found: Sequence[Diagnostic]) -> Diagnostic:
     return replace(one, span=Span(one.span.start + by, one.span.end + by))
 
 
-def _run(given: ProgramRun, options: GivenOptions, out: Print, warn: Print) -> bool:
-    from steptwin.languages.run_m1486 import M1486Run, run
+class M1486Programs(FileLanguage):
+    name = "m1486"
+    title = "M1486 programs"
+    suffixes = (".m1486",)
+    is_usual = True
+    options = frozenset({"variant", "interface", "memory", "wire"})
 
-    wanted = M1486Run.of(
-        given, variant=_variant(options).name, interface=_interface(options).name, wires=tuple(options.get("wire", ()))
-    )
-    return run(wanted, out, warn)
+    def check(self, source: SourceText, options: GivenOptions) -> CheckReport:
+        variant, interface = _variant(options), _interface(options)
+        checked = check(source.text, variant, interface)
+        shown = [f"{variant.title}, {interface.title} interface"]
+        for chip in checked.memory:
+            shown.append(_memory_summary(chip))
+            if options.get("memory"):
+                shown += _memory_lines(source, chip)
+        data = {
+            "variant": variant.name,
+            "interface": interface.name,
+            "memory": [_memory_data(source, chip) for chip in checked.memory],
+        }
+        return CheckReport(checked.diagnostics, data, shown)
+
+    def explain(self, source: SourceText, options: GivenOptions) -> list[Explanation]:
+        from steptwin.explain.m1486 import explain
+
+        return explain(source, _variant(options), _interface(options))
+
+    def migrate(self, source: SourceText, to: str, old: str | None) -> Migration:
+        new = variants.variant(to)
+        before = variants.DEFAULT if old is None else variants.variant(old)
+        found = migration.findings(source.text, before, new)
+        text = fixed(source.text, found)
+        left = [d for d in check(text, new).diagnostics if d.severity is Severity.ERROR]
+        left += [_moved(d, found) for d in found if d.code == migration.NOT_CONVERTED.code]
+        return Migration(f"from {before.title} to {new.title}", list(migration.differences(before, new)), found, text, left)
+
+    def run(self, given: ProgramRun, options: GivenOptions, out: Print, warn: Print) -> bool:
+        from steptwin.languages.run_m1486 import M1486Run, run
+
+        wanted = M1486Run.of(
+            given, variant=_variant(options).name, interface=_interface(options).name, wires=tuple(options.get("wire", ()))
+        )
+        return run(wanted, out, warn)
+
+    def world(self, program: Path, options: GivenOptions, show: Print) -> ProgramWorld:
+        from steptwin.languages.chips import Chain, check_chain
+        from steptwin.languages.run_m1486 import describe_chips
+
+        chain = Chain(variant=_variant(options), addresses=[OPEN_ADDRESS], interface=_interface(options))
+        check_chain(chain, has_program=True)
+        return ProgramWorld(describe_chips(chain, program.stem, program, [], []), {str(program): read_bytes(program)})
 
 
-def _world(program: Path, options: GivenOptions, show: Print) -> ProgramWorld:
-    from steptwin.languages.chips import Chain, check_chain
-    from steptwin.languages.run_m1486 import describe_chips
-
-    chain = Chain(variant=_variant(options), addresses=[OPEN_ADDRESS], interface=_interface(options))
-    check_chain(chain, has_program=True)
-    return ProgramWorld(describe_chips(chain, program.stem, program, [], []), {str(program): read_bytes(program)})
-
-
-M1486_PROGRAMS = FileLanguage(
-    name="m1486",
-    title="M1486 programs",
-    suffixes=(".m1486",),
-    is_usual=True,
-    options=frozenset({"variant", "interface", "memory", "wire"}),
-    check=_check,
-    explain=_explain,
-    migrate=_migrate,
-    run=_run,
-    world=_world,
-)
+M1486_PROGRAMS = M1486Programs()

@@ -37,111 +37,113 @@ def _files(program: str, options: GivenOptions) -> CompanionFiles:
     return CompanionFiles.of(Path(program), options.get("positions"), options.get("config"))
 
 
-def _check(source: SourceText, options: GivenOptions) -> CheckReport:
-    dialect = _dialect(options)
-    files = _files(source.name, options)
-    read = check_source(source, files.positions, files.config, dialect)
-    lines = read.checked.lines
-    shown = f"MIC488 firmware {dialect.firmware}, {count(lines, 'executable line')} of {dialect.max_steps}"
-    data = {
-        "firmware": dialect.firmware,
-        "positions": None if files.positions is None else str(files.positions),
-        "config": None if files.config is None else str(files.config),
-        "executable_lines": lines,
-        "limit_lines": dialect.max_steps,
-    }
-    return CheckReport(read.checked.diagnostics, data, [shown, *([str(files)] if files.found else [])], list(read.findings[1:]))
+class _RunLanguage(FileLanguage):
+    """Programs of the MIC488 that run, as text or compiled."""
+
+    title = "WBC programs"
+    options = frozenset({"positions", "config", "firmware", "travel", "statement_time"})
+
+    def run(self, given: ProgramRun, options: GivenOptions, out: Print, warn: Print) -> bool:
+        from steptwin.files.timedinputs import parse_duration
+        from steptwin.languages.run_wbc import WbcRun, run
+        from steptwin.languages.travels import parse_travel
+
+        wanted = WbcRun.of(
+            given,
+            positions=options.get("positions"),
+            config=options.get("config"),
+            firmware=options.get("firmware", DEFAULT.firmware),
+            statement_time=parse_duration(options.get("statement_time", "1ms"), "--statement-time"),
+            travels=parse_travel(",".join(options.get("travel", []))),
+        )
+        return run(wanted, out, warn)
+
+    def world(self, program: Path, options: GivenOptions, show: Print) -> ProgramWorld:
+        from steptwin.languages.run_wbc import WbcRun, prepare
+
+        given = prepare(WbcRun(program=program, positions=options.get("positions"), config=options.get("config")), show)
+        if given.companions.found:
+            show(str(given.companions))
+        return ProgramWorld(given.describe(str), {str(path): read_bytes(path) for path in given.paths})
 
 
-def _explain(source: SourceText, options: GivenOptions) -> list[Explanation]:
-    from steptwin.explain.mic488 import explain
+class WbcPrograms(_RunLanguage):
+    name = "wbc"
+    suffixes = (".prg",)
 
-    dialect = _dialect(options)
-    files = _files(source.name, options)
-    read = check_source(source, files.positions, files.config, dialect)
-    return [explain(source, read.checked, read.config, dialect)]
+    def check(self, source: SourceText, options: GivenOptions) -> CheckReport:
+        dialect = _dialect(options)
+        files = _files(source.name, options)
+        read = check_source(source, files.positions, files.config, dialect)
+        lines = read.checked.lines
+        shown = f"MIC488 firmware {dialect.firmware}, {count(lines, 'executable line')} of {dialect.max_steps}"
+        data = {
+            "firmware": dialect.firmware,
+            "positions": None if files.positions is None else str(files.positions),
+            "config": None if files.config is None else str(files.config),
+            "executable_lines": lines,
+            "limit_lines": dialect.max_steps,
+        }
+        return CheckReport(
+            read.checked.diagnostics, data, [shown, *([str(files)] if files.found else [])], list(read.findings[1:])
+        )
 
+    def explain(self, source: SourceText, options: GivenOptions) -> list[Explanation]:
+        from steptwin.explain.mic488 import explain
 
-def _migrate(source: SourceText, to: str, old: str | None) -> Migration:
-    new = dialect_for(to)
-    before = DEFAULT if old is None else dialect_for(old)
-    files = _files(source.name, {})
-    read = check_source(source, files.positions, files.config, before)
-    setup = None if read.config is None else setup_of(read.config)
-    found = migration.findings(source.text, before, new, read.positions, setup)
-    text = fixed(source.text, found)
-    left = [d for d in wbc_check.check(text, read.positions, setup, new).diagnostics if d.severity is Severity.ERROR]
-    return Migration(
-        f"from firmware {before.firmware} to {new.firmware}", list(migration.differences(before, new)), found, text, left
-    )
+        dialect = _dialect(options)
+        files = _files(source.name, options)
+        read = check_source(source, files.positions, files.config, dialect)
+        return [explain(source, read.checked, read.config, dialect)]
 
+    def migrate(self, source: SourceText, to: str, old: str | None) -> Migration:
+        new = dialect_for(to)
+        before = DEFAULT if old is None else dialect_for(old)
+        files = _files(source.name, {})
+        read = check_source(source, files.positions, files.config, before)
+        setup = None if read.config is None else setup_of(read.config)
+        found = migration.findings(source.text, before, new, read.positions, setup)
+        text = fixed(source.text, found)
+        left = [d for d in wbc_check.check(text, read.positions, setup, new).diagnostics if d.severity is Severity.ERROR]
+        return Migration(
+            f"from firmware {before.firmware} to {new.firmware}", list(migration.differences(before, new)), found, text, left
+        )
 
-def _format(text: str) -> str:
-    from steptwin.wbc.printer import format_text
+    def format(self, text: str) -> str:
+        from steptwin.wbc.printer import format_text
 
-    return format_text(text)
-
-
-def _run(given: ProgramRun, options: GivenOptions, out: Print, warn: Print) -> bool:
-    from steptwin.files.timedinputs import parse_duration
-    from steptwin.languages.run_wbc import WbcRun, run
-    from steptwin.languages.travels import parse_travel
-
-    wanted = WbcRun.of(
-        given,
-        positions=options.get("positions"),
-        config=options.get("config"),
-        firmware=options.get("firmware", DEFAULT.firmware),
-        statement_time=parse_duration(options.get("statement_time", "1ms"), "--statement-time"),
-        travels=parse_travel(",".join(options.get("travel", []))),
-    )
-    return run(wanted, out, warn)
-
-
-def _world(program: Path, options: GivenOptions, show: Print) -> ProgramWorld:
-    from steptwin.languages.run_wbc import WbcRun, prepare
-
-    given = prepare(WbcRun(program=program, positions=options.get("positions"), config=options.get("config")), show)
-    if given.companions.found:
-        show(str(given.companions))
-    return ProgramWorld(given.describe(str), {str(path): read_bytes(path) for path in given.paths})
+        return format_text(text)
 
 
-def _check_positions(source: SourceText, options: GivenOptions) -> CheckReport:
-    table, found = parse_positions(source.text)
-    return CheckReport(found, {"positions": len(table.rows)}, [count(len(table.rows), "position")])
+class WbcImages(_RunLanguage):
+    name = "wbc-image"
+    suffixes = (IMAGE,)
+    not_text = "is a compiled image: steptwin decompile makes a program of it"
 
 
-def _check_config(source: SourceText, options: GivenOptions) -> CheckReport:
-    firmware = _dialect(options).firmware
-    _, found = examine_config(IniFile.of_text(source.text), firmware)
-    return CheckReport(found, {"firmware": firmware}, [f"MIC488 firmware {firmware}"])
+class PositionTables(FileLanguage):
+    name = "positions"
+    title = "position tables"
+    suffixes = (".csv",)
+
+    def check(self, source: SourceText, options: GivenOptions) -> CheckReport:
+        table, found = parse_positions(source.text)
+        return CheckReport(found, {"positions": len(table.rows)}, [count(len(table.rows), "position")])
 
 
-_OPTIONS = frozenset({"positions", "config", "firmware", "travel", "statement_time"})
+class Configurations(FileLanguage):
+    name = "config"
+    title = "configurations"
+    suffixes = (".cfg",)
+    options = frozenset({"firmware"})
 
-WBC_PROGRAMS = FileLanguage(
-    name="wbc",
-    title="WBC programs",
-    suffixes=(".prg",),
-    options=_OPTIONS,
-    check=_check,
-    explain=_explain,
-    migrate=_migrate,
-    format=_format,
-    run=_run,
-    world=_world,
-)
-WBC_IMAGES = FileLanguage(
-    name="wbc-image",
-    title="WBC programs",
-    suffixes=(IMAGE,),
-    options=_OPTIONS,
-    not_text="is a compiled image: steptwin decompile makes a program of it",
-    run=_run,
-    world=_world,
-)
-POSITION_TABLES = FileLanguage(name="positions", title="position tables", suffixes=(".csv",), check=_check_positions)
-CONFIGURATIONS = FileLanguage(
-    name="config", title="configurations", suffixes=(".cfg",), options=frozenset({"firmware"}), check=_check_config
-)
+    def check(self, source: SourceText, options: GivenOptions) -> CheckReport:
+        firmware = _dialect(options).firmware
+        _, found = examine_config(IniFile.of_text(source.text), firmware)
+        return CheckReport(found, {"firmware": firmware}, [f"MIC488 firmware {firmware}"])
+
+
+WBC_PROGRAMS = WbcPrograms()
+WBC_IMAGES = WbcImages()
+POSITION_TABLES = PositionTables()
+CONFIGURATIONS = Configurations()

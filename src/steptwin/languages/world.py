@@ -11,10 +11,15 @@ from steptwin.languages.contract import CheckReport, FileLanguage, GivenOptions
 from steptwin.simulation.world.check import diagnose
 
 
-def _check(source: SourceText, options: GivenOptions) -> CheckReport:
-    folder = Path(source.name).parent
-    found = diagnose(source.name, source.text, lambda name: read_beside(folder, name))
-    return CheckReport(list(found.findings), companions=[(file, list(of)) for file, of in found.files])
+class Worlds(FileLanguage):
+    name = "world"
+    title = "worlds"
+    suffixes = (".toml",)
+
+    def check(self, source: SourceText, options: GivenOptions) -> CheckReport:
+        folder = Path(source.name).parent
+        found = diagnose(source.name, source.text, lambda name: read_beside(folder, name))
+        return CheckReport(list(found.findings), companions=[(file, list(of)) for file, of in found.files])
 
 
-WORLDS = FileLanguage(name="world", title="worlds", suffixes=(".toml",), check=_check)
+WORLDS = Worlds()

@@ -1,14 +1,15 @@
-"""Interface between the editor server and a language: one value for each, in `steptwin.lsp.languages`."""
+"""The interface of the editor server to a language: one `EditorLanguage` for each, in `steptwin.lsp.languages`."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 from steptwin.lsp.analysis import Analysis
 from steptwin.lsp.documents import MOST_CHARACTERS
 from steptwin.lsp.positions import LineIndex
+from steptwin.optionalmethods import OptionalMethods
 
 T = TypeVar("T")
 
@@ -65,23 +66,36 @@ class OtherTexts(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EditorLanguage:
-    """A language of texts."""
+class EditorLanguage(OptionalMethods, ABC):
+    """A language of texts: one object of one class."""
 
-    name: str
-    """For clients (``languageId``)."""
-    suffix: str
-    """Suffix of its files."""
-    is_meant: Callable[[str], bool] = lambda text: True
-    """Whether a text in a file with this suffix is one, because other programs use the suffix, too."""
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """For clients (``languageId``)."""
+
+    @property
+    @abstractmethod
+    def suffix(self) -> str:
+        """Suffix of its files."""
+
     shares_name: bool = False
     """Whether a machine has one of its files under the same name as its others."""
-    around: Callable[[OtherTexts, str], tuple[object, ...]] = lambda session, uri: ()
-    """Sources of the analysis of a text beside the text."""
-    analyse: Callable[[OtherTexts, str, LineIndex], Analysis]
     most_characters: int = MOST_CHARACTERS
     """Longer texts are not analysed."""
-    machines: Callable[[str, str], list[MachineFiles]] | None = None
-    """The controllers that a text describes, by its address and itself. Raises `Misuse` for one that cannot be read. None for
-    languages that describe none."""
+
+    def is_meant(self, text: str, /) -> bool:
+        """Whether a text in a file with this suffix is one, because other programs use the suffix, too."""
+        return True
+
+    def around(self, session: OtherTexts, uri: str, /) -> tuple[object, ...]:
+        """What the analysis of a text depends on beside the text."""
+        return ()
+
+    @abstractmethod
+    def analyse(self, session: OtherTexts, uri: str, lines: LineIndex, /) -> Analysis: ...
+
+    def machines(self, uri: str, text: str, /) -> list[MachineFiles]:
+        """The controllers that a text describes, by its address and itself, of a language that describes any. Raises `Misuse` for
+        one that cannot be read."""
+        return []

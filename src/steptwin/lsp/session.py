@@ -202,7 +202,7 @@ class EditorSession:
     def _read_machines(self, uri: str, lines: LineIndex, before: _Derived | None) -> Sequence[MachineFiles]:
         """Those that a text describes; while it cannot be read, during typing, the previous ones."""
         language = self._language(uri, lines)
-        if language is None or language.machines is None:
+        if language is None:
             return ()
         try:
             return language.machines(uri, lines.text)
@@ -218,7 +218,7 @@ class EditorSession:
         if self._worlds is None:
             found: dict[str, None] = {}
             for uri in self._documents:
-                for suffix in (one.suffix for one in LANGUAGES.values() if one.machines is not None):
+                for suffix in (one.suffix for one in LANGUAGES.values() if one.offers(EditorLanguage.machines)):
                     found.update(dict.fromkeys([uri] if uri.endswith(suffix) else []))
                     found.update(dict.fromkeys(self.files.beside(uri, suffix)))
             self._worlds = [uri for uri in found if self._is_world(uri)]
@@ -227,7 +227,7 @@ class EditorSession:
     def _is_world(self, uri: str) -> bool:
         lines = self.lines(uri)
         language = None if lines is None else self._language(uri, lines)
-        return language is not None and language.machines is not None
+        return language is not None and language.offers(EditorLanguage.machines)
 
     def related(self, uri: str) -> list[str]:
         """The other files of the machines that a file belongs to, normal addresses."""

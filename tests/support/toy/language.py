@@ -12,22 +12,26 @@ from steptwin.languages.contract import CheckReport, FileLanguage, GivenOptions,
 from steptwin.languages.program_run import ProgramRun
 
 
-def _check(source: SourceText, options: GivenOptions) -> CheckReport:
-    found = [
-        Diagnostic("T1", Severity.ERROR, Span(place, place + len(word)), f"{word!r} is no number")
-        for word in source.text.split()
-        if not word.isdecimal() and (place := source.text.index(word)) >= 0
-    ]
-    return CheckReport(found, {"targets": len(source.text.split())}, [count(len(source.text.split()), "target")])
+class Targets(FileLanguage):
+    name = "targets"
+    title = "lists of targets"
+    suffixes = (".targets",)
+
+    def check(self, source: SourceText, options: GivenOptions) -> CheckReport:
+        found = [
+            Diagnostic("T1", Severity.ERROR, Span(place, place + len(word)), f"{word!r} is no number")
+            for word in source.text.split()
+            if not word.isdecimal() and (place := source.text.index(word)) >= 0
+        ]
+        return CheckReport(found, {"targets": len(source.text.split())}, [count(len(source.text.split()), "target")])
+
+    def run(self, given: ProgramRun, options: GivenOptions, out: Print, warn: Print) -> bool:
+        targets = read_text(given.program).source.text.split()
+        out(f"moves to {', '.join(targets)}")
+        return bool(targets)
 
 
-def _run(given: ProgramRun, options: GivenOptions, out: Print, warn: Print) -> bool:
-    targets = read_text(given.program).source.text.split()
-    out(f"moves to {', '.join(targets)}")
-    return bool(targets)
-
-
-TARGETS = FileLanguage(name="targets", title="lists of targets", suffixes=(".targets",), check=_check, run=_run)
+TARGETS = Targets()
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from steptwin.errors import Misuse
 from steptwin.lsp.files import relative
 from steptwin.lsp.language import EditorLanguage, OtherTexts
 from steptwin.lsp.m1486.analysis import M1486Analysis
+from steptwin.lsp.positions import LineIndex
 from steptwin.lsp.world.tables import text_of
 from steptwin.m1486.lines import STEP_DIRECTION, Interface, interface
 from steptwin.m1486.variants import DEFAULT, Variant, variant
@@ -45,19 +46,18 @@ def chip_of(world: str, table: Mapping[str, Any]) -> ChipFiles | None:
     return ChipFiles(kind, drive, relative(world, program))
 
 
-MOST_CHARACTERS = 1 << 17
-"""Limit of an analysed program: many times what the chips of a line hold."""
+class M1486Programs(EditorLanguage):
+    name = "m1486"
+    suffix = ".m1486"
+    most_characters = 1 << 17
+    """Many times what the chips of a line hold."""
+
+    def around(self, session: OtherTexts, uri: str) -> tuple[Variant, Interface]:
+        chip = next((one for one in session.machines(ChipFiles) if one.program == uri), None)
+        return (DEFAULT, STEP_DIRECTION) if chip is None else (chip.variant, chip.interface)
+
+    def analyse(self, session: OtherTexts, uri: str, lines: LineIndex) -> M1486Analysis:
+        return M1486Analysis(uri, lines, *self.around(session, uri))
 
 
-def _around(session: OtherTexts, uri: str) -> tuple[Variant, Interface]:
-    chip = next((one for one in session.machines(ChipFiles) if one.program == uri), None)
-    return (DEFAULT, STEP_DIRECTION) if chip is None else (chip.variant, chip.interface)
-
-
-M1486_PROGRAMS = EditorLanguage(
-    name="m1486",
-    suffix=".m1486",
-    around=_around,
-    most_characters=MOST_CHARACTERS,
-    analyse=lambda session, uri, lines: M1486Analysis(uri, lines, *_around(session, uri)),
-)
+M1486_PROGRAMS = M1486Programs()

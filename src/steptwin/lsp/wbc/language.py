@@ -97,17 +97,6 @@ def _context(session: OtherTexts, program: str) -> ProgramContext:
     return ProgramContext(session.derived(table, _table), session.derived(config, _config, dialect.firmware), dialect)
 
 
-def _around_program(session: OtherTexts, uri: str) -> tuple[object, ...]:
-    around = _context(session, uri)
-    return around.positions, around.config, around.dialect
-
-
-def _analyse_program(session: OtherTexts, uri: str, lines: LineIndex) -> WbcAnalysis:
-    edited = session.kept(uri, Edited)
-    edited.update(lines.text, (lines.contents, lines.starts))
-    return WbcAnalysis(uri, lines, edited, _context(session, uri))
-
-
 def _firmware(session: OtherTexts, config: str) -> str:
     return next((one.dialect.firmware for one in session.machines(ControllerFiles) if one.config == config), DEFAULT.firmware)
 
@@ -135,25 +124,52 @@ def _used_rows(session: OtherTexts, table: str) -> UsedRows | None:
     return UsedRows(names, numbers, any(rows.all_may_be for rows in used))
 
 
-def _is_table(text: str) -> bool:
-    beginning = text[:_BEGINNING].lstrip()
-    return not beginning or ";" in re.split("[\r\n]", beginning, maxsplit=1)[0]
+class WbcPrograms(EditorLanguage):
+    name = "wbc"
+    suffix = ".prg"
+    shares_name = True
+
+    def around(self, session: OtherTexts, uri: str) -> tuple[object, ...]:
+        around = _context(session, uri)
+        return around.positions, around.config, around.dialect
+
+    def analyse(self, session: OtherTexts, uri: str, lines: LineIndex) -> WbcAnalysis:
+        edited = session.kept(uri, Edited)
+        edited.update(lines.text, (lines.contents, lines.starts))
+        return WbcAnalysis(uri, lines, edited, _context(session, uri))
 
 
-WBC_PROGRAMS = EditorLanguage(name="wbc", suffix=".prg", shares_name=True, around=_around_program, analyse=_analyse_program)
-POSITION_TABLES = EditorLanguage(
-    name="mic488-positions",
-    suffix=".csv",
-    is_meant=_is_table,
-    shares_name=True,
-    around=lambda session, uri: (_used_rows(session, uri),),
-    analyse=lambda session, uri, lines: TableAnalysis(uri, lines, _used_rows(session, uri)),
-)
-CONFIGURATIONS = EditorLanguage(
-    name="mic488-config",
-    suffix=".cfg",
-    is_meant=lambda text: _SECTION.search(text) is not None,
-    shares_name=True,
-    around=lambda session, uri: (_firmware(session, uri),),
-    analyse=lambda session, uri, lines: ConfigAnalysis(uri, lines, _firmware(session, uri)),
-)
+class PositionTables(EditorLanguage):
+    name = "mic488-positions"
+    suffix = ".csv"
+    shares_name = True
+
+    def is_meant(self, text: str) -> bool:
+        beginning = text[:_BEGINNING].lstrip()
+        return not beginning or ";" in re.split("[\r\n]", beginning, maxsplit=1)[0]
+
+    def around(self, session: OtherTexts, uri: str) -> tuple[UsedRows | None]:
+        return (_used_rows(session, uri),)
+
+    def analyse(self, session: OtherTexts, uri: str, lines: LineIndex) -> TableAnalysis:
+        return TableAnalysis(uri, lines, _used_rows(session, uri))
+
+
+class Configurations(EditorLanguage):
+    name = "mic488-config"
+    suffix = ".cfg"
+    shares_name = True
+
+    def is_meant(self, text: str) -> bool:
+        return _SECTION.search(text) is not None
+
+    def around(self, session: OtherTexts, uri: str) -> tuple[str]:
+        return (_firmware(session, uri),)
+
+    def analyse(self, session: OtherTexts, uri: str, lines: LineIndex) -> ConfigAnalysis:
+        return ConfigAnalysis(uri, lines, _firmware(session, uri))
+
+
+WBC_PROGRAMS = WbcPrograms()
+POSITION_TABLES = PositionTables()
+CONFIGURATIONS = Configurations()

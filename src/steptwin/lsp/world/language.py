@@ -20,35 +20,33 @@ FILES: dict[str, Callable[[str, Mapping[str, Any]], MachineFiles | None]] = {"mi
 """Readers of the files of a controller from the address of a description and its table there, by kinds of controllers."""
 
 
-def _is_world(text: str) -> bool:
-    tables = "|".join(map(re.escape, ("world", *KINDS)))
-    return re.search(rf"^[ \t]*\[\[?[ \t]*(?:{tables})[ \t]*[\].]", text, re.MULTILINE) is not None
-
-
-def machines_of(uri: str, text: str) -> list[MachineFiles]:
-    """See `EditorLanguage.machines`. Leaves out what is wrong."""
-    try:
-        data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
-        raise Misuse(str(error)) from None
-    read = (files(uri, table) for kind, files in FILES.items() for table in _tables(data, kind))
-    return [machine for machine in read if machine is not None]
-
-
 def _tables(data: Mapping[str, Any], kind: str) -> list[Mapping[str, Any]]:
     tables = data.get(kind)
     return [table for table in tables if isinstance(table, dict)] if isinstance(tables, list) else []
 
 
-def _analyse(session: OtherTexts, uri: str, lines: LineIndex) -> WorldAnalysis:
-    return WorldAnalysis(uri, lines, session, session.kept(uri, ElementSignals))
+class Worlds(EditorLanguage):
+    name = "steptwin-world"
+    suffix = ".toml"
+
+    def is_meant(self, text: str) -> bool:
+        tables = "|".join(map(re.escape, ("world", *KINDS)))
+        return re.search(rf"^[ \t]*\[\[?[ \t]*(?:{tables})[ \t]*[\].]", text, re.MULTILINE) is not None
+
+    def around(self, session: OtherTexts, uri: str) -> tuple[object, ...]:
+        return tuple(session.lines(file) for file in session.files_of(uri))
+
+    def analyse(self, session: OtherTexts, uri: str, lines: LineIndex) -> WorldAnalysis:
+        return WorldAnalysis(uri, lines, session, session.kept(uri, ElementSignals))
+
+    def machines(self, uri: str, text: str) -> list[MachineFiles]:
+        """As `EditorLanguage.machines`. Leaves out what is wrong."""
+        try:
+            data = tomllib.loads(text)
+        except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+            raise Misuse(str(error)) from None
+        read = (files(uri, table) for kind, files in FILES.items() for table in _tables(data, kind))
+        return [machine for machine in read if machine is not None]
 
 
-WORLDS = EditorLanguage(
-    name="steptwin-world",
-    suffix=".toml",
-    is_meant=_is_world,
-    around=lambda session, uri: tuple(session.lines(file) for file in session.files_of(uri)),
-    analyse=_analyse,
-    machines=machines_of,
-)
+WORLDS = Worlds()

@@ -16,6 +16,7 @@ from steptwin.machine import MachineEvent, Nanos
 from steptwin.messages import Message
 from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss
+from steptwin.optionalmethods import OptionalMethods
 from steptwin.simulation.kinds.links import LINK_KEYS, LineSpec
 from steptwin.simulation.mechanics.mechanics import EncoderReader
 from steptwin.simulation.mechanics.scale import DriveScale, GivenScale
@@ -240,7 +241,7 @@ HOMES_BY_VELOCITY = Message(
 CANNOT_BE_JOGGED = Message("simulation.cannot-be-jogged", "{name!r} is {kind}, which cannot be jogged")
 
 
-class ControllerKind(ABC, Generic[S, M, V]):
+class ControllerKind(OptionalMethods, ABC, Generic[S, M, V]):
     """A kind of controller: its spec, its machine, and what Python programs see of it. Each kind is one object of one class, in
     its folder.
 
@@ -292,10 +293,6 @@ class ControllerKind(ABC, Generic[S, M, V]):
         any, for each world of the description: machines share only what none of them changes. Both raise `Misuse`."""
 
     # ------------------------------------------------------------------ what only some have
-
-    def offers(self, method: Callable[..., object], /) -> bool:
-        """Whether this kind has a method that only some have, such as `ControllerKind.seek`."""
-        return getattr(type(self), method.__name__) is not method
 
     def lacks(self, name: str, what: str, /) -> Misuse:
         """Refusal of what only other controllers have, of a machine with that name."""
