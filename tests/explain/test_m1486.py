@@ -120,4 +120,4 @@ def test_errors_that_the_chip_finds_are_named() -> None:
 
 def test_wrong_commands_are_refused() -> None:
     with pytest.raises(Misuse, match=r"p\.m1486:2: .* steptwin check shows all errors"):
-        explained("[\nY5\n]\n")
+        explained("[\n%5\n]\n")

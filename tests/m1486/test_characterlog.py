@@ -49,9 +49,9 @@ def test_what_a_host_types(typed: str, meaning: str) -> None:
 
 
 def test_a_line_that_is_no_command_has_its_text_and_the_reason() -> None:
-    text = words("y5\r")
-    assert text.startswith("y5  ")
-    assert "'y'" in text
+    text = words("%5\r")
+    assert text.startswith("%5  ")
+    assert "'%'" in text
 
 
 def test_labels_are_those_of_the_type() -> None:

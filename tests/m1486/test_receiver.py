@@ -427,7 +427,7 @@ def test_resetting_an_e_type_takes_its_time_and_loses_what_arrives_meanwhile() -
 @pytest.mark.parametrize(
     ("line", "reason"),
     [
-        ("y", "no command begins with"),
+        ("%", "no command begins with"),
         ("v15", "16 to 20 000"),
         ("f0", "1 to 16 000 000"),
         ("rr", "second command"),
