@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import pytest
-from motorrecord_rig import CHIP, OTHER, TABLE, MotorRig, check
+from motorrecord_rig import CHIP, ME, OTHER, TABLE, MotorRig, check
 
 from steptwin.access.roles import Role
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.gateways.clients import NotPermitted
-from steptwin.gateways.epics.motorfields import StatusBit
+from steptwin.gateways.epics.motorfields import ProgressBit, StatusBit
 from steptwin.gateways.epics.records import LOST, NO_ALARM, FieldValue
 from steptwin.subject.commands import Enable, Move, StopAxes
 
@@ -317,6 +317,67 @@ def test_velocity_and_acceleration_of_the_registers() -> None:
         points = ("table.M1_VMAX", "table.M1_ACC", "table.M1_DEC")
         assert [reading.value for reading in rig.world.read(*points)] == [20.0, 10.0, 10.0]
         await rig.refused("VELO", 0.0, Misuse, "permitted are numbers above 0")
+
+    check(act)
+
+
+def test_mip_and_tdir_say_what_is_done() -> None:
+    async def act(rig: MotorRig) -> None:
+        await rig.put("VAL", 1.0)
+        assert rig.get("MIP", "TDIR") == [0, 1]
+        put = await rig.begin("VAL", -30.0)
+        for _ in range(5):
+            await rig.tick()
+        assert rig.get("MIP", "TDIR") == [ProgressBit.MOVE, 0]
+        await rig.begin("SPMG", 1)
+        assert rig.get("MIP") == [ProgressBit.STOP]
+        await rig.put("SPMG", 3)
+        assert rig.get("MIP") == [ProgressBit.MOVE]
+        await rig.put("STOP", 1)
+        await rig.over(put)
+        assert rig.get("MIP") == [0]
+        for button, bit in (("JOGF", ProgressBit.JOG_FORWARD), ("JOGR", ProgressBit.JOG_REVERSE)):
+            jog = await rig.begin(button, 1)
+            assert rig.get("MIP") == [bit]
+            await rig.put(button, 0)
+            await rig.over(jog)
+        rig.world.inner.do(Move("table", 1, to=20.0))
+        await rig.tick()
+        assert rig.get("MIP") == [ProgressBit.EXTERNAL]
+        await rig.stands()
+        assert rig.get("MIP") == [0]
+
+    check(act)
+
+
+def test_what_reads_the_controller_anew_and_what_never_changes() -> None:
+    async def act(rig: MotorRig) -> None:
+        assert rig.get("NTM", "RTRY", "RCNT", "BDST", "FRAC", "DLY", "UEIP", "DISP", "SCAN") == [1, 0, 0, 0.0, 1.0, 0.0, 0, 0, 0]
+        assert rig.get("UDF", "JAR") == [0, 100.0]
+        await rig.put("ACCL", 1.0)
+        assert rig.get("JAR") == [50.0]
+        rig.world.inner.do(Enable("table", 1, on=False))
+        assert rig.get("CNEN") == [1]
+        await rig.record.put(ME, "STUP", 1)
+        assert rig.get("CNEN", "STUP") == [0, 0]
+        rig.world.inner.do(Enable("table", 1, on=True))
+        await rig.record.put(ME, "PROC", 1)
+        assert rig.get("CNEN") == [1]
+
+    check(act)
+
+
+def test_sync_gives_val_the_position() -> None:
+    async def act(rig: MotorRig) -> None:
+        put = await rig.begin("VAL", 1000.0)
+        await rig.refused("SYNC", 1, Refusal, "it moves", OTHER)
+        rig.world.inner.do(StopAxes("table", 1))
+        with pytest.raises(Refusal, match="not at 1000 mm"):
+            await rig.over(put)
+        assert rig.get("VAL") == [1000.0]
+        await rig.put("SYNC", 1)
+        val, rbv, sync = rig.get("VAL", "RBV", "SYNC")
+        assert (val, sync) == (rbv, 0)
 
     check(act)
 

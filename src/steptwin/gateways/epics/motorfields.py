@@ -8,6 +8,8 @@ from steptwin.gateways.epics.records import AlarmSeverity, FieldQuantity, FieldR
 
 STOP, PAUSE, MOVE, GO = range(4)
 """States of SPMG."""
+STATUS_ON = 1
+"""A state of STUP."""
 USE, SET = range(2)
 VARIABLE, FROZEN = range(2)
 
@@ -43,6 +45,8 @@ def _rows() -> Iterator[FieldRow]:
     yield _double("DIFF", "DVAL - DRBV.", FieldQuantity.LENGTH)
     yield _short("DMOV", "1 when the whole motion is over.")
     yield _short("MOVN", "1 while the motor moves.")
+    yield _short("MIP", "What the record does, as bits of motorRecord.cc; 0: nothing.")
+    yield _short("TDIR", "1 where the last motion went in the positive direction of the controller.")
     yield _short("STOP", "1 stops; it is 0 again then.", put=True)
     yield _states("SPMG", "Whether motions may be made.", "Stop", "Pause", "Move", "Go", put=True)
     yield _double("TWV", "Distance of a tweak.", FieldQuantity.LENGTH, put=True)
@@ -67,6 +71,7 @@ def _rows() -> Iterator[FieldRow]:
     yield _double("VBAS", "Base velocity.", FieldQuantity.VELOCITY)
     yield _double("ACCL", "Time until VELO is reached, s.", FieldQuantity.TIME, put=True)
     yield _double("JVEL", "Velocity of jogs.", FieldQuantity.VELOCITY, put=True)
+    yield _double("JAR", "Acceleration of jogs, that of moves; 0 where the controller does not tell.", FieldQuantity.ACCELERATION)
     yield _double("HVEL", "Velocity of homing.", FieldQuantity.VELOCITY, put=True)
     yield _double("OFF", "RBV - DRBV in the direction of DIR.", FieldQuantity.LENGTH, put=True)
     yield _states("DIR", "Whether positions go as those of the controller.", "Pos", "Neg", put=True)
@@ -87,11 +92,32 @@ def _rows() -> Iterator[FieldRow]:
     yield _text("RTYP", "motor")
     yield _text("DTYP", "steptwin")
     yield _text("OUT", "Controller and axis.")
+    yield _short("UDF", "1 until a position is known.")
     yield _states("STAT", "Kind of alarm.", "NO_ALARM", "STATE", "COMM", "UDF", "HIGH", "LOW")
     yield _states("SEVR", "AlarmSeverity of the alarm.", *(one.name for one in AlarmSeverity))
 
 
-MOTOR_FIELDS: Mapping[str, FieldRow] = {row.name: row for row in _rows()}
+def _requests() -> Iterator[FieldRow]:
+    """Puts that move nothing."""
+    yield _states("STUP", "ON reads the controller; it is OFF again then.", "OFF", "ON", "BUSY", put=True)
+    yield _short("PROC", "Any value reads the controller.", put=True)
+    yield _short("SYNC", "1 sets VAL to RBV; it is 0 again then.", put=True)
+
+
+def _constants() -> Iterator[FieldRow]:
+    """How the record works, for clients that ask."""
+    yield _states("NTM", "Whether a put during a motion gives it a new target.", "NO", "YES")
+    yield _short("RTRY", "Retries: none.")
+    yield _short("RCNT", "The number of this retry.")
+    yield _double("BDST", "Backlash that is taken out: none.", FieldQuantity.LENGTH)
+    yield _double("FRAC", "Part of the way that a move is sent to the controller for.", FieldQuantity.PURE)
+    yield _double("DLY", "Pause between the end of a motion and DMOV, s.", FieldQuantity.TIME)
+    yield _states("UEIP", "Whether RBV is that of an encoder: it is what the controller counts.", "No", "Yes")
+    yield _short("DISP", "1 refuses puts of all clients: never.")
+    yield _states("SCAN", "When it is processed: by puts and by what the controller does.", "Passive")
+
+
+MOTOR_FIELDS: Mapping[str, FieldRow] = {row.name: row for row in (*_rows(), *_requests(), *_constants())}
 
 
 def first_values() -> dict[str, FieldValue]:
@@ -99,7 +125,18 @@ def first_values() -> dict[str, FieldValue]:
         row.name: "" if row.type is FieldType.STRING else 0.0 if row.type is FieldType.DOUBLE else 0
         for row in MOTOR_FIELDS.values()
     }
-    return found | {"DMOV": 1, "SPMG": GO, "RTYP": "motor", "DTYP": "steptwin", "SREV": 200, "TWV": 1.0, "PREC": 3}
+    return found | {
+        "DMOV": 1,
+        "SPMG": GO,
+        "RTYP": "motor",
+        "DTYP": "steptwin",
+        "SREV": 200,
+        "TWV": 1.0,
+        "PREC": 3,
+        "NTM": 1,
+        "FRAC": 1.0,
+        "UDF": 1,
+    }
 
 
 class StatusBit:
@@ -119,3 +156,24 @@ class StatusBit:
     COMM_ERROR = 1 << 12
     MINUS_LIMIT = 1 << 13
     HOMED = 1 << 14
+
+
+class ProgressBit:
+    """Bits of MIP."""
+
+    JOG_FORWARD = 0x0001
+    JOG_REVERSE = 0x0002
+    HOME_FORWARD = 0x0008
+    HOME_REVERSE = 0x0010
+    MOVE = 0x0020
+    STOP = 0x0200
+    EXTERNAL = 0x8000
+    """Somebody else has begun the motion."""
+
+
+BUTTON_BITS = {
+    "JOGF": ProgressBit.JOG_FORWARD,
+    "JOGR": ProgressBit.JOG_REVERSE,
+    "HOMF": ProgressBit.HOME_FORWARD,
+    "HOMR": ProgressBit.HOME_REVERSE,
+}

@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable
 from typing import Protocol
 
 from steptwin.errors import Misuse, Refusal
-from steptwin.gateways.epics.motorfields import SET
+from steptwin.gateways.epics.motorfields import SET, STATUS_ON
 from steptwin.gateways.epics.records import FieldValue, Putter
 
 FIXED = "no command changes the position of the controller"
@@ -45,6 +45,12 @@ class PutTarget(Protocol):
     async def pause(self, who: Putter, state: int) -> None: ...
 
     async def enable(self, who: Putter, *, on: bool) -> None: ...
+
+    async def refresh(self) -> None:
+        """Read the controller."""
+        ...
+
+    def synchronize(self) -> None: ...
 
     async def write_ramp(self, who: Putter, velocity: float, seconds: float) -> None: ...
 
@@ -135,6 +141,21 @@ async def _put_direction(record: PutTarget, who: Putter, name: str, value: Field
     record.turn(int(value))
 
 
+async def _put_process(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:
+    await record.refresh()
+
+
+async def _put_status(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:
+    if value == STATUS_ON:
+        await record.refresh()
+
+
+async def _put_sync(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:
+    if value:
+        record.check_setting(who)
+        record.synchronize()
+
+
 async def _put_enable(record: PutTarget, who: Putter, name: str, value: FieldValue) -> None:
     await record.enable(who, on=bool(value))
 
@@ -151,4 +172,7 @@ PUTS: dict[str, Callable[[PutTarget, Putter, str, FieldValue], Awaitable[None]]]
     "OFF": _put_offset,
     "DIR": _put_direction,
     "CNEN": _put_enable,
+    "PROC": _put_process,
+    "STUP": _put_status,
+    "SYNC": _put_sync,
 }

@@ -16,7 +16,18 @@ from steptwin.controllerstate import StatusLevel
 from steptwin.datasheet import AxisDescription, Condition, Limits
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.gateways.epics.controller import EpicsController
-from steptwin.gateways.epics.motorfields import FROZEN, GO, MOTOR_FIELDS, MOVE, PAUSE, STOP, StatusBit, first_values
+from steptwin.gateways.epics.motorfields import (
+    BUTTON_BITS,
+    FROZEN,
+    GO,
+    MOTOR_FIELDS,
+    MOVE,
+    PAUSE,
+    STOP,
+    ProgressBit,
+    StatusBit,
+    first_values,
+)
 from steptwin.gateways.epics.motorputs import FIXED, PUTS, put_setting
 from steptwin.gateways.epics.records import (
     LOST,
@@ -131,7 +142,8 @@ class MotorRecord(RecordBase):
         return max(0, min(9, math.ceil(math.log10(self._axis.pulses_per_unit))))
 
     def unit_of(self, row: FieldRow) -> str:
-        per = {FieldQuantity.PURE: "", FieldQuantity.VELOCITY: f"{self.unit}/s", FieldQuantity.TIME: "s"}
+        rates = {FieldQuantity.VELOCITY: f"{self.unit}/s", FieldQuantity.ACCELERATION: f"{self.unit}/s²"}
+        per = {FieldQuantity.PURE: "", FieldQuantity.TIME: "s", **rates}
         return per.get(row.quantity, self.unit)
 
     def limits_of(self, row: FieldRow) -> Limits | None:
@@ -168,10 +180,30 @@ class MotorRecord(RecordBase):
             return
         velocity, *ramp = (float(one or 0.0) for one in found)
         self._ramp = (velocity, *ramp)
-        self.values |= {"VELO": velocity, "ACCL": velocity / ramp[0] if ramp and ramp[0] else 0.0}
+        self.values |= {
+            "VELO": velocity,
+            "ACCL": velocity / ramp[0] if ramp and ramp[0] else 0.0,
+            "JAR": ramp[0] if ramp else 0.0,
+        }
         for name in ("JVEL", "HVEL"):
             self.values[name] = min(self._number(name) or velocity, velocity)
         await self.show()
+
+    async def show(self) -> None:
+        self.values["MIP"] = self._progress
+        await super().show()
+
+    @property
+    def _progress(self) -> int:
+        """MIP, as far as it is known."""
+        motion = self._motion
+        if motion is None:
+            return BUTTON_BITS[self._beginning[1]] if self._beginning is not None else 0
+        if motion.is_stopped or motion.is_paused:
+            return ProgressBit.STOP
+        if motion.is_foreign:
+            return ProgressBit.EXTERNAL
+        return ProgressBit.MOVE if motion.button is None else BUTTON_BITS[motion.button]
 
     # ------------------------------------------------------------------ coordinates
 
@@ -261,7 +293,7 @@ class MotorRecord(RecordBase):
         self.alarm = _ALARMS[level] if dial is not None else NOT_KNOWN
         before = self._number("DRBV")
         if dial is not None:
-            self.values |= {"DRBV": dial, "RBV": self.user(dial), "RRBV": self._steps(dial)}
+            self.values |= {"DRBV": dial, "RBV": self.user(dial), "RRBV": self._steps(dial), "UDF": 0}
             self.values["DIFF"] = self._number("DVAL") - dial
         moves = self._moves(state)
         low, high = (code == limit for limit in self._axis.limit_codes or (math.nan, math.nan))
@@ -280,7 +312,7 @@ class MotorRecord(RecordBase):
         ):
             bits |= bit * is_set
         ends = (int(low), int(high))
-        self.values |= {"MSTA": bits, "MOVN": int(moves), "RLLS": ends[0], "RHLS": ends[1]}
+        self.values |= {"MSTA": bits, "TDIR": bits & StatusBit.DIRECTION, "MOVN": int(moves), "RLLS": ends[0], "RHLS": ends[1]}
         self.values |= {"LLS": ends[self._sign < 0], "HLS": ends[self._sign > 0], "CNEN": int(bool(state["enabled"]))}
         if not is_sure:
             return
@@ -593,6 +625,12 @@ class MotorRecord(RecordBase):
         machine = self._controller.name
         await self._controller.do(who, Write(tuple((machine, point, value) for point, value in rows)))
         await self._read_ramp()
+
+    def synchronize(self) -> None:
+        """SYNC is put: VAL becomes RBV."""
+        if self.is_busy:
+            raise Refusal(f"{self._place}: it moves")
+        self._aim(self._number("DRBV"))
 
     def set_position(self, user: float) -> None:
         """RBV becomes ``user``, by OFF; nothing moves."""

@@ -30,6 +30,7 @@ class FieldQuantity(enum.Enum):
     DIAL = "position of the dial"
     LENGTH = "distance"
     VELOCITY = "velocity"
+    ACCELERATION = "acceleration"
     TIME = "time"
 
 
