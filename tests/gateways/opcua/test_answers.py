@@ -11,6 +11,7 @@ from typing import Any, cast
 
 import pytest
 from asyncua import Client, Node, ua
+from asyncua.ua.ua_binary import struct_from_binary
 from gateway_rig import GatewayWorld
 from virtual_loop import run_virtually
 
@@ -20,6 +21,7 @@ from steptwin.gateways.opcua.addressspace import node_id
 from steptwin.gateways.opcua.gateway import OpcUaGateway
 from steptwin.gateways.opcua.limits import MOST_READ
 from steptwin.gateways.opcua.options import OpcUaSpec
+from steptwin.gateways.opcua.session import ADDITIONAL_INFO
 from steptwin.simulation.describe.description import read_world
 
 WORLD = """
@@ -271,6 +273,27 @@ async def check_one_read_has_an_upper_bound(client: Client, world: GatewayWorld)
         await client.uaclient.read(ua.ReadParameters(NodesToRead=[one] * (MOST_READ + 1)))
 
 
+async def check_a_refusal_says_why_to_a_client_that_asks(client: Client, world: GatewayWorld) -> None:
+    stop = ua.CallMethodRequest(node(client, "M1").nodeid, node_id("types.Axis.Stop"), [])
+    move = ua.CallMethodRequest(node(client, "M1").nodeid, node_id("types.Axis.MoveTo"), [ua.Variant(5.0)])
+
+    async def asked(bits: int, *calls: ua.CallMethodRequest) -> tuple[list[str], list[str | None]]:
+        request: Any = ua.CallRequest()
+        request.Parameters.MethodsToCall = list(calls)
+        request.RequestHeader.ReturnDiagnostics = bits
+        protocol: Any = client.uaclient.protocol
+        answer: Any = struct_from_binary(ua.CallResponse, await protocol.send_request(request))
+        return [one.StatusCode.name for one in answer.Results], [one.AdditionalInfo for one in answer.DiagnosticInfos]
+
+    refused = ["Good", "BadInvalidState"]
+    assert await asked(0, stop, move) == (refused, [])
+    assert await asked(0x20, stop, move) == (refused, [])
+    codes, (of_stop, of_move) = await asked(ADDITIONAL_INFO, stop, move)
+    assert (codes, of_stop) == (refused, None)
+    assert "not enabled" in str(of_move)
+    assert await asked(ADDITIONAL_INFO, stop, stop) == (["Good", "Good"], [])
+
+
 async def check_what_the_gateway_refuses_is_in_the_audit_log(client: Client, world: GatewayWorld) -> None:
     logged: list[tuple[object, ...]] = []
     world.audit = lambda who, do, fields, outcome: logged.append((do, fields.get("value"), fields.get("code"), outcome))
@@ -289,6 +312,7 @@ async def check_what_the_gateway_refuses_is_in_the_audit_log(client: Client, wor
 
 
 CHECKS = (
+    check_a_refusal_says_why_to_a_client_that_asks,
     check_what_the_gateway_refuses_is_in_the_audit_log,
     check_a_dead_band_keeps_quiet,
     check_an_item_that_is_enabled_again_reports_its_value,

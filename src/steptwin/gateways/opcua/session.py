@@ -4,16 +4,18 @@ The public interface of asyncua gives the role of a client neither to a method n
 neither of several writes, and reads the next request of a connection when the one before has been answered: a stop would wait
 for the motion before it. It accepts filters that it does not know, and counts a dead band from the last value rather than from
 the one that was notified. So this module derives from its internal server and session, and nothing else does: it replaces
-services of OPC UA (those that `AbstractSession` names), ``process_message`` of a connection, and ``isub`` of monitored items.
+services of OPC UA (those that `AbstractSession` names), ``process_message`` and ``send_response`` of a connection (which leaves
+DiagnosticInfos empty), and ``isub`` of monitored items.
 """
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from itertools import count
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from asyncua import ua
 from asyncua.common.utils import Buffer
@@ -44,12 +46,18 @@ MOST_AT_ONCE = 64
 NOBODY = GatewayClient("nobody", Role.VIEWER)
 """Before a session is activated."""
 
+ADDITIONAL_INFO = 0x80
+"""Bit of ReturnDiagnostics: a text for each operation (OPC 10000-4, 7.12 and 7.33)."""
+_reasons: ContextVar[list[str] | None] = ContextVar("reasons", default=None)
+"""Reasons of what the request is refused for, by operation; None where its client has not asked for them."""
+
 _CALL = standard(ua.ObjectIds.CallRequest_Encoding_DefaultBinary)
+_WRITE = standard(ua.ObjectIds.WriteRequest_Encoding_DefaultBinary)
 _MAY_WAIT = frozenset(
     {
         _CALL,
         standard(ua.ObjectIds.ReadRequest_Encoding_DefaultBinary),
-        standard(ua.ObjectIds.WriteRequest_Encoding_DefaultBinary),
+        _WRITE,
         standard(ua.ObjectIds.HistoryReadRequest_Encoding_DefaultBinary),
         standard(ua.ObjectIds.CreateMonitoredItemsRequest_Encoding_DefaultBinary),
     }
@@ -171,8 +179,10 @@ class ConcurrentRequests:
         self._transport = connection.transport
         self._process = processor.process_message
         self._close = processor.close
+        self._send = processor.send_response
         self._answers: set[asyncio.Task[None]] = set()
         processor.process_message, processor.close = self.process_message, self.close
+        processor.send_response = self.send_response
 
     async def process_message(self, seqhdr: Any, body: Buffer) -> bool:
         head = body.copy()
@@ -184,14 +194,22 @@ class ConcurrentRequests:
             fault.ResponseHeader.ServiceResult = status(ua.StatusCodes.BadTooManyOperations)
             self._processor.send_response(struct_from_binary(ua.RequestHeader, head).RequestHandle, seqhdr, fault)
             return True
-        task = asyncio.create_task(self._answer(seqhdr, body))
+        asks_why = service in (_CALL, _WRITE) and struct_from_binary(ua.RequestHeader, head).ReturnDiagnostics & ADDITIONAL_INFO
+        task = asyncio.create_task(self._answer(seqhdr, body, [] if asks_why else None))
         self._answers.add(task)
         task.add_done_callback(self._answers.discard)
         return True
 
-    async def _answer(self, seqhdr: Any, body: Buffer) -> None:
+    async def _answer(self, seqhdr: Any, body: Buffer, reasons: list[str] | None) -> None:
+        _reasons.set(reasons)  # of this task and those that it begins
         if not await self._process(seqhdr, body):
             self._transport.close()  # as the library does
+
+    def send_response(self, handle: Any, seqhdr: Any, response: Any, *rest: Any) -> None:
+        reasons = _reasons.get()
+        if reasons:
+            response.DiagnosticInfos = [ua.DiagnosticInfo(AdditionalInfo=ua.String(text) if text else None) for text in reasons]
+        self._send(handle, seqhdr, response, *rest)
 
     async def close(self) -> None:
         """The connection is lost: what waits is not answered any more."""
@@ -312,7 +330,7 @@ class GatewaySession(InternalSession):
 
     async def write(self, params: ua.WriteParameters) -> list[ua.StatusCode]:
         """As `call`."""
-        return await asyncio.gather(*(self._code(self._write(one), "write", one) for one in params.NodesToWrite))
+        return _told(await asyncio.gather(*(self._code(self._write(one), "write", one) for one in params.NodesToWrite)))
 
     async def _write(self, one: ua.WriteValue) -> None:
         if one.AttributeId != ua.AttributeIds.Value:
@@ -328,25 +346,23 @@ class GatewaySession(InternalSession):
 
     async def call(self, params: list[ua.CallMethodRequest]) -> list[ua.CallMethodResult]:
         """All are begun at once, in their order: a stop does not wait for the motion before it."""
-        return await asyncio.gather(*(self._call(one) for one in params))
+        codes = _told(await asyncio.gather(*(self._code(self._call(one), "call", one) for one in params)))
+        return [ua.CallMethodResult(StatusCode=code) for code in codes]
 
-    async def _call(self, one: ua.CallMethodRequest) -> ua.CallMethodResult:
-        result = ua.CallMethodResult()
-        calling = self._service.call(self._client, self, one.ObjectId, one.MethodId, one.InputArguments)
-        result.StatusCode = await self._code(calling, "call", one)
-        return result
+    async def _call(self, one: ua.CallMethodRequest) -> None:
+        await self._service.call(self._client, self, one.ObjectId, one.MethodId, one.InputArguments)
 
-    async def _code(self, action: Awaitable[None], do: str, asked: ua.WriteValue | ua.CallMethodRequest) -> ua.StatusCode:
-        """The status code of what is done. What the gateway itself refuses is in the audit log, too."""
+    async def _code(self, action: Awaitable[None], do: str, asked: ua.WriteValue | ua.CallMethodRequest) -> _Outcome:
+        """What becomes of what is done. What the gateway itself refuses is in the audit log, too."""
         try:
             await action
         except ua.UaStatusCodeError as error:
             code = ua.StatusCode(error.code)
             self._service.refused(self._client, do, {**_asked(asked), "code": code.name})
-            return code
+            return _Outcome(code)
         except SteptwinError as error:
-            return status(next(code for kind, code in CODES if isinstance(error, kind)))
-        return ua.StatusCode()
+            return _Outcome(status(next(code for kind, code in CODES if isinstance(error, kind))), str(error))
+        return _Outcome(ua.StatusCode())
 
     async def close_session(self, delete_subs: bool = True) -> None:
         self._service.leave(self)
@@ -439,6 +455,19 @@ class GatewaySession(InternalSession):
             for identity in params.MonitoredItemIds:
                 queue.forget(identity)
         return codes
+
+
+class _Outcome(NamedTuple):
+    code: ua.StatusCode
+    reason: str = ""
+
+
+def _told(outcomes: Sequence[_Outcome]) -> list[ua.StatusCode]:
+    """The codes; the reasons go with the answer, if its client asks for them."""
+    reasons = _reasons.get()
+    if reasons is not None and any(one.reason for one in outcomes):
+        reasons[:] = [one.reason for one in outcomes]
+    return [one.code for one in outcomes]
 
 
 def _asked(asked: ua.WriteValue | ua.CallMethodRequest) -> dict[str, object]:
