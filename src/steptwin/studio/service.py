@@ -20,6 +20,10 @@ from steptwin.studio.static import add_page
 from steptwin.studio.viewers import Viewers
 from steptwin.subject.dispatch import LONGEST_REQUEST
 
+PONG_S = 300.0
+"""Time for the answer to a ping, which lies behind a message that is being read. A viewer that reads nothing of it is given
+up earlier (`steptwin.studio.viewers`)."""
+
 
 class StudioService:
     """Serves ``hub`` at ``listening`` until it is closed. A `Link` of a server."""
@@ -32,7 +36,13 @@ class StudioService:
         sockets = {viewers.PATH: self._viewers.serve, editors.PATH: self._editors.serve}
         guarded = Guard(make_app(hub, clock), sockets, origins, clock, around.on_internal)
         self._http = HttpService(
-            guarded, listening, tls, ws="websockets-sansio", ws_max_size=LONGEST_REQUEST, ws_per_message_deflate=False
+            guarded,
+            listening,
+            tls,
+            ws="websockets-sansio",
+            ws_max_size=LONGEST_REQUEST,
+            ws_ping_timeout=PONG_S,
+            ws_per_message_deflate=False,
         )
 
     def start(self) -> None:
