@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -33,8 +34,15 @@ OF_MODULES = {
 }
 
 
+NAMES = {"replace", "rename", "open", "fdopen", *WRITERS, *OF_LIBRARIES}.union(*OF_MODULES.values())
+MAY_WRITE = re.compile(rf"\b(?:{'|'.join(NAMES)})\s*\(")
+"""Modules without it need not be parsed."""
+
+
 def writing_calls(text: str) -> Iterator[str]:
     """What writes files in a module."""
+    if not MAY_WRITE.search(text):
+        return
     for call in ast.walk(ast.parse(text)):
         if isinstance(call, ast.Call) and (found := _writing(call)):
             yield found
