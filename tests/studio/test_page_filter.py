@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from playwright.sync_api import expect
+from playwright.sync_api import Page, expect
 from studio_page import PICTURES, Studio, button, serious, show
 from tests.studio.conftest import StudioWorld
 
@@ -22,6 +22,22 @@ kind = "m1486"
 [[axis]]
 name = "gantry"
 drive = "press-11.M2"
+[[axis]]
+name = "ram"
+drive = "press-12.M1"
+[[gate]]
+name = "joined"
+kind = "and"
+inputs = ["press-11.OUT1", "press-11.OUT2"]
+[[gate]]
+name = "elsewhere"
+kind = "and"
+inputs = ["press-12.OUT1", "press-12.OUT2"]
+[[relay]]
+name = "behind"
+[[wire]]
+from = "elsewhere.out"
+to = "behind.coil"
 """
     + "".join(f'[[mic488]]\nname = "{name}"\nline = "bus"\nunit = {unit}\n' for unit, name in enumerate(PRESSES, 1))
     + "".join(f'[[m1486]]\nname = "{name}"\nline = "chips"\naddress = {address}\n' for address, name in enumerate(DRUMS))
@@ -31,6 +47,21 @@ drive = "press-11.M2"
 @pytest.fixture
 def studio_world() -> StudioWorld:
     return StudioWorld(WORLD)
+
+
+def check_what_can_be_chosen(page: Page) -> None:
+    """While press-11 is shown alone."""
+    panels = page.get_by_role("main")
+    for panel in ("Registers", "Configuration"):
+        show(page, panel)
+        expect(panels.get_by_label("Controller", exact=True).locator("option")).to_have_text(["press-11"])
+    show(page, "Calculator")
+    axes = [f"press-11 M{axis}" for axis in (1, 2, 3, 4)]
+    expect(panels.get_by_label("Axis", exact=True).locator("option")).to_have_text(axes)
+    show(page, "Scope")
+    button(page, "Choose signals").click()
+    expect(panels.get_by_label("press-11 IN1", exact=True)).to_be_visible()
+    expect(panels.get_by_label("press-10 IN1", exact=True)).to_have_count(0)
 
 
 def test_one_of_thirty_controllers_is_found_in_all_lists(studio: Studio) -> None:
@@ -59,6 +90,19 @@ def test_one_of_thirty_controllers_is_found_in_all_lists(studio: Studio) -> None
     expect(pins.get_by_role("group")).to_have_count(0)
     expect(found.get_by_role("listitem")).to_have_count(0)
     expect(found.get_by_role("img", name="at rest")).to_have_count(4)  # whether it moves is seen all the same
+
+    button(page, "Wiring").click()
+    expect(panels.get_by_role("heading", name="elsewhere")).to_have_count(0)
+    expect(panels.get_by_role("heading", name="joined")).to_be_visible()
+    show(page, "Machine")
+    drawn = panels.locator("[data-name]")
+    expect(drawn).to_have_count(2)
+    assert drawn.evaluate_all("cards => cards.map(card => card.dataset.name)") == ["gantry", "joined"]
+    button(page, "Arrange").click()
+    assert {"ram", "elsewhere", "behind"} < {*drawn.evaluate_all("cards => cards.map(card => card.dataset.name)")}
+    button(page, "✓ Done").click()
+    expect(drawn).to_have_count(2)
+    check_what_can_be_chosen(page)
 
     show(page, "Overview")
     controllers = panels.get_by_role("table").first

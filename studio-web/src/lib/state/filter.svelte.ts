@@ -1,8 +1,24 @@
 import { SvelteSet } from "svelte/reactivity";
-import type { MachineModel } from "./model";
+import type { MachineModel, Model } from "./model";
 
 /** From so many controllers on the page offers a filter. */
 const MANY = 8;
+
+const ownerOf = (terminal: string) => terminal.split(".", 1)[0] ?? "";
+
+/** The elements that connections lead to from these controllers, over other elements too, not over other controllers. */
+function reached(from: ReadonlySet<string>, { machines, connections }: Model): ReadonlySet<string> {
+  const all = new Set(machines.map(({ name }) => name));
+  const found = new Set(from);
+  for (let before = 0; before < found.size;) {
+    before = found.size;
+    for (const { source, target } of connections) {
+      const ends = [ownerOf(source), ownerOf(target)];
+      if (ends.some((end) => found.has(end))) for (const end of ends) if (!all.has(end)) found.add(end);
+    }
+  }
+  return found;
+}
 
 /** Which controllers the lists of the page show, and which of them by their name alone; kept while the page is open. */
 class Filter {
@@ -22,6 +38,26 @@ class Filter {
       const text = all.join(" ").toLowerCase();
       return words.every((word) => text.includes(word));
     });
+  }
+
+  /** For lists to choose one from: what is chosen stays among them. */
+  offers(machines: readonly MachineModel[], chosen: string | undefined): readonly MachineModel[] {
+    const shown = new Set(this.of(machines));
+    return machines.filter((machine) => shown.has(machine) || machine.name === chosen);
+  }
+
+  /** Whether controllers, axes of the mechanics and elements with these names are shown: not what only hidden controllers have. */
+  shows(model: Model): (name: string) => boolean {
+    const shown = new Set(this.of(model.machines).map(({ name }) => name));
+    const hidden = new Set(model.machines.map(({ name }) => name).filter((name) => !shown.has(name)));
+    if (hidden.size === 0) return () => true;
+    const ofShown = reached(shown, model);
+    const ofHidden = reached(hidden, model);
+    const machineOf = new Map(model.mechanics.map(({ name, machine }) => [name, machine]));
+    return (name) => {
+      const machine = machineOf.get(name);
+      return machine === undefined ? ofShown.has(name) || !ofHidden.has(name) : !hidden.has(machine);
+    };
   }
 
   fold(machines: readonly MachineModel[], isFolded: boolean): void {

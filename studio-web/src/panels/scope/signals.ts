@@ -1,4 +1,4 @@
-import type { AxisModel, Model } from "../../lib/state/model";
+import type { AxisModel, MachineModel, Model } from "../../lib/state/model";
 import type { Quantity } from "./columns";
 
 interface Common {
@@ -6,6 +6,8 @@ interface Common {
   id: string;
   label: string;
   unit: string;
+  /** null: of a line. */
+  machine: MachineModel | null;
 }
 
 export interface CurveSignal extends Common {
@@ -48,7 +50,7 @@ export const isLane = (signal: Signal): boolean => signal.kind === "level" || is
 const WAVEFORM = "N";
 type Words = Quantity | "current" | "frames" | "statements";
 
-const passed = (kind: PassedSignal["kind"], source: string): Omit<PassedSignal, "label"> => ({
+const passed = (kind: PassedSignal["kind"], source: string): Omit<PassedSignal, "label" | "machine"> => ({
   id: `${source}.${kind}`,
   unit: "",
   kind,
@@ -64,6 +66,7 @@ export function signalsOf(model: Model, words: (what: Words) => string): Signal[
         id: `${axis.id}.${kind}`,
         label: `${axis.label} ${words(kind)}`,
         unit: kind === "position" ? axis.unit : `${axis.unit}/s`,
+        machine,
         kind,
         axis,
       })),
@@ -75,6 +78,7 @@ export function signalsOf(model: Model, words: (what: Words) => string): Signal[
         id: `${axis.id}.current${phase}`,
         label: `${axis.label} ${words("current")} ${phase}`,
         unit: "%",
+        machine,
         kind: "current",
         axis,
         pin,
@@ -83,16 +87,23 @@ export function signalsOf(model: Model, words: (what: Words) => string): Signal[
     );
     const statements: Signal[] = machine.isReal
       ? []
-      : [{ ...passed("statements", machine.name), label: `${machine.name} ${words("statements")}` }];
+      : [{ ...passed("statements", machine.name), machine, label: `${machine.name} ${words("statements")}` }];
     const pins = machine.sheet.pins.map((pin): Signal => {
       const label = several ? `${machine.name} ${pin.name}` : pin.name;
-      const common = { id: `${machine.name}.${pin.name}`, label, unit: pin.unit, pin: `${machine.name}.${pin.name}` };
+      const common = {
+        id: `${machine.name}.${pin.name}`,
+        label,
+        unit: pin.unit,
+        machine,
+        pin: `${machine.name}.${pin.name}`,
+      };
       return { ...common, kind: pin.unit === "V" ? "voltage" : "level" };
     });
     return [...curves, ...currents, ...pins, ...statements];
   });
   const frames = model.lines.map(({ name }): Signal => ({
     ...passed("frames", name),
+    machine: null,
     label: `${name} ${words("frames")}`,
   }));
   return [...ofMachines, ...frames];
