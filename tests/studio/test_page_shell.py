@@ -237,16 +237,3 @@ def test_a_phone_has_its_width_for_the_panels(studio: Studio) -> None:
     assert box["width"] <= 44
     rail.get_by_role("button", name="Registers", exact=True).click()
     expect(page.get_by_role("region", name="Registers", exact=True).last).to_be_visible()
-
-
-def test_actions_of_a_table_that_is_wider_than_its_pane_stay_in_sight(studio: Studio) -> None:
-    page = studio.page()
-    show(page, "Overview")
-    page.set_viewport_size({"width": 620, "height": 800})
-    shown = page.get_by_role("button", name="Power-cycle").first
-    box, table = shown.bounding_box(), page.get_by_role("table").first
-    pane = table.locator("xpath=..").bounding_box()
-    assert box is not None
-    assert pane is not None
-    assert table.evaluate("table => table.offsetWidth") > pane["width"]
-    assert box["x"] + box["width"] <= pane["x"] + pane["width"] + 1

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
-from studio_page import button, show
+from studio_page import button, panels_of, show, wider_than_panes
 from tests.studio.conftest import Process
 
 OF_TWINS = re.compile(r"\b(twins?|virtual\w*|world\w*|simulat\w*|descriptions?)\b", re.IGNORECASE)
@@ -97,9 +97,8 @@ def body_of(page: Page, panel: str) -> Locator:
 
 def test_every_panel(walked: tuple[Kind, Process, Page, list[str]]) -> None:
     kind, _, page, complaints = walked
-    there = page.get_by_role("navigation").get_by_role("button")
-    expect(there).to_have_count(len(kind.says))
-    names = [one.get_attribute("aria-label") or one.inner_text().strip() for one in there.all()]
+    expect(page.get_by_role("navigation").get_by_role("button")).to_have_count(len(kind.says))
+    names = panels_of(page)
     assert set(names) == set(kind.says)
     for name in names:
         show(page, name)
@@ -115,6 +114,12 @@ def test_every_panel(walked: tuple[Kind, Process, Page, list[str]]) -> None:
         named = re.findall(r"\*\*([^*]+)\*\*( \(twins\))?", row.partition(" | ")[2])
         assert {panel for panel, of_twins in named if not of_twins} <= set(names), row
     check_what_is_switched_and_written(kind, page)
+    page.set_viewport_size({"width": 390, "height": 844})
+    page.reload()  # without the tree
+    for name in names:
+        show(page, name)
+        expect(body_of(page, name)).to_contain_text(kind.says[name] if name != "Audit log" else "viewer 1")
+        assert wider_than_panes(page) == [], name
     assert complaints == []
 
 

@@ -60,6 +60,35 @@ class Studio:
         self._opened.close()
 
 
+WIDER = """() => {
+  const found = [];
+  for (const pane of document.querySelectorAll("main section > .body")) {
+    const edge = pane.getBoundingClientRect().left + pane.clientWidth;
+    const parts = [...pane.querySelectorAll("*")].filter((part) => !part.closest(".cm-scroller, svg, canvas, .hidden"));
+    const hides = (part) => getComputedStyle(part).overflowX !== "visible";
+    const shortens = (part) => getComputedStyle(part).textOverflow === "ellipsis" || part.matches("input, select");
+    const isShortened = (part) => part !== pane && (shortens(part) || isShortened(part.parentElement));
+    for (const part of [pane, ...parts]) {
+      if (!part.getClientRects().length || (part !== pane && isShortened(part))) continue;
+      const scrolls = hides(part) && part.scrollWidth > part.clientWidth + 1;
+      if (scrolls || part.getBoundingClientRect().right > edge + 1)
+        found.push(`${part.tagName} ${part.className} "${part.textContent.trim().slice(0, 30)}"`);
+    }
+  }
+  return found;
+}"""
+
+
+def wider_than_panes(page: Page) -> list[str]:
+    """What is cut off, scrolls sideways or lies outside of its pane; code and drawings may."""
+    return page.evaluate(WIDER)
+
+
+def panels_of(page: Page) -> list[str]:
+    buttons = page.get_by_role("navigation").get_by_role("button").all()
+    return [one.get_attribute("aria-label") or one.inner_text().strip() for one in buttons]
+
+
 def show(page: Page, panel: str) -> None:
     page.get_by_role("navigation").get_by_role("button", name=panel, exact=True).click()
     expect(page.get_by_role("region", name=panel, exact=True).last).not_to_be_empty()
