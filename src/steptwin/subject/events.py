@@ -95,7 +95,7 @@ def line_of(time: Nanos, machine: str, text: str) -> str:
 
 
 def _of_event(record: TraceRecord) -> Payload:
-    text = str(record.value)
+    text: str = _value(record)
     if record.subject == "note":
         return NotePayload(text)
     if record.subject in ("expectation", "overdue"):
@@ -132,7 +132,7 @@ _MAKE: Mapping[str, Callable[[TraceRecord], Payload]] = complete(
         "statement": lambda record: StatementPayload(record.subject, _value(record)),
         "event": _of_event,
         "input": _of_input,
-        "fault": lambda record: FaultPayload(record.subject, str(record.value)),
+        "fault": lambda record: FaultPayload(record.subject, _value(record)),
     },
 )
 
@@ -192,10 +192,10 @@ _READ: Mapping[str, Callable[[Mapping[str, Any]], Payload]] = complete(
         "statement": lambda data: StatementPayload(data["program"], data["line"]),
         "status": lambda data: StatusPayload(data["code"], read_message_text(data, "text"), tuple(data["facts"].items())),
         "note": lambda data: NotePayload(data["note"]),
-        "report": lambda data: ReportPayload(data["code"], data["what"]),
+        "report": lambda data: ReportPayload(data["code"], read_message_text(data, "what")),
         "button": lambda data: ButtonPayload(data["button"], data["pressed"]),
         "input": _read_input,
-        "fault": lambda data: FaultPayload(data["fault"], data["words"]),
+        "fault": lambda data: FaultPayload(data["fault"], read_message_text(data, "words")),
         "pace": _read_pace,
         "restored": lambda data: RestoredPayload(data["snapshot"]),
         "stopped": _read_stopped,

@@ -11,7 +11,7 @@ from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.motion import MotionState, Profile, at_rest, plan_position, plan_stop
 from steptwin.motion.profile import cruise
 from steptwin.simulation.mechanics.course import Build, Course, MechanicalState
-from steptwin.simulation.mechanics.loose import Looseness
+from steptwin.simulation.mechanics.loose import MOVES_WITH_LITTLE_CURRENT, MOVES_WITHOUT_CURRENT, RUNS_ON, Looseness
 from steptwin.simulation.mechanics.motor import NO_BURDEN, Burden, StepperMotor
 
 MOTOR = StepperMotor(((0.0, 1.0), (1e6, 1.0)), 1 / 32, 0.25, 0.0, 100.0, hold=0.5, hold_ns=300 * MILLISECOND)
@@ -109,7 +109,7 @@ def test_a_field_that_comes_to_rest_holds_what_it_can(load: float, due_s: float 
     assert loose.is_switched(Field(plan), due)
     found = moved(loose, Field(plan), before, due, load)
     assert loose.is_free
-    assert loose.why == "moves with too little current"
+    assert loose.why == MOVES_WITH_LITTLE_CURRENT
     assert found is not None
     assert (found.start, found.base, found.velocity(due)) == (due, 250, 0.0)
     assert found.velocity(due + SECOND) == pytest.approx(-(abs(load) - 0.25) * 32 * (1 if load > 0 else -1))
@@ -125,7 +125,7 @@ def test_current_is_reduced_again_after_it_was_switched_on() -> None:
     assert loose.is_switched(field, 1)
     found = moved(loose, field, here, SECOND, 0.0)
     assert found is not None
-    assert (found.segments, loose.is_free, loose.has_current, loose.why) == ((), True, False, "moves without current")
+    assert (found.segments, loose.is_free, loose.has_current, loose.why) == ((), True, False, MOVES_WITHOUT_CURRENT)
     field.is_energised = True
     assert moved(loose, field, here, 2 * SECOND, 0.76) is None
     assert not loose.is_free
@@ -193,7 +193,7 @@ def test_a_rotor_runs_on_after_a_stop_without_ramp(speed: float) -> None:
     assert found is not None
     assert (found.start, found.base) == (SECOND, round(speed))
     assert found.end is not None
-    assert (loose.is_free, loose.due, loose.why) == (True, found.end, "runs on after a stop without ramp")
+    assert (loose.is_free, loose.due, loose.why) == (True, found.end, RUNS_ON)
     assert (found.count(found.end) - found.base) % 64 == 0
     # It runs on whatever is looked at, until something else acts on it.
     after = Course(HELD, stopped.plan, SECOND, MechanicalState(round(speed), round(speed)), free=found)
@@ -201,7 +201,7 @@ def test_a_rotor_runs_on_after_a_stop_without_ramp(speed: float) -> None:
         assert moved(loose, stopped, after, now) is found
         assert loose.due == found.end
     assert moved(loose, stopped, after, found.end) is None
-    assert (loose.is_free, loose.due, loose.why) == (False, None, "moves with too little current")
+    assert (loose.is_free, loose.due, loose.why) == (False, None, MOVES_WITH_LITTLE_CURRENT)
 
 
 @pytest.mark.parametrize(("is_new", "stands", "is_on"), [(True, False, True), (False, True, True), (False, False, False)])
@@ -215,7 +215,7 @@ def test_what_ends_its_run(is_new: bool, stands: bool, is_on: bool) -> None:
     stopped.is_energised = is_on
     other = moved(loose, stopped, after, SECOND + MILLISECOND, is_new=is_new, stands=stands)
     assert other is not found
-    assert loose.why == ("moves with too little current" if is_on else "moves without current")
+    assert loose.why == (MOVES_WITH_LITTLE_CURRENT if is_on else MOVES_WITHOUT_CURRENT)
 
 
 def test_what_does_not_run_on() -> None:

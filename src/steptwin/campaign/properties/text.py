@@ -35,6 +35,7 @@ from steptwin.campaign.properties.tree import (
 from steptwin.durations import UNITS, duration
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.logic.expression import Comparison, ConditionParser
 from steptwin.simulation.logic.quantities import NumberLiteral, Quantity
@@ -69,9 +70,12 @@ def parse_property(text: str) -> PropertyFormula:
     return _PropertyParser(text).formula()
 
 
+PROPERTY = Message("campaign.property", "property {text!r}")
+
+
 class _PropertyParser(ConditionParser):
     def __init__(self, text: str) -> None:
-        super().__init__(text, "property")
+        super().__init__(text, PROPERTY)
 
     def formula(self) -> PropertyFormula:
         found = self._formula(self._implied())

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.messages import Message
 from steptwin.simulation.components.axis import find_axis
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
@@ -94,14 +95,22 @@ class Brake(BoardPart):
         return self._due
 
 
+IS_WORN = Message("simulation.brake-is-worn", "{name} is worn to {share:g} of its torque")
+IS_AS_NEW = Message("simulation.brake-is-as-new", "{name} is as new")
+
+
 def _wear(active: ActiveFault, brake: Brake, begins: bool, now: Nanos) -> str:
     brake.share = active.fault.number("share") if begins else 1.0
-    return f"{brake.board.name} is worn to {brake.share:g} of its torque" if begins else f"{brake.board.name} is as new"
+    return IS_WORN(name=brake.board.name, share=brake.share) if begins else IS_AS_NEW(name=brake.board.name)
+
+
+DOES_NOT_LET_GO = Message("simulation.does-not-let-go", "{name} does not let go")
+LETS_GO_AGAIN = Message("simulation.lets-go-again", "{name} lets go again")
 
 
 def _stick(active: ActiveFault, brake: Brake, begins: bool, now: Nanos) -> str:
     brake.is_stuck = begins
-    return f"{brake.board.name} {'does not let go' if begins else 'lets go again'}"
+    return (DOES_NOT_LET_GO if begins else LETS_GO_AGAIN)(name=brake.board.name)
 
 
 def _make(spec: BrakeSpec, site: Site) -> Brake:

@@ -9,6 +9,7 @@ from typing import ClassVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.motion.elastic import Response, Spring
 from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis
 from steptwin.simulation.components.element import Element
@@ -134,10 +135,13 @@ class Carriage(Stateful):
 # ---------------------------------------------------------------------- the element
 
 
+BELT_HAS_SHARE = Message("simulation.belt-has-share", "the belt of {name} has {share:g} of its frequency")
+
+
 def _slacken(active: ActiveFault, carriage: Carriage, begins: bool, now: Nanos) -> str:
     share = active.fault.number("share") if begins else 1.0
     carriage.soften(share, now)
-    return f"the belt of {carriage.spec.name} has {share:g} of its frequency"
+    return BELT_HAS_SHARE(name=carriage.spec.name, share=share)
 
 
 def _refers(spec: CarriageSpec, described: ElementSpecs) -> Iterator[Reference]:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.components.conveyor import find_conveyor
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.components.logic import BoardPart, BoardSpec, Joint
@@ -55,6 +56,10 @@ class CarrierSpec(BoardSpec):
             yield "onto", self.onto
 
 
+HOLDS = Message("simulation.holds-a-workpiece", "{cup} holds {piece}")
+FALLS_FROM = Message("simulation.falls-from", "{piece} falls from {cup}")
+
+
 class Carrier(BoardPart):
     """It carries a workpiece while it holds it. Then it lies on the belt below, or has fallen."""
 
@@ -94,7 +99,7 @@ class Carrier(BoardPart):
             self.carried = piece
             if self.source is not None:
                 self.source.take(piece)
-                self.source.report(f"{self.board.name} holds {piece.name}", piece.name, "held")
+                self.source.report(HOLDS(cup=self.board.name, piece=piece.name), piece.name, "held")
 
     def let_go(self, now: Nanos) -> None:
         """It does not hold anything from now on."""
@@ -108,7 +113,7 @@ class Carrier(BoardPart):
             source.put(piece, self._pick_at, now)
         else:
             self.dropped += 1
-            source.report(f"{piece.name} falls from {self.board.name}", piece.name, "falls")
+            source.report(FALLS_FROM(piece=piece.name, cup=self.board.name), piece.name, "falls")
 
     def passing(self, now: Nanos) -> Nanos | None:
         """When a belt that moves brings a workpiece to where it picks up, or takes it away."""

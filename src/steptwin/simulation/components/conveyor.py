@@ -14,6 +14,7 @@ from typing import ClassVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.components.axis import find_axis, turns_of_axis
 from steptwin.simulation.components.beltsensor import Sensor, SensorSpec
 from steptwin.simulation.components.conveyortable import FEED, RUN, ConveyorSpec, stop_terminal
@@ -40,6 +41,14 @@ _PULSE = 1
 
 
 # ---------------------------------------------------------------------- what is built
+
+
+IS_ON = Message("simulation.is-on-a-belt", "{piece} is on {belt}")
+GOES_BACK = Message("simulation.goes-back-on-a-belt", "{piece} goes back on {belt}")
+GOES_ON = Message("simulation.goes-on-on-a-belt", "{piece} goes on on {belt}")
+LEAVES = Message("simulation.leaves-a-belt", "{piece} leaves {belt}")
+FALLS_OFF = Message("simulation.falls-off-a-belt", "{piece} falls off the beginning of {belt}")
+STANDS_AT = Message("simulation.stands-on-a-belt", "{piece} stands at {place:g} mm of {belt}")
 
 
 class Conveyor(BoardPart):
@@ -173,7 +182,7 @@ class Conveyor(BoardPart):
         """Put a workpiece, whose lengths are places of this belt, with its front ``front`` mm from the beginning."""
         self._then = self.drive.place(now)
         self.load.put(piece._replace(origin=self.drive.place(now) - self.places(front), held=None))
-        self.report(f"{piece.name} is on {self.spec.name}", piece.name, "on")
+        self.report(IS_ON(piece=piece.name, belt=self.spec.name), piece.name, "on")
         self.board.kernel.mark(self.board.name)
 
     def take_over(self, piece: Workpiece, other: Conveyor, front: float, now: Nanos) -> None:
@@ -215,7 +224,7 @@ class Conveyor(BoardPart):
             for piece in self.load.pieces:
                 if piece.held is not None:
                     self.load.release(piece, belt + back)
-                    self.report(f"{piece.name} goes back on {self.spec.name}", piece.name, "goes back")
+                    self.report(GOES_BACK(piece=piece.name, belt=self.spec.name), piece.name, "goes back")
         ahead: int | None = None
         for piece in sorted(self.load.pieces, key=lambda one: one.front(belt), reverse=True):
             front = piece.front(belt)
@@ -225,14 +234,14 @@ class Conveyor(BoardPart):
                 if piece.held != at:
                     self.load.hold(piece, at)
                     self.report(
-                        f"{piece.name} stands at {float(at / self.per_mm):g} mm of {self.spec.name}", piece.name, "stands"
+                        STANDS_AT(piece=piece.name, place=float(at / self.per_mm), belt=self.spec.name), piece.name, "stands"
                     )
                 ahead = at - piece.length - 1
                 continue
             ahead = None
             if piece.held is not None:
                 self.load.release(piece, belt)
-                self.report(f"{piece.name} goes on on {self.spec.name}", piece.name, "goes on")
+                self.report(GOES_ON(piece=piece.name, belt=self.spec.name), piece.name, "goes on")
 
     def _limit(self, front: int, stride: int, ahead: int | None, now: Nanos) -> int | None:
         """The place up to which a workpiece can go, with its front at ``front``. ``ahead``: behind one that stands before it."""
@@ -259,12 +268,12 @@ class Conveyor(BoardPart):
             if front >= length and piece.held is None:
                 self.delivered += 1
                 self.take(piece)
-                self.report(f"{piece.name} leaves {self.spec.name}", piece.name, "leaves")
+                self.report(LEAVES(piece=piece.name, belt=self.spec.name), piece.name, "leaves")
                 if self.following is not None:
                     self.following.take_over(piece, self, 0.0, now)
             elif front < 0:
                 self.take(piece)
-                self.report(f"{piece.name} falls off the beginning of {self.spec.name}", piece.name, "falls")
+                self.report(FALLS_OFF(piece=piece.name, belt=self.spec.name), piece.name, "falls")
 
     def _next(self, now: Nanos) -> Nanos | None:
         """When the next workpiece is lost at the beginning, is delivered or cannot go on; or can again, at the end."""
@@ -302,16 +311,24 @@ def _check_stop(conveyor: Conveyor, fault: Fault) -> None:
         raise Misuse(f"fault {fault.kind.name}: {conveyor.spec.name!r} is moved by axis {conveyor.spec.axis!r}: let that stall")
 
 
+DRIVE_FAILS = Message("simulation.drive-fails", "the drive of {name} fails")
+DRIVE_IS_REPAIRED = Message("simulation.drive-is-repaired", "the drive of {name} is repaired")
+
+
 def _stop(active: ActiveFault, conveyor: Conveyor, begins: bool, now: Nanos) -> str:
     conveyor.is_stopped = begins
-    return f"the drive of {conveyor.spec.name} {'fails' if begins else 'is repaired'}"
+    return (DRIVE_FAILS if begins else DRIVE_IS_REPAIRED)(name=conveyor.spec.name)
+
+
+FEEDER_FAILS = Message("simulation.feeder-stands", "the feeder of {name} stands")
+FEEDER_WORKS_AGAIN = Message("simulation.feeder-works-again", "the feeder of {name} works again")
 
 
 def _stop_feeder(active: ActiveFault, conveyor: Conveyor, begins: bool, now: Nanos) -> str:
     conveyor.feeder_stands = begins
     kernel, name = conveyor.board.kernel, conveyor.spec.name
     kernel.report(kernel.owner(name), "edge", f"{name}.{FEEDER_STANDS}", float(begins))
-    return f"the feeder of {name} {'stands' if begins else 'works again'}"
+    return (FEEDER_FAILS if begins else FEEDER_WORKS_AGAIN)(name=name)
 
 
 def _make(spec: ConveyorSpec, site: Site) -> Conveyor:

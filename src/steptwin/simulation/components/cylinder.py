@@ -9,6 +9,7 @@ from math import floor
 from typing import ClassVar
 
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.messages import Message
 from steptwin.simulation.components.elementspec import Reference
 from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.simulation.components.site import Site
@@ -145,14 +146,22 @@ class Cylinder(BoardPart):
 # ---------------------------------------------------------------------- faults
 
 
+HAS_NO_AIR = Message("simulation.has-no-air", "{name} has no air")
+HAS_AIR_AGAIN = Message("simulation.has-air-again", "{name} has air again")
+
+
 def _take_air(active: ActiveFault, cylinder: Cylinder, begins: bool, now: Nanos) -> str:
     cylinder.has_air = not begins
-    return f"{cylinder.board.name} has {'no air' if begins else 'air again'}"
+    return (HAS_NO_AIR if begins else HAS_AIR_AGAIN)(name=cylinder.board.name)
+
+
+IS_JAMMED = Message("simulation.is-jammed", "{name} is jammed")
+IS_FREE_AGAIN = Message("simulation.cylinder-is-free-again", "{name} is free again")
 
 
 def _jam(active: ActiveFault, cylinder: Cylinder, begins: bool, now: Nanos) -> str:
     cylinder.is_jammed = begins
-    return f"{cylinder.board.name} is {'jammed' if begins else 'free again'}"
+    return (IS_JAMMED if begins else IS_FREE_AGAIN)(name=cylinder.board.name)
 
 
 # ---------------------------------------------------------------------- the element

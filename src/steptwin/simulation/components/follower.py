@@ -10,6 +10,7 @@ from typing import ClassVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.components.axis import AXIS, turns_of_axis
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
@@ -157,15 +158,22 @@ class Follower(Stateful):
         return Drawing(ROD, self.spec.highest, ("position",), sensors=tuple(one.zone for one in self.spec.switches))
 
 
+IS_STUCK = Message("simulation.follower-is-stuck", "{name} is stuck")
+FOLLOWS_AGAIN = Message("simulation.follows-its-cam-again", "{name} follows its cam again")
+
+
 def _stick(active: ActiveFault, follower: Follower, begins: bool, now: Nanos) -> str:
     follower.hold(begins, now)
-    return f"{follower.spec.name} {'is stuck' if begins else 'follows its cam again'}"
+    return (IS_STUCK if begins else FOLLOWS_AGAIN)(name=follower.spec.name)
+
+
+CAM_HAS_SHARE = Message("simulation.cam-has-share", "the cam of {name} has {share:g} of its lift")
 
 
 def _wear(active: ActiveFault, follower: Follower, begins: bool, now: Nanos) -> str:
     share = active.fault.number("share") if begins else 1.0
     follower.wear(share)
-    return f"the cam of {follower.spec.name} has {share:g} of its lift"
+    return CAM_HAS_SHARE(name=follower.spec.name, share=share)
 
 
 # ---------------------------------------------------------------------- the element

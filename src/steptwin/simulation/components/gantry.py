@@ -8,6 +8,7 @@ from typing import ClassVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.components.axis import BuiltAxis, find_axis
 from steptwin.simulation.components.coordinate import Coordinate, Pulled
 from steptwin.simulation.components.elementspec import ElementSpecs
@@ -65,6 +66,9 @@ class GantrySpec(BoardSpec):
             text.wrong((*self.path, "other"), "D007", f"other = {self.other!r} is its axis already: a gantry has two")
 
 
+ENDS_ARE_SKEWED = Message("simulation.ends-are-skewed", "the ends of {name} are skewed by {skew:g} {unit}")
+
+
 class Gantry(Touch):
     """Each motor moves half of the beam while both follow their fields; while one does not, the other one moves all of it.
 
@@ -95,7 +99,7 @@ class Gantry(Touch):
 
     def touching(self) -> str:
         skew = self.signals[SKEW].value(self.board.kernel.now)
-        return f"the ends of {self.board.name} are skewed by {skew:g} {self.unit}"
+        return ENDS_ARE_SKEWED(name=self.board.name, skew=skew, unit=self.unit)
 
     def update(self, now: Nanos) -> None:
         one, other = (end.mechanism for end in self.ends)
@@ -143,9 +147,12 @@ def _moving(ends: tuple[BuiltAxis, BuiltAxis]) -> Iterator[tuple[str, SignalOf]]
         yield name, SignalOf(sources, its.value, its.turns, its.version, unit)
 
 
+GUIDES_ARE_STIFF = Message("simulation.guides-are-stiff", "the guides of {name} have {factor:g} times their friction")
+
+
 def _stiffen(active: ActiveFault, gantry: Gantry, begins: bool, now: Nanos) -> str:
     gantry.is_stiff = active.fault.number("factor") if begins else 1.0
-    return f"the guides of {gantry.board.name} have {gantry.is_stiff:g} times their friction"
+    return GUIDES_ARE_STIFF(name=gantry.board.name, factor=gantry.is_stiff)
 
 
 def _make(spec: GantrySpec, site: Site) -> Gantry:

@@ -7,6 +7,7 @@ from math import floor
 from typing import ClassVar
 
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.messages import Message
 from steptwin.simulation.components.carrier import HELD, PICK, PLACE, Carrier, CarrierSpec, carrier_signals
 from steptwin.simulation.components.logic import STUCK, Joint, with_terminals
 from steptwin.simulation.components.site import Site
@@ -106,9 +107,13 @@ class Gripper(Carrier):
         return self._spec.stroke * (self.travel.place(now) / self.travel.full)
 
 
+LETS_WORKPIECES_SLIP = Message("simulation.lets-workpieces-slip", "{name} lets workpieces slip")
+HOLDS_AGAIN = Message("simulation.holds-again", "{name} holds again")
+
+
 def _slip(active: ActiveFault, gripper: Gripper, begins: bool, now: Nanos) -> str:
     gripper.slips = begins
-    return f"{gripper.board.name} {'lets workpieces slip' if begins else 'holds again'}"
+    return (LETS_WORKPIECES_SLIP if begins else HOLDS_AGAIN)(name=gripper.board.name)
 
 
 def _signals(gripper: Gripper) -> Mapping[str, SignalOf]:

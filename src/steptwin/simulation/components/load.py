@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.components.axis import BuiltAxis, find_axis
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.components.logic import BoardPart, BoardSpec, Joint, with_terminals
@@ -149,9 +150,12 @@ class FurtherLoad(BoardPart):
             self._condition.forget()
 
 
+LOAD_IS_CHANGED = Message("simulation.load-is-changed", "{name} is {factor:g} times what it should be")
+
+
 def _change(active: ActiveFault, load: FurtherLoad, begins: bool, now: Nanos) -> str:
     load.factor = active.fault.number("factor") if begins else 1.0
-    return f"{load.board.name} is {load.factor:g} times what it should be"
+    return LOAD_IS_CHANGED(name=load.board.name, factor=load.factor)
 
 
 def _make(spec: LoadSpec, site: Site) -> FurtherLoad:

@@ -10,6 +10,7 @@ from typing import NamedTuple, TypeVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.components.site import Site
@@ -111,11 +112,15 @@ def _check_input(part: BoardPart, fault: Fault) -> None:
     _check_terminal(part, fault, "input", part.board.inputs)
 
 
+IS_STUCK_AT = Message("simulation.is-stuck-at", "{name} is stuck at {level}")
+TERMINAL_IS_FREE = Message("simulation.terminal-is-free", "{name} is free again")
+
+
 def _stick(active: ActiveFault, part: BoardPart, begins: bool, now: Nanos) -> str:
     terminal, level = str(active.fault.get("output") or active.fault.get("input")), active.fault.whole("level") or 0
     part.board.hold(terminal.upper(), float(level) if begins else None)
     name = f"{part.board.name}.{terminal.lower()}"
-    return f"{name} is stuck at {level}" if begins else f"{name} is free again"
+    return IS_STUCK_AT(name=name, level=level) if begins else TERMINAL_IS_FREE(name=name)
 
 
 STUCK_OUTPUT = FaultKind(

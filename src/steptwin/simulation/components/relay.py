@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import ClassVar
 
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
@@ -80,14 +81,22 @@ class Relay(BoardPart):
         return self._due
 
 
+CONTACT_WELDS = Message("simulation.contact-welds", "the contact of {name} welds once it is closed")
+CONTACT_IS_FREE = Message("simulation.contact-is-free", "the contact of {name} is free again")
+
+
 def _weld(active: ActiveFault, relay: Relay, begins: bool, now: Nanos) -> str:
     relay.is_welded = begins
-    return f"the contact of {relay.board.name} {'welds once it is closed' if begins else 'is free again'}"
+    return (CONTACT_WELDS if begins else CONTACT_IS_FREE)(name=relay.board.name)
+
+
+COIL_IS_INTERRUPTED = Message("simulation.coil-is-interrupted", "the coil of {name} is interrupted")
+COIL_IS_CONNECTED = Message("simulation.coil-is-connected", "the coil of {name} is connected")
 
 
 def _interrupt(active: ActiveFault, relay: Relay, begins: bool, now: Nanos) -> str:
     relay.is_open = begins
-    return f"the coil of {relay.board.name} is {'interrupted' if begins else 'connected'}"
+    return (COIL_IS_INTERRUPTED if begins else COIL_IS_CONNECTED)(name=relay.board.name)
 
 
 RELAY = with_terminals(

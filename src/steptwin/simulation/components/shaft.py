@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, turns_of_axis
 from steptwin.simulation.components.contact import ContactSpec
 from steptwin.simulation.components.element import Element
@@ -175,10 +176,14 @@ def _signals(shaft: GearedShaft) -> Mapping[str, SignalOf]:
     return {"angle": SignalOf(source, shaft.angle, turning, shaft.version, "degree")}
 
 
+COUPLING_SLIPS = Message("simulation.coupling-slips", "the coupling of {name} slips")
+COUPLING_GRIPS = Message("simulation.coupling-grips", "the coupling of {name} grips, {behind:g} degrees behind")
+
+
 def _slip(active: ActiveFault, shaft: GearedShaft, begins: bool, now: Nanos) -> str:
     shaft.slip(begins, now)
     name = shaft.spec.name
-    return f"the coupling of {name} slips" if begins else f"the coupling of {name} grips, {shaft.behind:g} degrees behind"
+    return COUPLING_SLIPS(name=name) if begins else COUPLING_GRIPS(name=name, behind=shaft.behind)
 
 
 SHAFT: Element[ShaftSpec, GearedShaft] = Element(

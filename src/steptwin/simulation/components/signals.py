@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss, alike
 from steptwin.simulation.components.parts import WorldParts
@@ -68,6 +69,15 @@ class Idle:
         return None
 
 
+SIGNAL_IS_LATER = Message(
+    "simulation.signal-is-built-later",
+    "no signal {name!r} yet: [[{table}]] {owner!r} is built later; elements cannot depend on each other",
+)
+NOTHING_IS_CALLED = Message(
+    "simulation.nothing-is-called", "no signal {name!r}: nothing is called {owner!r}{hint}; there are {names}"
+)
+
+
 def find_signal(plan: WorldParts, name: str) -> SignalOf | Idle:
     """The signal called ``name``. Raises `Misuse` with the existing names."""
     if name == "time":
@@ -85,12 +95,10 @@ def find_signal(plan: WorldParts, name: str) -> SignalOf | Idle:
     if machine is None:
         later = plan.unbuilt(owner)
         if later is not None:
-            raise Unknown(
-                owner, f"no signal {name!r} yet: [[{later}]] {owner!r} is built later; elements cannot depend on each other"
-            )
+            raise Unknown(owner, SIGNAL_IS_LATER(name=name, table=later, owner=owner))
         known = [*plan.machines, *plan.element_names, "time", "idle"]
         near = NearMiss()
-        text = f"no signal {name!r}: nothing is called {owner!r}{near.hint(owner, known)}; there are {', '.join(known)}"
+        text = NOTHING_IS_CALLED(name=name, owner=owner, hint=near.hint(owner, known), names=known)
         raise Unknown(owner, text, near.of(owner, known))
     return _of_machine(plan.kind_of[owner], machine, plan.kernel_of[owner].source(owner), rest, name)
 
@@ -108,7 +116,7 @@ def _of_machine(kind: AnyKind, machine: MotionController, source: Source, rest: 
         return SignalOf((source,), read, unit=unit, check=partial(kind.refuse_taken, machine, pin))
     point = kind.point(machine, rest) if rest else None
     if point is None:
-        raise _unknown([point.path for point in kind.datasheet(machine).points], rest, name, ", and pins")
+        raise _unknown([point.path for point in kind.datasheet(machine).points], rest, name, AND_PINS())
     return SignalOf(
         (source,), point.read, point.turns, point.version, point.point.unit, is_kept=point.is_kept, freeze=point.freeze
     )
@@ -131,6 +139,11 @@ def _chosen(known: Mapping[str, T], rest: str, name: str) -> T:
     return found
 
 
+AND_PINS = Message("simulation.and-pins", ", and pins")
+AND_MORE = Message("simulation.and-more", " and more, {count} in all")
+NO_SIGNAL = Message("simulation.no-signal", "no signal {name!r}{hint}; there are {names}{more}{others}")
+
+
 def _unknown(known: Sequence[str], rest: str, name: str, others: str = "") -> Misuse:
     """The error for an unknown name, with the names of the same axis if it names one; otherwise similar ones of an element come
     first, and numbered ones last."""
@@ -139,12 +152,12 @@ def _unknown(known: Sequence[str], rest: str, name: str, others: str = "") -> Mi
     similar = [] if others else alike(rest[:MOST_COMPARED], known)
     in_order = dict.fromkeys([*similar, *sorted(known, key=_is_numbered)])
     shown = of_axis or list(in_order)[:MOST_NAMED]
-    more = "" if of_axis or len(shown) == len(known) else f" and more, {len(known)} in all"
+    more = "" if of_axis or len(shown) == len(known) else AND_MORE(count=len(known))
     near = NearMiss()
     meant = near.of(rest, known)
     return UnknownSignal(
         name,
-        f"no signal {name!r}{near.hint(rest, known)}; there are {', '.join(shown)}{more}{'' if of_axis else others}",
+        NO_SIGNAL(name=name, hint=near.hint(rest, known), names=shown, more=more, others="" if of_axis else others),
         None if meant is None else f"{name.removesuffix(rest)}{meant}",
     )
 

@@ -8,6 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.messages import Message
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.simulation.components.rigging import Rigging
@@ -114,6 +115,10 @@ class Ramp(NamedTuple):
         return found
 
 
+SUPPLY_IS_ON = Message("simulation.supply-is-on", "{supply} is on, with {fed}")
+SUPPLY_IS_OFF = Message("simulation.supply-is-off", "{supply} is off, with {fed}")
+
+
 class Supply(BoardPart):
     """GOOD is on, and so are the controllers, while its voltage is sufficient."""
 
@@ -182,9 +187,9 @@ class Supply(BoardPart):
         for machine in self._fed:
             machine.supply(self.is_good, now)
         kernel, name = self.board.kernel, self.board.name
-        names = ", ".join(self._spec.feeds)
-        text = f"{name} is {'on' if self.is_good else 'off'}, with {names}"
-        facts = ("element", name), ("on", self.is_good), ("fed", names)
+        fed = self._spec.feeds
+        text = (SUPPLY_IS_ON if self.is_good else SUPPLY_IS_OFF)(supply=name, fed=list(fed))
+        facts = ("element", name), ("on", self.is_good), ("fed", ", ".join(fed))
         kernel.report(kernel.owner(name), "event", "supply", text, *facts)
 
     def deadline(self) -> Nanos | None:
@@ -193,9 +198,13 @@ class Supply(BoardPart):
         return min((due for due in dues if due is not None), default=None)
 
 
+FULL_VOLTAGE = Message("simulation.full-voltage", "{name} has all of its voltage again")
+SAGS = Message("simulation.supply-sags", "{name} has {volts:g} V at most")
+
+
 def _sag(active: ActiveFault, supply: Supply, begins: bool, now: Nanos) -> str:
     supply.sag = active.fault.number("volts") if begins else None
-    return f"{supply.board.name} has {'all of its voltage again' if supply.sag is None else f'{supply.sag:g} V at most'}"
+    return FULL_VOLTAGE(name=supply.board.name) if supply.sag is None else SAGS(name=supply.board.name, volts=supply.sag)
 
 
 def _check_order(spec: SupplySpec, site: Site) -> None:

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis
 from steptwin.simulation.components.coordinate import PLACES, Coordinate, Pulled, pulled_to
 from steptwin.simulation.components.element import Element
@@ -192,10 +193,16 @@ def _signals(tool: Tool) -> Mapping[str, SignalOf]:
     return {name: SignalOf(source, its.value, its.turns, its.version, tool.unit) for name, its in tool.coordinates.items()}
 
 
+TOOL_BELT_SLIPS = Message("simulation.tool-belt-slips", "the belt of {belt} of {name} slips")
+TOOL_BELT_GRIPS = Message("simulation.tool-belt-grips", "the belt of {belt} of {name} grips, {behind:g} {unit} behind")
+
+
 def _slip(active: ActiveFault, tool: Tool, begins: bool, now: Nanos) -> str:
     belt, name = str(active.fault.get("belt")), tool.spec.name
     behind = tool.slip(belt, begins, now)
-    return f"the belt of {belt} of {name} {'slips' if begins else f'grips, {behind:g} {tool.unit} behind'}"
+    if begins:
+        return TOOL_BELT_SLIPS(belt=belt, name=name)
+    return TOOL_BELT_GRIPS(belt=belt, name=name, behind=behind, unit=tool.unit)
 
 
 TOOL: Element[ToolSpec, Tool] = Element(

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.components.logic import BoardPart
 from steptwin.simulation.logic.condition import SignalCondition
 from steptwin.simulation.mechanics.mechanics import Mechanism
@@ -14,6 +15,11 @@ from steptwin.state import Plain
 
 RESET, HIT = "RESET", "HIT"
 REPORT, JAM = "report", "jam"
+
+
+APART_AGAIN = Message("simulation.apart-again", "{zone}: apart again")
+TOUCH = Message("simulation.axes-touch", "{zone}: {axes} touch")
+PARTS_TOUCH = Message("simulation.parts-touch", "{zone}: parts touch")
 
 
 class Touch(BoardPart):
@@ -52,7 +58,7 @@ class Touch(BoardPart):
 
     def touching(self) -> str:
         """What happens when they touch, as text."""
-        return f"{self.board.name}: {' and '.join(self._axes) or 'parts'} touch"
+        return TOUCH(zone=self.board.name, axes=" and ".join(self._axes)) if self._axes else PARTS_TOUCH(zone=self.board.name)
 
     def update(self, now: Nanos) -> None:
         touches = self._condition.holds(now) or self._is_short
@@ -61,7 +67,7 @@ class Touch(BoardPart):
             if touches:
                 self._touch(now)
             else:
-                self._report(f"{self.board.name}: apart again", touches=False)
+                self._report(APART_AGAIN(zone=self.board.name), touches=False)
         is_reset = self.board.is_on(RESET)
         if is_reset and not self._was_reset and self._is_jammed:
             self._block(False, now)

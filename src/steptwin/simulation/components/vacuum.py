@@ -7,6 +7,7 @@ from math import ceil
 from typing import ClassVar
 
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.messages import Message
 from steptwin.motion.exponential import decay, logarithm
 from steptwin.simulation.components.carrier import HELD, PICK, PLACE, Carrier, CarrierSpec, carrier_signals
 from steptwin.simulation.components.logic import STUCK, Joint, with_terminals
@@ -121,9 +122,13 @@ class Vacuum(Carrier):
 # ---------------------------------------------------------------------- the element
 
 
+LEAKS = Message("simulation.leaks", "{name} leaks")
+IS_TIGHT_AGAIN = Message("simulation.is-tight-again", "{name} is tight again")
+
+
 def _leak(active: ActiveFault, vacuum: Vacuum, begins: bool, now: Nanos) -> str:
     vacuum.leaks = begins
-    return f"{vacuum.board.name} {'leaks' if begins else 'is tight again'}"
+    return (LEAKS if begins else IS_TIGHT_AGAIN)(name=vacuum.board.name)
 
 
 def _signals(vacuum: Vacuum) -> Mapping[str, SignalOf]:

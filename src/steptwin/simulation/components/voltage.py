@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.faults.table import number
@@ -20,14 +21,22 @@ class VoltageOutput(Protocol):
     def name(self) -> str: ...
 
 
+WIRE_IS_BROKEN = Message("simulation.wire-is-broken", "the wire of {name} is broken")
+WIRE_IS_WHOLE = Message("simulation.wire-is-whole", "the wire of {name} is whole again")
+
+
 def _break(active: ActiveFault, output: VoltageOutput, begins: bool, now: Nanos) -> str:
     output.is_broken = begins
-    return f"the wire of {output.name} is {'broken' if begins else 'whole again'}"
+    return (WIRE_IS_BROKEN if begins else WIRE_IS_WHOLE)(name=output.name)
+
+
+READS_WRONG = Message("simulation.reads-wrong", "{name} reads {offset:+g} V")
+READS_RIGHT = Message("simulation.reads-right", "{name} reads right again")
 
 
 def _drift(active: ActiveFault, output: VoltageOutput, begins: bool, now: Nanos) -> str:
     output.offset = active.fault.number("volts") if begins else 0.0
-    return f"{output.name} reads {output.offset:+g} V" if begins else f"{output.name} reads right again"
+    return READS_WRONG(name=output.name, offset=output.offset) if begins else READS_RIGHT(name=output.name)
 
 
 BROKEN_WIRE = FaultKind(

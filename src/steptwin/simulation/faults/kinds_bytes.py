@@ -3,40 +3,56 @@
 from __future__ import annotations
 
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.faults.active import ActiveFault, FaultReporter
 from steptwin.simulation.faults.effects import ByteEffect, InsertEffect, PiecesEffect, Run
 from steptwin.simulation.faults.table import ALL_LINES, LONGEST_MS, SERIAL, FaultKind, Layer, Occasion, number, whole
+
+BECOMES = Message("simulation.byte-becomes", "{byte:02X} becomes {turned:02X}")
 
 
 def _flip(active: ActiveFault, byte: int, run: Run, report: FaultReporter) -> int:
     bit = active.fault.whole("bit")
     turned = byte ^ 1 << (active.chance.below(8) if bit is None else bit)
-    report(active, f"{byte:02X} becomes {turned:02X}")
+    report(active, BECOMES(byte=byte, turned=turned))
     return turned
+
+
+IS_LOST = Message("simulation.byte-is-lost", "{byte:02X} is lost")
+SEVERAL_ARE_LOST = Message("simulation.bytes-are-lost", "{byte:02X} is lost and {more} more")
 
 
 def _drop(active: ActiveFault, byte: int, run: Run, report: FaultReporter) -> None:
     active.left = int(active.fault.number("length")) - 1
-    report(active, f"{byte:02X} is lost" + (f" and {active.left} more" if active.left else ""))
+    report(active, SEVERAL_ARE_LOST(byte=byte, more=active.left) if active.left else IS_LOST(byte=byte))
+
+
+COMES_BEFORE = Message("simulation.byte-comes-before", "{byte:02X} comes before it")
 
 
 def _insert(active: ActiveFault, byte: int, run: Run, report: FaultReporter) -> int:
     value = active.fault.whole("value")
     extra = active.chance.below(256) if value is None else value
-    report(active, f"{extra:02X} comes before it")
+    report(active, COMES_BEFORE(byte=extra))
     run.put((extra,))
     return byte
 
 
+SILENCE = Message("simulation.silence-before", "{time:g} ms of silence before it")
+
+
 def _gap(active: ActiveFault, byte: int, run: Run, report: FaultReporter) -> int:
-    report(active, f"{active.fault.number('for_ms'):g} ms of silence before it")
+    report(active, SILENCE(time=active.fault.number("for_ms")))
     run.pause(active.ns("for_ms"))
     return byte
 
 
+IN_PIECES = Message("simulation.bytes-in-pieces", "{count} bytes in pieces of {length}")
+
+
 def _split(active: ActiveFault, run: Run, count: int, report: FaultReporter) -> list[tuple[Nanos, bytes]]:
     length = int(active.fault.number("length"))
-    report(active, f"{count} bytes in pieces of {length}")
+    report(active, IN_PIECES(count=count, length=length))
     pause = active.ns("for_ms")
     pieces: list[tuple[Nanos, bytes]] = []
     for delay, piece in run.pieces:
@@ -45,9 +61,12 @@ def _split(active: ActiveFault, run: Run, count: int, report: FaultReporter) -> 
     return pieces
 
 
+NOISE = Message("simulation.bytes-of-noise", "{count} bytes of noise: {bytes}")
+
+
 def _noise(active: ActiveFault, run: Run, report: FaultReporter) -> None:
     noise = active.chance.some_bytes(int(active.fault.number("length")))
-    report(active, f"{len(noise)} bytes of noise: {noise.hex(' ')}")
+    report(active, NOISE(count=len(noise), bytes=noise.hex(" ")))
     run.put(noise)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from steptwin.messages import Message
 from steptwin.simulation.faults.active import ActiveFault, FaultReporter
 from steptwin.simulation.faults.answers import NEVER_SENT, AlteredAnswer, Exchange
 from steptwin.simulation.faults.effects import AnswerEffect, RequestEffect
@@ -25,8 +26,11 @@ _UNITS = 248
 """Unit 247 is followed by 0."""
 
 
+LATER = Message("simulation.answer-is-later", "{time:g} ms later: {bytes}")
+
+
 def _delay(active: ActiveFault, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
-    report(active, f"{active.fault.number('for_ms'):g} ms later: {sent.answer.hex(' ')}")
+    report(active, LATER(time=active.fault.number("for_ms"), bytes=sent.answer.hex(" ")))
     return sent._replace(delay=sent.delay + active.ns("for_ms"))
 
 
@@ -34,24 +38,36 @@ def _is_request_lost(fault: Fault) -> bool:
     return fault.get("lost") == "request"
 
 
+REQUEST_IS_LOST = Message("simulation.request-is-lost", "request lost on its way")
+
+
 def _lose_request(active: ActiveFault) -> tuple[int, str]:
-    return NEVER_SENT, "request lost on its way"
+    return NEVER_SENT, REQUEST_IS_LOST()
+
+
+ANSWER_IS_LOST = Message("simulation.answer-is-lost", "lost on its way: {bytes}")
 
 
 def _lose_answer(active: ActiveFault, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
-    report(active, f"lost on its way: {sent.answer.hex(' ')}")
+    report(active, ANSWER_IS_LOST(bytes=sent.answer.hex(" ")))
     return sent._replace(answer=b"")
 
 
+HELD_BACK = Message("simulation.answer-is-held-back", "held back: {bytes}")
+
+
 def _hold_back(active: ActiveFault, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
-    report(active, f"held back: {sent.answer.hex(' ')}")
+    report(active, HELD_BACK(bytes=sent.answer.hex(" ")))
     return sent._replace(answer=b"", later=sent.answer)
+
+
+ANSWERED_AS = Message("simulation.answered-as-unit", "answered as unit {unit}: {bytes}")
 
 
 def _answer_as(active: ActiveFault, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
     other = active.fault.whole("answers_as")
     other = (unit + 1) % _UNITS if other is None else other
-    report(active, f"answered as unit {other}: {sent.answer.hex(' ')}")
+    report(active, ANSWERED_AS(unit=other, bytes=sent.answer.hex(" ")))
     return sent._replace(answer=_as_unit(exchange.line, sent.answer, other))
 
 
@@ -61,22 +77,31 @@ def _as_unit(line: LineProtocol, raw: bytes, unit: int) -> bytes:
     return raw[:6] + bytes((unit,)) + raw[7:]
 
 
+WRONG_CRC = Message("simulation.wrong-crc", "wrong CRC: {bytes}")
+
+
 def _spoil_crc(active: ActiveFault, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
     raw = sent.answer
     wrong = int.from_bytes(raw[-2:], "little") ^ 1 + active.chance.below(0xFFFF)
     raw = raw[:-2] + wrong.to_bytes(2, "little")
-    report(active, f"wrong CRC: {raw.hex(' ')}")
+    report(active, WRONG_CRC(bytes=raw.hex(" ")))
     return sent._replace(answer=raw)
 
 
+ECHO = Message("simulation.echo", "echo: {bytes}")
+
+
 def _echo(active: ActiveFault, exchange: Exchange, unit: int, sent: AlteredAnswer, report: FaultReporter) -> AlteredAnswer:
-    report(active, f"echo: {exchange.request.hex(' ')}")
+    report(active, ECHO(bytes=exchange.request.hex(" ")))
     return sent._replace(before=exchange.request)
+
+
+REFUSED = Message("simulation.refused-with-exception", "refused with exception {code:02X}")
 
 
 def _refuse(active: ActiveFault) -> tuple[int, str]:
     code = active.fault.whole("code") or DEVICE_BUSY
-    return code, f"refused with exception {code:02X}"
+    return code, REFUSED(code=code)
 
 
 FRAMES = (

@@ -75,6 +75,11 @@ PIN_WITH_ITS_MACHINE = Message(
     "simulation.pin-with-its-machine", "fault {name}: pin = {pin!r}: name the machine as machine=NAME, and the pin alone"
 )
 UNKNOWN_PIN_OF_A_FAULT = Message("simulation.unknown-pin-of-a-fault", "fault {name}: pin = {pin!r}: {machine!r} has {names}")
+PIN_IS_STUCK = Message("simulation.pin-is-stuck", "{pin} is stuck at {level:g}")
+PIN_IS_FREE = Message("simulation.pin-is-free", "{pin} is free")
+SLAVE_IS_MUTE = Message("simulation.slave-is-mute", "a slave of its Modbus master does not answer")
+SLAVE_ANSWERS_AGAIN = Message("simulation.slave-answers-again", "the slave of its Modbus master answers again")
+REFUSED_REQUEST = Message("simulation.refused-request", "{what}: {bytes}")
 
 
 class FaultyMachine(Stateful):
@@ -345,13 +350,13 @@ class FaultyMachine(Stateful):
             self._stuck[pin] = active.name
             self._put(pin, level, now)
             active.struck += 1
-            self.report(active, now, f"{pin} is stuck at {level:g}")
+            self.report(active, now, PIN_IS_STUCK(pin=pin, level=level))
             active.due = active.end
         else:
             active.due = None
             del self._stuck[pin]
             self._put(pin, self._outer[pin], now)
-            self.report(active, now, f"{pin} is free")
+            self.report(active, now, PIN_IS_FREE(pin=pin))
 
     def fail_master(self, active: ActiveFault, now: Nanos) -> None:
         """The first moment sets the error, the second clears it."""
@@ -359,11 +364,11 @@ class FaultyMachine(Stateful):
             self._mute.append(active.name)
             active.struck = 1
             active.due = active.end
-            self.report(active, now, "a slave of its Modbus master does not answer")
+            self.report(active, now, SLAVE_IS_MUTE())
         else:
             self._mute.remove(active.name)
             active.due = None
-            self.report(active, now, "the slave of its Modbus master answers again")
+            self.report(active, now, SLAVE_ANSWERS_AGAIN())
         self.body.show_master_error(bool(self._mute), now)
 
     # ------------------------------------------------------------------ what the body asks
@@ -376,7 +381,7 @@ class FaultyMachine(Stateful):
         for active in self._faults.refusing():
             if active.matches(unit, pdu) and active.is_on(self._faults.link, line) and active.strikes(now):
                 code, text = active.fault.kind.effect.refusal(active)
-                self.report(active, now, f"{text}: {pdu.hex(' ')}")
+                self.report(active, now, REFUSED_REQUEST(what=text_of(text), bytes=pdu.hex(" ")))
                 return exception_pdu(function, code)
         return None
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import ClassVar
 
 from steptwin.machine import Nanos, Port, SendingPort
+from steptwin.messages import Message, text_of
 from steptwin.simulation.faults.active import ActiveFault, Faults
 from steptwin.simulation.faults.answers import Exchange, must_not_be_sent, pdu_of, spoil_answer
 from steptwin.simulation.faults.stream import spoil
@@ -16,6 +17,11 @@ from steptwin.wire.slave import FrameDirection, FrameObserver, SlavePort
 
 _ASKED = 64
 """More requests than this never wait for their answers (`steptwin.wire.gateway.QUEUE_REQUESTS`)."""
+
+
+WHERE = Message("simulation.where-a-fault-strikes", "{place}, {what}")
+TOWARDS_THE_TWIN = Message("simulation.towards-the-twin", "towards the twin")
+FROM_THE_TWIN = Message("simulation.from-the-twin", "from the twin")
 
 
 class FaultyPort(Stateful):
@@ -119,7 +125,7 @@ class FaultyPort(Stateful):
 
     def _exchange(self, data: bytes, now: Nanos) -> bytes:
         self._deliver(now)
-        for delay, piece in spoil(data, self._bytewise("in"), now, self._reporter("towards the twin")):
+        for delay, piece in spoil(data, self._bytewise("in"), now, self._reporter(TOWARDS_THE_TWIN())):
             # A line keeps the order of its bytes.
             at = max(now + delay, self._arriving[-1][0] if self._arriving else now)
             self._arriving.append((at, piece))
@@ -166,7 +172,7 @@ class FaultyPort(Stateful):
             fresh, self._fresh = self._fresh, []
         outgoing = self._bytewise("out")
         for moment, delay, data in fresh:
-            for more, piece in spoil(data, outgoing, now, self._reporter("from the twin")):
+            for more, piece in spoil(data, outgoing, now, self._reporter(FROM_THE_TWIN())):
                 at = moment + delay + more
                 self._leaving.append((max(at, self._leaving[-1][0]) if self._leaving else at, piece))
 
@@ -231,7 +237,11 @@ class FaultyPort(Stateful):
     def _reporter(self, which: str) -> Callable[[ActiveFault, str], None]:
         words = [*([self.link] if self.line_name else []), *([which] if which else [])]
         place = self.line_name or self.link
-        return lambda active, text: self._faults.report(active, place, self._now, ", ".join([*words, text]))
+
+        def report(active: ActiveFault, text: str) -> None:
+            self._faults.report(active, place, self._now, WHERE(place=words, what=text_of(text)) if words else text)
+
+        return report
 
 
 class FaultySendingPort(FaultyPort):

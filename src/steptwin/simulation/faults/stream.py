@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from steptwin.machine import Nanos
+from steptwin.messages import Message, text_of
 from steptwin.simulation.faults.active import ActiveFault, FaultReporter
 from steptwin.simulation.faults.effects import ByteEffect, InsertEffect, PiecesEffect, Run
+
+BYTE_OF = Message("simulation.byte-of", "byte {place} of {count}: {what}")
 
 
 def spoil(data: bytes, actives: Sequence[ActiveFault], now: Nanos, report: FaultReporter) -> list[tuple[Nanos, bytes]]:
@@ -22,7 +25,11 @@ def spoil(data: bytes, actives: Sequence[ActiveFault], now: Nanos, report: Fault
     if bytewise:
         for place, byte in enumerate(data):
             _pass(
-                run, byte, bytewise, now, lambda active, what, at=place: report(active, f"byte {at + 1} of {len(data)}: {what}")
+                run,
+                byte,
+                bytewise,
+                now,
+                lambda active, what, at=place: report(active, BYTE_OF(place=at + 1, count=len(data), what=text_of(what))),
             )
     else:
         run.put(data)

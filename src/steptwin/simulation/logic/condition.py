@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message, text_of
 from steptwin.points import FARTHEST_NS
 from steptwin.simulation.logic.expression import REMEMBERED, Comparison, Truth, comparisons, parse_condition, truth_of
 from steptwin.simulation.logic.quantities import Quantity, SignalName, Sum, next_change
@@ -65,6 +66,9 @@ def _in_units(text: str, units: tuple[tuple[str, str], ...]) -> Truth:
     return parse_condition(text).in_unit("", dict(units).__getitem__)
 
 
+WRONG_CONDITION = Message("simulation.wrong-condition", "condition {text!r}: {problem}")
+
+
 class SignalCondition:
     """A condition with its signals."""
 
@@ -84,7 +88,7 @@ class SignalCondition:
             if is_new:
                 node = _in_units(text, tuple((name, signal.unit) for name, signal in self._signals.items()))
         except Misuse as error:
-            raise Misuse(f"condition {text!r}: {error}") from None
+            raise Misuse(WRONG_CONDITION(text=text, problem=text_of(error))) from None
         self._test = truth_of(node, {name: signal.value for name, signal in self._signals.items()})
         found = (_Comparison.of(one, self._signals) for one in comparisons(node))
         self._comparisons = [one for one in found if one.moving]

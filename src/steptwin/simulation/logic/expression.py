@@ -23,6 +23,7 @@ from typing import TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.logic.quantities import (
     LARGEST,
     UNIT_NAMES,
@@ -134,12 +135,12 @@ Truth: TypeAlias = Comparison | Not | Junction
 @lru_cache(maxsize=REMEMBERED)
 def parse_condition(text: str) -> Truth:
     """Parse what is true or false. Raises `Misuse` with the column, the found and the expected token."""
-    return ConditionParser(text, "condition").condition()
+    return ConditionParser(text, CONDITION).condition()
 
 
 def parse_expression(text: str) -> Quantity:
     """Parse what has a value; a number counts as true if it is not 0. Raises `Misuse` as `parse_condition`."""
-    return ConditionParser(text, "expression").whole()
+    return ConditionParser(text, EXPRESSION).whole()
 
 
 def comparisons(node: Truth) -> Iterator[Comparison]:
@@ -185,16 +186,34 @@ def value_of(node: Quantity, reads: Mapping[str, ReadAt], check: Callable[[float
     return lambda now: node.value(lambda name: reads[name](now))
 
 
-class ConditionParser:
-    """``kind``: ``expression``; or ``condition`` and what is made of conditions, in which numbers must be compared."""
+CONDITION = Message("simulation.condition", "condition {text!r}")
+EXPRESSION = Message("simulation.expression", "expression {text!r}")
+BEGINS = Message("simulation.begins", "{text}...")
+TEXT_IS_TOO_LONG = Message("simulation.text-is-too-long", "{start} has {count} characters: permitted are {most}")
+TOO_MANY_OPERATIONS = Message("simulation.too-many-operations", "{start}: there are more than {most} of + - * / %")
+NESTED_TOO_DEEP = Message("simulation.nested-too-deep", "{start}: 'not' and parentheses are nested more than {most} deep")
+ENDS_TOO_EARLY = Message("simulation.ends-too-early", "{shown} ends too early: expected {expected}")
+FOUND_SOMETHING_ELSE = Message(
+    "simulation.found-something-else", "{shown}, column {column}: found {found!r}, expected {expected}"
+)
+SIGNAL_OR_NUMBER = Message("simulation.signal-or-number", "a signal or a number")
+NAME_OR_NUMBER = Message("simulation.name-or-number", "a name or a number")
+END_AND_OR = Message("simulation.end-and-or", "the end, 'and' or 'or'")
+END_OR_OPERATOR = Message("simulation.end-or-operator", "the end or an operator")
+ONE_OF = Message("simulation.one-of-signs", "one of {signs}")
+NUMBER_UP_TO = Message("simulation.number-up-to", "a number up to {most:g}")
 
-    def __init__(self, text: str, kind: str) -> None:
-        self._shown = f"{kind} {text!r}"
-        self._start = f"{kind} {text[:40]!r}..."
-        self._must_compare = kind != "expression"
-        self._operand = "a signal or a number" if self._must_compare else "a name or a number"
+
+class ConditionParser:
+    """``kind``: `EXPRESSION`; or `CONDITION`, in which numbers must be compared."""
+
+    def __init__(self, text: str, kind: Message) -> None:
+        self._shown = kind(text=text)
+        self._start = BEGINS(text=kind(text=text[:40]))
+        self._must_compare = kind is not EXPRESSION
+        self._operand = SIGNAL_OR_NUMBER() if self._must_compare else NAME_OR_NUMBER()
         if len(text) > LONGEST:
-            raise Misuse(f"{self._start} has {len(text)} characters: permitted are {LONGEST}")
+            raise Misuse(TEXT_IS_TOO_LONG(start=self._start, count=len(text), most=LONGEST))
         self._tokens = list(self._tokens_of(text.rstrip()))
         self._words = [*(_OTHER_SIGNS.get(found, found.lower()) for _, found, _ in self._tokens), ""]
         """The tokens as words and signs are compared; empty after the last."""
@@ -209,7 +228,7 @@ class ConditionParser:
             kind = match.lastgroup or ""
             operations += match[kind] in _OPERATIONS
             if operations > MOST_OPERATIONS:
-                raise Misuse(f"{self._start}: there are more than {MOST_OPERATIONS} of + - * / %")
+                raise Misuse(TOO_MANY_OPERATIONS(start=self._start, most=MOST_OPERATIONS))
             yield kind, match[kind], match.start(kind)
 
     def condition(self) -> Truth:
@@ -224,7 +243,7 @@ class ConditionParser:
 
     def _end(self) -> None:
         if self._at < len(self._tokens):
-            raise self._wrong("the end, 'and' or 'or'" if self._must_compare else "the end or an operator")
+            raise self._wrong(END_AND_OR() if self._must_compare else END_OR_OPERATOR())
 
     def _peek(self) -> str:
         if self._at == len(self._tokens):
@@ -242,21 +261,21 @@ class ConditionParser:
 
     def _wrong(self, expected: str) -> Misuse:
         if self._at == len(self._tokens):
-            return Misuse(f"{self._shown} ends too early: expected {expected}")
+            return Misuse(ENDS_TOO_EARLY(shown=self._shown, expected=expected))
         _, found, column = self._tokens[self._at]
-        return Misuse(f"{self._shown}, column {column + 1}: found {found!r}, expected {expected}")
+        return Misuse(FOUND_SOMETHING_ELSE(shown=self._shown, column=column + 1, found=found, expected=expected))
 
     def _enter(self) -> None:
         self._depth += 1
         if self._depth > MOST_NESTED:
-            raise Misuse(f"{self._start}: 'not' and parentheses are nested more than {MOST_NESTED} deep")
+            raise Misuse(NESTED_TOO_DEEP(start=self._start, most=MOST_NESTED))
 
     def _truth(self, node: Quantity) -> Truth:
         """The operand that ends here, as a condition."""
         if isinstance(node, Comparison | Not | Junction):
             return node
         if self._must_compare and not isinstance(node, SignalName):
-            raise self._wrong(f"one of {' '.join(COMPARE)}")
+            raise self._wrong(ONE_OF(signs=" ".join(COMPARE)))
         return Comparison(node, "!=", NumberLiteral(0.0))
 
     def _or(self) -> Quantity:
@@ -311,7 +330,7 @@ class ConditionParser:
         kind, text, _ = self._tokens[self._at] if self._at < len(self._tokens) else ("", "", 0)
         if kind == "number":
             if float(text) > LARGEST:
-                raise self._wrong(f"a number up to {LARGEST:g}")
+                raise self._wrong(NUMBER_UP_TO(most=LARGEST))
             self._at += 1
             return NumberLiteral(float(text), self._unit())
         if kind != "name" or text.lower() in _WORDS:

@@ -12,6 +12,7 @@ from typing import Protocol, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.points import FARTHEST_NS
 from steptwin.simulation.mechanics.scale import LENGTHS, TURNS
 
@@ -52,6 +53,10 @@ class Quantity(Protocol):
         ...
 
 
+OTHER_UNIT = Message("simulation.compared-with-another-unit", "{number:g} {unit} is compared with {other!r}")
+NO_UNIT = Message("simulation.compared-without-unit", "{number:g} {unit} is compared with what has no unit")
+
+
 @dataclass(frozen=True, slots=True)
 class NumberLiteral:
     number: float
@@ -72,8 +77,9 @@ class NumberLiteral:
         for kin in UNITS:
             if unit in kin and self.unit in kin:
                 return NumberLiteral(float(Fraction(str(self.number)) * kin[self.unit] / kin[unit]))
-        there = f"compared with {unit!r}" if unit else "compared with what has no unit"
-        raise Misuse(f"{self.number:g} {self.unit} is {there}")
+        if unit:
+            raise Misuse(OTHER_UNIT(number=self.number, unit=self.unit, other=unit))
+        raise Misuse(NO_UNIT(number=self.number, unit=self.unit))
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,11 @@ from dataclasses import dataclass
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.scheduler.kernel import Source
+
+IT_CAN_ONLY_BE_WRITTEN = Message("simulation.it-can-only-be-written", "it can only be written")
+CAN_ONLY_BE_WRITTEN = Message("simulation.can-only-be-written", "{name} can only be written")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,13 +51,13 @@ class SignalOf:
     def value(self, now: Nanos) -> float:
         """The value, after `bring`. Raises `Misuse` for a write-only signal."""
         if self.read is None:
-            raise Misuse("it can only be written")
+            raise Misuse(IT_CAN_ONLY_BE_WRITTEN())
         return self.read(now)
 
     def watch(self, name: str) -> None:
         """Prepare for use in a condition. Raises `Misuse` if that is impossible."""
         if self.read is None:
-            raise Misuse(f"{name} can only be written")
+            raise Misuse(CAN_ONLY_BE_WRITTEN(name=name))
         self.check()
         if self.is_kept:
             for source in self.sources:

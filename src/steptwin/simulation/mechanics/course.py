@@ -23,13 +23,14 @@ from operator import attrgetter
 from typing import NamedTuple
 
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message, MessageText
 from steptwin.motion import Profile, Segment
 from steptwin.motion.divisions import Plan, profile_of
 from steptwin.points import turns_of
 from steptwin.simulation.mechanics.motor import StepperMotor
 from steptwin.simulation.mechanics.resonance import Spell, spells
 
-UNFOLLOWED = "it no longer follows its field"
+UNFOLLOWED = Message("simulation.no-longer-follows", "it no longer follows its field")
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +97,10 @@ class LoadPiece(NamedTuple):
     begin: Nanos
     follows: bool
     pulses: int
+
+
+STALLS_BY_RESONANCE = Message("simulation.stalls-by-resonance", "{axis} stalls by resonance")
+STALLS = Message("simulation.stalls", "{axis} stalls: {why}")
 
 
 class Course:
@@ -241,16 +246,16 @@ class Course:
         before = max(bisect_right(self._spells, now_s, key=attrgetter("begin_s")) - 1, 0)
         return self._spells[before].at(max(now_s, self._spells[before].begin_s), motor.resonance.least)
 
-    def why_stalled(self, now: Nanos) -> str:
-        """Why the rotor loses the field in this moment, for a sentence."""
+    def stall_of(self, axis: str, now: Nanos) -> MessageText:
+        """The message that the rotor of ``axis`` loses the field in this moment, with its reason."""
         motor, profile = self.build.motor, profile_of(self.plan)
         if now in self._shaken:
-            return " by resonance"
+            return STALLS_BY_RESONANCE(axis=axis)
         part = bisect_right(profile.ends, now - profile.start)
         if motor is None or part >= len(profile.segments):
-            return f": {UNFOLLOWED}"
+            return STALLS(axis=axis, why=UNFOLLOWED())
         lack = motor.lack(profile.segments[part], (now - profile.start) / SECOND, self.build.sign)
-        return f": {lack or UNFOLLOWED}"
+        return STALLS(axis=axis, why=lack or UNFOLLOWED())
 
     def load_pieces(self) -> tuple[LoadPiece, ...]:
         """Where the load is, with as few entries as possible; for a drive at rest the distance of the load from it."""

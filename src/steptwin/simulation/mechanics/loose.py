@@ -6,6 +6,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.motion import Profile, at_rest
 from steptwin.motion.divisions import profile_of
 from steptwin.motioncontroller import Drive
@@ -14,6 +15,10 @@ from steptwin.simulation.mechanics.free import FreeMotion, slow_from
 from steptwin.simulation.mechanics.motor import Burden, StepperMotor
 from steptwin.simulation.mechanics.wells import Wells
 from steptwin.state import Stateful
+
+RUNS_ON = Message("simulation.runs-on", "{axis} runs on after a stop without ramp")
+MOVES_WITH_LITTLE_CURRENT = Message("simulation.moves-with-little-current", "{axis} moves with too little current")
+MOVES_WITHOUT_CURRENT = Message("simulation.moves-without-current", "{axis} moves without current")
 
 
 class Looseness(Stateful):
@@ -40,11 +45,11 @@ class Looseness(Stateful):
         return drive.is_energised is not self.has_current or (self.due is not None and self.due <= now)
 
     @property
-    def why(self) -> str:
+    def why(self) -> Message:
         """What a rotor does that is free, for events."""
         if self._overruns:
-            return "runs on after a stop without ramp"
-        return "moves with too little current" if self.has_current else "moves without current"
+            return RUNS_ON
+        return MOVES_WITH_LITTLE_CURRENT if self.has_current else MOVES_WITHOUT_CURRENT
 
     def motion(
         self,

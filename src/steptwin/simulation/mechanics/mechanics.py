@@ -13,6 +13,7 @@ from typing import ClassVar, NamedTuple, Protocol
 
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.messages import Message
 from steptwin.motion import Profile
 from steptwin.motion.divisions import profile_of
 from steptwin.motioncontroller import Drive
@@ -69,6 +70,18 @@ class EncoderBuild:
     on_load: bool = False
     counts: int | None = None
     pulses: int = 1
+
+
+IS_CAUGHT = Message("simulation.is-caught", "{axis} is caught, {pulses} pulses behind")
+PUSHES_UPPER = Message("simulation.pushes-upper-stop", "{axis} pushes against its upper hard stop")
+PUSHES_LOWER = Message("simulation.pushes-lower-stop", "{axis} pushes against its lower hard stop")
+LEAVES_UPPER = Message(
+    "simulation.leaves-upper-stop", "{axis} no longer pushes against its upper hard stop, {pulses} pulses behind"
+)
+LEAVES_LOWER = Message(
+    "simulation.leaves-lower-stop", "{axis} no longer pushes against its lower hard stop, {pulses} pulses behind"
+)
+STANDS = Message("simulation.stands-behind", "{axis} stands, {pulses} pulses behind")
 
 
 class Mechanism(Stateful):
@@ -229,8 +242,7 @@ class Mechanism(Stateful):
         stalled = self._course.at(now).stalled
         if stalled is not self._stalled:
             self._stalled = stalled
-            caught = f"{self._name} is caught, {self.lost(now)} pulses behind"
-            text = f"{self._name} stalls{self._course.why_stalled(now)}" if stalled else caught
+            text = self._course.stall_of(self._name, now) if stalled else IS_CAUGHT(axis=self._name, pulses=self.lost(now))
             facts = (
                 ("axis", self.number),
                 ("element", self._name),
@@ -246,8 +258,10 @@ class Mechanism(Stateful):
         if stop != self._stop:
             pushes, side = stop != 0, "upper" if (stop or self._stop) > 0 else "lower"
             lost = self.lost(now)
-            ended = f"{self._name} no longer pushes against its {side} hard stop, {lost} pulses behind"
-            text = f"{self._name} pushes against its {side} hard stop" if pushes else ended
+            if pushes:
+                text = (PUSHES_UPPER if side == "upper" else PUSHES_LOWER)(axis=self._name)
+            else:
+                text = (LEAVES_UPPER if side == "upper" else LEAVES_LOWER)(axis=self._name, pulses=lost)
             facts = ("axis", self.number), ("element", self._name), ("stop", side), ("pushes", pushes), ("lost", lost)
             self._kernel.report(self.machine, "event", "hard-stop", text, *facts)
             self._stop = stop
@@ -307,7 +321,7 @@ class Mechanism(Stateful):
         if falls is not self._falls and self._loose is not None:
             self._falls = falls
             lost = self.lost(now)
-            text = f"{self._name} {self._loose.why}" if falls else f"{self._name} stands, {lost} pulses behind"
+            text = self._loose.why(axis=self._name) if falls else STANDS(axis=self._name, pulses=lost)
             facts = ("axis", self.number), ("element", self._name), ("falls", falls), ("lost", lost)
             self._kernel.report(self.machine, "event", "fall", text, *facts)
         self._rest_due = free.end if free is not None and falls else None

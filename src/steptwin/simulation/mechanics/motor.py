@@ -20,6 +20,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.motion import Segment
 from steptwin.simulation.mechanics.resonance import MotionPart, Resonance
 
@@ -51,6 +52,12 @@ class Burden(NamedTuple):
 
 
 NO_BURDEN = Burden(0.0, 0.0)
+
+
+NEEDS_MORE_TORQUE = Message(
+    "simulation.needs-more-torque", "the motion needs more than the {has:.3g} N·m that the motor has at this speed"
+)
+NEEDS_TORQUE = Message("simulation.needs-torque", "the motion needs {need:.3g} N·m, the motor has {has:.3g} N·m")
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,8 +162,8 @@ class StepperMotor:
         if need < has * (1.0 - _SAME):
             return ""
         if need <= has * (1.0 + _SAME):
-            return f"the motion needs more than the {has:.3g} N·m that the motor has at this speed"
-        return f"the motion needs {need:.3g} N·m, the motor has {has:.3g} N·m"
+            return NEEDS_MORE_TORQUE(has=has)
+        return NEEDS_TORQUE(need=need, has=has)
 
     def loses(self, s: Any, begin_s: float, end_s: float, sign: int) -> float | None:
         """First moment from ``begin_s`` on and before ``end_s`` at which the torque is insufficient; seconds of segment ``s``.

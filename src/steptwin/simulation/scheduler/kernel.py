@@ -12,6 +12,7 @@ from typing import ClassVar, NamedTuple
 
 from steptwin.errors import Misuse, Runaway, TimeReversal
 from steptwin.machine import Fact, Nanos, PinEdge
+from steptwin.messages import NONE, Message
 from steptwin.motioncontroller import Drive, MotionController
 from steptwin.simulation.scheduler.followers import KernelFollower, KernelFollowers
 from steptwin.simulation.scheduler.kernelpart import KernelPart, KernelState
@@ -94,6 +95,18 @@ class Board(Stateful):
         self.kernel.put(self.name, output, level)
 
 
+MACHINE_IS_THERE = Message("simulation.machine-is-there", "there is a machine {name!r} already")
+NO_SUCH_MACHINE = Message("simulation.no-such-machine", "no machine {name!r}: there are {names}")
+NOTHING_COMPUTES_SIGNALS = Message(
+    "simulation.nothing-computes-signals", "nothing computes signals of {name!r}: there are {names}"
+)
+NO_SUCH_PIN = Message("simulation.no-such-pin", "{machine!r} has no pin {pin!r}: pins are {names}")
+NO_AXIS_OF = Message("simulation.no-axis-of", "no axis {axis} of {machine!r}, which has {count} axes")
+SIGNALS_DO_NOT_SETTLE = Message(
+    "simulation.signals-do-not-settle", "signals did not settle after {most} rounds at {now} ns: a loop of wires"
+)
+
+
 class Kernel:
     """Runs machines together. Ties in time are broken by the order in which machines and parts were added.
 
@@ -167,7 +180,7 @@ class Kernel:
     def add(self, name: str, machine: MotionController) -> None:
         """Add a machine and set its ``changed`` hook. Raises `TimeReversal` if its time is after the kernel's."""
         if name in self.machines:
-            raise Misuse(f"there is a machine {name!r} already")
+            raise Misuse(MACHINE_IS_THERE(name=name))
         if not self.is_blank:
             machine.advance(self.now)
         self.machines[name] = machine
@@ -190,7 +203,7 @@ class Kernel:
     def replace(self, name: str, machine: MotionController) -> None:
         """Replace the machine ``name`` by a wrapper with the same pins and axes."""
         if name not in self.machines:
-            raise Misuse(f"no machine {name!r}: there are {', '.join(self.machines) or 'none'}")
+            raise Misuse(NO_SUCH_MACHINE(name=name, names=list(self.machines) or NONE()))
         self.machines[name] = machine
         machine.changed = partial(self.mark, name)
         self.mark(name)
@@ -232,7 +245,7 @@ class Kernel:
         """The machine, line or element ``name`` as what a value depends on."""
         found = self._sources.get(name)
         if found is None:
-            raise Misuse(f"nothing computes signals of {name!r}: there are {', '.join(self._sources) or 'none'}")
+            raise Misuse(NOTHING_COMPUTES_SIGNALS(name=name, names=list(self._sources) or NONE()))
         return found
 
     def connect(self, wire: Wire) -> None:
@@ -254,13 +267,13 @@ class Kernel:
         if self._is_checked:
             return
         if name.machine not in self.machines and name.machine not in self.boards:
-            raise Misuse(f"no machine {name.machine!r}: there are {', '.join(self.machines) or 'none'}")
+            raise Misuse(NO_SUCH_MACHINE(name=name.machine, names=list(self.machines) or NONE()))
         pins = self._pin_names.get(name.machine)
         if pins is None:
             board = self.boards.get(name.machine)
             pins = self._pin_names[name.machine] = tuple(self.machines[name.machine].pins() if board is None else board.levels)
         if name.pin not in pins:
-            raise Misuse(f"{name.machine!r} has no pin {name.pin!r}: pins are {', '.join(pins)}")
+            raise Misuse(NO_SUCH_PIN(machine=name.machine, pin=name.pin, names=list(pins)))
 
     def _level(self, name: PinName) -> float:
         board = self.boards.get(name.machine)
@@ -271,7 +284,7 @@ class Kernel:
         found = self.machines.get(machine)
         axes = () if found is None else found.axes
         if not 1 <= axis <= len(axes):
-            raise Misuse(f"no axis {axis} of {machine!r}, which has {len(axes)} axes")
+            raise Misuse(NO_AXIS_OF(axis=axis, machine=machine, count=len(axes)))
         return axes[axis - 1]
 
     def follow(self, follower: KernelFollower, names: Iterable[str], *, leaves: bool = False) -> None:
@@ -473,7 +486,7 @@ class Kernel:
             if not self.stale:
                 break
         else:
-            raise Runaway(f"signals did not settle after {MAX_ROUNDS_PER_INSTANT} rounds at {self.now} ns: a loop of wires")
+            raise Runaway(SIGNALS_DO_NOT_SETTLE(most=MAX_ROUNDS_PER_INSTANT, now=self.now))
         self._find_deadlines()
 
     def _update_parts(self) -> None:

@@ -9,6 +9,7 @@ from typing import Annotated, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.fields import AxisNumber, MachineName, Meaning, choice, whole
+from steptwin.messages import Message
 from steptwin.simulation.script.command import UNITS, command
 
 STOPPED = "program: what the program does now: running (it goes on), paused, stopped; null where that is not known"
@@ -24,6 +25,9 @@ class Enable:
     on: Annotated[bool, Meaning("Whether it is to be on.")] = True
 
 
+EITHER_TO_OR_BY = Message("simulation.either-to-or-by", "move: give either to (a position) or by (a distance)")
+
+
 @command("move", "Begin to move.")
 @dataclass(frozen=True, slots=True)
 class Move:
@@ -36,7 +40,7 @@ class Move:
 
     def __post_init__(self) -> None:
         if (self.to is None) is (self.by is None):
-            raise Misuse("move: give either to (a position) or by (a distance)")
+            raise Misuse(EITHER_TO_OR_BY())
 
 
 @command("home", "Begin to home.")

@@ -15,6 +15,7 @@ from typing import Annotated, Any, TypeAlias, cast
 from steptwin.errors import Misuse
 from steptwin.fields import CHARACTERS, HEX, TIME, AxisNumber, MachineName, Meaning, choice, whole
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.simulation.faults import Fault
 from steptwin.simulation.script.command import FAULT, LEVELS, UNITS, command
 from steptwin.simulation.script.control import Home, Move, Seek
@@ -137,6 +138,9 @@ class Turn:
     counts: Annotated[int, Meaning("By how much.", whole(-(2**31), 2**31 - 1), unit="encoder counts")]
 
 
+UNKNOWN_COUPLING = Message("simulation.unknown-coupling", "{coupling!r}: an encoder shaft is turned by {names}")
+
+
 @command("couple", "What turns the encoder shaft of an axis without mechanics.")
 @dataclass(frozen=True, slots=True)
 class Couple:
@@ -148,7 +152,7 @@ class Couple:
 
     def __post_init__(self) -> None:
         if self.coupling not in COUPLINGS:
-            raise Misuse(f"{self.coupling!r}: an encoder shaft is turned by {', '.join(COUPLINGS)}")
+            raise Misuse(UNKNOWN_COUPLING(coupling=self.coupling, names=list(COUPLINGS)))
 
 
 @command("fault", "Something goes wrong from now on.", "name")

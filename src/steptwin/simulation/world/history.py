@@ -15,6 +15,7 @@ from typing import NamedTuple, TypeAlias
 from steptwin.durations import duration_text
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.world.eventpoints import EventPoints, points_of, stays_between_events
 from steptwin.simulation.world.inputs import ExternalInput, size_of
@@ -218,6 +219,9 @@ class _ChangedPoints:
             self._note((self._owner, path))
 
 
+PAST_IS_KEPT_FROM = Message("simulation.past-is-kept-from", "the past is kept from {begin} to {now}")
+
+
 class History:
     """The past of ``world`` from the present on. Inputs are recorded automatically, snapshots by `take`.
 
@@ -306,7 +310,7 @@ class History:
     def inputs_from(self, number: int) -> list[RecordedInput]:
         """The inputs after the first ``number``. Raises `Misuse` if they are no longer kept."""
         if not self.keeps_inputs_from(number):
-            raise Misuse(f"the past is kept from {duration_text(self.begin)} to {duration_text(self.world.now)}")
+            raise Misuse(PAST_IS_KEPT_FROM(begin=duration_text(self.begin), now=duration_text(self.world.now)))
         newest = list(islice(reversed(self._inputs), self.inputs_so_far - number))
         newest.reverse()
         return newest

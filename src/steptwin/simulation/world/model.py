@@ -13,6 +13,7 @@ from typing import Any
 
 from steptwin.diagnostics import SourceText
 from steptwin.machine import Nanos
+from steptwin.messages import NONE, Message, text_of
 from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.components.axis import AXIS, BuiltAxis
@@ -40,6 +41,13 @@ WORLD = "world"
 """The machine name in records that belong to no machine."""
 MOST_REMEMBERED = 10_000
 """Size limit of each cache of requests, signals and conditions, which scripts use repeatedly."""
+
+
+UNKNOWN = Message("simulation.unknown", "no {what} is called {name!r}{hint}; there are {names}")
+A_MACHINE_OR_LINE = Message("simulation.machine-or-line", "machine or line")
+A_MACHINE = Message("simulation.machine", "machine")
+A_BUTTON = Message("simulation.button", "button")
+A_LINE = Message("simulation.line", "line")
 
 
 class Model:
@@ -94,14 +102,14 @@ class Model:
         """The kernel of a machine or line, advanced to the present. Raises `Misuse` with the existing names."""
         kernel = self.parts.kernel_of.get(name)
         if kernel is None:
-            raise self.unknown("machine or line", name, self.parts.kernel_of)
+            raise self.unknown(A_MACHINE_OR_LINE(), name, self.parts.kernel_of)
         kernel.advance(self.now)
         return kernel
 
     @staticmethod
     def unknown(what: str, name: str, known: Iterable[str]) -> Unknown:
         near = NearMiss()
-        text = f"no {what} is called {name!r}{near.hint(name, known)}; there are {', '.join(known) or 'none'}"
+        text = UNKNOWN(what=text_of(what), name=name, hint=near.hint(name, known), names=list(known) or NONE())
         return Unknown(name, text, near.of(name, known))
 
     def condition(self, text: str) -> SignalCondition:
@@ -151,14 +159,14 @@ class Model:
         """The machine called ``name``. Raises `Misuse` with the existing ones."""
         machine = self.parts.machines.get(name)
         if machine is None:
-            raise self.unknown("machine", name, self.machines)
+            raise self.unknown(A_MACHINE(), name, self.machines)
         return machine
 
     def kind(self, name: str) -> AnyKind:
         """The kind of a machine. Raises `Misuse` with the existing machines."""
         kind = self.parts.kind_of.get(name)
         if kind is None:
-            raise self.unknown("machine", name, self.machines)
+            raise self.unknown(A_MACHINE(), name, self.machines)
         return kind
 
     def input_pin(self, name: str, pin: str, level: float) -> str:
@@ -219,14 +227,14 @@ class Model:
         """The button called ``name`` and its kernel. Raises `Misuse` with the existing buttons."""
         found = self.parts.built(BUTTON).get(name)
         if found is None:
-            raise self.unknown("button", name, self.parts.built(BUTTON))
+            raise self.unknown(A_BUTTON(), name, self.parts.built(BUTTON))
         return found
 
     def line_called(self, name: str) -> Line:
         """The line called ``name``. Raises `Misuse` with the existing lines."""
         line = self.lines.get(name)
         if line is None:
-            raise self.unknown("line", name, self.lines)
+            raise self.unknown(A_LINE(), name, self.lines)
         return line
 
     def put_fault(self, fault: Fault) -> None:

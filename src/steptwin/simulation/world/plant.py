@@ -12,6 +12,7 @@ from functools import partial
 
 from steptwin.errors import Misuse, Runaway, TimeReversal
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.describe.blueprint import Blueprint, FileContents
 from steptwin.simulation.describe.build import Keep
 from steptwin.simulation.describe.overrides import Overrides
@@ -27,6 +28,9 @@ from steptwin.simulation.world.references import check_faults, check_scripts, ch
 from steptwin.simulation.world.reports import Reports
 from steptwin.simulation.world.running import Script
 from steptwin.simulation.world.scripts import MOST_STEPS_PER_INSTANT, Scripts
+
+SNAPSHOT_OF_ANOTHER_WORLD = Message("simulation.snapshot-of-another-world", "the snapshot is of another world")
+SCRIPTS_LOOP = Message("simulation.scripts-loop", "scripts loop without end at {now} ns")
 
 
 class Plant(Model):
@@ -154,7 +158,7 @@ class Plant(Model):
                 self.now = due
             rounds, at = (rounds + 1, at) if self.now == at else (0, self.now)
             if rounds > MOST_STEPS_PER_INSTANT:
-                raise Runaway(f"scripts loop without end at {self.now} ns")
+                raise Runaway(SCRIPTS_LOOP(now=self.now))
             if kernels is not None and kernels <= self.now:
                 self._scripts.advance_kernels()
             elif own is not None and own <= self.now:
@@ -231,7 +235,7 @@ class Plant(Model):
         Raises `Misuse` for a snapshot of another world.
         """
         if snapshot.description != self._description():
-            raise Misuse("the snapshot is of another world")
+            raise Misuse(SNAPSHOT_OF_ANOTHER_WORLD())
         self.now = snapshot.now
         self.stopped = None
         self.trace.rewind(snapshot.trace)

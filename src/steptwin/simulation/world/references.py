@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any, get_args
 
 from steptwin.errors import Misuse, Refusal
+from steptwin.messages import Message
 from steptwin.simulation.describe.spec import ScriptSpec
 from steptwin.simulation.describe.steptable import STEPS
 from steptwin.simulation.faults import Fault
@@ -140,24 +141,37 @@ def _send(model: Model, step: do.Send) -> None:
     model.line_called(step.line)
 
 
+IS_SWITCHED_BY_A_SUPPLY = Message(
+    "simulation.is-switched-by-a-supply",
+    "{machine!r} is switched by its supply {supply!r}: switch that, or let it have a brown-out",
+)
+
+
 def _power_cycle(model: Model, step: do.PowerCycle) -> None:
     model.machine(step.machine)
     supply = model.parts.supplied.get(step.machine)
     if supply is not None:
-        raise Misuse(f"{step.machine!r} is switched by its supply {supply!r}: switch that, or let it have a brown-out")
+        raise Misuse(IS_SWITCHED_BY_A_SUPPLY(machine=step.machine, supply=supply))
+
+
+WRONG_HALT_OF_A_PROGRAM = Message("simulation.wrong-halt-of-a-program", "program = {program!r}: permitted are pause and stop")
+WRONG_AXIS_TO_HALT = Message("simulation.wrong-axis-to-halt", "axis = {axis}: {machine!r} is {title}, which has axes 1 to {most}")
 
 
 def _halt(model: Model, given: Halt) -> None:
     kind = model.kind(given.machine)
     axes = len(model.machine(given.machine).axes)
     if given.program not in (None, "pause", "stop"):
-        raise Misuse(f"program = {given.program!r}: permitted are pause and stop")
+        raise Misuse(WRONG_HALT_OF_A_PROGRAM(program=given.program))
     if given.axis is not None and not 1 <= given.axis <= axes:
-        raise Misuse(f"axis = {given.axis}: {given.machine!r} is {kind.title}, which has axes 1 to {axes}")
+        raise Misuse(WRONG_AXIS_TO_HALT(axis=given.axis, machine=given.machine, title=kind.title, most=axes))
 
 
 def _turn(model: Model, step: do.Turn) -> None:
     model.encoders(step.machine).check_turn(step.axis, step.counts)
+
+
+ENCODER_OF_AN_AXIS = Message("simulation.encoder-of-an-axis", "{drive}: its encoder is part of the mechanics of axis {name!r}")
 
 
 def _couple(model: Model, step: do.Couple) -> None:
@@ -165,7 +179,7 @@ def _couple(model: Model, step: do.Couple) -> None:
     drive = step.machine, f"M{step.axis}"
     for axis in model.axes.values():
         if axis.spec.drive == drive:
-            raise Misuse(f"{'.'.join(drive)}: its encoder is part of the mechanics of axis {axis.spec.name!r}")
+            raise Misuse(ENCODER_OF_AN_AXIS(drive=".".join(drive), name=axis.spec.name))
 
 
 def _see(model: Model, step: See) -> None:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.script import steps as do
 
 
@@ -34,6 +35,11 @@ class ScriptWait(NamedTuple):
     def is_timed(self) -> bool:
         """Whether only the passing of time ends the wait."""
         return self.condition is None and not self.asked
+
+
+WRONG_RESULT_OF_A_STEP = Message(
+    "simulation.wrong-result-of-a-step", "{value}: the result of a step is None, a truth value, a number or bytes"
+)
 
 
 class SentValues:
@@ -65,7 +71,7 @@ class SentValues:
             self._lengths.append(len(value))
             self._bytes += value
         else:
-            raise Misuse(f"{value!r}: the result of a step is None, a truth value, a number or bytes")
+            raise Misuse(WRONG_RESULT_OF_A_STEP(value=repr(value)))
 
     def values(self) -> Any:
         """All values in order."""

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 from steptwin.errors import Refusal, Runaway
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.kinds.master import Master
 from steptwin.simulation.scheduler.kernel import Kernel
 from steptwin.simulation.scheduler.observing import WorldObserver
@@ -34,6 +35,9 @@ class ScriptsState(NamedTuple):
 
     begun: int
     scripts: tuple[ScriptState, ...]
+
+
+TOO_MANY_STEPS = Message("simulation.too-many-steps", "script {name!r}: more than {most} steps at {now} ns")
 
 
 class Scripts:
@@ -276,7 +280,7 @@ class Scripts:
             if waiting is not None:
                 self._wait(script, waiting)
                 return
-        raise Runaway(f"script {script.name!r}: more than {MOST_STEPS_PER_INSTANT} steps at {self._model.now} ns")
+        raise Runaway(TOO_MANY_STEPS(name=script.name, most=MOST_STEPS_PER_INSTANT, now=self._model.now))
 
     def _take(self, step: do.Step, script: Script) -> StepResult:
         """Execute a step; returns what it waits for, or its result."""

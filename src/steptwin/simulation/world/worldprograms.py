@@ -8,6 +8,7 @@ from typing import Any
 
 from steptwin.diagnostics import SourceText, to_json
 from steptwin.errors import Misuse
+from steptwin.messages import NONE, Message
 from steptwin.simulation.kinds.kind import ControllerSpec
 from steptwin.simulation.kinds.programtexts import ProgramText, TextLanguage
 from steptwin.simulation.world.model import Model
@@ -21,20 +22,28 @@ def address_of(machine: str, place: str, language: TextLanguage) -> str:
     return f"steptwin:///{machine}/{place.replace(' ', '-')}{language.suffix}"
 
 
+NO_SUCH_CONTROLLER = Message("simulation.no-such-controller", "there is no controller {machine!r}: there are {names}")
+
+
 def program_texts(model: Model, machine: str) -> Sequence[ProgramText]:
     """Of a controller by name, at the present moment of the world; empty without any. Raises `Misuse` for another name."""
     if machine not in model.machines:
-        raise Misuse(f"there is no controller {machine!r}: there are {', '.join(model.machines)}")
+        raise Misuse(NO_SUCH_CONTROLLER(machine=machine, names=list(model.machines)))
     model.touch(machine)
     spec = next(one for one in model.spec.controllers if one.name == machine)
     return spec.kind.texts(spec, model.machines[machine], model.given)
+
+
+NO_PLACE_FOR_A_PROGRAM = Message(
+    "simulation.no-place-for-a-program", "{machine} has no place {place!r} for a program: places are {places}"
+)
 
 
 def text_at(model: Model, machine: str, place: str) -> ProgramText:
     """Raises `Misuse` with the places there are."""
     there = {text.place: text for text in program_texts(model, machine)}
     if place not in there:
-        raise Misuse(f"{machine} has no place {place!r} for a program: places are {', '.join(there) or 'none'}")
+        raise Misuse(NO_PLACE_FOR_A_PROGRAM(machine=machine, place=place, places=list(there) or NONE()))
     return there[place]
 
 
@@ -46,7 +55,7 @@ def name_of_text(model: Model, machine: str, place: str) -> str:
 def configuration_text(model: Model, machine: str) -> SourceText | None:
     """The configuration file of a controller by name; None for a kind that has none. Raises `Misuse` for another name."""
     if machine not in model.machines:
-        raise Misuse(f"there is no controller {machine!r}: there are {', '.join(model.machines)}")
+        raise Misuse(NO_SUCH_CONTROLLER(machine=machine, names=list(model.machines)))
     spec = next(one for one in model.spec.controllers if one.name == machine)
     return spec.kind.configuration(spec, model.machines[machine], model.given)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from steptwin.errors import Misuse
+from steptwin.messages import Message
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.status import AxisStatus, ProgramState
@@ -38,9 +39,12 @@ class Mic488View(MachineView):
         self._world.apply_input(do.Write(((self.name, register.upper(), float(value)),)))
 
 
+NO_SUCH_AXIS = Message("simulation.mic488.no-such-axis", "no axis {number!r}: axes are {names}")
+
+
 class _Axes(dict[int, "Mic488AxisView"]):
     def __missing__(self, number: object) -> Mic488AxisView:
-        raise Misuse(f"no axis {number!r}: axes are {', '.join(map(str, self))}")
+        raise Misuse(NO_SUCH_AXIS(number=number, names=list(self)))
 
 
 class Mic488AxisView:
