@@ -15,6 +15,7 @@ from typing import Any, Generic, TypeAlias, TypeVar, cast
 from steptwin.datasheet import AxisDescription, Datasheet, Detail, plain
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss
 
@@ -207,12 +208,15 @@ PARTS = ("status", "program", "pins", "details")
 """Of a state, beside its axes."""
 
 
+UNKNOWN_PART = Message("controllerstate.unknown-part", "parts: a state has no part {name!r}{hint}; there are {names}")
+
+
 def check_parts(sheet: Datasheet, wanted: Collection[str]) -> None:
     """Raises `Misuse` for what is no part of a state."""
     known = (*PARTS, *(axis.name for axis in sheet.axes))
     for name in wanted:
         if name not in known:
-            raise Misuse(f"parts: a state has no part {name!r}{NearMiss().hint(name, known)}; there are {', '.join(known)}")
+            raise Misuse(UNKNOWN_PART(name=name, hint=NearMiss().hint(name, known), names=list(known)))
 
 
 def parts_of(state: ControllerState, sheet: Datasheet, wanted: Collection[str]) -> dict[str, object]:

@@ -8,10 +8,18 @@ from functools import lru_cache
 
 from steptwin.errors import Misuse
 from steptwin.machine import MICROSECOND, MILLISECOND, SECOND, Nanos
+from steptwin.messages import Message
 
 UNITS: dict[str, Nanos] = {"us": MICROSECOND, "ms": MILLISECOND, "s": SECOND, "min": 60 * SECOND, "h": 3600 * SECOND}
 LONGEST_NS: Nanos = 366 * 24 * UNITS["h"]
 _DURATION = re.compile(r"(\d{1,30}(?:\.\d{1,30})?|\.\d{1,30}) *([a-z]*)\Z", re.ASCII)
+
+
+NO_UNIT = Message("durations.no-unit", "{value} has no unit: expected a number with {names}, such as '90 s' or '500 ms'")
+NO_DURATION = Message(
+    "durations.no-duration", "{value} is not a time: expected a number with {names}, such as '90 s' or '500 ms'"
+)
+TOO_LONG = Message("durations.too-long", "{value} is too long: permitted are 0 to {most} h")
 
 
 def duration(value: object) -> Nanos:
@@ -23,10 +31,9 @@ def duration(value: object) -> Nanos:
     found = _of_text(text.strip().lower()) if isinstance(text, str) else None
     if found is None:
         is_bare = isinstance(text, str) and _of_text(f"{text.strip()}s") is not None
-        what = "has no unit" if is_bare else "is not a time"
-        raise Misuse(f"{value!r} {what}: expected a number with {', '.join(UNITS)}, such as '90 s' or '500 ms'")
+        raise Misuse((NO_UNIT if is_bare else NO_DURATION)(value=repr(value), names=list(UNITS)))
     if found > LONGEST_NS:
-        raise Misuse(f"{value!r} is too long: permitted are 0 to {LONGEST_NS // UNITS['h']} h")
+        raise Misuse(TOO_LONG(value=repr(value), most=LONGEST_NS // UNITS["h"]))
     return found
 
 

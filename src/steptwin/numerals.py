@@ -11,6 +11,7 @@ import unicodedata
 from math import isfinite
 
 from steptwin.errors import Misuse
+from steptwin.messages import Message
 from steptwin.plaintypes import shown
 
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?", re.ASCII)
@@ -22,28 +23,42 @@ _LONGEST_WHOLE = 18
 """Digits; what is read as one has far fewer."""
 
 
+NO_NUMBER = Message("numerals.no-number", "{text} is not a number")
+OTHER_FORM = Message("numerals.other-form", "{text} is not a number: write {meant}")
+COMMA_OF_THOUSANDS = Message(
+    "numerals.comma-of-thousands", "{text} has a comma that may separate thousands: write {whole} or {fraction}"
+)
+COMMAS_OF_THOUSANDS = Message("numerals.commas-of-thousands", "{text} has a comma that may separate thousands: write {whole}")
+TOO_LARGE = Message("numerals.too-large", "{text} is too large for a number")
+
+
 def read_number(text: str, *, or_hexadecimal: bool = False) -> float:
     """A finite number. ``or_hexadecimal``: also a word as ``0x1F``. Raises `Misuse` with what to write instead."""
     text = text.strip()
     if or_hexadecimal and _HEXADECIMAL.fullmatch(text):
         return float(int(text, 16))
     if _GROUPED.fullmatch(text):
-        fraction = f" or {float(text.replace(',', '.'))}" if text.count(",") == 1 else ""
-        raise Misuse(f"{shown(text)} has a comma that may separate thousands: write {text.replace(',', '')}{fraction}")
+        whole = text.replace(",", "")
+        if text.count(",") > 1:
+            raise Misuse(COMMAS_OF_THOUSANDS(text=shown(text), whole=whole))
+        raise Misuse(COMMA_OF_THOUSANDS(text=shown(text), whole=whole, fraction=str(float(text.replace(",", ".")))))
     if not _NUMBER.fullmatch(text):
         meant = _meant(text)
-        raise Misuse(f"{shown(text)} is not a number{'' if meant is None else f': write {meant}'}")
+        raise Misuse(NO_NUMBER(text=shown(text)) if meant is None else OTHER_FORM(text=shown(text), meant=meant))
     value = float(text.replace(",", "."))
     if not isfinite(value):
-        raise Misuse(f"{shown(text)} is too large for a number")
+        raise Misuse(TOO_LARGE(text=shown(text)))
     return value
+
+
+NO_WHOLE_NUMBER = Message("numerals.no-whole-number", "{text} is not a whole number")
 
 
 def read_integer(text: str) -> int:
     """A whole number with its sign, or a word as ``0x1F``, exactly. Raises `Misuse`."""
     value = read_number(text, or_hexadecimal=True)
     if not value.is_integer():
-        raise Misuse(f"{shown(text.strip())} is not a whole number")
+        raise Misuse(NO_WHOLE_NUMBER(text=shown(text.strip())))
     return int(text) if len(text) <= 4000 and text.strip().lstrip("+-").isdecimal() else int(value)
 
 

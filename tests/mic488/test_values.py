@@ -184,7 +184,7 @@ def test_names_of_values(text: str, name: str, address: int, size: int) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("M1 POS", f"'M1 POS' is not a name of a value: {FORM}"),
+        ("M1 POS", f"'M1 POS' is not a name of a value: {FORM()}"),
         ("M1_ACC[0]", "'M1_ACC[0]': M1_ACC is one value of type REAL/DINT; name it without [ ] and :"),
         ("M1_ACC:dint", "'M1_ACC:dint': M1_ACC is one value of type REAL/DINT; name it without [ ] and :"),
         ("USER_REGISTER", "'USER_REGISTER': choose one of USER_REGISTER[0] to USER_REGISTER[1999]"),

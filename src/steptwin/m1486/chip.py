@@ -40,6 +40,7 @@ from steptwin.m1486.uart import Uart
 from steptwin.m1486.unit import NumericUnit
 from steptwin.m1486.variants import DEFAULT, Store, Variant
 from steptwin.machine import MILLISECOND, Fact, Nanos, PinEdge
+from steptwin.messages import Message, text_of
 from steptwin.state import Plain, Stateful
 
 SHUTDOWN_RESET_NS: Nanos = 10 * MILLISECOND
@@ -54,6 +55,31 @@ class ChipSnapshot:
     is_timed: bool
     statement_ns: Nanos
     state: Plain
+
+
+WRONG_ADDRESS = Message("m1486.wrong-address", "address {address}: four pins give 0 to {most}")
+OUTPUT_HIGH = Message("m1486.output-high", "B{line} high")
+OUTPUT_LOW = Message("m1486.output-low", "B{line} low")
+WRONG_DATA = Message("m1486.wrong-data", "wrong data: {what}")
+WRONG_DATA_STOPS = Message("m1486.wrong-data-stops", "wrong data: {what}; the program stops")
+POWER_ON = Message("m1486.power-on", "power-on")
+RESET_BY_RST = Message("m1486.reset-by-rst", "RST with all address pins low: reset")
+RESTART_BY_RST = Message("m1486.restart-by-rst", "RST: the program begins again")
+SHUTDOWN = Message("m1486.shutdown", "shutdown")
+SHUTDOWN_IS_OVER = Message("m1486.shutdown-is-over", "shutdown is over: the program begins again")
+LINE_OF_AN_INTERFACE = Message("m1486.line-of-an-interface", "B{line} belongs to the {interface} interface")
+BYTE_IS_SENT = Message("m1486.byte-is-sent", "U{number} sends {byte:02X}H")
+KILL = Message("m1486.kill", "Kill")
+CLEAR_KILL = Message("m1486.clear-kill", "Clear kill")
+FILE = Message("m1486.file", "a file of {size} bits")
+RESET = Message("m1486.reset", "reset")
+EEPROM_IS_NOT_KEPT = Message("m1486.eeprom-is-not-kept", "the EEPROM could not be kept: {why}")
+SNAPSHOT_OF_ANOTHER_CHIP = Message(
+    "m1486.snapshot-of-another-chip", "the snapshot is of {title} with other timing, or of another type than {own}"
+)
+
+
+NEGATIVE_STATEMENT_TIME = Message("m1486.negative-statement-time", "statement_ns = {statement_ns}: must not be negative")
 
 
 class M1486Chip(Stateful):
@@ -106,9 +132,9 @@ class M1486Chip(Stateful):
         image: bytes = b"",
     ) -> None:
         if not 0 <= address <= OPEN_ADDRESS:
-            raise Misuse(f"address {address}: four pins give 0 to {OPEN_ADDRESS}")
+            raise Misuse(WRONG_ADDRESS(address=address, most=OPEN_ADDRESS))
         if statement_ns is not None and statement_ns < 0:
-            raise Misuse(f"statement_ns = {statement_ns}: must not be negative")
+            raise Misuse(NEGATIVE_STATEMENT_TIME(statement_ns=statement_ns))
         self.variant = variant
         self.is_timed = is_timed
         self.store: Callable[[bytes], bytes | None] | None = None
@@ -337,7 +363,7 @@ class M1486Chip(Stateful):
         """Switch off and on again. Pins stay tied as they are, and the motor stays where it is."""
         self.advance(now)
         self._awake()
-        self.event("power-on", "power-on", now)
+        self.event("power-on", POWER_ON(), now)
         self._read_pins()
         self._start_anew(now)
         self._settle()
@@ -364,10 +390,10 @@ class M1486Chip(Stateful):
         if level and not self.is_shut_down:
             self._read_pins()
             if self.address == 0:
-                self.event("reset", "RST with all address pins low: reset", now)
+                self.event("reset", RESET_BY_RST(), now)
                 self._start_anew(now)
             else:
-                self.event("restart", "RST: the program begins again", now)
+                self.event("restart", RESTART_BY_RST(), now)
                 self._restart(now)
 
     def _restart(self, now: Nanos) -> None:
@@ -383,7 +409,7 @@ class M1486Chip(Stateful):
             self.program.restart(self.memory.begin, now)
 
     def _shut_down(self, now: Nanos) -> None:
-        self.event("shutdown", "shutdown", now)
+        self.event("shutdown", SHUTDOWN(), now)
         self._fall_silent(now)
         if not self.unit.on(OUTPUTS):
             self.io.tie_low(True, now)
@@ -405,7 +431,7 @@ class M1486Chip(Stateful):
         if not self.io["SD"]:
             return
         self._awake()
-        self.event("restart", "shutdown is over: the program begins again", now)
+        self.event("restart", SHUTDOWN_IS_OVER(), now)
         self.io.tie_low(False, now)
         self.uart.set_baud(self.variant.baud(*self.io.baud_pins()))
         self._restart(now)
@@ -439,7 +465,7 @@ class M1486Chip(Stateful):
     def refuse_occupied(self, line: int) -> None:
         """Raises `WrongData` for a line whose pin the driver interface uses (M-21)."""
         if line in self.interface.occupied:
-            raise WrongData(f"B{line} belongs to the {self.interface.title} interface")
+            raise WrongData(LINE_OF_AN_INTERFACE(line=line, interface=self.interface.title))
 
     def put_out(self, lines: range, bits: int, now: Nanos) -> None:
         """Set outputs, lowest line = least significant bit. Raises `WrongData` if the interface uses one (M-21)."""
@@ -448,7 +474,7 @@ class M1486Chip(Stateful):
         for bit, line in enumerate(lines):
             level = bits >> bit & 1
             if self.io.latches[line] != level:
-                self.event("output", f"B{line} {'high' if level else 'low'}", now, ("line", line), ("level", level))
+                self.event("output", (OUTPUT_HIGH if level else OUTPUT_LOW)(line=line), now, ("line", line), ("level", level))
                 self.io.set_latch(line, level, now)
 
     def switch(self, function: int, on: bool, now: Nanos) -> None:
@@ -460,7 +486,7 @@ class M1486Chip(Stateful):
             self.motor.look_at_limit(now)
 
     def upload(self, number: int, byte: int, now: Nanos) -> None:
-        self.event("upload", f"U{number} sends {byte:02X}H", now, ("command", number), ("byte", byte))
+        self.event("upload", BYTE_IS_SENT(number=number, byte=byte), now, ("command", number), ("byte", byte))
         self.send(byte, now)
 
     def event(self, code: str, text: str, now: Nanos, *facts: Fact) -> None:
@@ -472,9 +498,8 @@ class M1486Chip(Stateful):
     def wrong_data(self, what: str, now: Nanos) -> None:
         """Drop a command and stop the program, unless function 44 is ON (M-11)."""
         stops = not self.unit.on(CONTINUE)
-        self.event(
-            "wrong-data", f"wrong data: {what}{'; the program stops' if stops else ''}", now, ("why", what), ("stops", stops)
-        )
+        text = (WRONG_DATA_STOPS if stops else WRONG_DATA)(what=text_of(what))
+        self.event("wrong-data", text, now, ("why", str(what)), ("stops", stops))
         if stops:
             self.program.abandon(now)
 
@@ -487,11 +512,11 @@ class M1486Chip(Stateful):
             self.memory.refuse_file()
 
     def kill(self, now: Nanos) -> None:
-        self.event("kill", "Kill", now)
+        self.event("kill", KILL(), now)
         self.motor.kill(now)
 
     def clear_kill(self, now: Nanos) -> None:
-        self.event("clear-kill", "Clear kill", now)
+        self.event("clear-kill", CLEAR_KILL(), now)
         self.program.is_killed = False
 
     def close_file(self, now: Nanos) -> None:
@@ -499,13 +524,13 @@ class M1486Chip(Stateful):
         file = self.memory.close_file()
         if file is None:
             return
-        self.event("file", f"a file of {8 * len(file.code)} bits", now, ("size", 8 * len(file.code)))
+        self.event("file", FILE(size=8 * len(file.code)), now, ("size", 8 * len(file.code)))
         if self.variant.store is Store.EEPROM:
             self._keep(pack(file), now)  # M-37: nothing else is kept
 
     def software_reset(self, now: Nanos) -> None:
         """``\\``: defaults; an E type erases its EEPROM. Address and baud rate stay."""
-        self.event("reset", "reset", now)
+        self.event("reset", RESET(), now)
         self.set_defaults(now)
         if self.variant.store is Store.EEPROM:
             self._keep(b"", now)
@@ -517,7 +542,7 @@ class M1486Chip(Stateful):
             try:
                 stored = self.store(image)
             except OSError as error:
-                self.event("store-failed", f"the EEPROM could not be kept: {error}", now, ("why", str(error)))
+                self.event("store-failed", EEPROM_IS_NOT_KEPT(why=error), now, ("why", str(error)))
         self.image = image if stored is None else stored
 
     def set_defaults(self, now: Nanos) -> None:
@@ -541,8 +566,6 @@ class M1486Chip(Stateful):
         """Take the state of a snapshot, its moment too. Raises `Misuse` when it belongs to another kind of chip."""
         belongs = (snapshot.variant, snapshot.is_timed, snapshot.statement_ns)
         if belongs != (self.variant, self.is_timed, self.program.statement_ns):
-            raise Misuse(
-                f"the snapshot is of {snapshot.variant.title} with other timing, or of another type than {self.variant.title}"
-            )
+            raise Misuse(SNAPSHOT_OF_ANOTHER_CHIP(title=snapshot.variant.title, own=self.variant.title))
         self.set_state(snapshot.state)
         self.changed()

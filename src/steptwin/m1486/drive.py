@@ -24,6 +24,7 @@ from steptwin.m1486.microsteps import (
 from steptwin.m1486.unit import MASK
 from steptwin.m1486.variants import Variant
 from steptwin.machine import MICROSECOND, SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.motion import Profile, at_rest
 from steptwin.motion.divisions import Microstepping, StepTrain, forced_stop, step_train
 from steptwin.motion.profile import cruise
@@ -62,6 +63,14 @@ def speed_curve(settings: tuple[float, float, float, float], qualification: int,
 
 class WrongMove(Exception):
     """A move that cannot start; the text gives the reason."""
+
+
+DISTANCE_OFF_THE_GRID = Message(
+    "m1486.distance-off-the-grid", "the distance {distance} is not a multiple of {grid} (M{microstep})"
+)
+MICROSTEPS_AND_QUALIFICATION = Message(
+    "m1486.microsteps-and-qualification", "M{microstep} and Q{qualification} do not go together"
+)
 
 
 class ChipDrive(Stateful):
@@ -204,7 +213,7 @@ class ChipDrive(Stateful):
             self._start(MotionMode.ENDLESS, step_train(plan_endless(now, begin, self.endless, self._curve), begin, microstepping))
             return True
         if self.distance_u % self.grid_u:
-            raise WrongMove(f"the distance {self.distance_u} is not a multiple of {self.grid_u} (M{self.microstep})")
+            raise WrongMove(DISTANCE_OFF_THE_GRID(distance=self.distance_u, grid=self.grid_u, microstep=self.microstep))
         if self.distance_u == 0:
             return False
         profile = plan_distance(now, begin, begin + self.distance_u, self._curve)
@@ -268,7 +277,7 @@ class ChipDrive(Stateful):
         """Raises `WrongMove` for divisions that do not go together (M-11)."""
         microstep, qualification = self.microstep, self.qualification
         if qualification not in PAIRS[microstep]:
-            raise WrongMove(f"M{microstep} and Q{qualification} do not go together")
+            raise WrongMove(MICROSTEPS_AND_QUALIFICATION(microstep=microstep, qualification=qualification))
         return Microstepping(self.grid_u, microstep_size(qualification), self._speed(low_range_limit(microstep)))
 
     def _speed_curve(self) -> SpeedCurve:

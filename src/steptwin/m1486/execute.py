@@ -11,6 +11,7 @@ from steptwin.m1486.effects import CommandHost, Effect, Making, WrongData, refus
 from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import ChipCommand, JumpCondition
 from steptwin.machine import Nanos
+from steptwin.messages import Message, text_of
 from steptwin.tables import complete
 
 
@@ -35,6 +36,9 @@ _MAKERS: Mapping[str, Making] = complete(
 )
 
 
+NO_COMMAND = Message("m1486.no-command", "{command} is not a command")
+
+
 def compile_command(chip: CommandHost, command: ChipCommand, place: int, following: int) -> CompiledCommand:
     """The closure of a command stored in the memory at ``place``."""
     if command.from_variable:
@@ -42,12 +46,15 @@ def compile_command(chip: CommandHost, command: ChipCommand, place: int, followi
     why = out_of_range(command, chip.variant)
     spec = find(command.key, command.number, chip.variant)
     if why is not None or spec is None:
-        return CompiledCommand(refusing(why or f"{command} is not a command"), computes=True, is_linked=False)
+        return CompiledCommand(refusing(why or NO_COMMAND(command=command)), computes=True, is_linked=False)
     if isinstance(command.argument, JumpCondition):
         return CompiledCommand(*flow_effects.condition(chip, command.argument, following), is_linked=True)
     row = _MAKERS[spec.name]
     effect = row.make(chip, command.argument or 0, place, following)
     return CompiledCommand(effect, computes=row.computes, is_linked=row.is_linked)
+
+
+VARIABLE_GIVES = Message("m1486.variable-gives", "the internal variable gives: {why}")
 
 
 def _with_variable(chip: CommandHost, key: str, place: int, following: int) -> Effect:
@@ -57,7 +64,7 @@ def _with_variable(chip: CommandHost, key: str, place: int, following: int) -> E
         number = chip.unit.variable
         spec = find(key, number, chip.variant)
         if spec is None:
-            raise WrongData(f"the internal variable gives: {out_of_range(ChipCommand(key, number), chip.variant)}")
+            raise WrongData(VARIABLE_GIVES(why=text_of(out_of_range(ChipCommand(key, number), chip.variant) or "None")))
         return _MAKERS[spec.name].make(chip, number, place, following)(now)
 
     return run

@@ -6,11 +6,15 @@ from steptwin.m1486.effects import CommandHost, Effect, Makers, WrongData, refus
 from steptwin.m1486.functions import CARRY, USER_FLAGS
 from steptwin.m1486.syntax import JumpCondition
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.messages import Message
 
 LOOP_LEVELS = 4
 """M-5: most levels of nested loops."""
 
 MAKERS = Makers()
+
+
+TOO_MANY_LOOPS = Message("m1486.too-many-loops", "more than {most} loops inside one another")
 
 
 @MAKERS.does("Loop", computes=True)
@@ -24,12 +28,16 @@ def _loop(chip: CommandHost, count: int, _place: int, following: int) -> Effect:
             level = starts.index(following)
             del starts[level:], counts[level:]
         if len(counts) >= LOOP_LEVELS:
-            raise WrongData(f"more than {LOOP_LEVELS} loops inside one another")
+            raise WrongData(TOO_MANY_LOOPS(most=LOOP_LEVELS))
         counts.append(count)
         starts.append(following)
         return following
 
     return run
+
+
+END_OUTSIDE_A_LOOP = Message("m1486.end-outside-a-loop", "E outside a loop")
+LOOP_IS_OVERWRITTEN = Message("m1486.loop-is-overwritten", "the beginning of the loop has been overwritten")
 
 
 @MAKERS.does("End of loop", computes=True)
@@ -39,7 +47,7 @@ def _end_of_loop(chip: CommandHost, _number: int, _place: int, following: int) -
     def run(now: Nanos) -> int:
         counts = program.loop_counts
         if not counts:
-            raise WrongData("E outside a loop")  # M-20
+            raise WrongData(END_OUTSIDE_A_LOOP())  # M-20
         left = counts[-1] - 1
         if left:
             counts[-1] = left
@@ -49,34 +57,44 @@ def _end_of_loop(chip: CommandHost, _number: int, _place: int, following: int) -
         counts.pop()
         start = program.loop_starts.pop()
         if left and start < 0:
-            raise WrongData("the beginning of the loop has been overwritten")
+            raise WrongData(LOOP_IS_OVERWRITTEN())
         return following
 
     return run
+
+
+NO_LABEL = Message("m1486.no-label", "there is no label {label}")
 
 
 @MAKERS.does("Jump", computes=True, is_linked=True)
 def _jump(chip: CommandHost, label: int, _place: int, _following: int) -> Effect:
     target = chip.memory.labels.get(label)
     if target is None:
-        return refusing(f"there is no label {label}")  # M-17
+        return refusing(NO_LABEL(label=label))  # M-17
     return lambda now: target
+
+
+SUBROUTINE_IN_A_SUBROUTINE = Message("m1486.subroutine-in-a-subroutine", "a subroutine inside a subroutine")
 
 
 @MAKERS.does("Subroutine", computes=True, is_linked=True)
 def _call(chip: CommandHost, label: int, _place: int, following: int) -> Effect:
     target = chip.memory.labels.get(label)
     if target is None:
-        return refusing(f"there is no label {label}")  # M-17
+        return refusing(NO_LABEL(label=label))  # M-17
     program = chip.program
 
     def run(now: Nanos) -> int:
         if program.back is not None:
-            raise WrongData("a subroutine inside a subroutine")
+            raise WrongData(SUBROUTINE_IN_A_SUBROUTINE())
         program.back = following
         return target
 
     return run
+
+
+DOT_OUTSIDE_A_SUBROUTINE = Message("m1486.dot-outside-a-subroutine", "a dot outside a subroutine")
+CALL_IS_OVERWRITTEN = Message("m1486.call-is-overwritten", "the command after the call has been overwritten")
 
 
 @MAKERS.does("End of subroutine", computes=True)
@@ -86,13 +104,16 @@ def _return(chip: CommandHost, _number: int, _place: int, _following: int) -> Ef
     def run(now: Nanos) -> int:
         back = program.back
         if back is None:
-            raise WrongData("a dot outside a subroutine")  # M-20
+            raise WrongData(DOT_OUTSIDE_A_SUBROUTINE())  # M-20
         program.back = None
         if back < 0:
-            raise WrongData("the command after the call has been overwritten")
+            raise WrongData(CALL_IS_OVERWRITTEN())
         return back
 
     return run
+
+
+WAITS = Message("m1486.waits", "waits {duration:g} ms")
 
 
 @MAKERS.does("Wait")
@@ -101,7 +122,7 @@ def _wait(chip: CommandHost, milliseconds: int, _place: int, following: int) -> 
 
     def run(now: Nanos) -> int:
         chip.program.wait_until(now + duration)
-        chip.event("wait", f"waits {duration / MILLISECOND:g} ms", now, ("duration", duration))
+        chip.event("wait", WAITS(duration=duration / MILLISECOND), now, ("duration", duration))
         return following
 
     return run
@@ -118,7 +139,7 @@ def condition(chip: CommandHost, asked: JumpCondition, following: int) -> tuple[
     line, high, label = asked.line, asked.high, asked.label
     target = chip.memory.labels.get(label)
     # M-17: a missing label matters only when the condition holds.
-    jump: Effect = refusing(f"there is no label {label}") if target is None else lambda now: target
+    jump: Effect = refusing(NO_LABEL(label=label)) if target is None else lambda now: target
     unit, io = chip.unit, chip.io
 
     def if_line(now: Nanos) -> int:

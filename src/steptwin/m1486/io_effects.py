@@ -9,6 +9,7 @@ from steptwin.m1486.functions import REMAINDER, USER_FLAGS
 from steptwin.m1486.lines import LINES, line_group
 from steptwin.m1486.registers import UPLOADS
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 
 PRODUCTION_SERIES = 1
 """M-15: the byte of U16."""
@@ -31,14 +32,18 @@ MAKERS.does("Turn on")(_output(1))
 MAKERS.does("Clear")(_output(0))
 
 
+WAITS_UNTIL_HIGH = Message("m1486.waits-until-high", "waits until B{line} is high")
+WAITS_UNTIL_LOW = Message("m1486.waits-until-low", "waits until B{line} is low")
+
+
 def _line_wait(level: int) -> Maker:
     def make(chip: CommandHost, line: int, _place: int, following: int) -> Effect:
         def run(now: Nanos) -> int:
             chip.refuse_occupied(line)
             if chip.io.levels[line] != level:
                 chip.program.wait_for_line(line, level)
-                text = f"waits until B{line} is {'high' if level else 'low'}"
-                chip.event("wait", text, now, ("line", line), ("level", level))
+                text = WAITS_UNTIL_HIGH if level else WAITS_UNTIL_LOW
+                chip.event("wait", text(line=line), now, ("line", line), ("level", level))
             return following
 
         return run

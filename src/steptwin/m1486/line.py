@@ -22,7 +22,13 @@ from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.uart import MOST_WAITING
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.state import Stateful
+
+ADDRESS_TWICE = Message("m1486.address-twice", "two chips with address {address:X} on one line")
+NO_CHIP = Message("m1486.no-chip", "a chain needs at least one chip")
+DIFFERENT_BAUD_RATES = Message("m1486.different-baud-rates", "chips with different baud rates on one line: {rates} bit/s")
+DIFFERENT_LINE_TIMING = Message("m1486.different-line-timing", "chips with and without line timing on one line")
 
 
 class SerialChain(Stateful):
@@ -42,15 +48,15 @@ class SerialChain(Stateful):
         """By the address each had when the line was made."""
         for chip in chips:
             if chip.address in self.chips:
-                raise Misuse(f"two chips with address {chip.address:X} on one line")
+                raise Misuse(ADDRESS_TWICE(address=chip.address))
             self.chips[chip.address] = chip
         if not self.chips:
-            raise Misuse("a chain needs at least one chip")
+            raise Misuse(NO_CHIP())
         rates = {chip.uart.baud for chip in self.chips.values()}
         if len(rates) > 1:
-            raise Misuse(f"chips with different baud rates on one line: {', '.join(map(str, sorted(rates)))} bit/s")
+            raise Misuse(DIFFERENT_BAUD_RATES(rates=sorted(rates)))
         if len({chip.is_timed for chip in self.chips.values()}) > 1:
-            raise Misuse("chips with and without line timing on one line")
+            raise Misuse(DIFFERENT_LINE_TIMING())
         self._ports: list[LinePort] = []
         self._wire_free: Nanos = 0
         self.collisions = 0

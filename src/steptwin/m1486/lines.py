@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from steptwin.errors import Misuse
+from steptwin.messages import Message
 
 LINES = range(1, 22)
 """Lines B1 to B21."""
@@ -32,12 +33,15 @@ TWO_DACS = Interface("two", "Two DACs", 0, range(8, 18), 4)
 INTERFACES = (STEP_DIRECTION, DUAL_DAC, TWO_DACS)
 
 
+UNKNOWN_INTERFACE = Message("m1486.unknown-interface", "no driver interface is called {name!r}; there are {names}")
+
+
 def interface(name: str) -> Interface:
     """The driver interface called ``sd``, ``dual`` or ``two``. Raises `Misuse` with the names there are."""
     for i in INTERFACES:
         if i.name == name.strip().lower():
             return i
-    raise Misuse(f"no driver interface is called {name!r}; there are {', '.join(i.name for i in INTERFACES)}")
+    raise Misuse(UNKNOWN_INTERFACE(name=name, names=[i.name for i in INTERFACES]))
 
 
 SEEK_ENDS_LOW = frozenset((1, 2, 3, 8, 9, 10, 11, 16, 17, 18, 19))

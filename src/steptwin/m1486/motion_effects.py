@@ -7,6 +7,7 @@ from collections.abc import Callable
 from steptwin.m1486.drive import ChipDrive
 from steptwin.m1486.effects import CommandHost, Effect, Maker, Makers, WrongData
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 
 MAKERS = Makers()
 
@@ -52,10 +53,15 @@ MAKERS.does("Forward", computes=True)(_distance(1))
 MAKERS.does("Backward", computes=True)(_distance(-1))
 
 
+NUMBER_OFF_THE_GRID = Message(
+    "m1486.number-off-the-grid", "{number} is not a multiple of {grid} minimum microsteps (M{microstep})"
+)
+
+
 def _refuse_off_grid(chip: CommandHost, number: int) -> None:
     grid = chip.drive.grid_u
     if number % grid:
-        raise WrongData(f"{number} is not a multiple of {grid} minimum microsteps (M{chip.drive.microstep})")
+        raise WrongData(NUMBER_OFF_THE_GRID(number=number, grid=grid, microstep=chip.drive.microstep))
 
 
 @MAKERS.does("Direction", computes=True)

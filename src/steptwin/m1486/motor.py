@@ -12,6 +12,7 @@ from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.pins import JOG_DIRECTION_LINE, ChipPins, seek_ends
 from steptwin.m1486.unit import NumericUnit, counter_text
 from steptwin.machine import SECOND, Fact, Nanos
+from steptwin.messages import Message, text_of
 from steptwin.state import Stateful
 
 AXIS: Fact = "axis", 1
@@ -42,6 +43,16 @@ class MotorHost(Protocol):
     def event(self, code: str, text: str, now: Nanos, *facts: Fact) -> None: ...
 
 
+MOVES_ON_POSITIVE = Message("m1486.moves-on-positive", "moves on in positive direction")
+MOVES_ON_NEGATIVE = Message("m1486.moves-on-negative", "moves on in negative direction")
+SEEKS_POSITIVE = Message("m1486.seeks-positive", "seeks B{line} in positive direction")
+SEEKS_NEGATIVE = Message("m1486.seeks-negative", "seeks B{line} in negative direction")
+STANDS = Message("m1486.stands", "stands at {position}")
+STANDS_NOT_VALID = Message("m1486.stands-not-valid", "stands at {position}, position not valid")
+STOPS = Message("m1486.stops", "stops: {why}")
+MOVES = Message("m1486.moves", "moves {distance:+d} to {target} in {duration:.6f} s")
+
+
 class MotorControl(Stateful):
     """Controls the drive of a chip from its program and pins."""
 
@@ -66,19 +77,19 @@ class MotorControl(Stateful):
         try:
             started = drive.run(now)
         except WrongMove as wrong:
-            raise WrongData(str(wrong)) from None
+            raise WrongData(text_of(wrong)) from None
         if not started:
             return True
         if drive.motion is MotionMode.ENDLESS:
             self._started(
                 "moves",
-                f"moves on in {'positive' if drive.endless > 0 else 'negative'} direction",
+                (MOVES_ON_POSITIVE if drive.endless > 0 else MOVES_ON_NEGATIVE)(),
                 now,
                 ("direction", drive.endless),
             )
         else:
             duration = ((drive.profile.end or now) - now) / SECOND
-            text = f"moves {drive.distance_u:+d} to {counter_text(drive.counter_u(now))} in {duration:.6f} s"
+            text = MOVES(distance=drive.distance_u, target=counter_text(drive.counter_u(now)), duration=duration)
             self._started("moves", text, now, ("direction", 1 if drive.distance_u > 0 else -1), ("distance", drive.distance_u))
         return True
 
@@ -93,9 +104,9 @@ class MotorControl(Stateful):
         try:
             self.drive.seek(direction, now)
         except WrongMove as wrong:
-            raise WrongData(str(wrong)) from None
+            raise WrongData(text_of(wrong)) from None
         self._seek_line = line
-        text = f"seeks B{line} in {'positive' if direction > 0 else 'negative'} direction"
+        text = (SEEKS_POSITIVE if direction > 0 else SEEKS_NEGATIVE)(line=line)
         self._started("seeks", text, now, ("direction", direction), ("line", line))
         return True
 
@@ -131,10 +142,10 @@ class MotorControl(Stateful):
         was_jog = self.drive.motion is MotionMode.JOG
         self.drive.finish()
         if not was_jog:
-            validity = "" if self.drive.is_valid else ", position not valid"
             counter = self.drive.counter_u(now)
             facts = ("counter", counter), ("is_valid", self.drive.is_valid)
-            chip.event("stands", f"stands at {counter_text(counter)}{validity}", now, AXIS, *facts)
+            text = (STANDS if self.drive.is_valid else STANDS_NOT_VALID)(position=counter_text(counter))
+            chip.event("stands", text, now, AXIS, *facts)
             chip.io.set_output("BOOST", 1, now)
             self.show_runsign(now)
         chip.program.motion_ended()
@@ -149,7 +160,7 @@ class MotorControl(Stateful):
         """Down the ramp, and on to a full step by function 50."""
         chip, drive = self._chip, self.drive
         if drive.is_busy and not drive.is_stopping:
-            chip.event("stops", f"stops: {why}", now, AXIS, ("why", why))
+            chip.event("stops", STOPS(why=why), now, AXIS, ("why", why))
             drive.force_stop(now, FULL_STEP if chip.unit.on(FULLSTEP) else None)
 
     def kill(self, now: Nanos) -> None:

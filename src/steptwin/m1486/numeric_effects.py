@@ -8,6 +8,7 @@ from steptwin.m1486.lines import line_group
 from steptwin.m1486.registers import GENERAL, POSITION_REGISTER
 from steptwin.m1486.unit import FROM_LINES, MASK
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 
 MAKERS = Makers()
 
@@ -53,15 +54,24 @@ def _from_register(chip: CommandHost, number: int, _place: int, following: int) 
     return run
 
 
+NUMBER_NAMES_NO_LINES = Message(
+    "m1486.number-names-no-lines",
+    "{number} names no lines, and function 46 is ON: first line and count, such as 14, up to line 21",
+)
+NO_OPERAND_REGISTER = Message(
+    "m1486.no-operand-register", "{number} is not an operand register, and function 58 is ON: permitted are 1 to 8"
+)
+
+
 def _indirect(chip: CommandHost, number: int, now: Nanos, *, low_byte: bool) -> int:
     """The operand if functions 46 and 58 turn its number into lines or a register."""
     if chip.unit.operand_source == FROM_LINES:
         lines = line_group(number)
         if lines is None:
-            raise WrongData(f"{number} names no lines, and function 46 is ON: first line and count, such as 14, up to line 21")
+            raise WrongData(NUMBER_NAMES_NO_LINES(number=number))
         return chip.read(lines, now)
     if number not in GENERAL:
-        raise WrongData(f"{number} is not an operand register, and function 58 is ON: permitted are 1 to 8")
+        raise WrongData(NO_OPERAND_REGISTER(number=number))
     value = chip.memory.register(number)
     return value & 0xFF if low_byte else value
 
@@ -106,6 +116,12 @@ def _multiply(chip: CommandHost, number: int, _place: int, following: int) -> Ef
     return run
 
 
+DIVISION_BY_ZERO = Message("m1486.division-by-zero", "division by 0")
+DIVIDEND_IS_TOO_LARGE = Message(
+    "m1486.dividend-is-too-large", "{variable} / {operand}: at most {most} can be divided, except by 2, 4, 8, 16, 32, 64"
+)
+
+
 @MAKERS.does("Divide", computes=True)
 def _divide(chip: CommandHost, number: int, _place: int, following: int) -> Effect:
     unit = chip.unit
@@ -113,11 +129,9 @@ def _divide(chip: CommandHost, number: int, _place: int, following: int) -> Effe
     def run(now: Nanos) -> int:
         operand = _indirect(chip, number, now, low_byte=True) if unit.operand_source else number
         if operand == 0:
-            raise WrongData("division by 0")
+            raise WrongData(DIVISION_BY_ZERO())
         if unit.variable > DIVIDEND_LIMIT and operand not in FREE_DIVISORS:
-            raise WrongData(
-                f"{unit.variable} / {operand}: at most {DIVIDEND_LIMIT} can be divided, except by 2, 4, 8, 16, 32, 64"
-            )
+            raise WrongData(DIVIDEND_IS_TOO_LARGE(variable=unit.variable, operand=operand, most=DIVIDEND_LIMIT))
         unit.variable, remainder = divmod(unit.variable, operand)
         unit.remainder = remainder & 0xFF
         return following

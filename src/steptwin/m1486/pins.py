@@ -12,6 +12,7 @@ from steptwin.errors import Misuse
 from steptwin.m1486.lines import DUAL_DAC, LINES, RUNSIGN_LINE, SEEK_ENDS_LOW, STEP_DIRECTION, TWO_DACS, Interface
 from steptwin.m1486.variants import Variant
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.state import Stateful
 
 LINE_PINS = {f"B{line}": line for line in LINES}
@@ -126,35 +127,49 @@ def seek_ends(line: int, level: int) -> bool:
     return level == (0 if line in SEEK_ENDS_LOW else 1)
 
 
+ALIAS = Message("m1486.alias-of-a-pin", "{name} is {line}")
+UNKNOWN_INPUT_PIN = Message("m1486.unknown-input-pin", "no input pin {pin!r}: inputs are B1 to B21, {names}; {aliases}")
+
+
 def known_pin(pin: str) -> str:
     """The pin a name means, in either case and by its second name too. Raises `Misuse` with the inputs there are."""
     name = pin.strip().upper()
     name = ALIASES.get(name, name)
     if name not in LINE_PINS and name not in CONTROL_PINS:
         raise Misuse(
-            f"no input pin {pin!r}: inputs are B1 to B21, {', '.join(CONTROL_PINS)}; "
-            f"{', '.join(f'{other} is {line}' for other, line in ALIASES.items())}"
+            UNKNOWN_INPUT_PIN(
+                pin=pin, names=list(CONTROL_PINS), aliases=[ALIAS(name=other, line=line) for other, line in ALIASES.items()]
+            )
         )
     return name
+
+
+DIGITAL_INPUT_VALUE = Message("m1486.digital-input-value", "{name} = {value:g}: a digital input is 0 or 1")
 
 
 def settable_pin(pin: str, value: float) -> str:
     """The pin a name means, as `known_pin`. Raises `Misuse` unless it can take ``value``."""
     name = known_pin(pin)
     if value not in (0.0, 1.0):
-        raise Misuse(f"{name} = {value:g}: a digital input is 0 or 1")
+        raise Misuse(DIGITAL_INPUT_VALUE(name=name, value=value))
     return name
+
+
+PIN_IS_TAKEN = Message("m1486.pin-is-taken", "{pin} is taken: the {interface} interface has B{first} to B{last}")
 
 
 def refuse_taken(pin: str, interface: Interface) -> None:
     """`Misuse` for a line whose pin the driver interface uses: it is neither input nor output (M-21)."""
     taken = interface.occupied
     if LINE_PINS.get(pin) in taken:
-        raise Misuse(f"{pin} is taken: the {interface.title} interface has B{taken[0]} to B{taken[-1]}")
+        raise Misuse(PIN_IS_TAKEN(pin=pin, interface=interface.title, first=taken[0], last=taken[-1]))
 
 
 def _number(bits: list[int]) -> int:
     return sum(bit << n for n, bit in enumerate(bits))
+
+
+WRONG_BAUD_RATE = Message("m1486.wrong-baud-rate", "{baud} bit/s: {title} has {rates}")
 
 
 def baud_pins(variant: Variant, baud: int | None) -> int:
@@ -163,5 +178,5 @@ def baud_pins(variant: Variant, baud: int | None) -> int:
     if baud is None:
         return len(rates) - 1
     if baud not in rates:
-        raise Misuse(f"{baud} bit/s: {variant.title} has {', '.join(map(str, rates))}")
+        raise Misuse(WRONG_BAUD_RATE(baud=baud, title=variant.title, rates=list(rates)))
     return rates.index(baud)

@@ -15,6 +15,7 @@ from steptwin.m1486.effects import CommandHost, Effect, WrongData
 from steptwin.m1486.encoding import LONGEST, decode
 from steptwin.m1486.execute import compile_command
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.messages import Message, text_of
 from steptwin.state import Plain, Stateful
 from steptwin.statements import HookedStatements, StatementHook, StatementHooks, hook_before, without
 
@@ -186,7 +187,7 @@ class ProgramExecution(Stateful):
             self.pc = self._compiled[place].following
             self._pass(now, done + 1)
             now += done * statement
-            self._chip.wrong_data(str(wrong), now)
+            self._chip.wrong_data(text_of(wrong), now)
             return now
         self.pc = place
         self._pass(now, done)
@@ -219,7 +220,7 @@ class ProgramExecution(Stateful):
         try:
             self.pc = compiled.effect(now)
         except WrongData as wrong:
-            self._chip.wrong_data(str(wrong), now)
+            self._chip.wrong_data(text_of(wrong), now)
 
     def _compile(self, place: int) -> _Compiled:
         chip = self._chip
@@ -288,5 +289,8 @@ class ProgramExecution(Stateful):
         self._forget_code()
 
 
+BYTES_ARE_NO_COMMAND = Message("m1486.bytes-are-no-command", "these bytes of the command memory are no command")
+
+
 def _no_command(now: Nanos) -> NoReturn:
-    raise WrongData("these bytes of the command memory are no command")
+    raise WrongData(BYTES_ARE_NO_COMMAND())

@@ -20,6 +20,7 @@ from steptwin.m1486.syntax import ChipCommand, parse_line
 from steptwin.m1486.unit import NumericUnit
 from steptwin.m1486.variants import Store, Variant
 from steptwin.machine import Fact, Nanos
+from steptwin.messages import Message, text_of
 from steptwin.state import Stateful
 
 CR = 0x0D
@@ -69,6 +70,14 @@ class ReceiverHost(Protocol):
     def clear_kill(self, now: Nanos) -> None: ...
     def close_file(self, now: Nanos) -> None: ...
     def software_reset(self, now: Nanos) -> None: ...
+
+
+LINE_IS_TOO_LONG = Message("m1486.line-is-too-long", "a line longer than the input buffer")
+KILL_TAKES_NO_NUMBER = Message("m1486.kill-takes-no-number", "{line}: K takes no number")
+WRONG_ADDRESS_OF_A_CHIP = Message(
+    "m1486.wrong-address-of-a-chip", "X{argument} names no chip: permitted are {permitted}, or G for all"
+)
+FILE_IS_TOO_LARGE = Message("m1486.file-is-too-large", "the file is larger than the command memory of {bits} bits")
 
 
 class Receiver(Stateful):
@@ -197,7 +206,7 @@ class Receiver(Stateful):
             # No command is as long as the buffer; its end would never come.
             self._buffer.clear()
             self._skips_line = True
-            self._chip.wrong_data_received("a line longer than the input buffer", now)
+            self._chip.wrong_data_received(LINE_IS_TOO_LONG(), now)
 
     def _end_of_line(self, now: Nanos) -> None:
         seen, stored, skipped = self._seen, self._seen_stored, self._skips_line
@@ -244,7 +253,7 @@ class Receiver(Stateful):
             if line == "K":
                 self._chip.kill(now)
             else:
-                self._chip.wrong_data_received(f"{line}: K takes no number", now)
+                self._chip.wrong_data_received(KILL_TAKES_NO_NUMBER(line=line), now)
 
     def _select(self, argument: str, now: Nanos) -> None:
         """X: only the chip with this address receives from now on."""
@@ -255,7 +264,7 @@ class Receiver(Stateful):
             self.is_listening = int(argument, 16) == chip.address
         elif self.is_listening:
             chip.wrong_data_received(
-                f"X{argument} names no chip: permitted are {permitted_text('X', chip.variant)}, or G for all",
+                WRONG_ADDRESS_OF_A_CHIP(argument=argument, permitted=text_of(permitted_text("X", chip.variant))),
                 now,
             )
 
@@ -336,7 +345,7 @@ class Receiver(Stateful):
             memory.refuse_file()
             chip.send(NO_ROOM, now)
             bits = chip.variant.memory_bits
-            chip.event("file-refused", f"the file is larger than the command memory of {bits} bits", now, ("memory", bits))
+            chip.event("file-refused", FILE_IS_TOO_LARGE(bits=bits), now, ("memory", bits))
             return
         memory.store(raw)
         if chip.variant.store is Store.EEPROM:
@@ -358,12 +367,16 @@ class Receiver(Stateful):
         self.compress(now)
 
 
+NO_COMMAND = Message("m1486.empty-command", "no command")
+WRONG_LINE = Message("m1486.wrong-line", "{text}: {problem}")
+
+
 @lru_cache(_LINES_KEPT)
 def _read(text: str, variant: Variant) -> ChipCommand | str:
     """The command of a line, or a description of its error."""
     line, found = parse_line(text)
     command = line.command
     if command is None:
-        return f"{text}: {found[0].message if found else 'no command'}"
+        return WRONG_LINE(text=text, problem=text_of(found[0].message) if found else NO_COMMAND())
     # Where in the line it stood is not part of a command that may be kept.
     return out_of_range(command, variant) or ChipCommand(command.key, command.argument)

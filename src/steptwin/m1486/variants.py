@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.messages import Message
 
 
 class Store(enum.Enum):
@@ -82,10 +83,13 @@ DEFAULT = _A
 """The manual speaks of this one wherever it names no other (chapter X)."""
 
 
+UNKNOWN_VARIANT = Message("m1486.unknown-variant", "no M1486 variant is called {name!r}; there are {names}")
+
+
 def variant(name: str) -> Variant:
     """The member called ``name``: ``E1``, ``a2x``, ``M1486B``. Raises `Misuse` with the names there are."""
     wanted = name.strip().upper().removeprefix("M1486")
     for v in VARIANTS:
         if v.name.upper() == wanted:
             return v
-    raise Misuse(f"no M1486 variant is called {name!r}; there are {', '.join(v.name for v in VARIANTS)}")
+    raise Misuse(UNKNOWN_VARIANT(name=name, names=[v.name for v in VARIANTS]))

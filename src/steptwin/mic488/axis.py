@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.mic488.config import NO_INPUT, AxisConfig
 from steptwin.mic488.encoder import Coupling, Encoder
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN, wrapped_dint
@@ -58,6 +59,18 @@ class AxisHost(Protocol):
     def position_error(self, axis: int, now: Nanos) -> None:
         """``axis`` gave up correcting its position (status 5)."""
         ...
+
+
+IS_NOT_ENABLED = Message("mic488.is-not-enabled", "{what} ignored: M{axis} is not enabled")
+CANNOT_BRAKE = Message("mic488.cannot-brake", "M{axis} cannot brake before its soft limit")
+VELOCITY_IS_CLAMPED = Message(
+    "mic488.velocity-is-clamped", "M{axis}: {velocity:g} imp/s is more than the outputs give, {most:g} imp/s"
+)
+STOPPED_BY_LIMIT = Message("mic488.stopped-by-limit", "M{axis} stopped by {limit}")
+IS_HOMED = Message("mic488.is-homed", "M{axis} is at its home position")
+POSITION_COMMAND = Message("mic488.position-command", "position command")
+VELOCITY_COMMAND = Message("mic488.velocity-command", "velocity command")
+HOMING = Message("mic488.homing", "homing")
 
 
 class Axis(Stateful):
@@ -285,10 +298,10 @@ class Axis(Stateful):
         self._forget()
         self._steer(AxisStatus.VELOCITY, now)
 
-    def ready(self, what: str, now: Nanos) -> bool:
+    def ready(self, what: Message, now: Nanos) -> bool:
         """Whether motion commands are executed: with EN off they are accepted and do nothing (MIC-8)."""
         if not self.can_move:
-            self.host.axis_event(self.number, "drive-off", f"{what} ignored: M{self.number} is not enabled", now)
+            self.host.axis_event(self.number, "drive-off", IS_NOT_ENABLED(what=what(), axis=self.number), now)
             return False
         if self.status is AxisStatus.OFF:
             self.control.reference(self, now)
@@ -298,12 +311,12 @@ class Axis(Stateful):
 
     def move_to(self, coordinate_p: int, now: Nanos) -> None:
         """Position mode to ``coordinate_p``: ACC up, DEC down, VMAX cruise; stops on a soft limit (MIC-12)."""
-        if self.ready("position command", now):
+        if self.ready(POSITION_COMMAND, now):
             state = self.state(now)
             self._move(state, coordinate_p - self.offset_p)
 
     def move_by(self, distance_p: int, now: Nanos) -> None:
-        if self.ready("position command", now):
+        if self.ready(POSITION_COMMAND, now):
             state = self.state(now)
             self._move(state, state.count + distance_p)
 
@@ -318,7 +331,7 @@ class Axis(Stateful):
 
     def move_velocity(self, velocity_p: float, now: Nanos) -> None:
         """Velocity mode: ACC for speeding up and slowing down; ramped to 0 it ends with status 1 (MIC-11)."""
-        if not self.ready("velocity command", now):
+        if not self.ready(VELOCITY_COMMAND, now):
             return
         self._forget()
         self.run(self._clamped(velocity_p, now), AxisStatus.VELOCITY, now)
@@ -341,7 +354,7 @@ class Axis(Stateful):
         A velocity of 0 chooses no switch and does nothing (MIC-41).
         """
         velocity_p = self._clamped(velocity_p, now)
-        if velocity_p != 0.0 and self.ready("homing", now):
+        if velocity_p != 0.0 and self.ready(HOMING, now):
             self._forget()
             self.homing.start(self, velocity_p, now)
 
@@ -490,7 +503,7 @@ class Axis(Stateful):
 
     def overruns(self, now: Nanos) -> None:
         """Report that the axis cannot brake before its soft limit."""
-        self.host.axis_event(self.number, "overrun", f"M{self.number} cannot brake before its soft limit", now)
+        self.host.axis_event(self.number, "overrun", CANNOT_BRAKE(axis=self.number), now)
 
     def edge(self, direction: int) -> int | None:
         """Soft limit in ``direction`` as motor position; None where nothing limits (MIC-12) or homing ignores it (MIC-30)."""
@@ -522,7 +535,7 @@ class Axis(Stateful):
     def _clamped(self, velocity_p: float, now: Nanos) -> float:
         if abs(velocity_p) <= MAX_SPEED_P:
             return velocity_p if abs(velocity_p) >= LEAST else 0.0
-        text = f"M{self.number}: {velocity_p:g} imp/s is more than the outputs give, {MAX_SPEED_P:g} imp/s"
+        text = VELOCITY_IS_CLAMPED(axis=self.number, velocity=velocity_p, most=MAX_SPEED_P)
         self.host.axis_event(self.number, "speed-clamped", text, now)
         return MAX_SPEED_P if velocity_p > 0.0 else -MAX_SPEED_P
 
@@ -559,7 +572,7 @@ class Axis(Stateful):
     def _limit_stop(self, now: Nanos, direction: int) -> None:
         """A KL/KR switch stops at once (MIC-12)."""
         self._rest(now, LIMIT[direction])
-        self.host.axis_event(self.number, "limit", f"M{self.number} stopped by {'KR' if direction > 0 else 'KL'}", now)
+        self.host.axis_event(self.number, "limit", STOPPED_BY_LIMIT(axis=self.number, limit="KR" if direction > 0 else "KL"), now)
 
     def input_active(self, number: int) -> bool:
         """State of input ``number`` (from 0) after polarity, before the filter (MIC-30)."""
@@ -590,7 +603,7 @@ class Axis(Stateful):
         if self.homing.to_index:
             self.encoder.set_counter(self.config.enc_offset, self.shaft(now))
         self.control.reference(self, now)
-        self.host.axis_event(self.number, "homed", f"M{self.number} is at its home position", now)
+        self.host.axis_event(self.number, "homed", IS_HOMED(axis=self.number), now)
 
     # ------------------------------------------------------------------ position control
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.core import CoilAction, ControllerCore, RegisterAction
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN, wrapped_dint
@@ -178,6 +179,9 @@ MOTIONS: Mapping[str, AxisAction] = complete(
 )
 
 
+TRIGGER_WITHOUT_VALUE = Message("mic488.trigger-without-value", "trigger of M{axis} without a new value of {register}")
+
+
 def _trigger(key: str, move: AxisAction) -> DeviceBehaviour:
     def trigger(device: ControllerCore, value: float, now: Nanos) -> None:
         """MIC-16: starts the chosen axes that have a stored value, and uses it up, unless values are kept."""
@@ -187,7 +191,7 @@ def _trigger(key: str, move: AxisAction) -> DeviceBehaviour:
         for axis in _axes_chosen(device, value):
             stored = axis.pending.get(key) if device.config.trigger_keeps else axis.pending.pop(key, None)
             if stored is None:
-                text = f"trigger of M{axis.number} without a new value of {key}"
+                text = TRIGGER_WITHOUT_VALUE(axis=axis.number, register=key)
                 device.axis_event(axis.number, "trigger-empty", text, now)
             else:
                 move(axis, stored, now)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from steptwin.configuration import ConfigurationKey, Form, Section
 from steptwin.datasheet import Limits
 from steptwin.errors import Misuse
+from steptwin.messages import Message
 from steptwin.mic488.config import (
     ADDRESS_KEY,
     AXIS_KEYS,
@@ -108,6 +109,9 @@ def known_settings(
     return found
 
 
+NO_SETTING = Message("mic488.no-setting", "no setting {place!r}{hint}: settings are SECTION.KEY, such as Axis0.Gear")
+
+
 def with_values(text: str, name: str, changes: Mapping[str, str]) -> str:
     """The text in which ``Axis0.Acc`` and so on have other values; everything else stays as it is. Raises `Misuse` for keys that
     are not there, and for values that a file cannot hold."""
@@ -115,7 +119,7 @@ def with_values(text: str, name: str, changes: Mapping[str, str]) -> str:
     known = {f"{section}.{key.name}": (section, key.name) for section in sections_of() for key in keys_of(section)}
     for place, value in changes.items():
         if place not in known:
-            raise Misuse(f"no setting {place!r}{NearMiss().hint(place, known)}: settings are SECTION.KEY, such as Axis0.Gear")
+            raise Misuse(NO_SETTING(place=place, hint=NearMiss().hint(place, known)))
         file = file.with_value(*known[place], value)
     return file.source.text
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse, Runaway, TimeReversal
 from steptwin.machine import Fact, Nanos, PinEdge
+from steptwin.messages import Message
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.config import ANALOG_INPUTS, ControllerConfig
 from steptwin.mic488.encoder import Coupling, ShaftMotion
@@ -59,28 +60,50 @@ OUTPUT_PINS = tuple(f"OUT{n + 1}" for n in range(OUTPUTS))
 ENABLE_PINS = tuple(f"M{n + 1}_EN" for n in range(AXES))
 
 
+DIGITAL_INPUT_VALUE = Message("mic488.digital-input-value", "{name} = {value:g}: a digital input is 0 or 1")
+ANALOG_INPUT_VALUE = Message("mic488.analog-input-value", "{name} = {value:g} V: an analog input takes 0 to 10 V")
+UNKNOWN_INPUT_PIN = Message(
+    "mic488.unknown-input-pin", "no input pin {pin!r}: inputs are IN1 to IN{inputs} and AIN1 to AIN{analog}"
+)
+
+
 def check_pin(pin: str, value: float) -> None:
     """`Misuse` unless ``pin`` is an input that can take ``value``."""
     name = pin.upper()
     if name in INPUT_PINS:
         if value not in (0.0, 1.0):
-            raise Misuse(f"{name} = {value:g}: a digital input is 0 or 1")
+            raise Misuse(DIGITAL_INPUT_VALUE(name=name, value=value))
     elif name in ANALOG_PINS:
         if not 0.0 <= value <= 10.0:
-            raise Misuse(f"{name} = {value:g} V: an analog input takes 0 to 10 V")
+            raise Misuse(ANALOG_INPUT_VALUE(name=name, value=value))
     else:
-        raise Misuse(f"no input pin {pin!r}: inputs are IN1 to IN{INPUTS} and AIN1 to AIN{ANALOG_INPUTS}")
+        raise Misuse(UNKNOWN_INPUT_PIN(pin=pin, inputs=INPUTS, analog=ANALOG_INPUTS))
+
+
+UNKNOWN_AXIS = Message("mic488.unknown-axis", "no axis M{axis}: axes are M1 to M{most}")
+TOO_MANY_COUNTS = Message("mic488.too-many-counts", "M{axis}: {counts} encoder counts at once: permitted {least}…{most}")
 
 
 def check_turn(axis: int, counts: int) -> None:
     """`Misuse` unless there is such an axis, whose encoder can be turned by ``counts`` at once."""
     if not 1 <= axis <= AXES:
-        raise Misuse(f"no axis M{axis}: axes are M1 to M{AXES}")
+        raise Misuse(UNKNOWN_AXIS(axis=axis, most=AXES))
     if not DINT_MIN <= counts <= DINT_MAX:
-        raise Misuse(f"M{axis}: {counts} encoder counts at once: permitted {DINT_MIN}…{DINT_MAX}")
+        raise Misuse(TOO_MANY_COUNTS(axis=axis, counts=counts, least=DINT_MIN, most=DINT_MAX))
 
 
 NO_BANKS: Mapping[int, Any] = MappingProxyType({})
+
+
+POWER_ON = Message("mic488.power-on", "power-on")
+TOO_MANY_EVENTS = Message("mic488.too-many-events", "more than {most} events of one MIC488 at {at} ns")
+WRONG_COUNT_RATIO = Message(
+    "mic488.wrong-count-ratio", "M{axis}: {counts} encoder counts per {pulses} pulses: counts must not be 0, pulses 1 or more"
+)
+POSITION_NOT_REACHED = Message("mic488.position-not-reached", "M{axis} did not reach its position")
+STORED_REGISTERS_OF_OTHER_SIZE = Message(
+    "mic488.stored-registers-of-other-size", "the stored user registers of firmware {firmware} take {size} bytes, not {found}"
+)
 
 
 class ControllerCore(Stateful):
@@ -173,7 +196,7 @@ class ControllerCore(Stateful):
             axis.disable(now)
             axis.power_on(now)
         self.inputs.power_on()
-        self.event("power-on", "power-on", now)
+        self.event("power-on", POWER_ON(), now)
         self._power_on()
 
     def power_off(self, now: Nanos) -> None:
@@ -229,7 +252,7 @@ class ControllerCore(Stateful):
             self._plan_ahead(others, lamp=acted_at is not None or happened)
             if self._due is None or self._due > at:
                 return
-        raise Runaway(f"more than {MAX_EVENTS_PER_INSTANT} events of one MIC488 at {at} ns")
+        raise Runaway(TOO_MANY_EVENTS(most=MAX_EVENTS_PER_INSTANT, at=at))
 
     def _run_others(self, at: Nanos) -> None:
         """Inputs, then axes; then the program is notified, before its statement of this moment."""
@@ -397,7 +420,7 @@ class ControllerCore(Stateful):
     def gear_encoder(self, axis: int, counts: int, pulses: int, now: Nanos) -> None:
         """Set ``counts`` of the encoder of ``axis`` (from 1) per ``pulses`` of the drive, instead of the configured ones."""
         if counts == 0 or pulses < 1:
-            raise Misuse(f"M{axis}: {counts} encoder counts per {pulses} pulses: counts must not be 0, pulses 1 or more")
+            raise Misuse(WRONG_COUNT_RATIO(axis=axis, counts=counts, pulses=pulses))
         chosen = self._axis(axis)
         self.advance(now)
         chosen.encoder.gear(counts, pulses, chosen.profile.count(now), now)
@@ -405,7 +428,7 @@ class ControllerCore(Stateful):
 
     def _axis(self, number: int) -> Axis:
         if not 1 <= number <= AXES:
-            raise Misuse(f"no axis M{number}: axes are M1 to M{AXES}")
+            raise Misuse(UNKNOWN_AXIS(axis=number, most=AXES))
         return self.axes[number - 1]
 
     # ------------------------------------------------------------------ what axes ask of their controller
@@ -431,7 +454,7 @@ class ControllerCore(Stateful):
         keep_within_limits(self.axes[:2], now)
 
     def position_error(self, axis: int, now: Nanos) -> None:
-        self.axis_event(axis, "position-error", f"M{axis} did not reach its position", now)
+        self.axis_event(axis, "position-error", POSITION_NOT_REACHED(axis=axis), now)
         reaction = self.config.axes[axis - 1].err_ctrl_mode
         if reaction in (PositionControl.REACTION_PROGRAM, PositionControl.REACTION_OUT8):
             self.program.interrupt_by_position_error(now)
@@ -461,9 +484,7 @@ class ControllerCore(Stateful):
         if memory is None:
             return bytes(2 * len(stored))
         if len(memory) != 2 * len(stored):
-            raise Misuse(
-                f"the stored user registers of firmware {self.firmware.name} take {2 * len(stored)} bytes, not {len(memory)}"
-            )
+            raise Misuse(STORED_REGISTERS_OF_OTHER_SIZE(firmware=self.firmware.name, size=2 * len(stored), found=len(memory)))
         return bytes(memory)
 
     def _stored(self) -> slice:

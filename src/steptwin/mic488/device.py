@@ -9,6 +9,7 @@ from typing import Protocol
 
 from steptwin.errors import Misuse
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.messages import Message
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.core import NO_BANKS, ControllerCore
 from steptwin.mic488.program_banks import BankContents, LoadedProgram
@@ -30,11 +31,17 @@ class ControllerSnapshot:
     banks: BankContents
 
 
+PAUSE_INSIDE_A_REQUEST = Message(
+    "mic488.pause-inside-a-request",
+    "a request had a pause of {pause:.1f} ms inside: the controller drops a frame at 0.75 ms (MIC-15)",
+)
+
+
 def pause_observer(devices: Mapping[int, Mic488Device]) -> Callable[[int, Nanos], None]:
     """For ports that serve ``devices``: an event for a request with a pause inside (unit, 0 for all; pause in ns), see MIC-15."""
 
     def observe(unit: int, pause: Nanos) -> None:
-        text = f"a request had a pause of {pause / MILLISECOND:.1f} ms inside: the controller drops a frame at 0.75 ms (MIC-15)"
+        text = PAUSE_INSIDE_A_REQUEST(pause=pause / MILLISECOND)
         for device in devices.values() if unit == 0 else (devices[unit],):
             device.event("frame-pause", text, device.now)
 
@@ -45,6 +52,15 @@ class Serving(Protocol):
     """Serves the requests of a controller: its `Slave`, or a wrapper of that."""
 
     def answer(self, device: ControllerCore, pdu: bytes) -> bytes: ...
+
+
+REQUEST_FAILED = Message("mic488.request-failed", "request {request} failed, please report it: {what}")
+SNAPSHOT_OF_OTHER_FIRMWARE = Message(
+    "mic488.snapshot-of-other-firmware", "the snapshot is of firmware {firmware}, this controller has {own}"
+)
+SNAPSHOT_OF_OTHER_CONFIGURATION = Message(
+    "mic488.snapshot-of-other-configuration", "the snapshot is of a controller with another configuration"
+)
 
 
 class Mic488Device(ControllerCore):
@@ -89,7 +105,7 @@ class Mic488Device(ControllerCore):
         except Exception as error:  # noqa: BLE001 - a master waits for an answer
             at = traceback.extract_tb(error.__traceback__)[-1]
             what = f"{type(error).__name__}: {error} ({at.filename}:{at.lineno})"
-            self.event("internal-error", f"request {pdu.hex(' ')} failed, please report it: {what}", now)
+            self.event("internal-error", REQUEST_FAILED(request=pdu.hex(" "), what=what), now)
             self._settle()
             return exception_pdu(pdu[0] if pdu else 0, DEVICE_FAILURE)
 
@@ -103,9 +119,9 @@ class Mic488Device(ControllerCore):
         """Take the state of a snapshot, its moment and the contents of its banks too. `Misuse` when it is of another
         configuration or firmware."""
         if snapshot.firmware != self.firmware.name:
-            raise Misuse(f"the snapshot is of firmware {snapshot.firmware}, this controller has {self.firmware.name}")
+            raise Misuse(SNAPSHOT_OF_OTHER_FIRMWARE(firmware=snapshot.firmware, own=self.firmware.name))
         if snapshot.config != self.config:
-            raise Misuse("the snapshot is of a controller with another configuration")
+            raise Misuse(SNAPSHOT_OF_OTHER_CONFIGURATION())
         self.program.banks.restore(snapshot.banks)
         self.set_state(snapshot.state)
         self.changed()

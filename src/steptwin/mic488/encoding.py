@@ -11,6 +11,7 @@ from array import array
 from itertools import count
 
 from steptwin.errors import Misuse
+from steptwin.messages import Message
 
 DINT_MIN = -(2**31)
 DINT_MAX = 2**31 - 1
@@ -34,10 +35,13 @@ def swap_bytes(block: bytes | bytearray) -> bytes:
     return words.tobytes()
 
 
+NO_DINT = Message("mic488.no-dint", "{value} does not fit a DINT: permitted {least}…{most}")
+
+
 def dint_to_words(value: int) -> tuple[int, int]:
     """Low and high word of a DINT. Raises `Misuse` outside −2³¹…2³¹−1."""
     if not DINT_MIN <= value <= DINT_MAX:
-        raise Misuse(f"{value} does not fit a DINT: permitted {DINT_MIN}…{DINT_MAX}")
+        raise Misuse(NO_DINT(value=value, least=DINT_MIN, most=DINT_MAX))
     return _WORDS.unpack(_DINT.pack(value))
 
 
@@ -46,12 +50,15 @@ def words_to_dint(low: int, high: int) -> int:
     return _DINT.unpack(_WORDS.pack(low, high))[0]
 
 
+NO_REAL = Message("mic488.no-real", "{value:g} does not fit a REAL: permitted −{most:.5g}…{most:.5g}")
+
+
 def real_to_words(value: float) -> tuple[int, int]:
     """Low and high word of the nearest REAL. Raises `Misuse` for a finite number beyond ±3.4028e38; NaN, infinity pass."""
     try:
         return _WORDS.unpack(_REAL.pack(value))
     except OverflowError:
-        raise Misuse(f"{value:g} does not fit a REAL: permitted −{REAL_MAX:.5g}…{REAL_MAX:.5g}") from None
+        raise Misuse(NO_REAL(value=value, most=REAL_MAX)) from None
 
 
 def words_to_real(low: int, high: int) -> float:
@@ -69,20 +76,26 @@ def wrapped_dint(value: int) -> int:
     return (value - DINT_MIN) % 2**32 + DINT_MIN
 
 
+NAN_IS_NO_DINT = Message("mic488.nan-is-no-dint", "NaN is no DINT")
+
+
 def saturated_dint(value: float) -> int:
     """The nearest DINT within its range, which a register shows when its quantity is beyond it. Ties go to even.
 
     Raises `Misuse` for NaN.
     """
     if math.isnan(value):
-        raise Misuse("NaN is no DINT")
+        raise Misuse(NAN_IS_NO_DINT())
     return round(min(max(value, DINT_MIN), DINT_MAX))
+
+
+NAN_IS_NO_REAL = Message("mic488.nan-is-no-real", "NaN is no REAL of this device")
 
 
 def saturated_real(value: float) -> float:
     """``value`` limited to what a REAL can hold, so that it can always be packed. Raises `Misuse` for NaN."""
     if math.isnan(value):
-        raise Misuse("NaN is no REAL of this device")
+        raise Misuse(NAN_IS_NO_REAL())
     return min(max(value, -REAL_MAX), REAL_MAX)
 
 

@@ -13,6 +13,7 @@ from functools import cached_property
 
 from steptwin.diagnostics import Diagnostic, Fix, Severity, SourceText, Span, in_order
 from steptwin.errors import Misuse
+from steptwin.messages import Message
 
 _LINE = re.compile(r"([^\r\n]*)(\r\n|\r|\n|\Z)")
 _TRAILING_COMMENT = re.compile(r"\s[;#]")
@@ -38,6 +39,14 @@ class Header:
 
     section: str
     span: Span
+
+
+WOULD_NOT_READ_BACK = Message(
+    "mic488.would-not-read-back", "[{section}] {key} = {value!r} cannot be written to {name}: it would not read back"
+)
+NOT_IN_THE_ENCODING = Message(
+    "mic488.not-in-the-encoding", "[{section}] {key}: {value!r} has characters that {name} cannot hold: {problem}"
+)
 
 
 @dataclass(frozen=True)
@@ -108,11 +117,13 @@ class IniFile:
         changed = _read(SourceText(self.source.name, text[:start] + inserted + text[end:]), self.encoding)
         wanted = self._values() | {(section.lower(), key.lower()): value}
         if changed._values() != wanted or len(changed.findings) != len(self.findings):
-            raise Misuse(f"[{section}] {key} = {value!r} cannot be written to {self.source.name}: it would not read back")
+            raise Misuse(WOULD_NOT_READ_BACK(section=section, key=key, value=value, name=self.source.name))
         try:
             changed.to_bytes()
         except UnicodeEncodeError as error:
-            raise Misuse(f"[{section}] {key}: {value!r} has characters that {self.source.name} cannot hold: {error}") from None
+            raise Misuse(
+                NOT_IN_THE_ENCODING(section=section, key=key, value=value, name=self.source.name, problem=error)
+            ) from None
         return changed
 
     def _values(self) -> dict[tuple[str, str], str]:

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from steptwin.datasheet import Access, Condition, Limits, Point, PointAddress, PointEffect
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.mic488 import registermap
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.behaviour import BEHAVIOUR
@@ -215,6 +216,11 @@ def _short_name(text: str) -> tuple[ShortName, int | None] | None:
     return _OF_AXES.get(name) if of_device is None else (of_device, None)
 
 
+UNKNOWN_ADDRESS_SPACE = Message("mic488.unknown-address-space", "{text!r}: addresses begin with {names}")
+TYPE_IS_FIXED = Message("mic488.type-is-fixed", "{text!r}: {name} is of type {type}; leave out :{format}")
+SECOND_WORD = Message("mic488.second-word", "{text!r}: this is the second word of {name}, which is at {address}")
+
+
 def item_of(registers: RegisterMap, text: str) -> RegisterItem | None:
     """The register or part of one with this name or address; None if there is none. Raises `Misuse` for what is not a whole
     value."""
@@ -228,14 +234,14 @@ def item_of(registers: RegisterMap, text: str) -> RegisterItem | None:
             return None
     space, address = SPACES.get(match["space"].lower()), int(match["address"])
     if space is None:
-        raise Misuse(f"{text!r}: addresses begin with {', '.join(f'{name}:' for name in SPACES)}")
+        raise Misuse(UNKNOWN_ADDRESS_SPACE(text=text, names=[f"{name}:" for name in SPACES]))
     register = registers.at(space, address)
     if register.type is Type.MEMORY:
         return named(registers, f"{register.name}[{address - register.address}]:{match['view'] or UserFormat.WORD.value}")
     if match["view"] is not None:
-        raise Misuse(f"{text!r}: {register.name} is of type {register.type.value}; leave out :{match['view']}")
+        raise Misuse(TYPE_IS_FIXED(text=text, name=register.name, type=register.type.value, format=match["view"]))
     if address != register.address:
-        raise Misuse(f"{text!r}: this is the second word of {register.name}, which is at {register.address}")
+        raise Misuse(SECOND_WORD(text=text, name=register.name, address=register.address))
     return RegisterItem(register)
 
 

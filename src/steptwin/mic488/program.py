@@ -8,6 +8,7 @@ from typing import NamedTuple
 from steptwin.diagnostics import Span
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import NONE, Message, text_of
 from steptwin.mic488 import program_motion as motion
 from steptwin.mic488.program_banks import LoadedProgram, ProgramBanks, row_values
 from steptwin.mic488.program_device import ProgramDevice
@@ -36,6 +37,18 @@ class ProgramError(NamedTuple):
 
     span: Span
     text: str
+
+
+PROGRAM_BANK_IS_IN_USE = Message("mic488.program-bank-is-in-use", "program bank {bank} is in use: stop the program first")
+POSITION_BANK_IS_IN_USE = Message("mic488.position-bank-is-in-use", "position bank {bank} is in use: stop the program first")
+PROGRAM_BANK_IS_EMPTY = Message("mic488.program-bank-is-empty", "program bank {bank} is empty")
+POSITION_BANK_IS_EMPTY = Message("mic488.position-bank-is-empty", "position bank {bank} is empty")
+UNKNOWN_VARIABLE = Message("mic488.unknown-variable", "the program has no variable {name!r}: there are {names}")
+VARIABLE_OUT_OF_RANGE = Message("mic488.variable-out-of-range", "{name} = {value:g}: permitted are {least:g}…{most:g}")
+PATH_IS_LEFT = Message("mic488.path-is-left", "M{axis} slows down: the other axis left their path")
+NO_SUCH_ROW = Message("mic488.no-such-row", "{keyword} {row}: the position table has rows 0…{last}")
+AT_LINE = Message("mic488.at-line", "line {line}: {problem}")
+PULSE_IS_TOO_SHORT = Message("mic488.pulse-is-too-short", "PULSE(OUT{output}, …): permitted are 0.001 s and more")
 
 
 class ProgramControl(Stateful):
@@ -94,13 +107,13 @@ class ProgramControl(Stateful):
     def load_program(self, bank: int, program: LoadedProgram) -> None:
         """Fill a program bank. `Misuse` for a bank that does not exist or whose program is running or paused."""
         if self.runs_program(bank):
-            raise Misuse(f"program bank {bank} is in use: stop the program first")
+            raise Misuse(PROGRAM_BANK_IS_IN_USE(bank=bank))
         self.banks.load_program(bank, program)
 
     def load_positions(self, bank: int, table: PositionTable) -> None:
         """Fill a position bank. `Misuse` for a bank that does not exist or is in use."""
         if self.runs_positions(bank):
-            raise Misuse(f"position bank {bank} is in use: stop the program first")
+            raise Misuse(POSITION_BANK_IS_IN_USE(bank=bank))
         self.banks.load_positions(bank, table)
 
     def runs_program(self, bank: int) -> bool:
@@ -147,10 +160,10 @@ class ProgramControl(Stateful):
         self.error = False
         self.fault = None
         if program is None:
-            self._refuse(f"program bank {self.program_bank} is empty", now)
+            self._refuse(PROGRAM_BANK_IS_EMPTY(bank=self.program_bank), now)
         elif program.uses_positions and (table is None or not table.rows):
             # WBC-25
-            self._refuse(f"position bank {self.position_bank} is empty", now)
+            self._refuse(POSITION_BANK_IS_EMPTY(bank=self.position_bank), now)
         else:
             self._program, self._table = self.program_bank, self.position_bank
             self.state = RUNNING
@@ -219,9 +232,9 @@ class ProgramControl(Stateful):
         """Set a variable of the running or paused program. Raises `Misuse` for another name, and outside the range of REAL."""
         names = () if self.running is None else self.running.variables
         if name not in names:
-            raise Misuse(f"the program has no variable {name!r}: there are {', '.join(names) or 'none'}")
+            raise Misuse(UNKNOWN_VARIABLE(name=name, names=list(names) or NONE()))
         if not -REAL_MAX <= value <= REAL_MAX:
-            raise Misuse(f"{name} = {value:g}: permitted are {-REAL_MAX:g}…{REAL_MAX:g}")
+            raise Misuse(VARIABLE_OUT_OF_RANGE(name=name, value=value, least=-REAL_MAX, most=REAL_MAX))
         self.interpreter.disturb(self.interpreter.after(now))
         self.interpreter.cells[names.index(name)] = value
 
@@ -284,7 +297,7 @@ class ProgramControl(Stateful):
         try:
             interpreter.run(code, due, max(until, now))
         except ProgramFault as fault:
-            self._fail(str(fault))
+            self._fail(text_of(fault))
         if interpreter.acted:
             self._check_drives(interpreter.now, interpreter.after(interpreter.now))
             return interpreter.now
@@ -307,7 +320,7 @@ class ProgramControl(Stateful):
         self.fault = ProgramError(span, text)
         self._stop()
         line, _ = self.banks.programs[self._program].source.position(span.start)
-        self._refuse(f"line {line}: {text}", now)
+        self._refuse(AT_LINE(line=line, problem=text_of(text)), now)
         for axis in self.device.axes:
             axis.brake(now)
 
@@ -332,7 +345,7 @@ class ProgramControl(Stateful):
                 for axis in (x, y):
                     if axis.path is not None:
                         axis.brake(now)
-                        self.device.event("path-left", f"M{axis.number} slows down: the other axis left their path", now)
+                        self.device.event("path-left", PATH_IS_LEFT(axis=axis.number), now)
         if self.state is STOPPED:
             return
         m1, m2, m3, m4 = axes
@@ -386,7 +399,7 @@ class ProgramControl(Stateful):
         table = self.banks.positions.get(self._table)
         rows = () if table is None else table.rows
         if not 0 <= index < len(rows) or index != int(index):
-            raise ProgramFault(f"{keyword} {real_text(index)}: the position table has rows 0…{len(rows) - 1}")
+            raise ProgramFault(NO_SUCH_ROW(keyword=keyword, row=real_text(index), last=len(rows) - 1))
         return self._row(int(index))
 
     def _row(self, index: int) -> tuple[float | None, ...]:
@@ -401,7 +414,7 @@ class ProgramControl(Stateful):
 
     def pulse(self, output: int, duration: Nanos, now: Nanos) -> None:
         if duration <= 0:
-            raise ProgramFault(f"PULSE(OUT{output}, …): permitted are 0.001 s and more")
+            raise ProgramFault(PULSE_IS_TOO_SHORT(output=output))
         self._pulses[output - 1] = now + duration
 
     def set_output(self, number: int, on: bool, now: Nanos) -> bool:

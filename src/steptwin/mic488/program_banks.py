@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
+from steptwin.messages import Message, text_of
 from steptwin.mic488.axis import MAX_SPEED_P
 from steptwin.mic488.config import NO_INPUT, ControllerConfig
 from steptwin.mic488.homing import Homing
@@ -50,6 +51,12 @@ class BankContents(NamedTuple):
     """Bank, text."""
 
 
+NO_SUCH_PROGRAM_BANK = Message("mic488.no-such-program-bank", "program bank {bank}: permitted are 0…{last}")
+NO_SUCH_POSITION_BANK = Message("mic488.no-such-position-bank", "position bank {bank}: permitted are 0…{last}")
+PROGRAM_IS_TOO_LONG = Message("mic488.program-is-too-long", "{name}: {count} executable lines, firmware {firmware} holds {most}")
+TABLE_IS_TOO_LONG = Message("mic488.table-is-too-long", "{count} positions: a bank holds {most}")
+
+
 class ProgramBanks:
     """Programs and position tables of one controller, by bank from 0."""
 
@@ -61,22 +68,28 @@ class ProgramBanks:
 
     def load_program(self, bank: int, program: LoadedProgram) -> None:
         """Fill a program bank. `Misuse` for a bank that does not exist and for more steps than the firmware permits."""
-        self._check("program", bank)
+        self._check(NO_SUCH_PROGRAM_BANK, bank)
         if len(program.steps) > self._dialect.max_steps:
-            lines = f"{len(program.steps)} executable lines"
-            raise Misuse(f"{program.source.name}: {lines}, firmware {self._dialect.firmware} holds {self._dialect.max_steps}")
+            raise Misuse(
+                PROGRAM_IS_TOO_LONG(
+                    name=program.source.name,
+                    count=len(program.steps),
+                    firmware=self._dialect.firmware,
+                    most=self._dialect.max_steps,
+                )
+            )
         self.programs[bank] = program
 
     def load_positions(self, bank: int, table: PositionTable) -> None:
         """Fill a position bank. `Misuse` for a bank that does not exist and for too many rows."""
-        self._check("position", bank)
+        self._check(NO_SUCH_POSITION_BANK, bank)
         if len(table.rows) > self._dialect.max_positions:
-            raise Misuse(f"{len(table.rows)} positions: a bank holds {self._dialect.max_positions}")
+            raise Misuse(TABLE_IS_TOO_LONG(count=len(table.rows), most=self._dialect.max_positions))
         self.positions[bank] = table
 
-    def _check(self, kind: str, bank: int) -> None:
+    def _check(self, wrong: Message, bank: int) -> None:
         if not 0 <= bank < self._count:
-            raise Misuse(f"{kind} bank {bank}: permitted are 0…{self._count - 1}")
+            raise Misuse(wrong(bank=bank, last=self._count - 1))
 
     def contents(self) -> BankContents:
         """The contents of all banks."""
@@ -102,13 +115,17 @@ def row_values(record: bytes) -> tuple[float | None, ...]:
     return tuple(value if mask >> number & 1 and isfinite(value) else None for number, value in enumerate(values))
 
 
+POSITIONS_ARE_UNKNOWN = Message("mic488.positions-are-unknown", "its positions are not known without a table")
+CANNOT_RUN = Message("mic488.cannot-run", "{name} cannot run: {why}")
+
+
 def load(checked: CheckedProgram, name: str = "program") -> LoadedProgram:
     """A program for banks of controllers. `Misuse` when it has errors."""
     executable = checked.executable
     if executable is None:
         errors = checked.errors
-        reason = errors[0].message if errors else "its positions are not known without a table"
-        raise Misuse(f"{name} cannot run: {reason}")
+        reason = errors[0].message if errors else POSITIONS_ARE_UNKNOWN()
+        raise Misuse(CANNOT_RUN(name=name, why=text_of(reason)))
     steps = executable.steps
     code = compile_program(executable, ACCESS)
     source, records = SourceText(name, checked.text), executable.position_records

@@ -10,6 +10,7 @@ from typing import NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message, text_of
 from steptwin.mic488 import path
 from steptwin.mic488.axis import MAX_SPEED_P, SLOWEST_RAMP_P, Axis
 from steptwin.mic488.path import Path
@@ -81,6 +82,10 @@ class ChosenRow(NamedTuple):
     values: RowValues
 
 
+ROW_PROBLEM = Message("mic488.row-problem", "{keyword} {row}: {problem}")
+FIRST_AXES_ARE_NOT_ENABLED = Message("mic488.first-axes-are-not-enabled", "{keyword} ignored: M1 and M2 must be enabled")
+
+
 def row_motion(device: ProgramDevice, row: ChosenRow, lin_acc_u: float | None, now: Nanos) -> bool | None:
     """MOVEPTP, MOVELIN, MOVELIN_REL, MOVETOCIRC, DOCIRC, DOARC. `ProgramFault` when the row does not allow it.
 
@@ -89,19 +94,19 @@ def row_motion(device: ProgramDevice, row: ChosenRow, lin_acc_u: float | None, n
     keyword, index, values = row
     problem = row_problem(keyword, values)
     if problem is not None:
-        raise ProgramFault(f"{keyword} {real_text(index)}: {problem}")
+        raise ProgramFault(ROW_PROBLEM(keyword=keyword, row=real_text(index), problem=text_of(problem)))
     if keyword == "MOVEPTP":
         for axis, value_u in zip(device.axes, values, strict=True):
             if value_u is not None:
                 move(axis, "PABS", value_u, now)
         return None
     if not all(axis.can_move for axis in device.axes[:2]):
-        device.event("drive-off", f"{keyword} ignored: M1 and M2 must be enabled", now)
+        device.event("drive-off", FIRST_AXES_ARE_NOT_ENABLED(keyword=keyword), now)
         return None
     try:
         return _PATHS[keyword](_Plane(device, lin_acc_u, now), values)
     except Misuse as refusal:
-        raise ProgramFault(f"{keyword} {real_text(index)}: {refusal}") from None
+        raise ProgramFault(ROW_PROBLEM(keyword=keyword, row=real_text(index), problem=text_of(refusal))) from None
 
 
 class _Pace(NamedTuple):
@@ -110,6 +115,9 @@ class _Pace(NamedTuple):
     speed_u: float | None
     acc_u: float | None
     steepest: float
+
+
+PATH_VELOCITY_IS_CLAMPED = Message("mic488.path-velocity-is-clamped", "{speed} {unit}/s along the path is above {most:g} imp/s")
 
 
 class _Plane:
@@ -173,7 +181,7 @@ class _Plane:
         first = self.axes[0]
         speed_u = first.vmax_p / first.gear if pace.speed_u is None else pace.speed_u
         if speed_u * pace.steepest > MAX_SPEED_P:
-            text = f"{real_text(speed_u)} {first.config.unit_name}/s along the path is above {MAX_SPEED_P:g} imp/s"
+            text = PATH_VELOCITY_IS_CLAMPED(speed=real_text(speed_u), unit=first.config.unit_name, most=MAX_SPEED_P)
             self.device.event("speed-clamped", text, self.now)
             speed_u = MAX_SPEED_P / pace.steepest
         slowest_u = SLOWEST_RAMP_P / first.gear
@@ -199,13 +207,18 @@ def _to_circle(plane: _Plane, row: RowValues) -> bool:
     return plane.line(plane.motor_p(_circle(row, 0.0).begin, "MOVETOCIRC"), None)
 
 
+CIRCLE_BEGINS_ELSEWHERE = Message(
+    "mic488.circle-begins-elsewhere", "DOCIRC begins at {begin}, but the axes are at {place}: go there with MOVETOCIRC"
+)
+
+
 def _do_circle(plane: _Plane, row: RowValues) -> bool:
     arc = _circle(row, row[3] or 0.0)
     begin_p = plane.motor_p(arc.begin, "DOCIRC")
     if any(abs(begin - count) > 1 for begin, count in zip(begin_p, plane.counts, strict=True)):
         place = "({}, {})".format(*map(real_text, plane.place_u()))
         begin = "({}, {})".format(*map(real_text, arc.begin))
-        raise ProgramFault(f"DOCIRC begins at {begin}, but the axes are at {place}: go there with MOVETOCIRC")
+        raise ProgramFault(CIRCLE_BEGINS_ELSEWHERE(begin=begin, place=place))
     return plane.arc(arc, plane.motor_p(arc.end, "DOCIRC"))
 
 

@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Protocol, TypeAlias
 
 from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.mic488.axis import MAX_SPEED_P, Axis
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.encoder import Coupling
@@ -185,12 +186,15 @@ def _set_drive(axis: Axis, on: float, now: Nanos) -> bool:
     return True
 
 
+VALUE_OUT_OF_RANGE = Message("mic488.value-out-of-range", "{what} = {value} {unit}: permitted are {limits}")
+
+
 def position_p(axis: Axis, value_u: float, what: str) -> int:
     """Pulses of a position or distance (MIC-14). `ProgramFault` beyond what a position register holds."""
     pulses = value_u * axis.gear
     if not DINT_MIN - 0.5 < pulses < DINT_MAX + 0.5:
         limits = f"{DINT_MIN / axis.gear:.12g}…{DINT_MAX / axis.gear:.12g} {axis.config.unit_name}"
-        raise ProgramFault(f"{what} = {real_text(value_u)} {axis.config.unit_name}: permitted are {limits}")
+        raise ProgramFault(VALUE_OUT_OF_RANGE(what=what, value=real_text(value_u), unit=axis.config.unit_name, limits=limits))
     return round(pulses)
 
 

@@ -15,6 +15,7 @@ from types import MappingProxyType
 from typing import NamedTuple, Self
 
 from steptwin.errors import Misuse
+from steptwin.messages import Message
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN, WORD_MAX
 from steptwin.mic488.ranges import FINITE, ValueRange
 from steptwin.nearmiss import alike
@@ -268,6 +269,14 @@ def show_address(address: int) -> str:
     return f"{address} ({'-' if address < 0 else ''}0x{abs(address):04X})"
 
 
+NEAR_NAMES = Message("mic488.near-names", "; did you mean {names}?")
+WITH_NUMBER = Message("mic488.with-number", " with number {index}")
+REGISTER_AT = Message("mic488.register-at", "{name} at {place}")
+UNKNOWN_REGISTER = Message("mic488.unknown-register", "firmware {firmware} has no register named {name!r}{hint}")
+UNKNOWN_KEY = Message("mic488.unknown-key", "firmware {firmware} has no register with key {key!r}{number}")
+NO_REGISTER_HERE = Message("mic488.no-register-here", "firmware {firmware} has no {space} at {address}; nearest: {near}")
+
+
 class RegisterMap:
     """The registers of one firmware, ordered by space and address. Checked when built, then frozen.
 
@@ -327,15 +336,15 @@ class RegisterMap:
         if found is not None:
             return found
         near = alike(name.upper(), self._names)
-        hint = f"; did you mean {', '.join(near)}?" if near else ""
-        raise UnknownRegister(f"firmware {self.firmware.name} has no register named {name!r}{hint}")
+        hint = NEAR_NAMES(names=near) if near else ""
+        raise UnknownRegister(UNKNOWN_REGISTER(firmware=self.firmware.name, name=name, hint=hint))
 
     def of(self, key: str, index: int | None = None) -> Register:
         """The register of a row key and axis or channel number (from 1). Raises `UnknownRegister`."""
         found = self._keys.get((key, index))
         if found is None:
-            number = "" if index is None else f" with number {index}"
-            raise UnknownRegister(f"firmware {self.firmware.name} has no register with key {key!r}{number}")
+            number = "" if index is None else WITH_NUMBER(index=index)
+            raise UnknownRegister(UNKNOWN_KEY(firmware=self.firmware.name, key=key, number=number))
         return found
 
     def find(self, space: Space, address: int) -> Register | None:
@@ -353,9 +362,9 @@ class RegisterMap:
             return found
         place = bisect_right(self._starts[space], address)
         members = self._spaces[space]
-        near = [f"{r.name} at {_extent(r)}" for r in members[max(place - 1, 0) : place + 1]]
+        near = [REGISTER_AT(name=r.name, place=_extent(r)) for r in members[max(place - 1, 0) : place + 1]]
         raise UnknownRegister(
-            f"firmware {self.firmware.name} has no {space.value} at {show_address(address)}; nearest: {', '.join(near)}"
+            NO_REGISTER_HERE(firmware=self.firmware.name, space=space.value, address=show_address(address), near=near)
         )
 
     def pieces(self, space: Space, address: int, quantity: int) -> Iterator[RequestPart]:

@@ -13,6 +13,7 @@ from functools import cache, partial
 from types import MappingProxyType
 
 from steptwin.errors import Misuse
+from steptwin.messages import Message
 from steptwin.mic488.ranges import POSITIVE, ValueRange
 from steptwin.mic488.registermap import (
     DataType,
@@ -469,11 +470,14 @@ ROWS: tuple[MapRow, ...] = (
 )
 
 
+UNKNOWN_FIRMWARE = Message("mic488.unknown-firmware", "unknown firmware {name!r}; permitted: {names}")
+
+
 def firmware(name: str) -> Firmware:
     """The firmware generation of that name. Raises `Misuse` with the permitted names."""
     found = FIRMWARES.get(name)
     if found is None:
-        raise Misuse(f"unknown firmware {name!r}; permitted: {', '.join(FIRMWARES)}")
+        raise Misuse(UNKNOWN_FIRMWARE(name=name, names=list(FIRMWARES)))
     return found
 
 

@@ -9,6 +9,7 @@ from math import isfinite
 from typing import NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse
+from steptwin.messages import Message, text_of
 from steptwin.mic488.encoding import dint_to_words, real_to_words, word_to_int, words_to_dint, words_to_real
 from steptwin.mic488.registermap import DataType, Register, RegisterMap, Space, Type, WriteEffect
 from steptwin.mic488.registers import axes_of_mask
@@ -28,7 +29,7 @@ _NAME = re.compile(r"(?P<name>\w+?)(?:\[(?P<cell>\d{1,5})\])?(?::(?P<view>\w+))?
 _SWITCHES = {"on": 1.0, "true": 1.0, "off": 0.0, "false": 0.0}
 PROGRAM = 0
 """The program beside axes 1 to 4, in `halted`."""
-FORM = "expected NAME, or USER_REGISTER[N] with :int, :dint or :real behind it if it is no WORD"
+FORM = Message("mic488.form-of-a-name", "expected NAME, or USER_REGISTER[N] with :int, :dint or :real behind it if it is no WORD")
 
 
 class UserFormat(enum.Enum):
@@ -84,23 +85,33 @@ class RegisterItem:
         return f"{self.register.name}[{self.cell}]{'' if self.view is UserFormat.WORD else f':{self.view.value}'}"
 
 
+NO_NAME_OF_A_VALUE = Message("mic488.no-name-of-a-value", "{text!r} is not a name of a value: {form}")
+ONE_VALUE = Message("mic488.one-value", "{text!r}: {name} is one value of type {type}; name it without [ ] and :")
+CHOOSE_ONE = Message("mic488.choose-one", "{text!r}: choose one of {name}[0] to {name}[{last}]")
+UNKNOWN_FORMAT = Message("mic488.unknown-format", "{text!r}: permitted behind : are word, int, dint and real")
+
+
 def named(registers: RegisterMap, text: str) -> RegisterItem:
     """The value of that name: ``M1_POS_ACT``, ``OUT3``, ``USER_REGISTER[12]:real``. Raises `Misuse`."""
     match = _NAME.match(text.strip())
     if match is None:
-        raise Misuse(f"{text!r} is not a name of a value: {FORM}")
+        raise Misuse(NO_NAME_OF_A_VALUE(text=text, form=FORM()))
     register = registers.named(match["name"])
     if register.type is not Type.MEMORY:
         if match["cell"] or match["view"]:
-            raise Misuse(f"{text!r}: {register.name} is one value of type {register.type.value}; name it without [ ] and :")
+            raise Misuse(ONE_VALUE(text=text, name=register.name, type=register.type.value))
         return RegisterItem(register)
     if match["cell"] is None:
-        raise Misuse(f"{text!r}: choose one of {register.name}[0] to {register.name}[{register.cells - 1}]")
+        raise Misuse(CHOOSE_ONE(text=text, name=register.name, last=register.cells - 1))
     try:
         view = UserFormat((match["view"] or "word").lower())
     except ValueError:
-        raise Misuse(f"{text!r}: permitted behind : are word, int, dint and real") from None
+        raise Misuse(UNKNOWN_FORMAT(text=text)) from None
     return user_item(registers, int(match["cell"]), view)
+
+
+NO_SUCH_USER_REGISTER = Message("mic488.no-such-user-register", "user register {number} as {format} is outside 0 to {last}")
+ODD_REGISTER = Message("mic488.odd-register", "user register {number} as {format}: {format}s begin at even registers")
 
 
 def user_item(registers: RegisterMap, number: int, view: UserFormat, count: int = 1) -> RegisterItem:
@@ -108,10 +119,15 @@ def user_item(registers: RegisterMap, number: int, view: UserFormat, count: int 
     register = registers.of("USER_REGISTER")
     last = register.cells - view.size * count
     if not 0 <= number <= last:
-        raise Misuse(f"user register {number} as {view.name}{'' if count == 1 else f' × {count}'} is outside 0 to {last}")
+        raise Misuse(
+            NO_SUCH_USER_REGISTER(number=number, format=view.name if count == 1 else f"{view.name} × {count}", last=last)
+        )
     if view.size == 2 and number % 2:
-        raise Misuse(f"user register {number} as {view.name}: {view.name}s begin at even registers")
+        raise Misuse(ODD_REGISTER(number=number, format=view.name))
     return RegisterItem(register, number, view)
+
+
+NUMBER_OR_NAME = Message("mic488.number-or-name", "{problem}, or {names}")
 
 
 def value_of(register: Register, typed: str) -> float:
@@ -126,8 +142,7 @@ def value_of(register: Register, typed: str) -> float:
         return read_number(text, or_hexadecimal=register.type in (Type.WORD, Type.MEMORY))
     except Misuse as error:
         names = ("on", "off") if register.type is Type.BIT else tuple(register.values.values())
-        others = f", or {', '.join(names)}" if names else ""
-        raise Misuse(f"{error}{others}") from None
+        raise (Misuse(NUMBER_OR_NAME(problem=text_of(error), names=list(names))) if names else error) from None
 
 
 # ---------------------------------------------------------------------- values and words
@@ -154,6 +169,10 @@ def _kind(item: RegisterItem, data_type: DataType) -> Type:
     return kind
 
 
+CAN_ONLY_BE_READ = Message("mic488.can-only-be-read", "{name} can only be read")
+WRONG_SWITCH_VALUE = Message("mic488.wrong-switch-value", "{name} = {value}: permitted are 0 (OFF) and 1 (ON)")
+
+
 def encoded(item: RegisterItem, value: RegisterValue, data_type: DataType, unit: str = "u") -> pdu.ModbusRequest:
     """The request that writes ``value``, which is in units with DATA_TYPE REAL and in pulses with DINT.
 
@@ -161,10 +180,10 @@ def encoded(item: RegisterItem, value: RegisterValue, data_type: DataType, unit:
     """
     register = item.register
     if not register.accepts:
-        raise Misuse(f"{register.name} can only be read")
+        raise Misuse(CAN_ONLY_BE_READ(name=register.name))
     if register.type is Type.BIT:
         if value not in (0, 1):
-            raise Misuse(f"{register.name} = {value}: permitted are 0 (OFF) and 1 (ON)")
+            raise Misuse(WRONG_SWITCH_VALUE(name=register.name, value=value))
         return pdu.WriteCoilRequest(register.address, bool(value))
     words = encoded_words(item, value, data_type, unit)
     if len(words) == 1:
@@ -172,26 +191,33 @@ def encoded(item: RegisterItem, value: RegisterValue, data_type: DataType, unit:
     return pdu.WriteRegistersRequest(item.address, words)
 
 
+WHOLE_NUMBER_IS_NEEDED = Message("mic488.whole-number-is-needed", "{what}: a whole number is needed")
+VALUE_NOT_PERMITTED = Message("mic488.value-not-permitted", "{what}: permitted {permitted}")
+
+
 def encoded_words(item: RegisterItem, value: RegisterValue, data_type: DataType, unit: str = "u") -> tuple[int, ...]:
     """The words of ``value`` in a holding register, as of `encoded`. Raises `Misuse` for a value that it does not take."""
     register = item.register
     kind = _kind(item, data_type)
-    wrong = ""
     if kind is not Type.REAL and not (isfinite(value) and value == int(value)):
-        wrong = "a whole number is needed"
-    elif register.type is Type.MEMORY:
+        raise Misuse(WHOLE_NUMBER_IS_NEEDED(what=_shown(item, value, data_type, unit)))
+    permitted = ""
+    if register.type is Type.MEMORY:
         if item.view is UserFormat.INT and -0x8000 <= value <= 0x7FFF:
             return (int(value) & 0xFFFF,)
         if item.view in (UserFormat.INT, UserFormat.WORD) and (item.view is UserFormat.INT or not 0 <= value <= 0xFFFF):
-            wrong = f"permitted {item.view.range}"
+            permitted = item.view.range
     elif value not in register.permitted:
-        wrong = f"permitted {register.permitted} {register.unit(data_type, unit)}".rstrip()
-    if wrong:
-        shown = f"{item.name} = {value:g} {register.unit(data_type, unit)}".rstrip()
-        raise Misuse(f"{shown}: {wrong}")
+        permitted = f"{register.permitted} {register.unit(data_type, unit)}".rstrip()
+    if permitted:
+        raise Misuse(VALUE_NOT_PERMITTED(what=_shown(item, value, data_type, unit), permitted=permitted))
     if kind is Type.REAL:
         return real_to_words(value)
     return dint_to_words(int(value)) if kind is Type.DINT else (int(value),)
+
+
+def _shown(item: RegisterItem, value: RegisterValue, data_type: DataType, unit: str) -> str:
+    return f"{item.name} = {value:g} {item.register.unit(data_type, unit)}".rstrip()
 
 
 # ---------------------------------------------------------------------- reading with few frames
@@ -207,13 +233,16 @@ class Block(NamedTuple):
         return {item: decoded(item, words[place : place + item.size], data_type) for item, place in self.items}
 
 
+CAN_ONLY_BE_WRITTEN = Message("mic488.can-only-be-written", "{name} can only be written")
+
+
 def plan(registers: RegisterMap, items: Iterable[RegisterItem]) -> list[Block]:
     """The fewest reads that give all values, over what may be read only (MIC-3). Raises `Misuse` for what cannot be read."""
     blocks: list[Block] = []
     group: list[RegisterItem] = []
     for item in sorted(set(items)):
         if not item.register.reads:
-            raise Misuse(f"{item.register.name} can only be written")
+            raise Misuse(CAN_ONLY_BE_WRITTEN(name=item.register.name))
         if group and not _joins(registers, group, item):
             blocks.append(_block(group))
             group = []

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.motion.profile import NEAR_P, Profile, Segment
 from steptwin.motion.trig import QUARTER, arcsine_below_45, cosine, direction, length, sine
 
@@ -64,6 +65,12 @@ def circle(centre_x: float, centre_y: float, radius: float, sweep_q: float) -> A
     return Arc(centre_x, centre_y, radius, 0.0 if here else direction(-centre_x, -centre_y), sweep_q)
 
 
+ARC_WITHOUT_END = Message("motion.arc-without-end", "an arc needs an end point other than its beginning")
+RADIUS_IS_TOO_SMALL = Message(
+    "motion.radius-is-too-small", "radius = {radius:g}: must be at least {half:g}, half the distance of the ends"
+)
+
+
 def arc_between(x0: float, y0: float, x1: float, y1: float, radius: float, *, outward: bool, slack: float = 0.0) -> Arc:
     """The arc of at most half a turn from (x0, y0) to (x1, y1).
 
@@ -74,10 +81,10 @@ def arc_between(x0: float, y0: float, x1: float, y1: float, radius: float, *, ou
     chord = length(x1 - x0, y1 - y0)
     half = 0.5 * chord
     if chord == 0.0:
-        raise Misuse("an arc needs an end point other than its beginning")
+        raise Misuse(ARC_WITHOUT_END())
     if radius < half:
         if half - radius > slack:
-            raise Misuse(f"radius = {radius:g}: must be at least {half:g}, half the distance of the ends")
+            raise Misuse(RADIUS_IS_TOO_SMALL(radius=radius, half=half))
         radius = half
     # The unit vector to the left of the chord decides on which side of it the origin is.
     left_x, left_y = (y0 - y1) / chord, (x1 - x0) / chord
@@ -91,11 +98,15 @@ def arc_between(x0: float, y0: float, x1: float, y1: float, radius: float, *, ou
     return Arc(centre_x, centre_y, radius, direction(x0 - centre_x, y0 - centre_y), -bulge * sweep_q)
 
 
+WRONG_RADIUS = Message("motion.wrong-radius", "radius = {radius:g}: must be greater than 0")
+WRONG_ANGLE = Message("motion.wrong-angle", "angle = {angle:g}°: must be within ±{most}°")
+
+
 def _check(radius: float, sweep_q: float = 0.0) -> None:
     if not 0.0 < radius < inf:
-        raise Misuse(f"radius = {radius:g}: must be greater than 0")
+        raise Misuse(WRONG_RADIUS(radius=radius))
     if not abs(sweep_q) <= 4 * MOST_TURNS:
-        raise Misuse(f"angle = {90 * sweep_q:g}°: must be within ±{360 * MOST_TURNS}°")
+        raise Misuse(WRONG_ANGLE(angle=90 * sweep_q, most=360 * MOST_TURNS))
 
 
 # ---------------------------------------------------------------------- courses of one axis

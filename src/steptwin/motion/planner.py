@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.motion.profile import Profile, Segment, cruise, ramp
 
 LEAST, MOST = 1e-60, 1e60
@@ -32,6 +33,9 @@ class MotionState(NamedTuple):
         return cls(now, *profile.state(now))
 
 
+DISTANCE_OUT_OF_RANGE = Message("motion.distance-out-of-range", "distance = {distance} pulses: must be within ±{most}")
+
+
 def plan_position(state: MotionState, target: float, acc: float, dec: float, vmax: float) -> Profile:
     """To rest at ``target`` (whole but on the way of a path): trapezoid or triangle, through zero where it must turn.
 
@@ -43,7 +47,7 @@ def plan_position(state: MotionState, target: float, acc: float, dec: float, vma
         refuse_range(acc=(acc, "pulses/s²"), dec=(dec, "pulses/s²"), vmax=(vmax, "pulses/s"))
         _refuse_velocity(v)
     if not -FARTHEST_P <= target - count <= FARTHEST_P:
-        raise Misuse(f"distance = {target - count} pulses: must be within ±{FARTHEST_P}")
+        raise Misuse(DISTANCE_OUT_OF_RANGE(distance=target - count, most=FARTHEST_P))
     goal = float(target - count)
     distance = goal - p
     segments: list[Segment] = []
@@ -129,13 +133,21 @@ _SAME_P = 1e-6
 not overshoot by a rounding error and come back."""
 
 
+VALUE_OUT_OF_RANGE = Message(
+    "motion.value-out-of-range", "{name} = {value} {unit}: must be finite and greater than 0 (from {least:g} to {most:g})"
+)
+
+
 def refuse_range(**parameters: tuple[float, str]) -> None:
     """Raise `Misuse` for the first ``name=(value, unit)`` that is not a number from `LEAST` to `MOST`."""
     for name, (value, unit) in parameters.items():
         if not LEAST <= value <= MOST:
-            raise Misuse(f"{name} = {value} {unit}: must be finite and greater than 0 (from {LEAST:g} to {MOST:g})")
+            raise Misuse(VALUE_OUT_OF_RANGE(name=name, value=value, unit=unit, least=LEAST, most=MOST))
+
+
+VELOCITY_OUT_OF_RANGE = Message("motion.velocity-out-of-range", "velocity = {value} pulses/s: must be finite (within ±{most:g})")
 
 
 def _refuse_velocity(value: float) -> None:
     if not -MOST <= value <= MOST:
-        raise Misuse(f"velocity = {value} pulses/s: must be finite (within ±{MOST:g})")
+        raise Misuse(VELOCITY_OUT_OF_RANGE(value=value, most=MOST))

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.motion.planner import FARTHEST_P, MotionState, refuse_range
 from steptwin.motion.profile import Profile, Segment, at_rest, cruise
 
@@ -34,6 +35,11 @@ class SpeedCurve(NamedTuple):
     """V: highest speed (u/s). At or below ``start`` there is no ramp: constant ``top``, M-8."""
 
 
+DISTANCE_OF_RAMPS_OUT_OF_RANGE = Message(
+    "motion.distance-of-ramps-out-of-range", "distance = {distance} u: must be within ±{most}"
+)
+
+
 def plan_distance(now: Nanos, begin: int, target: float, curve: SpeedCurve) -> Profile:
     """From rest at ``begin`` to rest at ``target`` (u; whole but where a distance is sought). A short move leaves the curve
     half-way, at the speed at which the remaining distance is the braking distance, M-7.
@@ -42,7 +48,7 @@ def plan_distance(now: Nanos, begin: int, target: float, curve: SpeedCurve) -> P
     """
     _check(curve)
     if abs(target - begin) > FARTHEST_P:
-        raise Misuse(f"distance = {target - begin} u: must be within ±{FARTHEST_P}")
+        raise Misuse(DISTANCE_OF_RAMPS_OUT_OF_RANGE(distance=target - begin, most=FARTHEST_P))
     distance = float(abs(target - begin))
     if distance == 0.0:
         return at_rest(now, begin)

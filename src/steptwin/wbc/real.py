@@ -11,6 +11,7 @@ import struct
 from collections.abc import Callable, Mapping
 from math import fmod, sqrt
 
+from steptwin.messages import Message
 from steptwin.motion.trig import arccosine, arcsine, cosine, sine
 from steptwin.tables import complete
 from steptwin.wbc.registers import DINT, REAL_MAX
@@ -57,15 +58,22 @@ def whole(value: float) -> int:
     return round(min(max(value, DINT.low), DINT.high))
 
 
+DOES_NOT_EXIST = Message("wbc.does-not-exist", "{function}({x}) does not exist")
+DIVISION_BY_ZERO = Message("wbc.division-by-zero", "division by zero")
+
+
 def _quotient(a: float, b: float) -> float:
     if b == 0.0:
-        raise ProgramFault("division by zero")
+        raise ProgramFault(DIVISION_BY_ZERO())
     return a / b
+
+
+REMAINDER_OF_A_DIVISION_BY_ZERO = Message("wbc.remainder-of-a-division-by-zero", "remainder of a division by zero")
 
 
 def _remainder(a: float, b: float) -> float:
     if b == 0.0:
-        raise ProgramFault("remainder of a division by zero")
+        raise ProgramFault(REMAINDER_OF_A_DIVISION_BY_ZERO())
     return fmod(a, b)
 
 
@@ -119,7 +127,7 @@ def _tangent(degrees: float) -> float:
     angle_q = _quarters(degrees)
     below = cosine(angle_q)
     if below == 0.0:
-        raise ProgramFault(f"tg({real_text(degrees)}) does not exist")
+        raise ProgramFault(DOES_NOT_EXIST(function="tg", x=real_text(degrees)))
     return sine(angle_q) / below
 
 
@@ -127,25 +135,25 @@ def _cotangent(degrees: float) -> float:
     angle_q = _quarters(degrees)
     below = sine(angle_q)
     if below == 0.0:
-        raise ProgramFault(f"ctg({real_text(degrees)}) does not exist")
+        raise ProgramFault(DOES_NOT_EXIST(function="ctg", x=real_text(degrees)))
     return cosine(angle_q) / below
 
 
 def _arcsine(x: float) -> float:
     if not -1.0 <= x <= 1.0:
-        raise ProgramFault(f"asin({real_text(x)}) does not exist")
+        raise ProgramFault(DOES_NOT_EXIST(function="asin", x=real_text(x)))
     return arcsine(x) * QUARTER_DEG
 
 
 def _arccosine(x: float) -> float:
     if not -1.0 <= x <= 1.0:
-        raise ProgramFault(f"acos({real_text(x)}) does not exist")
+        raise ProgramFault(DOES_NOT_EXIST(function="acos", x=real_text(x)))
     return arccosine(x) * QUARTER_DEG
 
 
 def _root(x: float) -> float:
     if x < 0.0:
-        raise ProgramFault(f"sqrt({real_text(x)}) does not exist")
+        raise ProgramFault(DOES_NOT_EXIST(function="sqrt", x=real_text(x)))
     return sqrt(x)
 
 

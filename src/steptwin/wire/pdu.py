@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import ClassVar, TypeAlias
 
 from steptwin.errors import LineFailure, Misuse, Refusal
+from steptwin.messages import Message, text_of
 
 READ_COILS = 0x01
 READ_DISCRETE_INPUTS = 0x02
@@ -34,15 +35,15 @@ DEVICE_FAILURE = 0x04
 DEVICE_BUSY = 0x06
 GATEWAY_TARGET_FAILED = 0x0B
 EXCEPTION_NAMES = {
-    ILLEGAL_FUNCTION: "illegal function",
-    ILLEGAL_DATA_ADDRESS: "illegal data address",
-    ILLEGAL_DATA_VALUE: "illegal data value",
-    DEVICE_FAILURE: "device failure",
-    0x05: "acknowledge",
-    DEVICE_BUSY: "device busy",
-    0x08: "memory parity error",
-    0x0A: "gateway path unavailable",
-    GATEWAY_TARGET_FAILED: "gateway target failed to respond",
+    ILLEGAL_FUNCTION: Message("wire.illegal-function", "illegal function")(),
+    ILLEGAL_DATA_ADDRESS: Message("wire.illegal-data-address", "illegal data address")(),
+    ILLEGAL_DATA_VALUE: Message("wire.illegal-data-value", "illegal data value")(),
+    DEVICE_FAILURE: Message("wire.device-failure", "device failure")(),
+    0x05: Message("wire.acknowledge", "acknowledge")(),
+    DEVICE_BUSY: Message("wire.device-busy", "device busy")(),
+    0x08: Message("wire.memory-parity-error", "memory parity error")(),
+    0x0A: Message("wire.gateway-path-unavailable", "gateway path unavailable")(),
+    GATEWAY_TARGET_FAILED: Message("wire.gateway-target-failed-to-respond", "gateway target failed to respond")(),
 }
 
 # MIC-24: the limits of the protocol are those of the device.
@@ -63,6 +64,11 @@ def function_number(code: int) -> str:
     return f"{code} ({code:02X}h)"
 
 
+REFUSED_WITH = Message("wire.refused", "function {function} refused with exception {code} ({name})")
+DETAILED = Message("wire.refused-in-detail", "{refused}: {detail}")
+UNKNOWN_CODE = Message("wire.unknown-code", "unknown code")
+
+
 class ModbusException(Refusal):
     """The peer answered with an exception. Inside a slave: the request must be answered with one (`pdu`)."""
 
@@ -70,9 +76,10 @@ class ModbusException(Refusal):
         self.function = function
         self.code = code
         self.detail = detail
-        name = EXCEPTION_NAMES.get(code, "unknown code")
-        text = f"function {function_number(function)} refused with exception {code:02X} ({name})"
-        super().__init__(f"{text}: {detail}" if detail else text)
+        refused = REFUSED_WITH(
+            function=function_number(function), code=f"{code:02X}", name=EXCEPTION_NAMES.get(code, UNKNOWN_CODE())
+        )
+        super().__init__(DETAILED(refused=refused, detail=text_of(detail)) if detail else refused)
 
     @property
     def pdu(self) -> bytes:
@@ -219,6 +226,10 @@ def encode_request(request: ModbusRequest) -> bytes:
     return encode_response(request)
 
 
+WRONG_QUANTITY = Message("wire.wrong-quantity", "quantity {count} is outside 1 to {most}")
+WRONG_COIL_VALUE = Message("wire.wrong-coil-value", "coil value {value:04X} is neither FF00 nor 0000")
+
+
 def decode_request(pdu: bytes) -> ModbusRequest:
     """The request in a PDU, or `ModbusException` with the code a slave answers: 01 for a function outside the six,
     03 for a quantity, coil value, byte count or length that is not permitted (MIC-1, MIC-7, MIC-24).
@@ -232,7 +243,7 @@ def decode_request(pdu: bytes) -> ModbusRequest:
         _, address, count = _THREE_FIELDS.unpack(pdu)
         most = MAX_REGISTERS if function == READ_HOLDING_REGISTERS else MAX_BITS
         if not 1 <= count <= most:
-            raise ModbusException(function, ILLEGAL_DATA_VALUE, f"quantity {count} is outside 1 to {most}")
+            raise ModbusException(function, ILLEGAL_DATA_VALUE, WRONG_QUANTITY(count=count, most=most))
         return ReadRequest(function, address, count)
     if function not in WRITES:
         raise ModbusException(function, ILLEGAL_FUNCTION)
@@ -244,8 +255,11 @@ def decode_request(pdu: bytes) -> ModbusRequest:
     if function == WRITE_SINGLE_REGISTER:
         return WriteRegisterRequest(address, value)
     if value not in (COIL_ON, COIL_OFF):
-        raise ModbusException(function, ILLEGAL_DATA_VALUE, f"coil value {value:04X} is neither FF00 nor 0000")
+        raise ModbusException(function, ILLEGAL_DATA_VALUE, WRONG_COIL_VALUE(value=value))
     return WriteCoilRequest(address, value == COIL_ON)
+
+
+WRONG_BYTE_COUNT = Message("wire.wrong-byte-count", "byte count {bytes} does not match {count} registers")
 
 
 def _decode_write_registers(pdu: bytes) -> WriteRegistersRequest:
@@ -254,16 +268,19 @@ def _decode_write_registers(pdu: bytes) -> WriteRegistersRequest:
         raise _bad_length(function, len(pdu), 8)
     _, address, count, byte_count = _WRITE_HEAD.unpack_from(pdu)
     if not 1 <= count <= MAX_WRITTEN_REGISTERS:
-        raise ModbusException(function, ILLEGAL_DATA_VALUE, f"quantity {count} is outside 1 to {MAX_WRITTEN_REGISTERS}")
+        raise ModbusException(function, ILLEGAL_DATA_VALUE, WRONG_QUANTITY(count=count, most=MAX_WRITTEN_REGISTERS))
     if byte_count != 2 * count:
-        raise ModbusException(function, ILLEGAL_DATA_VALUE, f"byte count {byte_count} does not match {count} registers")
+        raise ModbusException(function, ILLEGAL_DATA_VALUE, WRONG_BYTE_COUNT(bytes=byte_count, count=count))
     if len(pdu) != 6 + byte_count:
         raise _bad_length(function, len(pdu), 6 + byte_count)
     return WriteRegistersRequest(address, struct.unpack_from(f">{count}H", pdu, 6))
 
 
+WRONG_LENGTH = Message("wire.wrong-length", "the PDU has {length} bytes instead of {wanted}")
+
+
 def _bad_length(function: int, length: int, wanted: int) -> ModbusException:
-    return ModbusException(function, ILLEGAL_DATA_VALUE, f"the PDU has {length} bytes instead of {wanted}")
+    return ModbusException(function, ILLEGAL_DATA_VALUE, WRONG_LENGTH(length=length, wanted=wanted))
 
 
 def encode_response(response: ModbusResponse) -> bytes:
