@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import IO
 
 from steptwin.errors import Misuse
+from steptwin.messages import Message
 from steptwin.system import READ_FLAGS, reason
 
 MOST_BYTES = 256 << 10
@@ -28,16 +29,25 @@ _KINDS = (
 )
 
 
+CANNOT_READ = Message("inputfiles.cannot-read", "cannot read {path}: {why}")
+
+
 def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
     """The content of a regular file of at most ``most`` bytes. Raises `Misuse`."""
     with open_regular(path, most) as file:
         try:
             data = file.read(most + 1)
         except OSError as error:
-            raise Misuse(f"cannot read {path}: {reason(error)}") from error
+            raise Misuse(CANNOT_READ(path=path, why=reason(error))) from error
     if len(data) > most:  # it grew, or its file system reports no sizes
         raise _too_large(path, len(data), most)
     return data
+
+
+TOO_MANY_VALUES = Message(
+    "inputfiles.too-many-values", "cannot read {path}: it has about {values} values; permitted are at most {most}"
+)
+NO_TEXT = Message("inputfiles.no-text", "cannot read {path}: it is no UTF-8 text")
 
 
 def read_recorded(path: Path) -> str:
@@ -46,11 +56,14 @@ def read_recorded(path: Path) -> str:
     data = read_bytes(path, MOST_RECORDED_BYTES)
     values = sum(map(data.count, (b",", b"[", b"{")))
     if values > MOST_RECORDED_VALUES:
-        raise Misuse(f"cannot read {path}: it has about {values} values; permitted are at most {MOST_RECORDED_VALUES}")
+        raise Misuse(TOO_MANY_VALUES(path=path, values=values, most=MOST_RECORDED_VALUES))
     try:
         return data.decode()
     except UnicodeDecodeError as error:
-        raise Misuse(f"cannot read {path}: it is no UTF-8 text") from error
+        raise Misuse(NO_TEXT(path=path)) from error
+
+
+NO_FILE = Message("inputfiles.no-file", "cannot read {path}: it is {kind}, not a file")
 
 
 def open_regular(path: Path, most: int | None = None) -> IO[bytes]:
@@ -59,9 +72,9 @@ def open_regular(path: Path, most: int | None = None) -> IO[bytes]:
         # Opening a pipe would wait for a program that writes into it.
         handle = os.open(path, READ_FLAGS)
     except OSError as error:
-        raise Misuse(f"cannot read {shown(path)}: {reason(error)}") from error
+        raise Misuse(CANNOT_READ(path=shown(path), why=reason(error))) from error
     except ValueError as error:
-        raise Misuse(f"cannot read {shown(path)}: {error}") from None
+        raise Misuse(CANNOT_READ(path=shown(path), why=error)) from None
     found = os.fstat(handle)
     if stat.S_ISREG(found.st_mode) and (most is None or found.st_size <= most):
         return os.fdopen(handle, "rb")
@@ -69,7 +82,7 @@ def open_regular(path: Path, most: int | None = None) -> IO[bytes]:
     if stat.S_ISREG(found.st_mode):
         raise _too_large(path, found.st_size, most or 0)
     kind = next((kind for is_one, kind in _KINDS if is_one(found.st_mode)), "something else")
-    raise Misuse(f"cannot read {path}: it is {kind}, not a file")
+    raise Misuse(NO_FILE(path=path, kind=kind))
 
 
 def _too_large(path: Path, size: int, most: int) -> Misuse:

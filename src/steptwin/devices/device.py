@@ -69,6 +69,10 @@ WAITED_TOO_LONG = Message("devices.waited-too-long", "{command} was not sent: it
 AXIS_IS_JOGGED = Message("devices.axis-is-jogged", "{name}: a twin can be made at rest: an axis is jogged")
 JOGGED_ALREADY = Message("devices.jogged-already", "{name} axis {axis} is jogged already")
 JOG_STOPPED_MEANWHILE = Message("devices.jog-stopped-meanwhile", "jog was not begun: a stop was requested meanwhile")
+LINE_LOST = Message("devices.connection-lost", "connection lost: {why}")
+LINE_FOUND = Message("devices.connected-again", "connected again")
+MOTION_IGNORED = Message("devices.motion-ignored", "motion ignored: M{axis} is not enabled")
+SETTINGS_KEPT = Message("devices.settings-kept", "settings before the first write are in {where}")
 
 
 class ConnectedDevice:
@@ -131,12 +135,12 @@ class ConnectedDevice:
             try:
                 await self._look()
             except LineFailure as failure:
-                self._lose(str(failure))
+                self._lose(text_of(failure))
                 await asyncio.sleep(pause_s)
                 pause_s = min(2.0 * pause_s, RECONNECT_S[1])
                 continue
             except SteptwinError as refusal:  # another controller is there, or none
-                self._lose(str(refusal))
+                self._lose(text_of(refusal))
                 await asyncio.sleep(RECONNECT_S[1])
                 continue
             except Exception as error:  # noqa: BLE001  the others go on, and so does this one
@@ -170,12 +174,12 @@ class ConnectedDevice:
         self._known.clear()
         if self.lost is None:
             self._subject.forget()
-            self._subject.publish(StatusPayload("line-lost", f"connection lost: {why}"))
+            self._subject.publish(StatusPayload("line-lost", LINE_LOST(why=text_of(why))))
         self.lost = f"{self.name}: {why}"
 
     def _find(self) -> None:
         self.lost = None
-        self._subject.publish(StatusPayload("line-found", "connected again"))
+        self._subject.publish(StatusPayload("line-found", LINE_FOUND()))
 
     # ------------------------------------------------------------------ commands
 
@@ -282,7 +286,7 @@ class ConnectedDevice:
             with contextlib.suppress(LineFailure):
                 after = await self._ignoring(request)
         for axis in sorted(before & after):
-            self._subject.publish(StatusPayload(NOT_ENABLED, f"motion ignored: M{axis} is not enabled", (("axis", axis),)))
+            self._subject.publish(StatusPayload(NOT_ENABLED, MOTION_IGNORED(axis=axis), (("axis", axis),)))
 
     def _refuse_while_stopping(self, wanted: Command) -> None:
         if self._stopping:
@@ -305,7 +309,7 @@ class ConnectedDevice:
         """Done once, before the first write. Raises `SteptwinError` where they cannot be kept; then nothing is written."""
         where = self._around.keep(self.name, await self._device.settings_text())
         self._is_kept = True
-        self._subject.publish(StatusPayload("settings-kept", f"settings before the first write are in {where}"))
+        self._subject.publish(StatusPayload("settings-kept", SETTINGS_KEPT(where=where)))
 
     async def settings(self) -> str:
         """Values that can be read and written, as JSON. Raises `LineFailure`."""
@@ -399,7 +403,7 @@ class ConnectedDevice:
     def _report(self, error: Exception) -> None:
         """Report an error of a jog for whose end no caller waits."""
         if isinstance(error, SteptwinError):
-            self._subject.publish(StatusPayload("jog-failed", str(error)))
+            self._subject.publish(StatusPayload("jog-failed", text_of(error)))
         else:
             self._around.on_internal(error)
 

@@ -12,11 +12,13 @@ from typing import Any, Protocol
 from steptwin.drivers.exchange import A, ExchangeCounts, Job, Q
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 
 LONGEST_WAIT_S = 1e6
 """Longest time-out of a motion, s: eleven days."""
 
 
+LINE_IS_CLOSED = Message("drivers.line-is-closed", "the line {place} is closed")
 LOCK_SLICE_S = 1.0
 
 

@@ -9,17 +9,15 @@ from types import TracebackType
 from typing import Any, Generic, Self, cast
 
 from steptwin.drivers.exchange import A, ExchangeCounts, Exchanger, Job, LineLost, Q
-from steptwin.drivers.line import LOCK_SLICE_S
+from steptwin.drivers.line import LINE_IS_CLOSED, LOCK_SLICE_S
 from steptwin.drivers.tcp import Endpoint
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
-from steptwin.messages import Message
 from steptwin.system import reason
 from steptwin.tracing import is_traced, span
 
 CLOSE_S = 1.0
 """Time for the other end to close a connection, s."""
-LINE_IS_CLOSED = Message("drivers.line-is-closed", "the line {place} is closed")
 
 
 class TaskLine(Generic[Q, A]):

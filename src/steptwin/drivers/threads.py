@@ -15,7 +15,7 @@ from collections.abc import Callable, Hashable, Mapping
 from typing import Any, Generic
 
 from steptwin.drivers.exchange import A, ExchangeCounts, Exchanger, Job, LineLost, Q
-from steptwin.drivers.line import LOCK_SLICE_S
+from steptwin.drivers.line import LINE_IS_CLOSED, LOCK_SLICE_S
 from steptwin.drivers.tcp import Channel, Endpoint
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
@@ -61,7 +61,7 @@ class ThreadLine(Generic[Q, A]):
     async def exchange(self, job: Job[Q, A]) -> A:
         with self._changed:
             if self._closed:
-                raise Misuse(f"the line {self.place} is closed")
+                raise Misuse(LINE_IS_CLOSED(place=self.place))
             self._engine.submit(job)
             try:
                 if self._leading:

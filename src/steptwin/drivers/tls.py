@@ -10,7 +10,11 @@ from dataclasses import dataclass
 
 from steptwin.drivers.tcp import CONNECT_S, Channel, TcpEndpoint, TimedSocketChannel
 from steptwin.errors import Misuse
+from steptwin.messages import Message
 from steptwin.system import reason
+
+WRONG_TRUSTED = Message("drivers.wrong-trusted", "{address}: trusted={trusted}: {why}")
+WRONG_CERTIFICATE = Message("drivers.wrong-certificate", "{address}: certificate={certificate}, key={key}: {why}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,11 +33,11 @@ class TlsEndpoint(TcpEndpoint):
         try:
             context.load_verify_locations(self.trusted)
         except (OSError, ssl.SSLError) as error:
-            raise Misuse(f"{self}: trusted={self.trusted}: {reason(error)}") from None
+            raise Misuse(WRONG_TRUSTED(address=self, trusted=self.trusted, why=reason(error))) from None
         try:
             context.load_cert_chain(self.certificate, self.key, password="")
         except (OSError, ssl.SSLError, ValueError) as error:
-            raise Misuse(f"{self}: certificate={self.certificate}, key={self.key}: {reason(error)}") from None
+            raise Misuse(WRONG_CERTIFICATE(address=self, certificate=self.certificate, key=self.key, why=reason(error))) from None
         return context
 
     def open(self) -> Channel:

@@ -11,6 +11,7 @@ from steptwin.files.textfiles import check_writable
 from steptwin.files.world import World
 from steptwin.files.writing import is_written_directly
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.describe.overrides import NO_OVERRIDES, Overrides
 from steptwin.simulation.faults import read as read_fault
 from steptwin.simulation.script import steps as do
@@ -23,10 +24,13 @@ def is_session(path: Path) -> bool:
     return path.suffix.lower() == SESSION_SUFFIX
 
 
+WRONG_SUFFIX_OF_A_SESSION = Message("files.wrong-suffix-of-a-session", "{path}: the name of a session must end with {suffix}")
+
+
 def check_session_target(path: Path) -> None:
     """Check that a session can be written to a path, and that its name ends as that of a session. Raises `Misuse`."""
     if not is_session(path) and not is_written_directly(path):
-        raise Misuse(f"{path}: the name of a session must end with {SESSION_SUFFIX}")
+        raise Misuse(WRONG_SUFFIX_OF_A_SESSION(path=path, suffix=SESSION_SUFFIX))
     check_writable(path)
 
 

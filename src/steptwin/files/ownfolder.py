@@ -6,7 +6,12 @@ from pathlib import Path
 
 from steptwin.errors import Misuse
 from steptwin.inputfiles import shown
+from steptwin.messages import Message
 from steptwin.system import reason
+
+NOT_IN_THE_FOLDER = Message("files.not-in-the-folder", "cannot write {path}: {why}")
+ONLY_INTO_THE_FOLDER = Message("files.only-into-the-folder", "cannot write {path}: requests write into {folder} only")
+NOT_THROUGH_A_LINK = Message("files.not-through-a-link", "cannot write {path}: it is a link, and requests write through none")
 
 
 def place_in(folder: Path, name: str) -> Path:
@@ -19,9 +24,9 @@ def place_in(folder: Path, name: str) -> Path:
         is_within = path.parent.resolve().is_relative_to(folder.resolve())
         is_link = path.is_symlink() or (path.is_file() and path.stat().st_nlink > 1)
     except (OSError, RuntimeError) as error:  # RuntimeError: links in a circle
-        raise Misuse(f"cannot write {shown(path)}: {reason(error)}") from None
+        raise Misuse(NOT_IN_THE_FOLDER(path=shown(path), why=reason(error))) from None
     if not is_within or path.name in ("", ".."):
-        raise Misuse(f"cannot write {shown(path)}: requests write into {folder} only")
+        raise Misuse(ONLY_INTO_THE_FOLDER(path=shown(path), folder=folder))
     if is_link:
-        raise Misuse(f"cannot write {shown(path)}: it is a link, and requests write through none")
+        raise Misuse(NOT_THROUGH_A_LINK(path=shown(path)))
     return path

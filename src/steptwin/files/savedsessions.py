@@ -11,6 +11,7 @@ from typing import NamedTuple
 from steptwin.errors import Misuse
 from steptwin.files.beginning import SESSION_SUFFIX
 from steptwin.machine import Nanos
+from steptwin.messages import Message
 from steptwin.system import reason
 
 MOST = 200
@@ -41,6 +42,10 @@ def saved_sessions(folder: Path) -> list[SavedSession]:
     return sorted(found, key=lambda one: one.saved, reverse=True)[:MOST]
 
 
+CANNOT_READ_SESSION = Message("files.cannot-read-session", "cannot read {path}: {why}")
+NO_SESSION_OF_A_WORLD = Message("files.no-session-of-a-world", "{path} is not a session of a world")
+
+
 def read_saved(path: Path) -> SavedSession:
     """From the head of a file. Raises `Misuse` where it is no session, or cannot be read."""
     try:
@@ -48,16 +53,19 @@ def read_saved(path: Path) -> SavedSession:
             head = file.read(HEAD_BYTES)
         about = path.stat()
     except OSError as error:
-        raise Misuse(f"cannot read {path}: {reason(error)}") from error
+        raise Misuse(CANNOT_READ_SESSION(path=path, why=reason(error))) from error
     until = _UNTIL.search(head)
     if b'"steptwin_session"' not in head or until is None:
-        raise Misuse(f"{path} is not a session of a world")
+        raise Misuse(NO_SESSION_OF_A_WORLD(path=path))
     at = datetime.fromtimestamp(about.st_mtime, UTC).isoformat(timespec="milliseconds")
     return SavedSession(path.stem, about.st_size, at, int(until[1]))
+
+
+WRONG_NAME_OF_A_SESSION = Message("files.wrong-name-of-a-session", "name = {name!r}: permitted are {form}")
 
 
 def path_of(folder: Path, name: str) -> Path:
     """Where the session called ``name`` is, or would be. Raises `Misuse` for what is no name."""
     if not NAME.fullmatch(name):
-        raise Misuse(f"name = {name!r}: permitted are {NAME_FORM}")
+        raise Misuse(WRONG_NAME_OF_A_SESSION(name=name, form=NAME_FORM))
     return folder / f"{name}{SESSION_SUFFIX}"

@@ -19,6 +19,7 @@ from steptwin.files.textfiles import write_bytes
 from steptwin.files.world import FailedSave, World
 from steptwin.inputfiles import read_recorded
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.plaintypes import fitting
 from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.description import read_world
@@ -36,6 +37,12 @@ LONGEST_NUMBER = 100
 """Limit of the digits of a whole number; permitted values have far fewer."""
 
 _STEPS = {kind.__name__: kind for kind in ACTIONS}
+
+
+SESSION_ENDS_BEFORE = Message("files.session-ends-before", "the session ends at {until:g} s, before {end:g} s")
+SESSION_ENDS_BEFORE_AN_INPUT = Message(
+    "files.session-ends-before-an-input", "the session ends at {until} ns, before an input at {time} ns"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,10 +85,10 @@ class Session:
         """
         end = self.until if until is None else until
         if end > self.until:
-            raise Misuse(f"the session ends at {self.until / SECOND:g} s, before {end / SECOND:g} s")
+            raise Misuse(SESSION_ENDS_BEFORE(until=self.until / SECOND, end=end / SECOND))
         world = self.world(keep_trace=keep_trace, keep_inputs=keep_inputs)
         if self.inputs and self.inputs[-1].time > self.until:
-            raise Misuse(f"the session ends at {self.until} ns, before an input at {self.inputs[-1].time} ns")
+            raise Misuse(SESSION_ENDS_BEFORE_AN_INPUT(until=self.until, time=self.inputs[-1].time))
         for _ in replay(world, self.inputs, end):
             pass
         return world
@@ -99,13 +106,18 @@ def _firmwares(world: World) -> dict[str, str]:
     return {name: sheet.variant for name, sheet in sheets.items() if sheet.variant}
 
 
+NO_SESSION_IS_RECORDED = Message(
+    "files.no-session-is-recorded", "this world does not record a session: it does not keep its inputs"
+)
+
+
 def session_of(world: World) -> Session:
     """The session of a world up to now. It contains the inputs of Python code, not the code.
 
     Raises `Misuse` for a world that does not keep its inputs.
     """
     if not world.keeps_inputs:
-        raise Misuse("this world does not record a session: it does not keep its inputs")
+        raise Misuse(NO_SESSION_IS_RECORDED())
     _settle(world)
     spec = world.spec
     return Session(
@@ -144,13 +156,18 @@ def save(session: Session, path: Path | str) -> None:
     write_bytes(Path(path), (json.dumps(data, indent=1) + "\n").encode())
 
 
+SESSION_OF_ANOTHER_FORMAT = Message(
+    "files.session-of-another-format", "{path} is a session of format {format}: this version reads {own}"
+)
+
+
 def load(path: Path | str) -> Session:
     """Read a session. Raises `Misuse` for a file that cannot be read or is not a session."""
     content = read_recorded(Path(path))
     try:
         data = json.loads(content, parse_int=_whole, parse_constant=_finite)
         if data["steptwin_session"] != FORMAT:
-            raise Misuse(f"{path} is a session of format {data['steptwin_session']}: this version reads {FORMAT}")
+            raise Misuse(SESSION_OF_ANOTHER_FORMAT(path=path, format=data["steptwin_session"], own=FORMAT))
         return _session(data)
     except (LookupError, TypeError, ValueError, RecursionError, OverflowError, AttributeError) as error:
         raise error if isinstance(error, Misuse) else Misuse(f"{path} is not a session of a world: {_why(error)}") from None

@@ -12,6 +12,7 @@ from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.files.writing import check_content, new_content
 from steptwin.inputfiles import MOST_BYTES, read_bytes, shown
+from steptwin.messages import Message
 from steptwin.system import reason
 from steptwin.textcodec import Decoded, decode
 
@@ -28,18 +29,24 @@ class TextFile:
         return self.decoded.to_bytes(text)
 
 
+CANNOT_WRITE = Message("files.cannot-write", "cannot write {path}: {why}")
+
+
 def check_writable(path: Path) -> None:
     """Check in advance that a file can be written; missing folders are permitted. Raises `Misuse`."""
     try:
         check_content(path)
     except (OSError, ValueError) as error:
-        raise Misuse(f"cannot write {shown(path)}: {reason(error)}") from None
+        raise Misuse(CANNOT_WRITE(path=shown(path), why=reason(error))) from None
+
+
+NO_FOLDER = Message("files.no-folder", "cannot write {path}: there is no folder {folder}")
 
 
 def check_folder(path: Path) -> None:
     """Check that the folder of a file exists. Raises `Misuse`."""
     if not path.parent.is_dir():
-        raise Misuse(f"cannot write {shown(path)}: there is no folder {shown(path.parent)}")
+        raise Misuse(NO_FOLDER(path=shown(path), folder=shown(path.parent)))
 
 
 @contextmanager
@@ -51,7 +58,7 @@ def new_file(path: Path) -> Generator[IO[bytes]]:
     except SteptwinError:  # a failed line or database is an `OSError`, too
         raise
     except OSError as error:
-        raise Misuse(f"cannot write {shown(path)}: {reason(error)}") from error
+        raise Misuse(CANNOT_WRITE(path=shown(path), why=reason(error))) from error
 
 
 def write_bytes(path: Path, data: bytes) -> None:

@@ -21,8 +21,11 @@ from steptwin.history.rows import RowBatch, RunHead
 from steptwin.history.spool import Spool
 from steptwin.history.writer import HistoryWriter
 from steptwin.machine import SECOND
+from steptwin.messages import Message
 from steptwin.simulation.describe.servicetables import HISTORY
 from steptwin.system import reason
+
+CANNOT_BE_KEPT = Message("history.cannot-be-kept", "{folder}: {why}")
 
 
 class HistoryKeeper:
@@ -65,7 +68,7 @@ class HistoryKeeper:
         try:
             self._spool.begin(head)
         except OSError as error:
-            raise LineFailure(f"{self._folder}: {reason(error)}") from error
+            raise LineFailure(CANNOT_BE_KEPT(folder=self._folder, why=reason(error))) from error
         self._task = endless(self._keep(self._recorder, self._spool), self._fail)
         return {"url": shown(self._url)}
 

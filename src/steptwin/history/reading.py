@@ -29,6 +29,7 @@ from steptwin.history.database import SQLITE, check_version, engine_of, failure,
 from steptwin.history.motions import KeptMotion
 from steptwin.history.schema import EVENT, PLAN, POINT, RUN, SAMPLE, SUMMARY, TEXT
 from steptwin.machine import MICROSECOND, SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.motion.plain import read_plan
 from steptwin.nearmiss import NearMiss
 
@@ -140,6 +141,14 @@ class _Row(NamedTuple):
     value: Any
 
 
+DOES_NOT_EXIST = Message("history.does-not-exist", "{database} does not exist")
+NO_SUCH_RUN = Message("history.no-such-run", "run {number}: {there}, and -1 is the last one")
+DATES_OR_SECONDS = Message(
+    "history.dates-or-seconds", "begin and end are two dates, or seconds since the begin of the run that 'run' names"
+)
+NO_SUCH_POINT = Message("history.no-such-point", "no point {name!r} has been kept{hint}")
+
+
 class HistoryDatabase:
     """The history at ``url``: ``sqlite:///FILE`` or the address of a PostgreSQL database.
 
@@ -149,7 +158,7 @@ class HistoryDatabase:
     def __init__(self, url: str, folder: Path = Path()) -> None:
         self._url = read_url(url, folder)
         if self._url.get_backend_name() == SQLITE and not Path(str(self._url.database)).is_file():
-            raise Misuse(f"{self._url.database} does not exist")
+            raise Misuse(DOES_NOT_EXIST(database=self._url.database))
         self._engine = engine_of(self._url)
         try:
             with self._engine.connect() as connection:
@@ -204,7 +213,7 @@ class HistoryDatabase:
         found = runs[number:][:1] if number < 0 else [run for run in runs if run.number == number]
         if not found or -number > len(runs):
             there = f"there are {runs[0].number} to {runs[-1].number}" if runs else "there is none"
-            raise Misuse(f"run {number}: {there}, and -1 is the last one")
+            raise Misuse(NO_SUCH_RUN(number=number, there=there))
         return found[0]
 
     def points(self, pattern: str = "*") -> list[KeptPoint]:
@@ -247,7 +256,7 @@ class HistoryDatabase:
         if not isinstance(begin, int | float) and not isinstance(end, int | float):
             return _Bounds(True, _micros(begin), _micros(end))
         if run is None or isinstance(begin, datetime) or isinstance(end, datetime):
-            raise Misuse("begin and end are two dates, or seconds since the begin of the run that 'run' names")
+            raise Misuse(DATES_OR_SECONDS())
         origin = self.run(run).began_ns
         return _Bounds(False, *(None if at is None else origin + round(at * SECOND) for at in (begin, end)))
 
@@ -261,7 +270,7 @@ class HistoryDatabase:
                 unit = rows[-1].unit
                 return [row.id for row in rows], rows[-1].type, f"{unit}/s" if is_velocity else unit, is_velocity
         names = sorted({point.name for point in self.points()})
-        raise Misuse(f"no point {name!r} has been kept{NearMiss().hint(name, names)}")
+        raise Misuse(NO_SUCH_POINT(name=name, hint=NearMiss().hint(name, names)))
 
     def _samples(self, ids: list[int], kind: str, bounds: _Bounds, runs: Mapping[int, KeptRun], most: int | None) -> list[_Row]:
         s = SAMPLE.c
@@ -411,10 +420,15 @@ def _of_samples(point: str, rows: list[_Row], runs: Mapping[int, KeptRun], bound
     return found
 
 
+TOO_MANY_VALUES = Message(
+    "history.too-many-values", "{point} has more than {most} values here: take a shorter stretch, or one value in a longer time"
+)
+
+
 def _check_size(point: str, found: int, length_s: float, every_s: float | None) -> None:
     """Check the number of the values that are found and those of another length. Raises `Misuse`."""
     if found + (0.0 if every_s is None else length_s / every_s) > MOST_VALUES:
-        raise Misuse(f"{point} has more than {MOST_VALUES} values here: take a shorter stretch, or one value in a longer time")
+        raise Misuse(TOO_MANY_VALUES(point=point, most=MOST_VALUES))
 
 
 def _arrays(point: str, unit: str, rows: list[_Row], *, is_text: bool, is_motion: bool) -> PointSeries:

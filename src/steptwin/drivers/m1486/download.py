@@ -21,6 +21,7 @@ from steptwin.m1486.structure import written_label
 from steptwin.m1486.syntax import ChipCommand, ParsedProgram
 from steptwin.m1486.variants import Store, Variant
 from steptwin.machine import MILLISECOND, SECOND
+from steptwin.messages import Message, text_of
 
 DownloadProgress = Callable[[int, int], object]
 """Called with the number of commands sent, and their total."""
@@ -50,12 +51,17 @@ def checked_program(text: str, variant: Variant, interface: Interface, name: str
     return checked.program
 
 
+NOT_TO_SEVERAL_CHIPS = Message(
+    "drivers.m1486.not-to-several-chips", "XG is not sent: a command to several chips cannot be verified; select each chip with X"
+)
+
+
 def parts(program: ParsedProgram) -> list[tuple[int | None, list[ChipCommand]]]:
     """The commands in order, split where ``X`` selects another chip; None before the first X."""
     found: list[tuple[int | None, list[ChipCommand]]] = [(None, [])]
     for command in program.commands:
         if command.key == "XG":
-            raise Misuse("XG is not sent: a command to several chips cannot be verified; select each chip with X")
+            raise Misuse(NOT_TO_SEVERAL_CHIPS())
         if command.key == "X":
             found.append((command.number, []))
         else:
@@ -85,6 +91,16 @@ def probes(commands: Sequence[ChipCommand]) -> list[bool]:
     return allowed
 
 
+CHIPS_OF_SEVERAL_TYPES = Message(
+    "drivers.m1486.chips-of-several-types",
+    "{name} is not sent: {chip} is an {kind}, {other} an {another}; a program is checked for one type: send each its own",
+)
+NO_CHIP_IS_SELECTED = Message("drivers.m1486.no-chip-is-selected", "{name} is not sent: no X before {command} selects its chip")
+CHIP_IS_NOT_ON_THE_LINE = Message(
+    "drivers.m1486.chip-is-not-on-the-line", "{name} is not sent: it names chip {address:X}, which is not on this line"
+)
+
+
 async def send_program(
     units: Mapping[int | None, ChipUnit],
     text: str,
@@ -97,8 +113,8 @@ async def send_program(
     first = next(iter(units.values()))
     other = next((unit for unit in units.values() if unit.variant is not first.variant), None)
     if other is not None:
-        kinds = f"{first.name} is an {first.variant.title}, {other.name} an {other.variant.title}"
-        raise Misuse(f"{name} is not sent: {kinds}; a program is checked for one type: send each its own")
+        kind, another = first.variant.title, other.variant.title
+        raise Misuse(CHIPS_OF_SEVERAL_TYPES(name=name, chip=first.name, kind=kind, other=other.name, another=another))
     permission = first.permission()
     asked = {unit: unit.permission().is_stopped for unit in units.values()}
     program = checked_program(text, first.variant, await _interface(first, text, permission), name)
@@ -106,8 +122,8 @@ async def send_program(
     for address, commands in found:
         if address not in units:
             if address is None:
-                raise Misuse(f"{name} is not sent: no X before {commands[0]} selects its chip")
-            raise Misuse(f"{name} is not sent: it names chip {address:X}, which is not on this line")
+                raise Misuse(NO_CHIP_IS_SELECTED(name=name, command=commands[0]))
+            raise Misuse(CHIP_IS_NOT_ON_THE_LINE(name=name, address=address))
     total = sum(len(commands) for _, commands in found)
     done = 0
     uploaded = b""
@@ -136,6 +152,9 @@ async def _interface(unit: ChipUnit, text: str, permission: Permission) -> Inter
                 await unit.rest()
                 await unit.find_interface()
     return unit.notes.interface or STEP_DIRECTION
+
+
+TAKES_NO_CHARACTERS = Message("drivers.m1486.takes-no-characters", "{place}: {chip} takes no more characters: it {why}")
 
 
 class _Typist:
@@ -222,8 +241,20 @@ class _Typist:
             await unit.line.sleep(FULL_PAUSE_NS / SECOND)
             return
         if await unit.query_type(round(UNKNOWN_S * SECOND), self.permission) is None:
-            raise Busy(f"{unit.place}: {unit.name} takes no more characters: it {unit.why_busy()}")
+            raise Busy(TAKES_NO_CHARACTERS(place=unit.place, chip=unit.name, why=unit.why_busy()))
         self._typed = 0
+
+
+FILE_IS_HALF_TYPED = Message(
+    "drivers.m1486.file-is-half-typed",
+    "{place}: the file for {chip} could not be typed ({why}), and the chip not be reset ({second}): it still waits for "
+    "the rest of it",
+)
+FILE_IS_GIVEN_UP = Message(
+    "drivers.m1486.file-is-given-up",
+    "{place}: the file for {chip} was not typed to its end ({why}); the chip was reset: nothing of it runs, position and "
+    "settings are those of power-up",
+)
 
 
 async def type_file(unit: ChipUnit, lines: Sequence[str], permission: Permission, report: Callable[[int], object]) -> None:
@@ -251,13 +282,9 @@ async def type_file(unit: ChipUnit, lines: Sequence[str], permission: Permission
             await reset(unit)
         except (LineFailure, Refusal) as second:
             raise FileGivenUp(
-                f"{unit.place}: the file for {unit.name} could not be typed ({failure}), and the chip not be reset ({second}): "
-                "it still waits for the rest of it"
+                FILE_IS_HALF_TYPED(place=unit.place, chip=unit.name, why=text_of(failure), second=text_of(second))
             ) from failure
-        raise FileGivenUp(
-            f"{unit.place}: the file for {unit.name} was not typed to its end ({failure}); the chip was reset: nothing of it "
-            "runs, position and settings are those of power-up"
-        ) from failure
+        raise FileGivenUp(FILE_IS_GIVEN_UP(place=unit.place, chip=unit.name, why=text_of(failure))) from failure
     report(len(lines))
 
 

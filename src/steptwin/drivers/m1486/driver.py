@@ -113,6 +113,29 @@ DISTANCE_IS_OUT_OF_RANGE = Message(
 )
 
 
+LABEL_IS_NOT_STARTED = Message("drivers.m1486.label-is-not-started", "{place}: label {label} is not started: {why}")
+CONTINUES = Message(
+    "drivers.m1486.continues", "{place}: {chip} continues: function 44 is ON, LIMIT is low, or it is still braking"
+)
+PROGRAM_IS_NOT_STARTED = Message(
+    "drivers.m1486.program-is-not-started",
+    "{place}: {chip} is at rest: it has no label {label}, or its program has come to its end at once; each command that "
+    "was sent has overwritten the oldest one in its memory",
+)
+IS_NOT_AT_REST = Message(
+    "drivers.m1486.is-not-at-rest",
+    "{place}: {chip} is not at rest: Kill holds it (function 51 OFF), its program continues, LIMIT is low, or it is still "
+    "braking. C75 was not sent, because function 44 may be ON and the motor would move again: recover lets it go on, "
+    "reset ends it",
+)
+END_IS_REACHED = Message(
+    "drivers.m1486.end-is-reached",
+    "label {label}: the end of the program can be reached from it; there the chip goes on with what was sent since, in "
+    "the end with the J that starts it, again and again (M-12). End it with a loop, such as @9 W1000 J9, or run it once "
+    "with download or run_block",
+)
+
+
 class AsyncM1486:
     """A chip at an address (``/dev/ttyUSB0``, ``tcp://host:5022``) or on a line shared with others.
 
@@ -513,24 +536,17 @@ class AsyncM1486:
         permission = unit.permission()
         part = unit.notes.sent.part(label, unit.variant, unit.notes.interface)
         if part is not None and part.has_end:
-            raise Misuse(
-                f"label {label}: the end of the program can be reached from it; there the chip goes on with what was sent since, "
-                "in the end with the J that starts it, again and again (M-12). End it with a loop, such as @9 W1000 J9, or run "
-                "it once with download or run_block"
-            )
+            raise Misuse(END_IS_REACHED(label=label))
         async with unit.turn(permission):
             await unit.rest()
             spare = None if part is None else unit.spare_bits(part.begins_at)
             if spare is not None and spare < START_BITS:
-                raise ProgramLost(f"{self.line.place}: label {label} is not started: {_lost(spare, unit.variant)}")
+                raise ProgramLost(LABEL_IS_NOT_STARTED(place=self.line.place, label=label, why=_lost(spare, unit.variant)))
             await unit.send(f":{label}")
             await begin(unit, "j", ChipMotion.BLOCK, permission, label=label)
             if not await unit.runs_at_once():
                 unit.notes.motion = None
-                raise ProgramLost(
-                    f"{self.line.place}: {unit.name} is at rest: it has no label {label}, or its program has come to its end at "
-                    "once; each command that was sent has overwritten the oldest one in its memory"
-                )
+                raise ProgramLost(PROGRAM_IS_NOT_STARTED(place=self.line.place, chip=unit.name, label=label))
 
     async def stop(self) -> bool:
         """Brake with the ramp, and end a program: nothing begins any more that was asked for before, also if this process dies
@@ -583,12 +599,8 @@ class AsyncM1486:
             notes.motion = None
             if await unit.query_type(round(timeout_s * SECOND)) is None:
                 if is_held:
-                    raise Busy(
-                        f"{self.line.place}: {unit.name} is not at rest: Kill holds it (function 51 OFF), its program continues, "
-                        "LIMIT is low, or it is still braking. C75 was not sent, because function 44 may be ON and the motor "
-                        "would move again: recover lets it go on, reset ends it"
-                    )
-                raise Busy(f"{self.line.place}: {unit.name} continues: function 44 is ON, LIMIT is low, or it is still braking")
+                    raise Busy(IS_NOT_AT_REST(place=self.line.place, chip=unit.name))
+                raise Busy(CONTINUES(place=self.line.place, chip=unit.name))
 
     async def wait(self, timeout_s: float | None = None, *, check: bool = True) -> ChipMoveEnd:
         """Wait until the chip has executed all commands, and return why a motion ended.
@@ -723,13 +735,22 @@ class AsyncM1486:
         return await send_program({self.address: self._unit, None: self._unit}, text, progress=progress, name=name)
 
 
+BEGINNING_IS_OVERWRITTEN = Message(
+    "drivers.m1486.beginning-is-overwritten",
+    "what was sent since the program, questions too, has filled the {size} bits of the command memory and overwritten its "
+    "beginning: download it anew",
+)
+NO_ROOM_TO_START = Message(
+    "drivers.m1486.no-room-to-start",
+    "the program and what was sent since fill the {size} bits of the command memory but for {spare}; a start takes "
+    "{start}: download it anew",
+)
+
+
 def _lost(spare_bits: int, variant: Variant) -> str:
-    size = f"the {variant.memory_bits} bits of the command memory"
     if spare_bits < 0:
-        return (
-            f"what was sent since the program, questions too, has filled {size} and overwritten its beginning: download it anew"
-        )
-    return f"the program and what was sent since fill {size} but for {spare_bits}; a start takes {START_BITS}: download it anew"
+        return BEGINNING_IS_OVERWRITTEN(size=variant.memory_bits)
+    return NO_ROOM_TO_START(size=variant.memory_bits, spare=spare_bits, start=START_BITS)
 
 
 async def download_to(

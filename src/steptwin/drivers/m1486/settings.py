@@ -17,6 +17,7 @@ from steptwin.m1486.lines import Interface
 from steptwin.m1486.microsteps import FULL_STEP, HIGHEST_SPEED, PAIRS, microstep_size
 from steptwin.m1486.variants import Variant
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message
 from steptwin.motion.ramps import SpeedCurve, longest_within, plan_distance
 
 COMMANDS = {
@@ -26,6 +27,11 @@ COMMANDS = {
     if spec.use.sets is setting and setting is not Setting.VARIABLE
 }
 """The command of each setting."""
+
+
+MICROSTEPS_AND_QUALIFICATION = Message(
+    "drivers.m1486.microsteps-and-qualification", "M{m} and Q{q} do not go together: with M{m} go {names}"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +58,7 @@ class ChipSettings:
         """Raises `Misuse` for an M and Q that do not go together: a move would not start (M-11)."""
         m, q = self.microstep, self.qualification
         if m is not None and q is not None and q not in PAIRS[m]:
-            raise Misuse(f"M{m} and Q{q} do not go together: with M{m} go {', '.join(f'Q{n}' for n in PAIRS[m])}")
+            raise Misuse(MICROSTEPS_AND_QUALIFICATION(m=m, q=q, names=[f"Q{n}" for n in PAIRS[m]]))
 
     def travel_s(self, distance_u: int, variant: Variant) -> float | None:
         """The duration of a move, s; None if a setting is unknown."""

@@ -34,8 +34,10 @@ AXIS = 1
 COUNTER = (1, 2, 3)
 """The bytes of the position counter, by the numbers of ``U``."""
 FORMAT = "steptwin M1486 settings 1"
-BUSY = StatusPayload("busy", "moves, waits or runs its program")
-AT_REST = StatusPayload("at-rest", "is at rest")
+IS_ACTIVE = Message("drivers.m1486.is-active", "moves, waits or runs its program")
+RESTS = Message("drivers.m1486.rests", "is at rest")
+BUSY = StatusPayload("busy", IS_ACTIVE())
+AT_REST = StatusPayload("at-rest", RESTS())
 NO_TWIN = Message("drivers.no-twin-of-m1486", "no twin beside an M1486, whose position is unknown while it moves (M-28)")
 UNKNOWN_POINT = Message("drivers.m1486.unknown-point", "{point!r} is not a point of an M1486: there are {names}")
 ONE_AXIS_ONLY = Message("drivers.m1486.one-axis-only", "axis = {axis}: an M1486 has axis {only} only")

@@ -69,6 +69,22 @@ DOES_NOT_ANSWER_YET = Message(
 )
 
 
+IS_NOT_OPEN = Message("drivers.m1486.is-not-open", "{place}: {chip} is not open")
+UNKNOWN_NUMBER_OF_CHIPS = Message(
+    "drivers.m1486.unknown-number-of-chips",
+    "{place}: the answers do not show how many chips there are: name the address of the chip",
+)
+NOT_ALONE_ON_ITS_LINE = Message(
+    "drivers.m1486.not-alone-on-its-line", "{place}: a chip without address has to be the only one on its line"
+)
+UNKNOWN_TYPE_LETTER = Message(
+    "drivers.m1486.unknown-type-letter", "{place}: {chip} reports the type letter {letter:02X}H, which no M1486 has"
+)
+REPORTS_ANOTHER_TYPE = Message(
+    "drivers.m1486.reports-another-type", "{place}: {chip} reports that it is an M1486{letter}, not {title}"
+)
+
+
 class ChipUnit:
     """The chip with ``address`` on ``line``; None: the only one, which needs no selection."""
 
@@ -79,7 +95,7 @@ class ChipUnit:
         self.talk: CharacterTalk = line.notes[TALK]
         known = line.notes.setdefault("m1486 chips", set())
         if (None in known) is not (address is None) and known:
-            raise Misuse(f"{line.place}: a chip without address has to be the only one on its line")
+            raise Misuse(NOT_ALONE_ON_ITS_LINE(place=line.place))
         known.add(address)
         self.notes: ChipNotes = line.notes.setdefault(("m1486", address), ChipNotes())
 
@@ -109,7 +125,7 @@ class ChipUnit:
     @property
     def variant(self) -> Variant:
         if self.notes.variant is None:
-            raise Misuse(f"{self.place}: {self.name} is not open")
+            raise Misuse(IS_NOT_OPEN(place=self.place, chip=self.name))
         return self.notes.variant
 
     def turn(self, permission: Permission | None = None) -> AbstractAsyncContextManager[object]:
@@ -232,7 +248,7 @@ class ChipUnit:
                     self.notes.asked_at = self.line.now()
                 return
         self.talk.forget(None)
-        raise LineFailure(f"{self.place}: the answers do not show how many chips there are: name the address of the chip")
+        raise LineFailure(UNKNOWN_NUMBER_OF_CHIPS(place=self.place))
 
     async def _probe(self, text: str, patience_ns: Nanos) -> bytes:
         """Send ``text``, and return everything that comes back within ``patience_ns`` after it."""
@@ -454,7 +470,7 @@ class ChipUnit:
         (letter,) = await self.read(20, rests=True)
         if letter != notes.variant.type_letter:
             raise WrongType(
-                f"{self.place}: {self.name} reports that it is an M1486{_NAMES.get(letter, '?')}, not {notes.variant.title}"
+                REPORTS_ANOTHER_TYPE(place=self.place, chip=self.name, letter=_NAMES.get(letter, "?"), title=notes.variant.title)
             )
         return letter
 
@@ -508,7 +524,7 @@ class ChipUnit:
         else:
             raise self._differs(20)
         if letter not in _NAMES:
-            raise WrongType(f"{self.place}: {self.name} reports the type letter {letter:02X}H, which no M1486 has")
+            raise WrongType(UNKNOWN_TYPE_LETTER(place=self.place, chip=self.name, letter=letter))
         if notes.variant is None:
             notes.variant = next(variant for variant in VARIANTS if variant.type_letter == letter)
         await self.read(FUNCTION_BYTES[0], rests=True)

@@ -26,6 +26,7 @@ from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse
 from steptwin.inputfiles import read_bytes
 from steptwin.machine import SECOND
+from steptwin.messages import Message
 from steptwin.mic488.config import ControllerConfig, read_config
 from steptwin.mic488.describe import AxisScale
 from steptwin.mic488.inifile import IniFile
@@ -63,6 +64,11 @@ class Mic488Status:
 def load_config(path: str | Path, firmware: str = DEFAULT_FIRMWARE) -> ControllerConfig:
     """The configuration in a ``.cfg`` file of the vendor's tool. Raises `Misuse` with all its errors."""
     return read_config(IniFile.parse(read_bytes(Path(path)), str(path)), firmware)
+
+
+NO_OUTPUT = Message("drivers.mic488.no-output", "no output {number}: outputs are 1 to {most}")
+STARTED_AGAIN = Message("drivers.mic488.started-again", "the program was paused, but runs: another master has started it again")
+CAN_ONLY_BE_READ = Message("drivers.mic488.can-only-be-read", "{name} can only be read")
 
 
 class AsyncMic488:
@@ -206,7 +212,7 @@ class AsyncMic488:
     async def set_output(self, number: int, on: bool) -> None:
         """Switch OUT1 to OUT8."""
         if not 1 <= number <= OUTPUTS:
-            raise Misuse(f"no output {number}: outputs are 1 to {OUTPUTS}")
+            raise Misuse(NO_OUTPUT(number=number, most=OUTPUTS))
         await self._unit.write(self._unit.item("OUT", number), on)
 
     # ------------------------------------------------------------------ several axes
@@ -244,7 +250,7 @@ class AsyncMic488:
             finally:
                 await self.stop()  # the program may have begun a motion meanwhile
             if await self.program.state() is ProgramState.RUNNING:
-                raise Unconfirmed("the program was paused, but runs: another master has started it again")
+                raise Unconfirmed(STARTED_AGAIN())
 
     async def _halt(self, key: str, axes: Sequence[int], what: str) -> None:
         chosen = [check_axis(axis) for axis in axes or ALL_AXES]
@@ -303,7 +309,7 @@ class AsyncMic488:
         for name, value in values:
             item = named(unit.registers, name)
             if not item.register.accepts:
-                raise Misuse(f"{name} can only be read")
+                raise Misuse(CAN_ONLY_BE_READ(name=name))
             ended = unit.ended_by(item, value)
             moved = () if ended else _moved_by(item)
             chosen.append((item, value, ended, moved, unit.permission(*moved, own=own) if moved else None))

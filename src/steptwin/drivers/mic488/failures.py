@@ -17,6 +17,13 @@ _WHY = {
     2: Message("drivers.mic488.no-register", "the controller does not have this register, or not for this function"),
     3: Message("drivers.mic488.value-is-not-accepted", "the controller does not accept this value"),
 }
+_DONE = {
+    "paused": Message("drivers.mic488.paused", "paused"),
+    "stopped": Message("drivers.mic488.stopped", "stopped"),
+    "switched off": Message("drivers.mic488.switched-off", "switched off"),
+}
+"""What was to be done to an axis or a program."""
+UNKNOWN = Message("drivers.mic488.unknown-exception", "unknown")
 AT_PLACE = Message("drivers.mic488.at-place", "{place}: {what}")
 REFUSED = Message("drivers.mic488.refused", "'{request}' was refused: {why} (exception {code:02X}, {name})")
 REFUSED_WITHOUT_REASON = Message("drivers.mic488.refused-without-reason", "'{request}' was refused: exception {code:02X}, {name}")
@@ -39,7 +46,7 @@ class ModbusRefusal(Mic488Refusal):
 
     def __init__(self, place: str, request: object, exception: ModbusException) -> None:
         self.code = exception.code
-        code, name = exception.code, text_of(EXCEPTION_NAMES.get(exception.code, "unknown"))
+        code, name = exception.code, EXCEPTION_NAMES.get(exception.code, UNKNOWN())
         if code in _WHY:
             super().__init__(place, REFUSED(request=request, why=_WHY[code](), code=code, name=name))
         else:
@@ -68,4 +75,4 @@ class Unconfirmed(LineFailure):
 
 def unconfirmed(who: str, what: str, failure: LineFailure) -> Unconfirmed:
     """The error for the axis or controller ``who``, which could not be ``what``, such as ``stopped``."""
-    return Unconfirmed(UNCONFIRMED(who=who, what=what, problem=text_of(failure)))
+    return Unconfirmed(UNCONFIRMED(who=text_of(who), what=_DONE[what](), problem=text_of(failure)))

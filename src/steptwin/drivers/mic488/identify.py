@@ -11,6 +11,7 @@ from steptwin.drivers.mic488.failures import ModbusRefusal, NoMic488
 from steptwin.drivers.modbus import ModbusQuery, words
 from steptwin.errors import LineFailure, Refusal
 from steptwin.machine import MILLISECOND, Nanos
+from steptwin.messages import Message, text_of
 from steptwin.mic488.registermap import RegisterMap
 from steptwin.mic488.registers import AXES, register_map
 from steptwin.wire import pdu
@@ -35,6 +36,12 @@ class FoundUnit(NamedTuple):
     unit: int
     firmware: str | None
     every_unit: bool = False
+
+
+NO_MIC488 = Message(
+    "drivers.mic488.no-mic488", "{place}: unit {unit} responds, but does not have the registers of a MIC488 ({why})"
+)
+IMPLAUSIBLE = Message("drivers.mic488.implausible-values", "implausible values")
 
 
 async def firmware_of(line: DriverLine[ModbusQuery, bytes], unit: int, timeout_ns: Nanos) -> str:
@@ -74,9 +81,7 @@ async def firmware_of(line: DriverLine[ModbusQuery, bytes], unit: int, timeout_n
         return _NEW if may_be_new and await answers(_NEW) else _OLD
     if refusal is None and failure is not None:
         raise failure
-    raise NoMic488(
-        f"{line.place}: unit {unit} responds, but does not have the registers of a MIC488 ({refusal or 'implausible values'})"
-    )
+    raise NoMic488(NO_MIC488(place=line.place, unit=unit, why=IMPLAUSIBLE() if refusal is None else text_of(refusal)))
 
 
 def _plausible(registers: RegisterMap, start: int, content: tuple[int, ...]) -> bool:

@@ -53,6 +53,11 @@ ITS_PROGRAM = Message("drivers.mic488.its-program", "its program")
 TWIN_NEEDS_REST = Message("drivers.mic488.twin-needs-rest", "{place}: a twin can be made at rest: {names} runs")
 
 
+ANOTHER_CONTROLLER = Message(
+    "drivers.mic488.another-controller", "another controller is there: firmware {firmware} instead of {before}"
+)
+
+
 class Mic488Part:
     """Positions are in configured units if the driver knows them; else pulses per unit are unknown."""
 
@@ -83,7 +88,7 @@ class Mic488Part:
         before = self._mic.firmware
         await self._mic.find_firmware()
         if self._mic.firmware != before:
-            raise NotReady(self.line.place, f"another controller is there: firmware {self._mic.firmware} instead of {before}")
+            raise NotReady(self.line.place, ANOTHER_CONTROLLER(firmware=self._mic.firmware, before=before))
 
     # ------------------------------------------------------------------ points
 
@@ -374,18 +379,25 @@ def _edges(before: Mic488Status, status: Mic488Status) -> list[Payload]:
     ]
 
 
+AXIS_STATUS = Message("drivers.mic488.axis-status", "M{axis}: {status}")
+CONTROLLER_STATUS = Message("drivers.mic488.controller-status", "controller: {status}")
+PROGRAM_STATE = Message("drivers.mic488.program-state", "program: {state}")
+
+
 def _changes(before: Mic488Status, status: Mic488Status) -> list[Payload]:
     """Changes of the registers that show the state of the controller."""
     found: list[Payload] = [
-        StatusPayload("axis-status", f"M{axis}: {status_text(new)}", (("axis", axis), ("status", new)))
+        StatusPayload("axis-status", AXIS_STATUS(axis=axis, status=text_of(status_text(new))), (("axis", axis), ("status", new)))
         for axis, (old, new) in enumerate(zip(before.axes, status.axes, strict=True), start=1)
         if old != new
     ]
     if status.controller != before.controller and status.controller is not None:
         text = CONTROLLER_STATUS_TEXTS.get(status.controller, f"unknown status {status.controller}")
-        found.append(StatusPayload("controller-status", f"controller: {text}", (("status", status.controller),)))
+        found.append(
+            StatusPayload("controller-status", CONTROLLER_STATUS(status=text_of(text)), (("status", status.controller),))
+        )
     if status.program != before.program:
         known = {state.value: state.name.lower() for state in ProgramState}
         text = known.get(status.program, f"unknown state {status.program}")
-        found.append(StatusPayload("program-state", f"program: {text}", (("state", status.program),)))
+        found.append(StatusPayload("program-state", PROGRAM_STATE(state=text_of(text)), (("state", status.program),)))
     return found

@@ -89,6 +89,9 @@ class UnitNotes:
         self.control: ControlRegisters | None = None
 
 
+THE_PROGRAM = Message("drivers.mic488.the-program", "the program")
+
+
 class Unit:
     """The controller with slave address ``number`` on ``line``.
 
@@ -403,7 +406,7 @@ class Unit:
         try:
             await self.write(self.item("PROGRAM_CTRL"), state, urgent=True, most_attempts=URGENT_TRIES)
         except LineFailure as failure:
-            raise unconfirmed("the program", what, failure) from failure
+            raise unconfirmed(THE_PROGRAM(), what, failure) from failure
 
     async def stop(self, axes: Sequence[int], key: str = "M_STOP", what: str = "stopped") -> None:
         """Stop axes in the same instant, before all waiting requests. Raises `Unconfirmed`."""
@@ -419,7 +422,10 @@ def axis_mask(axes: Iterable[int]) -> int:
     return sum(1 << check_axis(axis) - 1 for axis in set(axes))
 
 
+UNKNOWN_AXIS = Message("drivers.mic488.unknown-axis", "no axis {axis}: axes are 1 to {most}")
+
+
 def check_axis(axis: int) -> int:
     if axis not in range(1, AXES + 1):
-        raise Misuse(f"no axis {axis}: axes are 1 to {AXES}")
+        raise Misuse(UNKNOWN_AXIS(axis=axis, most=AXES))
     return axis
