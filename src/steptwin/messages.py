@@ -62,7 +62,7 @@ class Message:
 
     def __call__(self, /, **values: Any) -> MessageText:
         """The text with these values: texts, numbers, messages, lists of them. Raises `KeyError` for one that is missing."""
-        shown = {name: _List(value) if isinstance(value, (list, tuple)) else value for name, value in values.items()}
+        shown = {name: _List(value) if type(value) in (list, tuple) else value for name, value in values.items()}
         return MessageText(self.english.format_map(shown), self.id, {name: _json_value(value) for name, value in values.items()})
 
 
@@ -81,7 +81,7 @@ class _List(tuple[Any, ...]):
 def _json_value(value: Any) -> JsonValue:
     if isinstance(value, MessageText):
         return value.plain()
-    if isinstance(value, (list, tuple)):
+    if type(value) in (list, tuple):
         return [_json_value(one) for one in value]
     if isinstance(value, float) and not isfinite(value):
         return str(value)

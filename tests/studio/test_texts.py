@@ -6,22 +6,16 @@ import re
 from collections.abc import Iterable, Iterator
 from functools import cache
 
-import pytest
-from tests.support.sentences import ROOT, Sentences, has_words, refused, table
+from tests.support.sentences import ROOT, Sentences, has_words, table
 
 from steptwin.datasheet import Datasheet
-from steptwin.files.world import World
-from steptwin.live.studio.demo import FOLDER, describe_demo
 from steptwin.m1486.datasheet import datasheet_of
 from steptwin.m1486.microsteps import UNIT
 from steptwin.m1486.variants import VARIANTS
-from steptwin.messages import MessageText
 from steptwin.mic488 import configform
 from steptwin.mic488.points import AXIS_SHORT_NAMES, SHORT_NAMES
 from steptwin.mic488.registers import AXIS_STATUS_TEXTS, CONTROLLER_STATUS_TEXTS, ROWS
 from steptwin.simulation.faults.kinds import rows
-from steptwin.subject.events import payload_of
-from steptwin.subject.payloads import is_shown
 from steptwin.verify import m1486, mic488
 
 SOURCES = ROOT / "src/steptwin"
@@ -32,20 +26,15 @@ GOLDEN = [
     *sorted((ROOT / "tests/m1486/golden").glob("*.golden")),
 ]
 FINDING = re.compile(r"^.+?:\d+:\d+: (?:error|warning|note) [MW]\d+: (.*)$|^ +\d* *= (?!suggestion:)(.*)$", re.MULTILINE)
-REFUSING = [
-    *(f"mic488/{name}.py" for name in ("core", "encoding", "program", "program_banks", "values")),
-    "m1486/*_effects.py",
-]
-"""Where what a viewer asks for can be refused. Not among them: files and descriptions."""
 PLACE = re.compile(r"\{#?\w+\}")
 CONTINUED = re.compile(r'"\s+f?"')
 MOST_PARTS = 3
-OTHERS = ("findings.ts", "refusals.ts", "descriptions.ts")
+OTHERS = ("findings.ts", "descriptions.ts")
 
 
 @cache
 def polish() -> Sentences:
-    tables = ("datasheets.ts", "meanings.ts", "happened.ts", *OTHERS)
+    tables = ("datasheets.ts", "meanings.ts", *OTHERS)
     return Sentences(sentence for name in tables for sentence in table(name))
 
 
@@ -59,14 +48,6 @@ def test_findings_of_the_checkers_are_polish() -> None:
     found = {text for text in found_in_programs() if has_words(text)}
     assert len(found) > 500
     assert sorted(text for text in found if not polish().fits(text)) == []
-
-
-def test_refusals_are_polish() -> None:
-    paths = {path for pattern in REFUSING for path in SOURCES.glob(pattern)}
-    # What is computed is a 7: without its place, what is wrong with it may be another refusal.
-    found = {(path.name, text) for path in paths for text in refused(path) if not text.endswith(": 7") or text.count(" ") > 3}
-    assert len(found) > 40
-    assert sorted((name, text) for name, text in found if not polish().fits(text)) == []
 
 
 def test_permitted_values_and_defaults_of_faults_are_polish() -> None:
@@ -119,20 +100,6 @@ def test_meanings_of_data_sheets_are_polish_and_nothing_else_is_there() -> None:
         *(meaning for variant in VARIANTS for meaning in of_chip(datasheet_of(variant))),
         *(parameter.meaning for kind in rows() for parameter in kind.parameters),
     } - table("meanings.ts")
-
-
-@pytest.mark.parametrize("name", ["demo", "hoist/hoist", "feeder", "handwheel", "two_stations/two_stations"])
-def test_events_of_the_examples_are_polish(name: str) -> None:
-    if name == "demo":
-        world = World.from_toml(describe_demo(free_ports=True), {"demo.prg": (FOLDER / "demo.prg").read_bytes()})
-    else:
-        world = World.load(ROOT / f"examples/worlds/{name}.toml")
-    with world:
-        world.run(for_=12.0)
-        shown = [payload.text for record in world.trace if is_shown(payload := payload_of(record))]
-    assert shown
-    happened = Sentences(table("happened.ts"))
-    assert [text for text in shown if not (isinstance(text, MessageText) or happened.fits(text))] == []
 
 
 def test_states_are_polish() -> None:

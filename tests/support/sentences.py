@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import ast
 import json
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -57,32 +56,3 @@ def _form(sentence: str) -> str:
         else:
             form += r"(?:[ ,;(].*)?" if index > 1 and pieces[index - 1] == "" else ".+?"
     return form
-
-
-def refused(path: Path) -> Iterator[str]:
-    """What a module raises, with 7 for what is computed; without errors of other families than those for users."""
-    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-        if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and node.exc.args:
-            kind = node.exc.func
-            name = kind.id if isinstance(kind, ast.Name) else kind.attr if isinstance(kind, ast.Attribute) else ""
-            if name not in ("ValueError", "TypeError", "RuntimeError", "AttributeError", "KeyError"):
-                yield from filter(has_words, _texts(node.exc.args[0]))
-
-
-def _texts(node: ast.AST) -> list[str]:
-    """The texts that an expression can be."""
-    match node:
-        case ast.Constant(str(text)):
-            return [text]
-        case ast.JoinedStr(values):
-            found, before = "", ""
-            for value in values:
-                part = value.value if isinstance(value, ast.Constant) else "7"
-                found += "" if part == before == "7" else str(part)
-                before = str(part)
-            return [found]
-        case ast.IfExp(body=body, orelse=orelse):
-            return [*_texts(body), *_texts(orelse)]
-        case ast.BinOp(left=left, op=ast.Add(), right=right):
-            return [one + other for one in _texts(left) for other in _texts(right)]
-    return []

@@ -1,4 +1,7 @@
 export const en = {
+  notConnected: "the studio is not connected",
+  noAnswer: "{name}: no answer within {seconds} s",
+  connectionLost: "the connection was lost before the answer came; whether it was done is not known",
   connecting: "connecting",
   reconnecting: "no connection to the studio: trying again",
   silent: "the studio does not answer",

@@ -1,5 +1,7 @@
 import type { Sentence } from "../lib/protocol/types";
 import { polishOf } from "./sentences";
+import { POLISH as WORDS } from "./words";
+import { pl } from "./pl";
 import polish from "./polish.json";
 
 /** A text of the service, and which message it is, where it is one with an id. */
@@ -8,8 +10,11 @@ export interface Said {
   message?: Sentence;
 }
 
-/** Messages of the service in Polish, by id, with the places of the English one (src/steptwin/messages.py; tests/test_messages.py). */
-const POLISH: Readonly<Record<string, string>> = polish;
+/** Messages in Polish, by id: of the page itself, and of the service (src/steptwin/messages.py; tests/test_messages.py), with the places of the English ones. */
+const POLISH: Readonly<Record<string, string>> = {
+  ...polish,
+  ...Object.fromEntries(Object.entries(pl).map(([key, text]) => [`page.${key}`, text])),
+};
 
 /** A value of a message: what somebody gave or a program measured, which stays as it is; an object is a message. */
 type Value = string | number | readonly Value[] | { text: string; id?: string; values?: Values };
@@ -33,7 +38,9 @@ function shown(value: Value, isQuoted: boolean, format?: string): string {
   if (typeof value === "string") return isQuoted ? quoted(value) : value;
   if ("text" in value) {
     const found =
-      value.id === undefined ? polishOf(value.text) : inPolish({ id: value.id, values: value.values ?? {} });
+      value.id === undefined
+        ? (WORDS[value.text] ?? polishOf(value.text))
+        : inPolish({ id: value.id, values: value.values ?? {} });
     return isQuoted ? quoted(found ?? value.text) : (found ?? value.text);
   }
   return value.map((one) => shown(one, isQuoted, format)).join(", ");

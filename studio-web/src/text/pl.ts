@@ -1,6 +1,9 @@
 import type { en } from "./en";
 
 export const pl: Record<keyof typeof en, string> = {
+  notConnected: "studio nie jest połączone",
+  noAnswer: "{name}: brak odpowiedzi przez {seconds} s",
+  connectionLost: "połączenie zerwało się przed odpowiedzią; nie wiadomo, czy to wykonano",
   connecting: "łączenie",
   reconnecting: "brak połączenia ze studiem: ponawianie",
   silent: "studio nie odpowiada",

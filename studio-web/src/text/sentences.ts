@@ -2,10 +2,8 @@ import type { Sentence } from "../lib/protocol/types";
 import { DATASHEETS } from "./datasheets";
 import { DESCRIPTIONS } from "./descriptions";
 import { FINDINGS } from "./findings";
-import { HAPPENED } from "./happened";
 import { MEANINGS } from "./meanings";
 import { inPolish } from "./messages";
-import { REFUSALS } from "./refusals";
 import { language } from "./texts.svelte";
 import { POLISH } from "./words";
 
@@ -14,7 +12,7 @@ import { POLISH } from "./words";
  * translated, too; a list and what stands behind a colon part by part.
  */
 const KNOWN: ReadonlyMap<string, string> = new Map([
-  ...[MEANINGS, DATASHEETS, HAPPENED, FINDINGS, REFUSALS, DESCRIPTIONS].flatMap((table) => Object.entries(table)),
+  ...[MEANINGS, DATASHEETS, FINDINGS, DESCRIPTIONS].flatMap((table) => Object.entries(table)),
   // Single words are also names that somebody gave.
   ...Object.entries(POLISH).filter(([words]) => words.includes(" ")),
 ]);

@@ -1,5 +1,7 @@
 import type { OpenLink, Link } from "./link";
 import type { Said } from "../../text";
+import { en } from "../../text/en";
+import { fill } from "../../text/texts.svelte";
 import type { Answer, HelloMessage, Pushed, Requests, Sentence } from "./types";
 
 export type Hello = HelloMessage["hello"];
@@ -20,6 +22,11 @@ export class RequestError extends Error {
   get said(): Said {
     return { text: this.message, message: this.sentence };
   }
+}
+
+/** An error of the page itself, whose texts are its own. */
+function own(code: ErrorCode, key: keyof typeof en, values: Record<string, string | number> = {}): RequestError {
+  return new RequestError(code, fill(en[key], values), { id: `page.${key}`, values });
 }
 
 /** What to show of a rejection. */
@@ -109,12 +116,12 @@ export class Connection {
     id: number = this.newId(),
   ): Promise<Requests[N]["answer"]> {
     if (!this.isOpen || this.link === null) {
-      return Promise.reject(new RequestError("closed", "the studio is not connected"));
+      return Promise.reject(own("closed", "notConnected"));
     }
     const promise = new Promise<unknown>((done, failed) => {
       const timer = this.timers.set(() => {
         this.waiting.delete(id);
-        failed(new RequestError("timeout", `${name}: no answer within ${within_ms / 1000} s`));
+        failed(own("timeout", "noAnswer", { name, seconds: within_ms / 1000 }));
       }, within_ms);
       this.waiting.set(id, { done, failed, timer });
     });
@@ -147,10 +154,7 @@ export class Connection {
     this.isOpen = false;
     this.link = null;
     this.timers.clear(this.watchdog);
-    const error = new RequestError(
-      "closed",
-      "the connection was lost before the answer came; whether it was done is not known",
-    );
+    const error = own("closed", "connectionLost");
     for (const [id, waiting] of this.waiting) this.reject(id, waiting, error);
     if (code === NO_TOKEN && this.stateNow === "refused") return; // it would be refused again
     this.enter("connecting");
