@@ -8,23 +8,30 @@ import json
 import math
 import pickle
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from importlib import import_module
+from inspect import signature
 from pathlib import Path
 from string import Formatter
 
 import pytest
 
+from steptwin.diagnostics import SourceText, Span
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
+from steptwin.files.world import World
+from steptwin.live.studio.demo import FOLDER, describe_demo
 from steptwin.messages import MESSAGES, Message, MessageText, text_of, with_messages
-from steptwin.subject.dispatch import failure, raised
+from steptwin.subject.dispatch import code_of, failure, raised
+from steptwin.subject.events import payload_of
+from steptwin.subject.payloads import is_shown
+from steptwin.wire.pdu import ModbusException
 
 ROOT = Path(__file__).parents[1]
 SOURCES = ROOT / "src"
 POLISH = ROOT / "studio-web/src/text/polish.json"
 DONE = (
-    *(f"{room}/**/*.py" for room in ("access", "calc", "debug", "devices", "studio", "subject", "why")),
+    *(f"{room}/**/*.py" for room in ("access", "calc", "debug", "devices", "m1486", "mic488", "studio", "subject", "why")),
     *(
         f"live/{name}.py"
         for name in ("clock", "control", "debugging", "directory", "keptsettings", "lookback", "pace", "why", "world")
@@ -38,8 +45,10 @@ DONE = (
         for name in ("kind", "lines", "master", "*/control", "*/heldjog", "*/kind", "*/memory", "m1486/programs")
     ),
 )
-"""Of the others that reach the page, sentences still are in the tables by English (tests/studio/test_texts.py)."""
-ERRORS = ("LineFailure", "Misuse", "Refusal")
+"""Where what a page asks for can be refused."""
+ERRORS = ("LineFailure", "Misuse", "ProgramFault", "Refusal", "Runaway", "WrongData", "WrongMove")
+HAPPENS = ("devices/**/*.py", "drivers/**/*.py", "live/**/*.py", "m1486/**/*.py", "mic488/**/*.py", "simulation/**/*.py")
+REPORTS = ("axis_event", "event", "refusing", "report", "wrong_data", "wrong_data_received", "_started", "StatusPayload")
 DEFINITION = re.compile(r'^[A-Z_]+ = Message\(\s*"([^"]*)"', re.MULTILINE)
 FORMAT = re.compile(r"\+?(0\d+)?(\.\d+)?[gfdX]")
 """Formats of numbers that the page knows."""
@@ -82,16 +91,42 @@ def calls() -> Iterator[tuple[str, ast.Call, Message]]:
                 yield f"{path}:{node.lineno}", node, known[node.func.id]
 
 
+def calls_in(patterns: Iterable[str]) -> Iterator[tuple[Path, ast.Call]]:
+    for path in {path for pattern in patterns for path in (SOURCES / "steptwin").glob(pattern)}:
+        yield from ((path, node) for node in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(node, ast.Call))
+
+
 def test_errors_that_reach_the_page_are_messages() -> None:
-    """Not a text of its own in any ``raise``."""
-    paths = [path for pattern in DONE for path in (SOURCES / "steptwin").glob(pattern)]
-    nodes = [
-        (path, node) for path in paths for node in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(node, ast.Raise)
-    ]
-    calls = [(path, node.exc) for path, node in nodes if isinstance(node.exc, ast.Call) and ast.unparse(node.exc.func) in ERRORS]
-    found = [(path, call.lineno) for path, call in calls if isinstance(call.args[0], ast.Constant | ast.JoinedStr)]
+    """Not a text of its own in any error."""
+    calls = [(path, call) for path, call in calls_in(DONE) if ast.unparse(call.func) in ERRORS and call.args]
+    assert len(calls) > 300
+    assert [(path, call.lineno) for path, call in calls if isinstance(call.args[0], ast.Constant | ast.JoinedStr)] == []
+
+
+def test_events_are_messages() -> None:
+    """No sentence is reported but that of a message."""
+    calls = [(path, call) for path, call in calls_in(HAPPENS) if ast.unparse(call.func).rpartition(".")[2] in REPORTS]
     assert len(calls) > 100
-    assert found == []
+    assert [(path, call.lineno) for path, call in calls if any(map(is_sentence, call.args))] == []
+
+
+def is_sentence(node: ast.expr) -> bool:
+    if isinstance(node, ast.JoinedStr):
+        return any(isinstance(part, ast.Constant) and " " in str(part.value) for part in node.values)
+    return isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.count(" ") > 1
+
+
+@pytest.mark.parametrize("name", ["demo", "hoist/hoist", "feeder", "handwheel", "two_stations/two_stations"])
+def test_events_of_the_examples_are_messages(name: str) -> None:
+    if name == "demo":
+        world = World.from_toml(describe_demo(free_ports=True), {"demo.prg": (FOLDER / "demo.prg").read_bytes()})
+    else:
+        world = World.load(ROOT / f"examples/worlds/{name}.toml")
+    with world:
+        world.run(for_=12.0)
+        texts = [payload.text for record in world.trace if is_shown(payload := payload_of(record))]
+    assert texts
+    assert [text for text in texts if text_of(text).id is None] == []
 
 
 def test_each_use_of_a_message_gives_its_values() -> None:
@@ -120,17 +155,75 @@ def test_two_messages_with_one_id_are_refused(wide: Message) -> None:
     del MESSAGES[wide.id]
 
 
-@pytest.mark.parametrize("kind", [Misuse, Refusal, LineFailure])
+def error_kinds() -> list[type[SteptwinError]]:
+    """All error classes of the sources; their modules are imported."""
+    known, before = {"SteptwinError"}, 0
+    found = re.compile(r"^class (\w+)\(([\w., ]+)\):", re.MULTILINE)
+    classes = [(path, *one) for path in SOURCES.rglob("*.py") for one in found.findall(path.read_text("utf-8"))]
+    while len(known) > before:
+        before = len(known)
+        known |= {name for _, name, bases in classes if known & set(re.findall(r"\w+", bases))}
+    for module in {module_of(path) for path, name, _ in classes if name in known}:
+        import_module(module)
+    kinds = {SteptwinError}
+    for _ in range(len(known)):
+        kinds |= {one for kind in kinds for one in kind.__subclasses__() if one.__module__.startswith("steptwin.")}
+    assert {kind.__name__ for kind in kinds} == known
+    return sorted(kinds, key=lambda kind: kind.__name__)
+
+
+def made(kind: type[SteptwinError], text: MessageText) -> SteptwinError:
+    """An error of this kind; what its own ``__init__`` takes is chosen by the types there."""
+    if not any("__init__" in vars(one) for one in kind.__mro__ if one.__module__.startswith("steptwin.")):
+        return kind(text)
+    examples: dict[str, object] = {
+        "bool": True,
+        "bytes": b"7",
+        "int": 3,
+        "object": "a request",
+        "str": text,
+        "str | None": "another",
+        "ChipMoveEnd": "the end of a motion",
+        "Collection[int]": (1, 2),
+        "Findings": (),
+        "LineFailure": LineFailure(text),
+        "LineFailure | None": LineFailure(text),
+        "LineRequest": Changing("a request"),
+        "ModbusException": ModbusException(3, 2),
+        "MoveEnd": "the end of a motion",
+        "Nanos": 7,
+        "Path": Path("file"),
+        "Sequence[Diagnostic]": (),
+        "Sequence[str]": (),
+        "SourceText": SourceText("file", ""),
+        "Span": Span(0, 1),
+        "list[Diagnostic]": [],
+    }
+    return kind(**{one.name: examples[one.annotation] for one in signature(kind).parameters.values()})
+
+
+class Changing(str):
+    """A request that changes something."""
+
+    __slots__ = ()
+    changes = True
+
+
+@pytest.mark.parametrize("kind", error_kinds())
 def test_an_error_is_the_same_after_pickling_copying_and_json(wide: Message, kind: type[SteptwinError]) -> None:
     inner = wide(name="belt", width=1e7, names=["wide", MessageText("from elsewhere")])
     text = Message("test.outer", "in {place}: {problem}")(place="here", problem=inner)
     del MESSAGES["test.outer"], MESSAGES[wide.id]
-    error = kind(text)
-    assert str(error) == "in here: 'belt' is 1e+07 mm wide; permitted are wide, from elsewhere"
-    by_json = raised(json.loads(json.dumps(failure(error)))["error"])
-    for other in (pickle.loads(pickle.dumps(error)), copy.deepcopy(error), by_json):
+    assert text == "in here: 'belt' is 1e+07 mm wide; permitted are wide, from elsewhere"
+    error = made(kind, text)
+    for other in (pickle.loads(pickle.dumps(error)), copy.deepcopy(error)):
         assert type(other) is kind
-        assert (str(other), text_of(other).plain()) == (str(error), text.plain())
+        assert vars(other).keys() == vars(error).keys()
+        assert (str(other), text_of(other).plain()) == (str(error), text_of(error).plain())
+    by_json = raised(json.loads(json.dumps(failure(error)))["error"])
+    assert type(by_json) in (Misuse, Refusal, LineFailure)
+    assert isinstance(error, type(by_json)) or code_of(error) == "failure"
+    assert (str(by_json), text_of(by_json).plain()) == (str(error), text_of(error).plain())
 
 
 def test_what_json_has_no_number_for_is_a_text(wide: Message) -> None:

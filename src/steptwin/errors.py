@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 
 class SteptwinError(Exception):
     """Base of every error this package raises on purpose. Its text is meant for the user."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle and copy: an exception is otherwise made again from its text, which an own ``__init__`` does not take."""
+        return _made_again, (type(self), self.args), self.__dict__
+
+
+def _made_again(kind: type[SteptwinError], args: tuple[Any, ...]) -> SteptwinError:
+    error = kind.__new__(kind)
+    error.args = args
+    return error
 
 
 class Misuse(SteptwinError, ValueError):
