@@ -82,14 +82,12 @@ def test_modules_above_the_kinds_that_know_a_device_have_a_reason() -> None:
 
 
 NAMED = re.compile(rf"\b({'|'.join(DEVICES)})\b|[\"'`](?i:{'|'.join(DEVICES)})[\"'`]")
-PAGE_REASONS = {"text/findings.ts": "where its sentences come from"}
-"""Modules of the page that name a device all the same."""
 
 
-def test_modules_of_the_page_that_know_a_device_have_a_reason() -> None:
+def test_no_module_of_the_page_knows_a_device() -> None:
     """Names in sentences for people, such as M1486 in a help text, are none."""
     modules = {path.relative_to(PAGE).as_posix(): path for path in PAGE.rglob("*") if path.suffix in (".ts", ".svelte")}
     modules.pop("lib/protocol/types.ts", None)  # generated
     found = {name for name, path in modules.items() if not name.endswith(".test.ts") and NAMED.search(path.read_text("utf-8"))}
     assert "panels/program/Program.svelte" in modules
-    assert found == {*PAGE_REASONS}
+    assert found == set()

@@ -21,15 +21,24 @@ from steptwin.diagnostics import SourceText, Span
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 from steptwin.files.world import World
 from steptwin.live.studio.demo import FOLDER, describe_demo
+from steptwin.m1486.datasheet import datasheet_of as chip_sheet
+from steptwin.m1486.microsteps import UNIT
+from steptwin.m1486.variants import VARIANTS
 from steptwin.messages import MESSAGES, Message, MessageText, text_of, with_messages
+from steptwin.mic488.configform import config_form
+from steptwin.mic488.datasheet import datasheet_of as mic488_sheet
+from steptwin.mic488.registers import AXIS_STATUS_TEXTS, CONTROLLER_STATUS_TEXTS, FIRMWARES
+from steptwin.simulation.faults.kinds import rows as fault_kinds
 from steptwin.subject.dispatch import code_of, failure, raised
 from steptwin.subject.events import payload_of
 from steptwin.subject.payloads import is_shown
+from steptwin.verify import m1486, mic488
 from steptwin.wire.pdu import ModbusException
 
 ROOT = Path(__file__).parents[1]
 SOURCES = ROOT / "src"
 POLISH = ROOT / "studio-web/src/text/polish.json"
+ROWS = ROOT / "studio-web/src/text/rows.json"
 DONE = (
     *(f"{room}/**/*.py" for room in ("access", "calc", "debug", "devices", "m1486", "mic488", "studio", "subject", "why")),
     *(
@@ -50,14 +59,14 @@ ERRORS = ("LineFailure", "Misuse", "ProgramFault", "Refusal", "Runaway", "WrongD
 HAPPENS = ("devices/**/*.py", "drivers/**/*.py", "live/**/*.py", "m1486/**/*.py", "mic488/**/*.py", "simulation/**/*.py")
 REPORTS = ("axis_event", "event", "refusing", "report", "wrong_data", "wrong_data_received", "_started", "StatusPayload")
 DEFINITION = re.compile(r'^[A-Z_]+ = Message\(\s*"([^"]*)"', re.MULTILINE)
-FORMAT = re.compile(r"\+?(0\d+)?(\.\d+)?[gfdX]")
-"""Formats of numbers that the page knows."""
+FORMAT = re.compile(r"\+?(0\d+)?(\.\d+)?[gfdX]|\n|; ")
+"""Formats of numbers and lists that the page knows."""
 
 
 @cache
 def defining() -> dict[str, dict[str, Message]]:
     """The messages that a module has, by the names of their constants, for modules that define any."""
-    paths = [path for path in SOURCES.rglob("*.py") if " = Message(" in path.read_text("utf-8")]
+    paths = [path for path in SOURCES.rglob("*.py") if "Message(" in path.read_text("utf-8")]
     return {name: messages_in(name) for name in map(module_of, paths)}
 
 
@@ -85,10 +94,18 @@ def calls() -> Iterator[tuple[str, ast.Call, Message]]:
     names = re.compile(rf"\b({'|'.join({name for messages in defining().values() for name in messages})})\(")
     for path in SOURCES.rglob("*.py"):
         text = path.read_text("utf-8")
-        known = messages_in(module_of(path)) if names.search(text) else {}
-        for node in ast.walk(ast.parse(text)) if known else ():
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in known:
-                yield f"{path}:{node.lineno}", node, known[node.func.id]
+        tree = ast.parse(text) if names.search(text) else None
+        known = {} if tree is None else {**messages_in(module_of(path)), **messages_through(tree)}
+        for node in ast.walk(tree) if tree is not None and known else ():
+            if isinstance(node, ast.Call) and (name := ast.unparse(node.func)) in known:
+                yield f"{path}:{node.lineno}", node, known[name]
+
+
+def messages_through(tree: ast.Module) -> dict[str, Message]:
+    """Messages of imported modules by their names in this one, such as ``f.WRITE``."""
+    imports = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
+    modules = {alias.asname or alias.name: f"{node.module}.{alias.name}" for node in imports for alias in node.names}
+    return {f"{name}.{one}": said for name, module in modules.items() for one, said in defining().get(module, {}).items()}
 
 
 def calls_in(patterns: Iterable[str]) -> Iterator[tuple[Path, ast.Call]]:
@@ -141,6 +158,31 @@ def test_the_page_has_each_message_in_polish_with_the_same_places() -> None:
     assert {one: places(polish[one]) for one in polish} == {one: places(MESSAGES[one].english) for one in MESSAGES}
     for one in MESSAGES.values():
         assert all(not form or FORMAT.fullmatch(form) for _, form, _ in places(one.english)), one.id
+
+
+def rows_of_tables() -> dict[str, set[str]]:
+    sheets = [*map(chip_sheet, VARIANTS), *map(mic488_sheet, FIRMWARES)]
+    kinds = tuple(fault_kinds())
+    return {
+        "points": {name for sheet in sheets for name in (*(p.path for p in sheet.points), *(c.name for c in sheet.commands))},
+        "configuration": {key.name for section in config_form("", "").sections for key in section.settings},
+        "faults": {kind.name for kind in kinds},
+        "parameters": {f"{kind.name}.{one.name}" for kind in kinds for one in kind.parameters},
+        "checks": {check.id for check in (*mic488.CHECKS, *m1486.CHECKS)},
+    }
+
+
+def test_the_page_has_each_row_of_the_tables_in_polish_and_nothing_else() -> None:
+    """By its name, or with ``{n}`` for the number in it; a parameter of several kinds of faults once."""
+    polish = json.loads(ROWS.read_text("utf-8"))
+    words = polish.pop("words")
+    assert sum(map(len, polish.values())) > 200
+    for table, rows in rows_of_tables().items():
+        forms = [(row, re.sub(r"\d+", "{n}", row, count=1), row.rpartition(".")[2]) for row in rows]
+        used = {next((form for form in named if form in polish[table]), named[0]) for named in forms}
+        assert used == polish[table].keys(), table
+    defaults = {one.otherwise for kind in fault_kinds() for one in kind.parameters if one.otherwise}
+    assert {UNIT, f"{UNIT}/s", *defaults, *AXIS_STATUS_TEXTS.values(), *CONTROLLER_STATUS_TEXTS.values()} <= words.keys()
 
 
 @pytest.fixture

@@ -12,6 +12,16 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from steptwin.messages import Message, MessageText, text_of
+
+REPORT = Message("diagnostics.report", "{lines:\n}")
+FOUND = Message("diagnostics.found", "{place}: {severity} {code}: {message}")
+HINT = Message("diagnostics.hint", "  {pad} = {hint}")
+SUGGESTION = Message("diagnostics.suggestion", "  {pad} = suggestion: {text}")
+REMOVE_IT = Message("diagnostics.remove-it", "remove it")
+START_A_NEW_LINE = Message("diagnostics.start-a-new-line", "start a new line")
+A_BLANK = Message("diagnostics.a-blank", "a blank")
+MORE = Message("diagnostics.more", "{name}: {count} more are not shown")
 LONGEST_SHOWN = 400
 """Characters of a source line in a message; of a longer one the part around the place."""
 MOST_SHOWN = 100
@@ -36,6 +46,9 @@ class Severity(enum.Enum):
     ERROR = "error"
     WARNING = "warning"
     NOTE = "note"
+
+
+_SEVERITIES = {one: Message(f"diagnostics.{one.value}", one.value)() for one in Severity}
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,12 +113,12 @@ def in_order(diagnostics: Iterable[Diagnostic]) -> list[Diagnostic]:
     return sorted(diagnostics, key=lambda d: (d.span.start, d.span.end, d.code))
 
 
-def render(source: SourceText, diagnostics: Sequence[Diagnostic]) -> str:
+def render(source: SourceText, diagnostics: Sequence[Diagnostic]) -> MessageText:
     """The diagnostics as text: place, severity, code, message, source line with carets, hint, suggestion.
 
     For terminals: at most `MOST_SHOWN` of them, long texts cut, control characters made visible.
     """
-    parts: list[str] = []
+    lines: list[str] = []
     for d in diagnostics[:MOST_SHOWN]:
         line, column = source.position(d.span.start)
         text = source.line(line)
@@ -119,20 +132,23 @@ def render(source: SourceText, diagnostics: Sequence[Diagnostic]) -> str:
             first = min(max(0, before - LONGEST_SHOWN // 2), len(shown) - LONGEST_SHOWN)
             shown, before = shown[first : first + LONGEST_SHOWN], before - first
             width = min(width, LONGEST_SHOWN - before) or 1
-        parts.append(visible(f"{source.name}:{line}:{column}: {d.severity.value} {d.code}: {_cut(d.message)}"))
-        parts.append(f"  {gutter} | {visible(shown)}")
-        parts.append(f"  {pad} | {' ' * before}{'^' * width}")
+        place = f"{visible(source.name)}:{line}:{column}"
+        lines.append(FOUND(place=place, severity=_SEVERITIES[d.severity], code=d.code, message=_cut(d.message)))
+        lines.append(f"  {gutter} | {visible(shown)}")
+        lines.append(f"  {pad} | {' ' * before}{'^' * width}")
         if d.hint:
-            parts.append(visible(f"  {pad} = {_cut(d.hint)}"))
+            lines.append(HINT(pad=pad, hint=_cut(d.hint)))
         if d.fix and not d.fix.is_named:
-            parts.append(visible(f"  {pad} = suggestion: {_cut(d.fix.text.strip()) or _blank_fix(d.fix.text)}"))
+            lines.append(SUGGESTION(pad=pad, text=_cut(d.fix.text.strip()) or _blank_fix(d.fix.text)))
     if len(diagnostics) > MOST_SHOWN:
-        parts.append(visible(f"{source.name}: {len(diagnostics) - MOST_SHOWN} more are not shown"))
-    return "\n".join(parts)
+        lines.append(MORE(name=visible(source.name), count=len(diagnostics) - MOST_SHOWN))
+    return REPORT(lines=lines)
 
 
-def _cut(text: str) -> str:
-    return text if len(text) <= LONGEST_TEXT else f"{text[:LONGEST_TEXT]}…"
+def _cut(text: str) -> MessageText:
+    """A text for a terminal, of a length that it can show."""
+    said = text_of(text)
+    return MessageText(visible(text if len(text) <= LONGEST_TEXT else f"{text[:LONGEST_TEXT]}…"), said.id, said.values)
 
 
 def visible(text: str) -> str:
@@ -140,10 +156,10 @@ def visible(text: str) -> str:
     return _CONTROL.sub(lambda found: _PICTURES.get(found[0], "\ufffd"), text)
 
 
-def _blank_fix(text: str) -> str:
+def _blank_fix(text: str) -> MessageText:
     if not text:
-        return "remove it"
-    return "start a new line" if "\n" in text else "a blank"
+        return REMOVE_IT()
+    return START_A_NEW_LINE() if "\n" in text else A_BLANK()
 
 
 def to_json(source: SourceText, diagnostics: Sequence[Diagnostic]) -> list[dict[str, object]]:

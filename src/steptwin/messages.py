@@ -47,7 +47,8 @@ class MessageText(str):
 
 
 class Message:
-    """A sentence with places for values, as in `str.format`; a list is shown with commas between its members.
+    """A sentence with places for values, as in `str.format`; a list is shown with commas between its members, ``{lines:\n}``
+    with line ends.
 
     Its id is ``room.what-is-wrong``. Raises `ValueError` for an id that another message has.
     """
@@ -67,9 +68,12 @@ class Message:
 
 
 class _List(tuple[Any, ...]):
-    """A list as messages show it."""
+    """A list as messages show it. Its format is what stands between its members."""
 
     __slots__ = ()
+
+    def __format__(self, between: str) -> str:
+        return (between or ", ").join(map(str, self))
 
     def __str__(self) -> str:
         return ", ".join(map(str, self))

@@ -43,7 +43,9 @@ def test_the_chain_at_a_moment_as_json(session: str) -> None:
     told = json.loads(invoke("why", session, "cell.OUT1 = 0", "--at", "2.7s", "--json"))
     assert told["at_ns"] == "2700000000"
     assert told["since_ns"] == "2624000000"
-    assert told["links"][1] == {"time_ns": "2624000000", "subject": "cell", "text": "line 15 `ask = OFF` was executed"}
+    link = told["links"][1]
+    assert (link["time_ns"], link["subject"], link["text"]) == ("2624000000", "cell", "line 15 `ask = OFF` was executed")
+    assert link["messages"]["text"]["id"] == "why.was-executed"
 
 
 def test_what_a_program_waits_for(session: str) -> None:

@@ -30,7 +30,7 @@ def found(text: str) -> str:
         return files[name].encode()
 
     diagnosis = diagnose("w.toml", description, read)
-    lines = []
+    lines: list[str] = []
     for finding in diagnosis.findings:
         lines.append(render(SourceText("w.toml", description), [finding]))
         if finding.fix is not None:

@@ -295,3 +295,21 @@ def test_axe_finds_nothing_serious(studio: Studio, language: str) -> None:
     found = page.evaluate("axe.run({resultTypes: ['violations']})")
     serious = [one for one in found["violations"] if one["impact"] in ("serious", "critical")]
     assert not serious, json.dumps(serious, indent=1)[:3000]
+
+
+def test_findings_are_in_polish_and_the_words_of_a_program_stay(studio: Studio) -> None:
+    page = studio.page(panel="Program")
+    write(page, "JUMP coil\nDELAI 1\n")
+    expect(findings(page)).to_contain_text("there is no label coil")
+    page.get_by_label("Language").select_option("pl")
+    found = page.get_by_role("complementary", name="Uwagi")
+    # A coil is a "cewka" in a data sheet.
+    expect(found).to_contain_text("nie ma etykiety coil")
+    expect(found).to_contain_text("zdefiniuj etykietę coil: w osobnej linii")
+    expect(found).to_contain_text("nieznana instrukcja DELAI")
+    page.get_by_label("Język").select_option("en")
+    choose(page, "drum/program.m1486")
+    write(page, "J5\n", "program")
+    expect(findings(page)).to_contain_text("there is no label 5")
+    page.get_by_label("Language").select_option("pl")
+    expect(found).to_contain_text("nie ma etykiety 5")

@@ -129,6 +129,7 @@ def test_every_kind_of_fault_says_what_it_takes() -> None:
     assert json.loads(json.dumps(found)) == found
     stuck = found["stuck"]
     assert (stuck["layer"], stuck["occasion"], stuck["lines"]) == ("physics", "always", [])
+    assert [one.pop("messages")["permitted"]["id"] for one in stuck["parameters"][:2]] == ["simulation.text", "simulation.to"]
     assert stuck["parameters"][:2] == [
         {"name": "pin", "meaning": "Which input.", "permitted": "text", "default": "", "words": [], "required": True},
         {

@@ -461,7 +461,9 @@ def test_plain_answers() -> None:
     answer = waits().why("guard.no").plain()
     assert answer["since_ns"] == "1021000000"
     assert answer["complete"] is True
-    assert answer["links"][0] == {"time_ns": "1021000000", "subject": "guard", "text": "guard.no became 1"}
+    message = {"id": "why.became", "values": {"signal": "guard.no", "value": 1, "how": ""}}
+    link = {"time_ns": "1021000000", "subject": "guard", "text": "guard.no became 1", "messages": {"text": message}}
+    assert answer["links"][0] == link
 
 
 def test_a_question_changes_nothing() -> None:

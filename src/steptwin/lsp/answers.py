@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from steptwin.diagnostics import Diagnostic, Span
+from steptwin.messages import MessageText
 from steptwin.symbols import SymbolKind
 
 
@@ -162,7 +163,7 @@ class SemanticToken:
 class CodeAction:
     """A change that fixes a finding."""
 
-    title: str
+    title: MessageText
     edits: Edits
     mends: Diagnostic
 

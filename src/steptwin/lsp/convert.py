@@ -9,6 +9,7 @@ from lsprotocol import types as lsp
 from steptwin.diagnostics import Diagnostic, Severity, Span
 from steptwin.lsp import answers as a
 from steptwin.lsp.positions import Encoding, LineIndex
+from steptwin.messages import text_of
 from steptwin.symbols import SymbolKind
 
 SOURCE = "steptwin"
@@ -75,10 +76,14 @@ class Converter:
         return lsp.Range(self.position(span.start), self.position(span.end))
 
     def diagnostic(self, found: Diagnostic) -> lsp.Diagnostic:
-        message = found.message if found.hint is None else f"{found.message}\n{found.hint}"
+        """Its ``data`` are message and hint as messages (`steptwin.messages`), for the page of the studio."""
+        lines = [found.message] if found.hint is None else [found.message, found.hint]
         tags = [lsp.DiagnosticTag.Unnecessary] if found.code in _UNNECESSARY else None
         severity = _SEVERITIES[found.severity]
-        return lsp.Diagnostic(self.range(found.span), message, severity=severity, code=found.code, source=SOURCE, tags=tags)
+        data = [text_of(line).plain() for line in lines]
+        return lsp.Diagnostic(
+            self.range(found.span), "\n".join(lines), severity=severity, code=found.code, source=SOURCE, tags=tags, data=data
+        )
 
     def hover(self, found: a.Hover) -> lsp.Hover:
         return lsp.Hover(lsp.MarkupContent(lsp.MarkupKind.Markdown, found.text), self.range(found.span))

@@ -266,10 +266,11 @@ def _code_action(server: EditorServer, params: lsp.CodeActionParams) -> list[lsp
         found = navigation.fixes(server.session, params.text_document.uri, converter.span(params.range))
         return [
             lsp.CodeAction(
-                action.title,
+                str(action.title),
                 kind=lsp.CodeActionKind.QuickFix,
                 diagnostics=[converter.diagnostic(action.mends)],
                 edit=changes_of(action.edits, server.converter, server.session.shown),
+                data=action.title.plain(),
             )
             for action in found
         ]

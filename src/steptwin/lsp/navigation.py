@@ -12,7 +12,16 @@ from steptwin.lsp.answers import SHARED, CallEdge, CodeAction, Edit, OutlineItem
 from steptwin.lsp.files import normal
 from steptwin.lsp.letters import has_letters
 from steptwin.lsp.session import EditorSession
+from steptwin.messages import Message, MessageText
 from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
+
+FIX = Message("lsp.fix", "{action} ({code})")
+START_A_NEW_LINE = Message("lsp.start-a-new-line", "Start a new line")
+REMOVE_THE_EMPTY_LINE = Message("lsp.remove-the-empty-line", "Remove the empty line")
+REMOVE = Message("lsp.remove", "Remove {old}")
+WRITE_A_BLANK = Message("lsp.write-a-blank", "Write a blank")
+WRITE = Message("lsp.write", "Write {new}")
+REPLACE = Message("lsp.replace", "Replace {old} by {new}")
 
 MOST_SYMBOLS = 500
 """Answers to a search over all texts."""
@@ -113,13 +122,15 @@ def fixes(session: EditorSession, uri: str, span: Span) -> list[CodeAction]:
     return found
 
 
-def _title(diagnostic: Diagnostic, old: str, new: str) -> str:
-    shown = new.strip()
-    if not shown:
-        title = "Start a new line" if "\n" in new else f"Remove {old.strip() or 'the empty line'}" if not new else "Write a blank"
+def _title(diagnostic: Diagnostic, old: str, new: str) -> MessageText:
+    old, shown = old.strip(), new.strip()
+    if shown:
+        action = REPLACE(old=old, new=shown) if old else WRITE(new=shown)
+    elif new:
+        action = START_A_NEW_LINE() if "\n" in new else WRITE_A_BLANK()
     else:
-        title = f"Write {shown}" if not old.strip() else f"Replace {old.strip()} by {shown}"
-    return f"{title.splitlines()[0][:100]} ({diagnostic.code})"
+        action = REMOVE(old=old) if old else REMOVE_THE_EMPTY_LINE()
+    return FIX(action=MessageText(action.splitlines()[0][:100], action.id, action.values), code=diagnostic.code)
 
 
 def workspace_symbols(session: EditorSession, query: str) -> list[tuple[str, OutlineItem]]:

@@ -15,6 +15,27 @@ from steptwin.m1486.registers import UPLOADS
 from steptwin.m1486.structure import is_computed
 from steptwin.m1486.syntax import ChipCommand, JumpCondition
 from steptwin.m1486.variants import VARIANTS, Variant
+from steptwin.messages import Message, MessageText
+
+IS_OUT_OF_RANGE = Message("m1486.is-out-of-range", "{argument} is out of range")
+IS_LINES_TO = Message("m1486.is-lines-to", "{number} is lines {first} to {last}")
+NO_LINE = Message("m1486.no-line", "no line: the count in {number} is 0")
+IS_LINE = Message("m1486.is-line", "{number} is line {first}")
+FREE_LINES_ARE = Message("m1486.free-lines-are", "free lines are {free}")
+BOTH = Message("m1486.both", "{one}; {other}")
+ON_OTHERS = Message("m1486.on-others", "{permitted} on {title}; {others} would take it")
+ON = Message("m1486.on", "{permitted} on {title}")
+BELONGS_TO_INTERFACE = Message("m1486.belongs-to-interface", "{lines} belongs to the {title} interface")
+BELONG_TO_INTERFACE = Message("m1486.belong-to-interface", "{lines} belong to the {title} interface")
+LABEL_IS_OUT_OF_RANGE = Message("m1486.label-is-out-of-range", "label {label} is out of range")
+ADDRESS_IS_OUT_OF_RANGE = Message("m1486.address-is-out-of-range", "address {number:X} is out of range")
+CARRY_IS_SET_BY_ARITHMETIC = Message(
+    "m1486.carry-is-set-by-arithmetic", "flag {carry}, the carry, is set and cleared by + and - only; {hint}"
+)
+FUNCTION_IS_RESERVED = Message("m1486.function-is-reserved", "function {number} is reserved")
+NO_MEANING = Message("m1486.no-meaning", "the manual gives it no meaning")
+BYTE_IS_RESERVED = Message("m1486.byte-is-reserved", "byte {number} is reserved")
+BYTES_WITH_A_MEANING = Message("m1486.bytes-with-a-meaning", "bytes with a meaning are {known}")
 
 _INSTEAD_OF_ZERO = {"=": "C100", "G": "H"}
 """Zero is no distance and no position; other commands express the intention."""
@@ -66,20 +87,21 @@ def _out_of_range(command: ChipCommand, number: int, variant: Variant) -> Diagno
     key = command.key
     hint = permitted_text(key, variant)
     fix = None
-    subject = f"{key} {grouped(number)}"
+    message = IS_OUT_OF_RANGE(argument=f"{key} {grouped(number)}")
     kind = rows(key)[0].kind
     if kind in (ArgType.LABEL, ArgType.ADDRESS):
-        subject = f"label {grouped(number)}" if kind is ArgType.LABEL else f"address {number:X}"
-        hint += f" on {variant.title}{_others_that_take(key, number, variant)}"
+        is_label = kind is ArgType.LABEL
+        message = LABEL_IS_OUT_OF_RANGE(label=grouped(number)) if is_label else ADDRESS_IS_OUT_OF_RANGE(number=number)
+        hint = _on(hint, key, number, variant)
     elif number == CARRY and any(spec.kind is ArgType.FLAG for spec in rows(key)):
-        hint = f"flag {CARRY}, the carry, is set and cleared by + and - only; {hint}"
+        hint = CARRY_IS_SET_BY_ARITHMETIC(carry=CARRY, hint=hint)
     elif kind is ArgType.LINES:
-        hint = f"{_lines_reached(number)}; {hint}"
+        hint = BOTH(one=_lines_reached(number), other=hint)
     elif number == 0 and key in _INSTEAD_OF_ZERO:
         fix = Fix(command.span, _INSTEAD_OF_ZERO[key])
     elif kind is ArgType.NUMBER:
         fix = _nearest(command, number, variant)
-    return findings.OUT_OF_RANGE(command.argument_span, f"{subject} is out of range", hint, fix)
+    return findings.OUT_OF_RANGE(command.argument_span, message, hint, fix)
 
 
 def _nearest(command: ChipCommand, number: int, variant: Variant) -> Fix | None:
@@ -90,34 +112,36 @@ def _nearest(command: ChipCommand, number: int, variant: Variant) -> Fix | None:
     return Fix(command.argument_span, str(permitted[0] if number < permitted[0] else permitted[-1]))
 
 
-def _lines_reached(number: int) -> str:
+def _lines_reached(number: int) -> MessageText:
     """What a number that names no lines would name."""
     first, count = divmod(number, 10)
     if count == 0:
-        return f"no line: the count in {number} is 0"
+        return NO_LINE(number=number)
     if count == 1:
-        return f"{number} is line {first}"
-    return f"{number} is lines {first} to {first + count - 1}"
+        return IS_LINE(number=number, first=first)
+    return IS_LINES_TO(number=number, first=first, last=first + count - 1)
 
 
-def _others_that_take(key: str, number: int, variant: Variant) -> str:
+def _on(permitted: MessageText, key: str, number: int, variant: Variant) -> MessageText:
+    """What the variant takes, and who would take the number."""
+    title = variant.title
     others = [v.title for v in VARIANTS if v.clock == variant.clock and find(key, number, v)]
-    return f"; {', '.join(others)} would take it" if others else ""
+    return ON_OTHERS(permitted=permitted, title=title, others=others) if others else ON(permitted=permitted, title=title)
 
 
 def _label_of_condition(condition: JumpCondition, variant: Variant, labels: Mapping[int, int]) -> Iterator[Diagnostic]:
     if find("J", condition.label, variant) is None:
-        hint = f"{range_text(rows('J')[0], variant)} on {variant.title}{_others_that_take('J', condition.label, variant)}"
+        hint = _on(range_text(rows("J")[0], variant), "J", condition.label, variant)
         fix = Fix(condition.label_span, str(labels[condition.label])) if condition.label in labels else None
-        yield findings.OUT_OF_RANGE(condition.label_span, f"label {grouped(condition.label)} is out of range", hint, fix)
+        yield findings.OUT_OF_RANGE(condition.label_span, LABEL_IS_OUT_OF_RANGE(label=grouped(condition.label)), hint, fix)
 
 
 def _reserved(command: ChipCommand, spec: CommandSpec, number: int) -> Diagnostic | None:
     if spec.kind is ArgType.FUNCTION and is_reserved(number):
-        return findings.RESERVED(command.argument_span, f"function {number} is reserved", "the manual gives it no meaning")
+        return findings.RESERVED(command.argument_span, FUNCTION_IS_RESERVED(number=number), NO_MEANING())
     if spec.kind is ArgType.UPLOAD and number not in UPLOADS:
-        known = ", ".join(map(str, UPLOADS))
-        return findings.RESERVED(command.argument_span, f"byte {number} is reserved", f"bytes with a meaning are {known}")
+        known = list(UPLOADS)
+        return findings.RESERVED(command.argument_span, BYTE_IS_RESERVED(number=number), BYTES_WITH_A_MEANING(known=known))
     return None
 
 
@@ -129,6 +153,5 @@ def _occupied(command: ChipCommand, spec: CommandSpec, number: int, interface: I
     refuses = ChipState.LINES in spec.use.writes or spec.use.waits in (Wait.LINE, Wait.SEEK)
     finding = findings.LINE_OCCUPIED if refuses else findings.LINE_READ_OCCUPIED
     free = lines_text([line for line in LINES if line not in interface.occupied])
-    verb = "belongs" if len(taken) == 1 else "belong"
-    message = f"{lines_text(taken)} {verb} to the {interface.title} interface"
-    return finding(command.argument_span, message, f"free lines are {free}")
+    message = BELONGS_TO_INTERFACE if len(taken) == 1 else BELONG_TO_INTERFACE
+    return finding(command.argument_span, message(lines=lines_text(taken), title=interface.title), FREE_LINES_ARE(free=free))

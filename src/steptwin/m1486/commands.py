@@ -18,6 +18,19 @@ from steptwin.m1486.lines import LINES, line_group
 from steptwin.m1486.microsteps import MICROSTEPS, QUALIFICATIONS, UNIT
 from steptwin.m1486.registers import REGISTERS, UPLOAD_RANGE, register
 from steptwin.m1486.variants import Variant
+from steptwin.messages import Message, MessageText
+
+LINE_GROUPS = Message(
+    "m1486.line-groups", "first line 1 to 21 and count 1 to 9 as one number, such as 14 for lines 1 to 4, up to line 21"
+)
+CONDITIONS_TEXT = Message("m1486.conditions-text", "line {first} to {last} or flag {flag} to {carry}, then H or L and a label")
+PROFILES_TEXT = Message("m1486.profiles-text", "{low} to {high} step/s, or a larger number above V for no parabolic part")
+
+NO_NUMBER = Message("m1486.nothing", "nothing")
+RANGES = Message("m1486.ranges", "{ranges}")
+TO = Message("m1486.to", "{low} to {high}")
+WITH_UNIT = Message("m1486.with-unit", "{range} {unit}")
+NAMED = Message("m1486.named", "{range} ({name})")
 
 
 class ArgType(enum.Enum):
@@ -126,6 +139,12 @@ _STARTS = _S.MOTION | _S.POSITION | _S.SETTINGS | _S.FUNCTIONS
 _SEEK = _U(_STARTS | _S.LINES, _MOVES, waits=Wait.SEEK, motion=Motion.SEEK)
 _OPERANDS = _S.VARIABLE | _S.FUNCTIONS | _S.LINES | _S.REGISTERS
 """Functions 46 and 58 make lines or a register of the number."""
+
+UNITS = {
+    unit: Message(f"m1486.unit.{id_}", unit)()
+    for id_, unit in (("ms", "ms"), ("times", "times"), ("speed", "step/s"), ("acceleration", "step/s²"), ("distance", UNIT))
+}
+_KINDS = {kind: Message(f"m1486.kind.{kind.value}", kind.value)() for kind in (ArgType.LINE, ArgType.FUNCTION, ArgType.FLAG)}
 
 _ROWS: tuple[CommandSpec, ...] = (
     # Program control
@@ -347,32 +366,30 @@ def grouped(number: int) -> str:
     return f"{number:,}".replace(",", " ") if number >= 10_000 else str(number)
 
 
-def permitted_text(key: str, variant: Variant) -> str:
+def permitted_text(key: str, variant: Variant) -> MessageText:
     """The numbers that may follow ``key``, as text: ``1 to 21 (line), 40 to 63 (function), 75 (Clear kill)``."""
     specs = [s for s in rows(key) if s.kind is not ArgType.NONE]
     if not specs:
-        return "nothing"
+        return NO_NUMBER()
     several = len(specs) > 1
     texts = sorted((s.permitted(variant)[0], range_text(s, variant, named=several)) for s in specs)
-    return ", ".join(text for _, text in texts)
+    return texts[0][1] if len(texts) == 1 else RANGES(ranges=[text for _, text in texts])
 
 
-def range_text(spec: CommandSpec, variant: Variant, *, named: bool = False) -> str:
+def range_text(spec: CommandSpec, variant: Variant, *, named: bool = False) -> MessageText:
     """The permitted numbers of one row with their unit, followed by what they stand for if ``named``."""
     values = spec.permitted(variant)
     if spec.kind is ArgType.NONE:
-        return "nothing"
+        return NO_NUMBER()
     if spec.kind is ArgType.ADDRESS:
-        return f"{values[0]:X} to {values[-1]:X}"
+        return TO(low=f"{values[0]:X}", high=f"{values[-1]:X}")
     if spec.kind is ArgType.LINES:
-        return "first line 1 to 21 and count 1 to 9 as one number, such as 14 for lines 1 to 4, up to line 21"
+        return LINE_GROUPS()
     if spec.kind is ArgType.CONDITION:
-        return f"line {LINES[0]} to {LINES[-1]} or flag {USER_FLAGS[0]} to {CARRY}, then H or L and a label"
+        return CONDITIONS_TEXT(first=LINES[0], last=LINES[-1], flag=USER_FLAGS[0], carry=CARRY)
     if values == _PROFILE:
-        return f"{PROFILE_RANGE[0]} to {PROFILE_RANGE[-1]} {spec.unit}, or a larger number above V for no parabolic part"
-    text = f"{grouped(values[0])} to {grouped(values[-1])}" if isinstance(values, range) else ", ".join(map(str, values))
+        return PROFILES_TEXT(low=PROFILE_RANGE[0], high=PROFILE_RANGE[-1])
+    text = TO(low=grouped(values[0]), high=grouped(values[-1])) if isinstance(values, range) else RANGES(ranges=list(values))
     if spec.unit:
-        text += f" {spec.unit}"
-    if named:
-        text += f" ({spec.name if spec.kind is ArgType.NUMBER else spec.kind.value})"
-    return text
+        text = WITH_UNIT(range=text, unit=UNITS[spec.unit])
+    return NAMED(range=text, name=_KINDS.get(spec.kind, spec.name)) if named else text

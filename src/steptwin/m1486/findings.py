@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from steptwin.diagnostics import Diagnostic, Fix, Severity, Span
+from steptwin.messages import MessageText
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +24,7 @@ class ChipFinding:
     def severity(self) -> Severity:
         return Severity.ERROR if self.code.startswith("M1") else Severity.WARNING
 
-    def __call__(self, span: Span, message: str, hint: str | None = None, fix: Fix | None = None) -> Diagnostic:
+    def __call__(self, span: Span, message: MessageText, hint: MessageText | None = None, fix: Fix | None = None) -> Diagnostic:
         return Diagnostic(self.code, self.severity, span, message, hint, fix)
 
 

@@ -8,12 +8,13 @@ from itertools import groupby
 
 from steptwin.diagnostics import Diagnostic, Fix, Severity, Span
 from steptwin.m1486 import findings
-from steptwin.m1486.argument_rules import lines_text, number_problem
+from steptwin.m1486.argument_rules import BELONG_TO_INTERFACE, FREE_LINES_ARE, lines_text, number_problem
 from steptwin.m1486.commands import (
     CALCULATING,
     DIVIDEND_LIMIT,
     FREE_DIVISORS,
     PROFILE_RANGE,
+    TO,
     ArgType,
     When,
     find,
@@ -32,11 +33,72 @@ from steptwin.m1486.structure_rules import label_problem
 from steptwin.m1486.successors import flow_of
 from steptwin.m1486.syntax import ChipCommand
 from steptwin.m1486.variants import Variant
+from steptwin.messages import Message, MessageText, text_of
+
+SIZE_OF_MICROSTEP = Message("m1486.size-of-microstep", "with M{microstep} a microstep is {size} minimum microsteps")
+WITH_MICROSTEP_GO = Message("m1486.with-microstep-go", "with M{microstep} go {names}")
+V_IS_NOT_ABOVE_S = Message("m1486.v-is-not-above-s", "V {velocity} is not above S {start_stop}")
+V_IS_ABOVE_HIGHEST = Message(
+    "m1486.v-is-above-highest", "V {velocity} is above {highest} step/s, the highest speed with Q{qualification}"
+)
+ENDS_IN_FINE_STEPS = Message(
+    "m1486.ends-in-fine-steps",
+    "the distance {distance} ends in steps of M{m} at {speed} step/s, above the {limit:g} step/s of M{m}",
+)
+P_IS_BETWEEN = Message("m1486.p-is-between", "P {profile} is above {high} and not above V {velocity}")
+PROFILES = Message("m1486.profiles", "{low} to {high} step/s, or above V for no parabolic part")
+A_IS_LARGE = Message(
+    "m1486.a-is-large", "A {acceleration} is large for S {start_stop}; the table of permitted pairs is not available"
+)
+SAFE_ACCELERATION = Message("m1486.safe-acceleration", "up to {times} times S is taken to be safe")
+AT_MOST_EXCEPT_FOR = Message("m1486.at-most-except-for", "at most {most}, except for {divisors}")
+THE_DISTANCE = Message("m1486.the-distance", "the distance")
+IS_NOT_A_MULTIPLE_OF = Message("m1486.is-not-a-multiple-of", "{what} {distance} is not a multiple of {size}")
+NO_PAIR = Message("m1486.no-pair", "M{microstep} and Q{qualification} do not go together")
+NO_RAMP = Message("m1486.no-ramp", "the move runs at V without a ramp")
+Q1_REACHES_V = Message("m1486.q1-reaches-v", "Q1 goes as far as V")
+COARSE_STEPS = Message(
+    "m1486.coarse-steps", "a multiple of {coarse} is made in steps of Q{q}; S up to {limit:g} step/s goes with any distance"
+)
+VARIABLE_IS = Message("m1486.variable-is", "the internal variable is {variable}")
+WRITES_RUNSIGN_LINE = Message("m1486.writes-runsign-line", "{command} writes B{line} while function 40 (Runsign) is ON")
+ON_SOME_PATHS = Message("m1486.on-some-paths", "on some paths {message}")
+BOTH_OPERANDS = Message("m1486.both-operands", "functions 46 and 58 are both ON")
+OPERAND_COMES_FROM_THE_LINES = Message("m1486.operand-comes-from-the-lines", "the operand comes from the lines")
+GROUPS_OF_LINES = Message("m1486.groups-of-lines", "first line and count, such as 14 for lines 1 to 4, up to line 21")
+IS_NOT_AN_OPERAND_REGISTER = Message(
+    "m1486.is-not-an-operand-register", "{number} is not an operand register, and function 58 is ON"
+)
+STARTED_AGAIN = Message(
+    "m1486.started-again", "the file comes to its end from label {label} and finds this J behind it, again and again"
+)
+REGISTERS_ARE_SHARED = Message(
+    "m1486.registers-are-shared", "on {title} the registers lie in the last {bits} bits of the command memory"
+)
+SAFE_AFTER_RESET = Message(
+    "m1486.safe-after-reset", "safe with \\ as the first command and at most {limit} bits; these are {bits} bits"
+)
+NAMES_NO_LINES = Message("m1486.names-no-lines", "{number} names no lines, and function 46 is ON")
+VARIABLE_CAN_GIVE = Message("m1486.variable-can-give", "the internal variable can give: {message}")
+C40_GIVES_THE_LINE_BACK = Message("m1486.c40-gives-the-line-back", "C40 gives the line back")
+INSIDE_A_SUBROUTINE = Message("m1486.inside-a-subroutine", "{command} inside a subroutine")
+ONE_LEVEL_ONLY = Message("m1486.one-level-only", "one level only")
+DOT_WITHOUT_A_CALL = Message("m1486.dot-without-a-call", "this dot is reached without a call")
+JUMP_OVER_THE_SUBROUTINE = Message("m1486.jump-over-the-subroutine", "jump over the subroutine")
+DOES_NOT_COME_BACK = Message("m1486.does-not-come-back", "{command} does not come back")
+SUBROUTINE_ENDS_WITH_A_DOT = Message("m1486.subroutine-ends-with-a-dot", "a subroutine ends with a dot")
+LABEL_IS_GIVEN_TWICE = Message("m1486.label-is-given-twice", "label {label} is given a second time")
+NEVER_REACHED_ONE = Message("m1486.never-reached-one", "this command is never reached")
+NEVER_REACHED_MORE = Message("m1486.never-reached-more", "these {count} commands are never reached")
+VARIABLE_GIVES = Message("m1486.variable-may-give", "the internal variable gives: {message}")
+END_WITH_A_LOOP = Message("m1486.end-with-a-loop", "end it with a loop, such as @9 W1000 J9, which wrong data end")
+NOTHING_JUMPS_TO_LABEL = Message("m1486.nothing-jumps-to-label", "nothing jumps to label {label}")
+LATER_ONE_COUNTS = Message("m1486.later-one-counts", "the later one counts")
 
 ACCELERATION_PER_START_STOP = 65
 """Ratio of acceleration to start/stop speed above which the missing table would be needed (M-4)."""
 
-_Fault = tuple[ChipFinding, str, str | None]
+_Fault = tuple[ChipFinding, MessageText, MessageText | None]
 """An error because of a setting: the finding, the message, the hint."""
 _Rule = Callable[[ChipCommand, Settings], _Fault | None]
 
@@ -72,7 +134,7 @@ def _judge(command: ChipCommand, states: set[Settings], rule: _Rule) -> Iterator
         return
     finding, message, hint = found[0]
     if finding.severity is Severity.ERROR and None in faults:
-        finding, message = findings.MAY_FAIL, f"on some paths {message}"
+        finding, message = findings.MAY_FAIL, ON_SOME_PATHS(message=message)
     span = command.span if command.number is None else command.argument_span
     fix = None
     if finding is findings.NOT_A_MULTIPLE and command.number is not None:
@@ -88,9 +150,9 @@ def _distance(command: ChipCommand, state: Settings) -> _Fault | None:
     size = microstep_size(state.microstep)
     if distance % size == 0:
         return None
-    what = "the distance" if is_move else command.key
-    hint = f"with M{state.microstep} a microstep is {size} minimum microsteps"
-    return findings.NOT_A_MULTIPLE, f"{what} {grouped(distance)} is not a multiple of {size}", hint
+    what = THE_DISTANCE() if is_move else command.key
+    hint = SIZE_OF_MICROSTEP(microstep=state.microstep, size=size)
+    return findings.NOT_A_MULTIPLE, IS_NOT_A_MULTIPLE_OF(what=what, distance=grouped(distance), size=size), hint
 
 
 def _nearest_multiple(distance: int, states: set[Settings]) -> str:
@@ -105,8 +167,9 @@ def _pair(command: ChipCommand, state: Settings) -> _Fault | None:
     allowed = PAIRS[state.microstep]
     if state.qualification in allowed:
         return None
-    hint = f"with M{state.microstep} go {', '.join(f'Q{q}' for q in allowed)}"
-    return findings.FORBIDDEN_PAIR, f"M{state.microstep} and Q{state.qualification} do not go together", hint
+    names = [f"Q{q}" for q in allowed]
+    hint = WITH_MICROSTEP_GO(microstep=state.microstep, names=names)
+    return findings.FORBIDDEN_PAIR, NO_PAIR(microstep=state.microstep, qualification=state.qualification), hint
 
 
 def _no_ramp(command: ChipCommand, state: Settings) -> _Fault | None:
@@ -117,8 +180,8 @@ def _no_ramp(command: ChipCommand, state: Settings) -> _Fault | None:
         or state.velocity > state.start_stop
     ):
         return None
-    message = f"V {state.velocity} is not above S {state.start_stop}"
-    return findings.NO_RAMP, message, "the move runs at V without a ramp"
+    message = V_IS_NOT_ABOVE_S(velocity=state.velocity, start_stop=state.start_stop)
+    return findings.NO_RAMP, message, NO_RAMP()
 
 
 def _too_fast(command: ChipCommand, state: Settings) -> _Fault | None:
@@ -127,8 +190,8 @@ def _too_fast(command: ChipCommand, state: Settings) -> _Fault | None:
     highest = HIGHEST_SPEED[state.qualification]
     if state.velocity <= highest or state.velocity <= low_range_limit(state.microstep):
         return None
-    message = f"V {state.velocity} is above {highest} step/s, the highest speed with Q{state.qualification}"
-    return findings.SPEED_ABOVE_Q, message, "Q1 goes as far as V"
+    message = V_IS_ABOVE_HIGHEST(velocity=state.velocity, highest=highest, qualification=state.qualification)
+    return findings.SPEED_ABOVE_Q, message, Q1_REACHES_V()
 
 
 def _fine_end(command: ChipCommand, state: Settings) -> _Fault | None:
@@ -147,11 +210,11 @@ def _fine_end(command: ChipCommand, state: Settings) -> _Fault | None:
     fine, coarse = microstep_size(m), microstep_size(q)
     if q not in PAIRS[m] or distance % fine or distance % coarse == 0 or speed <= limit:
         return None
-    message = f"the distance {grouped(distance)} ends in steps of M{m} at {speed} step/s, above the {limit:g} step/s of M{m}"
+    message = ENDS_IN_FINE_STEPS(distance=grouped(distance), m=m, speed=speed, limit=limit)
     return (
         findings.ENDS_IN_FINE_STEPS,
         message,
-        f"a multiple of {coarse} is made in steps of Q{q}; S up to {limit:g} step/s goes with any distance",
+        COARSE_STEPS(coarse=coarse, q=q, limit=limit),
     )
 
 
@@ -160,8 +223,9 @@ def _profile(command: ChipCommand, state: Settings) -> _Fault | None:
         return None
     if state.profile in PROFILE_RANGE or state.profile > state.velocity:
         return None
-    message = f"P {state.profile} is above {PROFILE_RANGE[-1]} and not above V {state.velocity}"
-    hint = f"{PROFILE_RANGE[0]} to {PROFILE_RANGE[-1]} step/s, or above V for no parabolic part"
+    low, high = PROFILE_RANGE[0], PROFILE_RANGE[-1]
+    message = P_IS_BETWEEN(profile=state.profile, high=high, velocity=state.velocity)
+    hint = PROFILES(low=low, high=high)
     return findings.PROFILE_OUT_OF_RANGE, message, hint
 
 
@@ -171,8 +235,8 @@ def _acceleration(command: ChipCommand, state: Settings) -> _Fault | None:
         return None
     if state.acceleration <= ACCELERATION_PER_START_STOP * state.start_stop:
         return None
-    message = f"A {state.acceleration} is large for S {state.start_stop}; the table of permitted pairs is not available"
-    hint = f"up to {ACCELERATION_PER_START_STOP} times S is taken to be safe"
+    message = A_IS_LARGE(acceleration=state.acceleration, start_stop=state.start_stop)
+    hint = SAFE_ACCELERATION(times=ACCELERATION_PER_START_STOP)
     return findings.NO_ACCELERATION_TABLE, message, hint
 
 
@@ -185,22 +249,22 @@ def _operand(command: ChipCommand, state: Settings, interface: Interface) -> _Fa
     if number is None:
         return None
     if state.lines_operand and state.register_operand:
-        return findings.BOTH_OPERANDS, "functions 46 and 58 are both ON", "the operand comes from the lines"
+        return findings.BOTH_OPERANDS, BOTH_OPERANDS(), OPERAND_COMES_FROM_THE_LINES()
     if state.lines_operand:
         lines = line_group(number)
         if lines is None:
-            hint = "first line and count, such as 14 for lines 1 to 4, up to line 21"
-            return findings.OUT_OF_RANGE, f"{number} names no lines, and function 46 is ON", hint
+            hint = GROUPS_OF_LINES()
+            return findings.OUT_OF_RANGE, NAMES_NO_LINES(number=number), hint
         taken = [line for line in lines if line in interface.occupied]
         if taken:
-            message = f"{lines_text(taken)} belong to the {interface.title} interface"
+            message = BELONG_TO_INTERFACE(lines=lines_text(taken), title=interface.title)
             free = lines_text([line for line in LINES if line not in interface.occupied])
-            return findings.LINE_READ_OCCUPIED, message, f"free lines are {free}"
+            return findings.LINE_READ_OCCUPIED, message, FREE_LINES_ARE(free=free)
         return None
     if state.lines_operand is None or state.register_operand is None:
         return None
     if state.register_operand and number not in GENERAL:
-        return findings.OUT_OF_RANGE, f"{number} is not an operand register, and function 58 is ON", "1 to 8"
+        return findings.OUT_OF_RANGE, IS_NOT_AN_OPERAND_REGISTER(number=number), TO(low=1, high=8)
     if command.key == "/" and not state.register_operand:
         return _dividend(number, state)
     return None
@@ -209,8 +273,9 @@ def _operand(command: ChipCommand, state: Settings, interface: Interface) -> _Fa
 def _dividend(divisor: int, state: Settings) -> _Fault | None:
     if state.variable is None or state.variable <= DIVIDEND_LIMIT or divisor in FREE_DIVISORS:
         return None
-    hint = f"at most {grouped(DIVIDEND_LIMIT)}, except for {', '.join(map(str, sorted(FREE_DIVISORS)))}"
-    return findings.DIVIDEND_TOO_LARGE, f"the internal variable is {grouped(state.variable)}", hint
+    divisors = sorted(FREE_DIVISORS)
+    hint = AT_MOST_EXCEPT_FOR(most=grouped(DIVIDEND_LIMIT), divisors=divisors)
+    return findings.DIVIDEND_TOO_LARGE, VARIABLE_IS(variable=grouped(state.variable)), hint
 
 
 def _from_variable(
@@ -225,9 +290,11 @@ def _from_variable(
         return
     first = min(found, key=lambda p: p.message)
     if len(found) == len(problems):
-        yield replace(first, span=command.span, message=f"the internal variable gives: {first.message}", fix=None)
+        yield replace(first, span=command.span, message=VARIABLE_GIVES(message=first.message), fix=None)
     else:
-        yield findings.MAY_FAIL(command.span, f"the internal variable can give: {first.message}", first.hint)
+        yield findings.MAY_FAIL(
+            command.span, VARIABLE_CAN_GIVE(message=first.message), None if first.hint is None else text_of(first.hint)
+        )
 
 
 def _variable_problem(
@@ -246,20 +313,20 @@ def _runsign(command: ChipCommand, states: set[Settings], variant: Variant) -> I
         spec = None if number is None else find(command.key, number, variant)
         if number is None or spec is None or not state.runsign or RUNSIGN_LINE not in spec.lines(number):
             continue
-        message = f"{command} writes B{RUNSIGN_LINE} while function 40 (Runsign) is ON"
-        yield findings.RUNSIGN_LINE_USED(command.span, message, "C40 gives the line back")
+        message = WRITES_RUNSIGN_LINE(command=command, line=RUNSIGN_LINE)
+        yield findings.RUNSIGN_LINE_USED(command.span, message, C40_GIVES_THE_LINE_BACK())
         return
 
 
 def _calls(stream: CommandStream, flow: FlowAnalysis) -> Iterator[Diagnostic]:
     for index in flow.nested_calls:
         command = stream.commands[index]
-        yield findings.NESTED_CALL(command.span, f"{command} inside a subroutine", "one level only")
+        yield findings.NESTED_CALL(command.span, INSIDE_A_SUBROUTINE(command=command), ONE_LEVEL_ONLY())
     for index in flow.lone_returns:
-        yield findings.RETURN_ALONE(stream.commands[index].span, "this dot is reached without a call", "jump over the subroutine")
+        yield findings.RETURN_ALONE(stream.commands[index].span, DOT_WITHOUT_A_CALL(), JUMP_OVER_THE_SUBROUTINE())
     for index in flow.endless_calls:
         command = stream.commands[index]
-        yield findings.NEVER_RETURNS(command.span, f"{command} does not come back", "a subroutine ends with a dot")
+        yield findings.NEVER_RETURNS(command.span, DOES_NOT_COME_BACK(command=command), SUBROUTINE_ENDS_WITH_A_DOT())
 
 
 def _labels(stream: CommandStream, flow: FlowAnalysis) -> Iterator[Diagnostic]:
@@ -274,11 +341,11 @@ def _labels(stream: CommandStream, flow: FlowAnalysis) -> Iterator[Diagnostic]:
             first, *others = group
             if used.isdisjoint((first, *others)):
                 span = stream.commands[first].span
-                yield findings.LABEL_UNUSED(span, f"nothing jumps to label {label}", None, Fix(span, ""))
+                yield findings.LABEL_UNUSED(span, NOTHING_JUMPS_TO_LABEL(label=label), None, Fix(span, ""))
                 continue
             for later in others:
-                message = f"label {label} is given a second time"
-                yield findings.LABEL_TWICE(stream.commands[later].span, message, "the later one counts")
+                message = LABEL_IS_GIVEN_TWICE(label=label)
+                yield findings.LABEL_TWICE(stream.commands[later].span, message, LATER_ONE_COUNTS())
 
 
 def _never_reached(stream: CommandStream, flow: FlowAnalysis) -> Iterator[Diagnostic]:
@@ -287,8 +354,9 @@ def _never_reached(stream: CommandStream, flow: FlowAnalysis) -> Iterator[Diagno
     for is_reached, group in groupby(queued, lambda at: at in flow.states):
         if not is_reached:
             run = [stream.commands[at] for at in group]
-            count = "this command is" if len(run) == 1 else f"these {len(run)} commands are"
-            yield findings.NEVER_REACHED(Span(run[0].span.start, run[-1].span.end), f"{count} never reached")
+            count = len(run)
+            message = NEVER_REACHED_ONE() if count == 1 else NEVER_REACHED_MORE(count=count)
+            yield findings.NEVER_REACHED(Span(run[0].span.start, run[-1].span.end), message)
 
 
 def _started_again(stream: CommandStream, variant: Variant, interface: Interface) -> Iterator[Diagnostic]:
@@ -301,8 +369,8 @@ def _started_again(stream: CommandStream, variant: Variant, interface: Interface
         if target is None or stream.in_file[target] is None:
             continue
         if index in flow_of(stream, variant, interface).reached((target,)):
-            message = f"the file comes to its end from label {label} and finds this J behind it, again and again"
-            yield findings.STARTED_AGAIN(command.span, message, "end it with a loop, such as @9 W1000 J9, which wrong data end")
+            message = STARTED_AGAIN(label=label)
+            yield findings.STARTED_AGAIN(command.span, message, END_WITH_A_LOOP())
 
 
 def _shared_registers(stream: CommandStream, flow: FlowAnalysis, variant: Variant) -> Iterator[Diagnostic]:
@@ -316,8 +384,8 @@ def _shared_registers(stream: CommandStream, flow: FlowAnalysis, variant: Varian
         moves = is_register and any((value(command, s) or 0) in GENERAL for s in states)
         operates = _calculates(command) and any(s.register_operand for s in states)
         if moves or operates:
-            message = f"on {variant.title} the registers lie in the last {variant.shared_bits} bits of the command memory"
-            hint = f"safe with \\ as the first command and at most {limit} bits; these are {stream.bits} bits"
+            message = REGISTERS_ARE_SHARED(title=variant.title, bits=variant.shared_bits)
+            hint = SAFE_AFTER_RESET(limit=limit, bits=stream.bits)
             first = stream.commands[0].span.start
             fix = Fix(Span(first, first), "\\\n") if stream.bits <= limit else None
             yield findings.REGISTERS_SHARED(command.span, message, hint, fix)

@@ -16,6 +16,7 @@ from steptwin.m1486.findings import ChipFinding
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.m1486.syntax import ChipCommand, parse
 from steptwin.m1486.variants import Store, Variant
+from steptwin.messages import MessageText
 
 CONVERTED = ChipFinding("M223", "number for the other clock", "At 24 MHz speeds, accelerations and times have other numbers.")
 NOT_CONVERTED = ChipFinding("M140", "no number for the other clock", "The chip does not take the number that it would need.")
@@ -65,7 +66,7 @@ def _converted(command: ChipCommand, old: Variant, new: Variant) -> Diagnostic |
         return None
     if command.number is None:
         message = f"the internal variable means another {'time' if power < 0 else 'speed or acceleration'} here"
-        return CONVERTED(command.span, message, "its values must be converted")
+        return CONVERTED(command.span, MessageText(message), MessageText("its values must be converted"))
     if command.key == "P" and command.number not in PROFILE_RANGE:
         return None  # no parabolic acceleration, at any clock
     exact = command.number * Fraction(old.clock, new.clock) ** power
@@ -73,7 +74,7 @@ def _converted(command: ChipCommand, old: Variant, new: Variant) -> Diagnostic |
     permitted = f"{PROFILE_RANGE[0]} to {PROFILE_RANGE[-1]}" if command.key == "P" else permitted_text(command.key, new)
     if find(command.key, number, new) is None or (command.key == "P" and number not in PROFILE_RANGE):
         message = f"{command} would have to be {command.key}{float(exact):g} on {new.title}: permitted is {permitted}"
-        return NOT_CONVERTED(command.argument_span, message)
+        return NOT_CONVERTED(command.argument_span, MessageText(message))
     message = f"{command} is {command.key}{float(exact):g} on {new.title}"
-    hint = None if exact == number else "rounded to a whole number"
-    return CONVERTED(command.argument_span, message, hint, Fix(command.argument_span, str(number)))
+    hint = None if exact == number else MessageText("rounded to a whole number")
+    return CONVERTED(command.argument_span, MessageText(message), hint, Fix(command.argument_span, str(number)))

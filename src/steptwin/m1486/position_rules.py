@@ -17,7 +17,13 @@ from steptwin.m1486.microsteps import DEFAULT_DISTANCE_U, UNIT
 from steptwin.m1486.structure import CommandStream, written_label
 from steptwin.m1486.syntax import ChipCommand
 from steptwin.m1486.variants import Variant
+from steptwin.messages import Message
 from steptwin.tables import complete
+
+COUNTER_SHOWS = Message("m1486.counter-shows", "at position {position} the counter shows {shown}")
+BEGIN_WITH_A_POSITION = Message(
+    "m1486.begin-with-a-position", "the move would be {distance}; begin with a position that = sets, so that none is below 0"
+)
 
 MOST_COMMANDS = 2_000
 """Most commands followed along all paths together, of those that move, jump or are about a position; beyond it the rest of a
@@ -57,8 +63,9 @@ def position_rules(stream: CommandStream, variant: Variant) -> Iterator[Diagnost
             command = stream.commands[index]
             shown = position % len(_COUNTER)
             target = command.number or 0
-            message = f"at position {_signed(position)} the counter shows {grouped(shown)}"
-            hint = f"the move would be {_signed(target - shown)}; begin with a position that = sets, so that none is below 0"
+            message = COUNTER_SHOWS(position=_signed(position), shown=grouped(shown))
+            distance = _signed(target - shown)
+            hint = BEGIN_WITH_A_POSITION(distance=distance)
             yield findings.POSITION_PASSED(command.span, message, hint)
         for after in _after(stream, state):
             waiting.append(_State(onward[after.index], after.position, after.distance, after.back, after.loops))

@@ -17,6 +17,34 @@ from steptwin.m1486 import findings
 from steptwin.m1486.commands import CONDITIONS, LARGEST_LABEL, LETTERS, meant, rows, takes_number, takes_variable, use_of
 from steptwin.m1486.commanduse import CommandUse
 from steptwin.m1486.findings import ChipFinding
+from steptwin.messages import Message, MessageText
+
+SUCH_AS_I2H5 = Message("m1486.such-as-i2h5", "such as I2H5: if line 2 is high, go to label 5")
+NO_COMMAND_BEGINS_WITH = Message("m1486.no-command-begins-with", "no command begins with {char!r}")
+FOUND = Message("m1486.found", "found {char!r}")
+BLANK_INSIDE_A_NUMBER = Message("m1486.blank-inside-a-number", "blank inside a number, read as {digits}")
+EXPECTED = Message("m1486.expected", "{expected} expected, {found}")
+NO_COMMAND_BEGINS_WITH_NUL = Message(
+    "m1486.no-command-begins-with-nul", "no command begins with NUL; the sender ends lines with CR NUL"
+)
+SECOND_COMMAND = Message("m1486.second-command", "{char!r} begins a second command ({name}) on this line")
+FOUND_THE_END_OF_THE_LINE = Message("m1486.found-the-end-of-the-line", "found the end of the line")
+NO_BLANK_TO_THE_CHIP = Message("m1486.no-blank-to-the-chip", "{name} (U+{code:04X}), which is no blank to the chip")
+TOO_MANY_DIGITS = Message("m1486.too-many-digits", "a number of {count} digits")
+MOST_DIGITS = Message("m1486.most-digits", "no number has more than 8")
+A_NUMBER_OR_THE_VARIABLE = Message("m1486.a-number-or-the-variable", "a number, or the end of the line for the internal variable")
+A_NUMBER = Message("m1486.a-number", "a number")
+IS_NOT_A_NUMBER = Message("m1486.is-not-a-number", "{left} is not a number")
+IS_A_LETTER_NOT_A_DIGIT = Message("m1486.is-a-letter-not-a-digit", "{letter!r} is a letter, not a digit")
+DIRECTIONS = Message("m1486.directions", "F moves in positive, B in negative direction")
+NO_SIGN = Message("m1486.no-sign", "numbers have no sign")
+HAS_A_SIGN = Message("m1486.has-a-sign", "{rest} has a sign")
+IS_NOT_A_WHOLE_NUMBER = Message("m1486.is-not-a-whole-number", "{number} is not a whole number")
+ONE_COMMAND_A_LINE = Message("m1486.one-command-a-line", "one command a line")
+ADDRESSES = Message("m1486.addresses", "0 to 9, A to F, or G for all chips")
+TAKES_NO_NUMBER = Message("m1486.takes-no-number", "{keyword} takes no number")
+EXPECTED_AFTER = Message("m1486.expected-after", "{expected} expected after {command}, {found}")
+VARIABLE_CANNOT_REPLACE_IT = Message("m1486.variable-cannot-replace-it", "the internal variable cannot replace it")
 
 _NOWHERE = Span(0, 0)
 _LINE_END = re.compile(r"\r\n|\r|\n")
@@ -27,6 +55,10 @@ _BLANKS = frozenset(" \t")
 _LEVELS = frozenset("HL")
 _MOST_DIGITS = 18
 """More digits than any number of the language has; longer ones are no numbers."""
+_EXPECTED = {
+    what: Message(f"m1486.expected.{what.lower().replace(' ', '-')}", what)()
+    for what in ("address", "number", "label", "line or flag", "H or L", "end of the line")
+}
 _MEANT = {"’": "'", "‘": "'", "`": "'", "–": "-", "−": "-", "×": "*", "÷": "/", "1": "L", "|": "L", "0": "O"}
 """Characters that word processors, scanners and eyes put for others."""
 _MEANT_DIGIT = {"l": "1", "I": "1", "|": "1", "O": "0", "o": "0"}
@@ -196,9 +228,9 @@ class _LineReader:
         return self.capitals[self.at : self.at + 1]
 
     @property
-    def found(self) -> str:
+    def found(self) -> MessageText:
         """The next character for messages."""
-        return f"found {self.chars[self.at]!r}" if self.next else "found the end of the line"
+        return FOUND(char=self.chars[self.at]) if self.next else FOUND_THE_END_OF_THE_LINE()
 
     def take(self) -> str:
         char = self.next
@@ -216,12 +248,14 @@ class _LineReader:
     def rest_span(self) -> Span:
         return self.span(self.at, len(self.chars))
 
-    def error(self, finding: ChipFinding, span: Span, message: str, hint: str | None = None, fix: Fix | None = None) -> None:
+    def error(
+        self, finding: ChipFinding, span: Span, message: MessageText, hint: MessageText | None = None, fix: Fix | None = None
+    ) -> None:
         self.diagnostics.append(finding(span, message, hint, fix))
         self.is_broken = True
 
     def give_up(
-        self, finding: ChipFinding, span: Span, message: str, hint: str | None = None, fix: Fix | None = None
+        self, finding: ChipFinding, span: Span, message: MessageText, hint: MessageText | None = None, fix: Fix | None = None
     ) -> NoReturn:
         self.error(finding, span, message, hint, fix)
         raise _BrokenLine
@@ -235,9 +269,7 @@ def _no_other_blank(reader: _LineReader) -> None:
         name = unicodedata.name(first, "a control character").lower()
         span = reader.span(found[0], found[-1] + 1)
         fixed = "".join(" " if char.isspace() else char for char in reader.chars[found[0] : found[-1] + 1])
-        reader.give_up(
-            findings.UNKNOWN_COMMAND, span, f"{name} (U+{ord(first):04X}), which is no blank to the chip", None, Fix(span, fixed)
-        )
+        reader.give_up(findings.UNKNOWN_COMMAND, span, NO_BLANK_TO_THE_CHIP(name=name, code=ord(first)), None, Fix(span, fixed))
 
 
 def _command(reader: _LineReader) -> ChipCommand:
@@ -254,16 +286,26 @@ def _command(reader: _LineReader) -> ChipCommand:
         argument, argument_end = _condition(reader)
     elif key == "X":
         if reader.next not in _HEX:
-            hint = "0 to 9, A to F, or G for all chips"
-            reader.give_up(findings.ARGUMENT_MISSING, reader.span(reader.at), f"address expected, {reader.found}", hint)
+            hint = ADDRESSES()
+            reader.give_up(
+                findings.ARGUMENT_MISSING,
+                reader.span(reader.at),
+                EXPECTED(expected=_EXPECTED["address"], found=reader.found),
+                hint,
+            )
         argument = int(reader.take(), 16)
     elif takes_number(key):
         argument = _number(reader)
         _no_word(reader, key, argument)
         _no_other_notation(reader, key, argument_start)
         if argument is None and not takes_variable(key):
-            hint = "the internal variable cannot replace it"
-            reader.give_up(findings.ARGUMENT_MISSING, reader.span(reader.at), f"number expected, {reader.found}", hint)
+            hint = VARIABLE_CANNOT_REPLACE_IT()
+            reader.give_up(
+                findings.ARGUMENT_MISSING,
+                reader.span(reader.at),
+                EXPECTED(expected=_EXPECTED["number"], found=reader.found),
+                hint,
+            )
     return ChipCommand(key, argument, reader.span(start), reader.span(argument_start, argument_end))
 
 
@@ -277,9 +319,9 @@ def _number(reader: _LineReader) -> int | None:
         return None
     span = reader.span(start)
     if len(digits) > _MOST_DIGITS:
-        reader.give_up(findings.BAD_ARGUMENT, span, f"a number of {len(digits)} digits", "no number has more than 8")
+        reader.give_up(findings.BAD_ARGUMENT, span, TOO_MANY_DIGITS(count=len(digits)), MOST_DIGITS())
     if span.end - span.start > len(digits):
-        message = f"blank inside a number, read as {digits}"
+        message = BLANK_INSIDE_A_NUMBER(digits=digits)
         reader.diagnostics.append(findings.BLANK_IN_NUMBER(span, message, None, Fix(span, digits)))
     return int(digits)
 
@@ -287,8 +329,8 @@ def _number(reader: _LineReader) -> int | None:
 def _no_word(reader: _LineReader, key: str, number: int | None) -> None:
     """Letters in the place of a number are no row of commands."""
     if number is None and _WORD.match(reader.chars, reader.at):
-        hint = "a number, or the end of the line for the internal variable" if takes_variable(key) else "a number"
-        reader.give_up(findings.BAD_ARGUMENT, reader.rest_span(), f"{reader.left} is not a number", hint)
+        hint = A_NUMBER_OR_THE_VARIABLE() if takes_variable(key) else A_NUMBER()
+        reader.give_up(findings.BAD_ARGUMENT, reader.rest_span(), IS_NOT_A_NUMBER(left=reader.left), hint)
 
 
 def _no_other_notation(reader: _LineReader, key: str, start: int) -> None:
@@ -303,15 +345,15 @@ def _no_other_notation(reader: _LineReader, key: str, start: int) -> None:
     if all_meant and not apart and not _DIGITS.isdisjoint(reader.chars[start:]):
         digits = "".join(_MEANT_DIGIT.get(char, char) for char in rest)
         fix = Fix(Span(reader.places[start], span.end), reader.chars[start : reader.at] + digits)
-        reader.give_up(findings.BAD_ARGUMENT, span, f"{rest[0]!r} is a letter, not a digit", None, fix)
+        reader.give_up(findings.BAD_ARGUMENT, span, IS_A_LETTER_NOT_A_DIGIT(letter=rest[0]), None, fix)
     if rest[1:2] not in _DIGITS:
         return
     if not has_digits and rest[0] in "+-":
-        hint = "F moves in positive, B in negative direction" if key in "FB" else "numbers have no sign"
-        reader.give_up(findings.BAD_ARGUMENT, span, f"{rest} has a sign", hint, _without_sign(reader, key, start))
+        hint = DIRECTIONS() if key in "FB" else NO_SIGN()
+        reader.give_up(findings.BAD_ARGUMENT, span, HAS_A_SIGN(rest=rest), hint, _without_sign(reader, key, start))
     if has_digits and rest[0] in ".,":
         number = reader.chars[start:]
-        reader.give_up(findings.BAD_ARGUMENT, reader.span(start, len(reader.chars)), f"{number} is not a whole number")
+        reader.give_up(findings.BAD_ARGUMENT, reader.span(start, len(reader.chars)), IS_NOT_A_WHOLE_NUMBER(number=number))
 
 
 def _without_sign(reader: _LineReader, key: str, start: int) -> Fix | None:
@@ -341,9 +383,9 @@ def _condition(reader: _LineReader) -> tuple[JumpCondition, int]:
 
 
 def _bad_condition(reader: _LineReader, expected: str, fix: Fix | None = None) -> NoReturn:
-    hint = "such as I2H5: if line 2 is high, go to label 5"
+    hint = SUCH_AS_I2H5()
     span = reader.span(reader.at) if fix is None else fix.span
-    reader.give_up(findings.BAD_CONDITION, span, f"{expected} expected, {reader.found}", hint, fix)
+    reader.give_up(findings.BAD_CONDITION, span, EXPECTED(expected=_EXPECTED[expected], found=reader.found), hint, fix)
 
 
 def _level_read_as_one(span: Span, digits: str) -> Fix | None:
@@ -361,9 +403,9 @@ def _unknown(reader: _LineReader) -> NoReturn:
     meant = _MEANT.get(char)
     # A digit alone is worth a suggestion only where a number follows, as in 120 for l20.
     fix = Fix(span, meant) if meant and (char not in _DIGITS or len(reader.left) > 1) else None
-    message = f"no command begins with {char!r}"
+    message = NO_COMMAND_BEGINS_WITH(char=char)
     if char == "\0":
-        message = "no command begins with NUL; the sender ends lines with CR NUL"
+        message = NO_COMMAND_BEGINS_WITH_NUL()
     reader.give_up(findings.UNKNOWN_COMMAND, span, message, None, fix)
 
 
@@ -374,10 +416,10 @@ def _end_of_command(reader: _LineReader, command: ChipCommand) -> None:
         return
     span = reader.rest_span()
     if reader.next in LETTERS:
-        message = f"{rest[0]!r} begins a second command ({rows(reader.next)[0].name}) on this line"
-        reader.error(findings.SECOND_COMMAND, span, message, "one command a line", Fix(Span(span.start, span.start), "\n"))
+        message = SECOND_COMMAND(char=rest[0], name=rows(reader.next)[0].name)
+        reader.error(findings.SECOND_COMMAND, span, message, ONE_COMMAND_A_LINE(), Fix(Span(span.start, span.start), "\n"))
     elif rest[0] in _DIGITS and not takes_number(command.key):
-        reader.give_up(findings.NO_ARGUMENT_TAKEN, span, f"{command.key} takes no number", None, Fix(span, ""))
+        reader.give_up(findings.NO_ARGUMENT_TAKEN, span, TAKES_NO_NUMBER(keyword=command.key), None, Fix(span, ""))
     else:
         what = "number" if command.from_variable else "end of the line"
-        reader.give_up(findings.BAD_ARGUMENT, span, f"{what} expected after {command}, {reader.found}")
+        reader.give_up(findings.BAD_ARGUMENT, span, EXPECTED_AFTER(expected=_EXPECTED[what], command=command, found=reader.found))

@@ -9,11 +9,31 @@ from collections.abc import Iterable, Sequence
 from itertools import groupby
 from typing import NamedTuple
 
+from steptwin.messages import NONE, Message, MessageText, text_of
 from steptwin.mic488.encoding import word_to_int, words_to_dint, words_to_real
 from steptwin.mic488.registermap import DataType, QuantityKind, Register, RegisterMap, RequestPart, Space, Type, show_address
 from steptwin.mic488.registers import axes_of_mask
 from steptwin.wire import pdu as modbus
 
+EMPTY_REQUEST = Message("mic488.empty-request", "empty request")
+NOT_IMPLEMENTED = Message("mic488.not-implemented", "not implemented by the device")
+A_FUNCTION = Message("mic488.a-function", "function {function}")
+FUNCTION = Message("mic488.function", "function {function}: {detail}")
+READ = Message("mic488.read", "read {what}")
+WRITE = Message("mic488.write", "write {what}")
+WROTE = Message("mic488.wrote", "wrote {what}")
+READ_BITS = Message("mic488.read-bits", "read bits {data}")
+READ_REGISTERS = Message("mic488.read-registers", "read registers {values}")
+MALFORMED = Message("mic488.malformed", "malformed: {what}")
+EXCEPTION = Message("mic488.exception", "exception {code:02d} {name} ({where})")
+PART = Message("mic488.part", "{name} = {value}")
+PARTS = Message("mic488.parts", "{parts:; }")
+UNMAPPED = Message("mic488.unmapped", "{where} (unmapped)")
+HALF = Message("mic488.half", "half of {name} at {address}")
+ALL_OFF = Message("mic488.all-off", "all off")
+ALL_ON = Message("mic488.all-on", "all on")
+ON = Message("mic488.on", "{names} on")
+MEANING = Message("mic488.meaning", "{text} ({word})")
 MOST_VALUES = 8
 """Longer lists of plain numbers are cut."""
 
@@ -40,51 +60,52 @@ class Wording:
 
     # ------------------------------------------------------------------ PDUs
 
-    def request(self, pdu: bytes) -> str:
+    def request(self, pdu: bytes) -> MessageText:
         """The text of a request: registers read, or registers written with their values."""
         try:
             request = modbus.decode_request(pdu)
         except modbus.ModbusException as refusal:
             if not pdu:
-                return "empty request"
-            return f"function {modbus.function_number(pdu[0])}: {refusal.detail or 'not implemented by the device'}"
+                return EMPTY_REQUEST()
+            detail = text_of(refusal.detail) if refusal.detail else NOT_IMPLEMENTED()
+            return FUNCTION(function=modbus.function_number(pdu[0]), detail=detail)
         match request:
             case modbus.ReadRequest(function, address, count):
-                return f"read {self._names(_SPACES[function], address, count)}"
+                return READ(what=self._names(_SPACES[function], address, count))
             case modbus.WriteCoilRequest(address, on):
-                return f"write {self._bits(Space.COIL, address, [on])}"
+                return WRITE(what=self._bits(Space.COIL, address, [on]))
             case modbus.WriteRegisterRequest(address, value):
-                return f"write {self._word(address, value)}"
+                return WRITE(what=self._word(address, value))
             case modbus.WriteRegistersRequest(address, values):
-                return f"write {self._registers(address, values)}"
+                return WRITE(what=self._registers(address, values))
 
-    def response(self, pdu: bytes, request: bytes | None = None) -> str:
+    def response(self, pdu: bytes, request: bytes | None = None) -> MessageText:
         """The text of a response. Values and registers can only be named if the request is known."""
         try:
             response = modbus.decode_response(pdu)
         except modbus.BadResponse as failure:
-            return f"malformed: {failure}"
+            return MALFORMED(what=text_of(failure))
         asked = _decoded(request)
         match response:
             case modbus.ExceptionResponse(function, code):
                 name = modbus.EXCEPTION_NAMES.get(code, "unknown exception")
-                where = f"function {modbus.function_number(function)}" if asked is None else str(asked.address)
-                return f"exception {code:02d} {name} ({where})"
+                where = A_FUNCTION(function=modbus.function_number(function)) if asked is None else str(asked.address)
+                return EXCEPTION(code=code, name=text_of(name), where=where)
             case modbus.BitsResponse(function, packed):
                 if isinstance(asked, modbus.ReadRequest) and asked.function == function and len(packed) == (asked.count + 7) // 8:
                     states = modbus.unpack_bits(packed, asked.count)
-                    return f"read {self._bits(_SPACES[function], asked.address, states)}"
-                return f"read bits {packed.hex(' ')}"
+                    return READ(what=self._bits(_SPACES[function], asked.address, states))
+                return READ_BITS(data=packed.hex(" "))
             case modbus.RegistersResponse(values):
                 if isinstance(asked, modbus.ReadRequest) and asked.function == pdu[0] and asked.count == len(values):
-                    return f"read {self._registers(asked.address, values)}"
-                return f"read registers {_numbers(values)}"
+                    return READ(what=self._registers(asked.address, values))
+                return READ_REGISTERS(values=_numbers(values))
             case modbus.WriteCoilRequest(address, on):
-                return f"wrote {self._bits(Space.COIL, address, [on])}"
+                return WROTE(what=self._bits(Space.COIL, address, [on]))
             case modbus.WriteRegisterRequest(address, value):
-                return f"wrote {self._word(address, value)}"
+                return WROTE(what=self._word(address, value))
             case modbus.WriteResponse(address, count):
-                return f"wrote {self._names(Space.HOLDING, address, count)}"
+                return WROTE(what=self._names(Space.HOLDING, address, count))
 
     # ------------------------------------------------------------------ parts of a request
 
@@ -93,16 +114,16 @@ class Wording:
         pieces = self.register_map.pieces(space, address, count)
         return (list(group) for _, group in groupby(pieces, _group_key))
 
-    def _names(self, space: Space, address: int, count: int) -> str:
-        return ", ".join(_name(group) for group in self._groups(space, address, count))
+    def _names(self, space: Space, address: int, count: int) -> list[str]:
+        return [_name(group) for group in self._groups(space, address, count)]
 
-    def _bits(self, space: Space, address: int, states: Sequence[bool]) -> str:
-        parts = []
+    def _bits(self, space: Space, address: int, states: Sequence[bool]) -> list[MessageText]:
+        parts: list[MessageText] = []
         for group in self._groups(space, address, len(states)):
             start = group[0].address - address
             shown = states[start : start + sum(p.size for p in group)]
-            parts.append(f"{_name(group)} = {_switches(group, shown)}")
-        return ", ".join(parts)
+            parts.append(PART(name=_name(group), value=_switches(group, shown)))
+        return parts
 
     def _word(self, address: int, value: int) -> str:
         """Function 06. On JOG_SPEED it carries a signed number in units (MIC-6)."""
@@ -111,13 +132,13 @@ class Wording:
             return f"{register.name} = {word_to_int(value)} {self._unit(register)}"
         return self._registers(address, (value,))
 
-    def _registers(self, address: int, words: Sequence[int]) -> str:
-        parts = []
+    def _registers(self, address: int, words: Sequence[int]) -> MessageText:
+        parts: list[MessageText] = []
         for group in self._groups(Space.HOLDING, address, len(words)):
             start = group[0].address - address
             shown = words[start : start + sum(p.size for p in group)]
-            parts.append(f"{_name(group)} = {self._values(group, shown)}")
-        return "; ".join(parts)
+            parts.append(PART(name=_name(group), value=self._values(group, shown)))
+        return PARTS(parts=parts)
 
     # ------------------------------------------------------------------ values
 
@@ -129,13 +150,13 @@ class Wording:
         axis = register.axis
         return self.scales[axis - 1] if axis is not None and axis <= len(self.scales) else None
 
-    def _values(self, group: list[RequestPart], words: Sequence[int]) -> str:
+    def _values(self, group: list[RequestPart], words: Sequence[int]) -> str | list[MessageText]:
         registers = [p.register for p in group if p.register is not None]
         if not registers or not group[0].whole:
             return " ".join(f"{word:04X}" for word in words)
         first = registers[0]
         if first.type.size == 1:
-            return ", ".join(_meaning(first, word) for word in words) if first.type is Type.WORD else _numbers(words)
+            return [_meaning(first, word) for word in words] if first.type is Type.WORD else _numbers(words)
         pairs = zip(words[::2], words[1::2], strict=True)
         if first.type is Type.DINT or (first.type is Type.VALUE and self.data_type is DataType.DINT):
             return self._pulses(registers, [words_to_dint(low, high) for low, high in pairs])
@@ -178,9 +199,9 @@ def _name(group: list[RequestPart]) -> str:
     end = last.address + last.size - 1
     if first.register is None or last.register is None:
         where = str(first.address) if first.address == end else f"{first.address}…{end}"
-        return f"{where} (unmapped)"
+        return UNMAPPED(where=where)
     if not first.whole:
-        return f"half of {first.register.name} at {show_address(first.address)}"
+        return HALF(name=first.register.name, address=show_address(first.address))
     if first.register.cells > 1:
         offset = first.register.address
         cells = f"{first.address - offset}" if first.address == end else f"{first.address - offset} … {end - offset}"
@@ -192,19 +213,19 @@ def _switches(group: list[RequestPart], states: Sequence[bool]) -> str:
     if len(states) == 1:
         return "ON" if states[0] else "OFF"
     if not any(states):
-        return "all off"
+        return ALL_OFF()
     if all(states):
-        return "all on"
+        return ALL_ON()
     if group[0].register is None:
         return "".join("1" if on else "0" for on in states)
-    return ", ".join(p.register.name for p, on in zip(group, states, strict=True) if on and p.register is not None) + " on"
+    return ON(names=[p.register.name for p, on in zip(group, states, strict=True) if on and p.register is not None])
 
 
-def _meaning(register: Register, word: int) -> str:
+def _meaning(register: Register, word: int) -> MessageText:
     if register.kind is QuantityKind.MASK:
-        return f"{' '.join(f'M{axis}' for axis in axes_of_mask(word)) or 'none'} ({word})"
+        return MEANING(text=" ".join(f"M{axis}" for axis in axes_of_mask(word)) or NONE(), word=word)
     text = register.values.get(word)
-    return str(word) if text is None else f"{text} ({word})"
+    return MessageText(str(word)) if text is None else MEANING(text=text_of(text), word=word)
 
 
 def _numbers(words: Sequence[int]) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import fields
-from typing import get_type_hints
+from typing import Any, get_type_hints
 
 from steptwin.controllerstate import ControllerState
 from steptwin.datasheet import Datasheet
@@ -185,7 +185,8 @@ def _event_of(kind: str, given: Mapping[str, object]) -> dict[str, object]:
     head = {"number": _NUMBER_OF_EVENT, "time_ns": MOMENT, "machine": {"type": "string"}, "kind": {"const": kind}}
     cause = {"type": ["integer", "null"], "minimum": 1, "description": "The command or the event that led to it."}
     text = {"type": "string", "description": "As text; it adds nothing to the rest."}
-    words = [name for name in ("words", "what", "text") if given.get(name, text) in (TEXT, text)]
+    shapes: Mapping[str, Any] = given
+    words = [name for name in ("words", "what", "text") if shapes.get(name, text).get("type") == "string"]
     return with_sentences({**head, **given, "cause": cause, "text": text}, *words)
 
 

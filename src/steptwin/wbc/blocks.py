@@ -5,10 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from steptwin.diagnostics import Diagnostic
+from steptwin.messages import Message
 from steptwin.wbc import findings as f
 from steptwin.wbc.findings import ProgramFinding, Spanned
 from steptwin.wbc.foreign import IF_UNKNOWN
 from steptwin.wbc.tree import KeywordStatement
+
+IS_NOT_CLOSED = Message("wbc.is-not-closed", "{keyword} is not closed")
+CLOSING_IS_MISSING = Message("wbc.closing-is-missing", "{closing} is missing")
+WITHOUT_OPENING = Message("wbc.without-opening", "{keyword} without {opening}")
+NOTHING_IS_OPEN = Message("wbc.nothing-is-open", "no {opening} is open here")
+SECOND_ELSE = Message("wbc.second-else", "a second ELSE in one IF")
+CLOSE_THE_INNER_IF = Message("wbc.close-the-inner-if", "close the inner IF with ENDIF first")
 
 
 @dataclass(slots=True)
@@ -68,7 +76,9 @@ class BlockMatcher:
         finding, opening = _NOT_OPENED[keyword]
         if not self._open[opening]:
             fix = "" if isinstance(place, KeywordStatement) else None  # else another word was meant
-            self._diagnostics.append(finding.at(place, f"{keyword} without {opening}", f"no {opening} is open here", fix))
+            self._diagnostics.append(
+                finding.at(place, WITHOUT_OPENING(keyword=keyword, opening=opening), NOTHING_IS_OPEN(opening=opening), fix)
+            )
             return
         while self._stack[-1][0] != opening:
             self._abandon()
@@ -76,9 +86,7 @@ class BlockMatcher:
         blocks = self.blocks
         if keyword == "ELSE":
             if start in blocks.middle:
-                self._diagnostics.append(
-                    f.SECOND_ELSE.at(place, "a second ELSE in one IF", "close the inner IF with ENDIF first")
-                )
+                self._diagnostics.append(f.SECOND_ELSE.at(place, SECOND_ELSE(), CLOSE_THE_INNER_IF()))
             else:
                 blocks.middle[start] = step
             return
@@ -94,4 +102,4 @@ class BlockMatcher:
         keyword, _, place = self._stack.pop()
         self._open[keyword] -= 1
         finding, closing = _NOT_CLOSED[keyword]
-        self._diagnostics.append(finding.at(place, f"{keyword} is not closed", f"{closing} is missing"))
+        self._diagnostics.append(finding.at(place, IS_NOT_CLOSED(keyword=keyword), CLOSING_IS_MISSING(closing=closing)))

@@ -14,6 +14,7 @@ from itertools import pairwise
 
 from steptwin.diagnostics import Diagnostic, SourceText, Span
 from steptwin.errors import Misuse
+from steptwin.messages import MessageText
 from steptwin.wbc import image as im
 from steptwin.wbc.check import check
 from steptwin.wbc.events import INPUT_LABELS
@@ -125,7 +126,7 @@ def program_of(data: bytes, name: str) -> tuple[SourceText, PositionTable, list[
         statements = "1 statement is" if found.inferred == 1 else f"{found.inferred} statements are"
         message = f"{statements} inferred from the order of the vendor's keywords (WBC-40)"
         hint = f"they are marked '{MARK}' by steptwin decompile; whether the device does the same is not known"
-        doubts.append(INFERRED.at(Span(place, place + len(MARK)), message, hint))
+        doubts.append(INFERRED.at(Span(place, place + len(MARK)), MessageText(message), MessageText(hint)))
     return SourceText(name, found.text), found.positions, doubts
 
 

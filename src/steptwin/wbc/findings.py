@@ -9,6 +9,25 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from steptwin.diagnostics import Diagnostic, Fix, Severity, Span
+from steptwin.messages import Message, MessageText
+
+DID_YOU_MEAN = Message("wbc.did-you-mean", "did you mean {meant}?")
+WRITE = Message("wbc.write", "write {text}")
+THERE_IS_NO = Message("wbc.there-is-no", "there is no {name}")
+TAKE_ANOTHER_NAME = Message("wbc.take-another-name", "take another name")
+LACKS_COMPARISON_AFTER = Message("wbc.lacks-comparison-after", "{keyword} lacks the comparison after {text}")
+NAMES_HAVE_LETTERS = Message(
+    "wbc.names-have-letters", "names have letters without accents, digits and _, and do not begin with a digit"
+)
+IS_MISSING_AFTER = Message("wbc.is-missing-after", "= is missing after {text}")
+WBC_HAS_NO = Message("wbc.wbc-has-no", "WBC has no {word}")
+ARGUMENTS_ARE_SEPARATED_BY_BLANKS = Message("wbc.arguments-are-separated-by-blanks", "arguments are separated by blanks")
+A_REGISTER = Message("wbc.a-register", "a register")
+A_STATEMENT = Message("wbc.a-statement", "a statement")
+A_FUNCTION = Message("wbc.a-function", "a function")
+A_CONSTANT = Message("wbc.a-constant", "a constant")
+CHECKED_FOR = Message("wbc.checked-for", "checked for {firmware}")
+NUMBERED_ROWS_OF_TABLE = Message("wbc.numbered-rows-of-table", "the table has {rows}, numbered from 0")
 
 
 class Spanned(Protocol):
@@ -32,14 +51,19 @@ class ProgramFinding:
         return Severity.ERROR if self.code.startswith("W1") else Severity.WARNING
 
     def at(
-        self, place: Spanned, message: str, hint: str | None = None, fix: str | Fix | None = None, meant: str | None = None
+        self,
+        place: Spanned,
+        message: MessageText,
+        hint: MessageText | None = None,
+        fix: str | Fix | None = None,
+        meant: str | None = None,
     ) -> Diagnostic:
         """The message for one place. ``fix`` is the text that replaces it, or a replacement elsewhere. ``meant`` is the name that
         was probably meant: the fix, and the hint asks for it.
         """
         span = Span(place.start, place.end)
         if meant is not None:
-            return Diagnostic(self.code, self.severity, span, message, f"did you mean {meant}?", Fix(span, meant, is_named=True))
+            return Diagnostic(self.code, self.severity, span, message, DID_YOU_MEAN(meant=meant), Fix(span, meant, is_named=True))
         return Diagnostic(self.code, self.severity, span, message, hint, Fix(span, fix) if isinstance(fix, str) else fix)
 
 

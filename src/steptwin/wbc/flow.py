@@ -7,9 +7,21 @@ from __future__ import annotations
 
 from steptwin.controlflow import ControlFlow
 from steptwin.diagnostics import Diagnostic
+from steptwin.messages import Message
 from steptwin.wbc import findings as f
 from steptwin.wbc import steps as s
 from steptwin.wbc.conditions import outcome
+
+END_THE_PROGRAM_ABOVE = Message(
+    "wbc.end-the-program-above", "end the program above with END or JUMP; a RETURN without JUMP is a program error"
+)
+LABEL_HAS_NO_RETURN = Message("wbc.label-has-no-return", "the interrupt label of {name} has no RETURN")
+EVERY_PATH_LEAVES = Message("wbc.every-path-leaves", "every path from the interrupt label of {name} leaves without RETURN")
+RETURN_WITHOUT_A_JUMP = Message("wbc.return-without-a-jump", "RETURN without a JUMP")
+END_WITH_RETURN = Message("wbc.end-with-return", "end it with RETURN, or leave it by JUMP")
+INTERRUPTED_LINE_IS_NOT_CONTINUED = Message("wbc.interrupted-line-is-not-continued", "the interrupted line is not continued")
+THIS_LINE_IS_NEVER_REACHED = Message("wbc.this-line-is-never-reached", "this line is never reached")
+NO_LABEL_OR_INTERRUPT_LEADS_HERE = Message("wbc.no-label-or-interrupt-leads-here", "no label or interrupt leads here")
 
 
 def flow_of(steps: tuple[s.ProgramStep, ...]) -> ControlFlow:
@@ -45,13 +57,13 @@ def interrupt_ends(flow: ControlFlow, executable: s.Executable) -> list[Diagnost
         place = steps[entry]
         falls = any(step is None or isinstance(step, s.InterruptStep) for step in ends)
         if falls or not any(isinstance(step, s.JumpStep | s.EndStep | s.ProgResetStep) for step in ends):
-            message = f"the interrupt label of {event.name} has no RETURN"
+            message = LABEL_HAS_NO_RETURN(name=event.name)
             beyond = [number for number in numbers if number == len(steps) or isinstance(steps[number], s.InterruptStep)]
             fix = f.after(steps[min(beyond) - 1], "\nRETURN") if beyond else None
-            found.append(f.NO_RETURN.at(place, message, "end it with RETURN, or leave it by JUMP", fix))
+            found.append(f.NO_RETURN.at(place, message, END_WITH_RETURN(), fix))
         else:
-            message = f"every path from the interrupt label of {event.name} leaves without RETURN"
-            found.append(f.LEFT_BY_JUMP.at(place, message, "the interrupted line is not continued"))
+            message = EVERY_PATH_LEAVES(name=event.name)
+            found.append(f.LEFT_BY_JUMP.at(place, message, INTERRUPTED_LINE_IS_NOT_CONTINUED()))
     return found
 
 
@@ -65,7 +77,7 @@ def unreached(flow: ControlFlow, executable: s.Executable) -> list[Diagnostic]:
             reported = False
         elif not reported and not isinstance(step, s.ElseStep | s.EndIfStep | s.EndWhileStep | s.ReturnStep | s.EndStep):
             reported = True
-            found.append(f.NEVER_REACHED.at(step, "this line is never reached", "no label or interrupt leads here"))
+            found.append(f.NEVER_REACHED.at(step, THIS_LINE_IS_NEVER_REACHED(), NO_LABEL_OR_INTERRUPT_LEADS_HERE()))
     return found
 
 
@@ -74,6 +86,6 @@ def stray_returns(flow: ControlFlow, executable: s.Executable) -> list[Diagnosti
     steps = executable.steps
     if not steps or not flow.returns[0]:
         return []
-    hint = "end the program above with END or JUMP; a RETURN without JUMP is a program error"
+    hint = END_THE_PROGRAM_ABOVE()
     strays = [steps[number] for number in flow.level(0) if number < len(steps)]
-    return [f.STRAY_RETURN.at(step, "RETURN without a JUMP", hint) for step in strays if isinstance(step, s.ReturnStep)]
+    return [f.STRAY_RETURN.at(step, RETURN_WITHOUT_A_JUMP(), hint) for step in strays if isinstance(step, s.ReturnStep)]

@@ -7,21 +7,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-_LOOP = "count in a WHILE … ENDWHILE"
-_LEAVE = "JUMP to a label behind the ENDWHILE"
-_SUBROUTINE = "a subroutine is a label: JUMP goes there, RETURN comes back to the line after the JUMP"
+from steptwin.messages import Message, MessageText
 
-INSTEAD: Mapping[str, str] = {
+_LOOP = Message("wbc.count-in-a-while", "count in a WHILE … ENDWHILE")()
+_LOOP_OR_JUMP = Message("wbc.count-or-jump-back", "count in a WHILE … ENDWHILE, or JUMP back to a label")()
+_SUBROUTINE = Message(
+    "wbc.subroutine-is-a-label", "a subroutine is a label: JUMP goes there, RETURN comes back to the line after the JUMP"
+)()
+
+INSTEAD: Mapping[str, MessageText] = {
     "FOR": _LOOP,
-    "NEXT": "a WHILE ends with ENDWHILE",
-    "REPEAT": f"{_LOOP}, or JUMP back to a label",
-    "UNTIL": "a loop that looks at its end is a label, an IF and a JUMP",
-    "DO": f"{_LOOP}, or JUMP back to a label",
-    "BREAK": _LEAVE,
-    "EXIT": f"{_LEAVE}; END ends the program",
+    "NEXT": Message("wbc.while-ends-with-endwhile", "a WHILE ends with ENDWHILE")(),
+    "REPEAT": _LOOP_OR_JUMP,
+    "UNTIL": Message("wbc.loop-that-looks-at-its-end", "a loop that looks at its end is a label, an IF and a JUMP")(),
+    "DO": _LOOP_OR_JUMP,
+    "BREAK": Message("wbc.jump-behind-the-endwhile", "JUMP to a label behind the ENDWHILE")(),
+    "EXIT": Message("wbc.jump-behind-or-end", "JUMP to a label behind the ENDWHILE; END ends the program")(),
     "SUB": _SUBROUTINE,
     "FUNCTION": _SUBROUTINE,
-    "PRINT": "write a user register such as $I0 or $R2, which a master can read",
+    "PRINT": Message("wbc.write-a-user-register", "write a user register such as $I0 or $R2, which a master can read")(),
 }
 
 STATEMENTS_ELSEWHERE: Mapping[str, str] = {
@@ -35,12 +39,12 @@ ELSE_IF = frozenset({"ELSEIF", "ELSIF"})
 
 DECLARATIONS = frozenset({"LET", "CONST", "VAR", "DIM", "INT", "FLOAT"})
 
-OPERATOR_WORDS: Mapping[str, tuple[str | None, str]] = {
-    "MOD": ("%", "the remainder is written %"),
-    "AND": (None, "& is 'and' of bits, && of conditions"),
-    "OR": (None, "| is 'or' of bits, || of conditions"),
-    "XOR": (None, "a - b is not 0 where two values differ"),
-    "^": (None, "multiply instead: SET X = Y * Y"),
+OPERATOR_WORDS: Mapping[str, tuple[str | None, MessageText]] = {
+    "MOD": ("%", Message("wbc.remainder", "the remainder is written %")()),
+    "AND": (None, Message("wbc.and", "& is 'and' of bits, && of conditions")()),
+    "OR": (None, Message("wbc.bitwise-or", "| is 'or' of bits, || of conditions")()),
+    "XOR": (None, Message("wbc.xor", "a - b is not 0 where two values differ")()),
+    "^": (None, Message("wbc.multiply-instead", "multiply instead: SET X = Y * Y")()),
 }
 """By operator: its equivalent in WBC if there is exactly one, and advice."""
 
@@ -52,15 +56,17 @@ TIME_UNITS: Mapping[str, float] = {"s": 1, "ms": 0.001, "min": 60}
 
 UNITS = frozenset({*TIME_UNITS, "mm", "mm/s", "°", "°/s", "deg", "rpm", "V", "%", "imp"})
 
+_ONE_CHARACTER = Message("wbc.one-character", "one character, WBC writes two")()
+_NO_OPERATOR = Message("wbc.not-an-operator", "not an operator of WBC")()
 _SPACES = "\u2000\u2001\u2002\u2003\u2004\u2005\u2006\u2007\u2008\u2009\u200a\u202f\u3000"
-LOOK_ALIKES: Mapping[str, tuple[str, str]] = {
-    **dict.fromkeys("‐‑–—−", ("a dash, not a minus", "-")),
-    "\u00a0": ("a no-break space, not a blank", " "),
-    **dict.fromkeys(_SPACES, ("a wide or narrow space, not a blank", " ")),
-    **dict.fromkeys("\u200b\u200c\u200d\u2060\ufeff", ("an invisible character", "")),
-    "≤": ("one character, WBC writes two", "<="),
-    "≥": ("one character, WBC writes two", ">="),
-    **dict.fromkeys("×·", ("not an operator of WBC", "*")),
-    "÷": ("not an operator of WBC", "/"),
+LOOK_ALIKES: Mapping[str, tuple[MessageText, str]] = {
+    **dict.fromkeys("‐‑–—−", (Message("wbc.a-dash", "a dash, not a minus")(), "-")),
+    "\u00a0": (Message("wbc.a-no-break-space", "a no-break space, not a blank")(), " "),
+    **dict.fromkeys(_SPACES, (Message("wbc.a-wide-or-narrow-space", "a wide or narrow space, not a blank")(), " ")),
+    **dict.fromkeys("\u200b\u200c\u200d\u2060\ufeff", (Message("wbc.an-invisible-character", "an invisible character")(), "")),
+    "≤": (_ONE_CHARACTER, "<="),
+    "≥": (_ONE_CHARACTER, ">="),
+    **dict.fromkeys("×·", (_NO_OPERATOR, "*")),
+    "÷": (_NO_OPERATOR, "/"),
 }
 """Characters that look like one of WBC: their names, and the character of WBC."""

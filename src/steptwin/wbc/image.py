@@ -12,6 +12,7 @@ from typing import Any
 
 from steptwin.diagnostics import Diagnostic
 from steptwin.errors import Misuse
+from steptwin.messages import MessageText
 from steptwin.tables import complete
 from steptwin.wbc import findings as f
 from steptwin.wbc import steps as s
@@ -88,18 +89,20 @@ def build(executable: s.Executable, positions: PositionTable, *, inferred: bool 
     records: list[bytes] = []
     for number, step in enumerate(executable.steps):
         if number == SLOTS:
-            diagnostics.append(f.IMAGE_FULL.at(step, f"{len(executable.steps)} commands", f"the image holds {SLOTS}"))
+            diagnostics.append(
+                f.IMAGE_FULL.at(step, MessageText(f"{len(executable.steps)} commands"), MessageText(f"the image holds {SLOTS}"))
+            )
             break
         try:
             record = _Record(number)
             records.append(record.of(step).ljust(SLOT_BYTES, b"\0"))
         except _NotEncodable as reason:
-            diagnostics.append(f.NOT_ENCODABLE.at(step, f"{reason} has no documented form in the image"))
+            diagnostics.append(f.NOT_ENCODABLE.at(step, MessageText(f"{reason} has no documented form in the image")))
         else:
             if record.inferred and not inferred:
                 message = f"{record.inferred[0]} has no documented form in the image"
                 hint = "--inferred writes it in a form that was never seen (WBC-40)"
-                diagnostics.append(f.NOT_ENCODABLE.at(step, message, hint))
+                diagnostics.append(f.NOT_ENCODABLE.at(step, MessageText(message), MessageText(hint)))
     if diagnostics:
         return None, diagnostics
     if len(positions.rows) > ROWS:

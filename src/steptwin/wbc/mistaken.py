@@ -6,11 +6,19 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 
 from steptwin.diagnostics import Diagnostic, Fix, Span
+from steptwin.messages import Message
 from steptwin.wbc import findings as f
 from steptwin.wbc import steps as s
 from steptwin.wbc.dialect import Dialect
 from steptwin.wbc.registers import ROWS
 from steptwin.wbc.scope import ProgramScope
+
+NOTHING_CHANGES = Message("wbc.nothing-changes", "nothing changes {name} while the program waits here")
+NOTHING_CHANGES_BOTH = Message("wbc.nothing-changes-both", "nothing changes {one} and {other} while the program waits here")
+REMOVE_OR_DID_YOU_MEAN = Message("wbc.remove-or-did-you-mean", "remove it, or did you mean {meant}?")
+WAIT_LOOKS_AT_REGISTERS = Message("wbc.wait-looks-at-registers", "a WAIT looks at registers, or at what an interrupt sets")
+IS_A_VARIABLE = Message("wbc.is-a-variable", "{name} is a variable: it has nothing to do with {meant}")
+IS_SET_BUT_NEVER_USED = Message("wbc.is-set-but-never-used", "{name} is set but never used")
 
 _FAMILIES: Mapping[str, str] = {
     "OUTPUT": "OUT",
@@ -45,12 +53,12 @@ def unused_variables(executable: s.Executable, scope: ProgramScope, dialect: Dia
     for index, name in enumerate(scope.variables.values()):
         if index not in read:
             meant = register_meant(name.key, dialect) or scope.nearest_register(name.text)
-            hint = f"remove it, or did you mean {meant or 'a register'}?"
+            hint = REMOVE_OR_DID_YOU_MEAN(meant=meant or f.A_REGISTER())
             named = None if meant is None else Fix(Span(name.start, name.end), meant, is_named=True)
             fix = named or _removed(executable, index)
-            found.append(f.NEVER_USED.at(name, f"{name.text} is set but never used", hint, fix))
+            found.append(f.NEVER_USED.at(name, IS_SET_BUT_NEVER_USED(name=name.text), hint, fix))
         elif (meant := register_meant(name.key, dialect, _CERTAIN)) is not None:
-            message = f"{name.text} is a variable: it has nothing to do with {meant}"
+            message = IS_A_VARIABLE(name=name.text, meant=meant)
             found.append(f.LIKE_A_REGISTER.at(name, message, meant=meant))
     return found
 
@@ -75,8 +83,8 @@ def waits_for_variables(executable: s.Executable, dialect: Dialect) -> list[Diag
         if not names:
             continue
         meant = next((meant for name in names if (meant := register_meant(name.upper(), dialect))), None)
-        hint = f"did you mean {meant}?" if meant else "a WAIT looks at registers, or at what an interrupt sets"
-        message = f"nothing changes {' and '.join(names)} while the program waits here"
+        hint = f.DID_YOU_MEAN(meant=meant) if meant else WAIT_LOOKS_AT_REGISTERS()
+        message = NOTHING_CHANGES(name=names[0]) if len(names) == 1 else NOTHING_CHANGES_BOTH(one=names[0], other=names[1])
         found.append(f.WAITS_FOR_VARIABLE.at(step, message, hint))
     return found
 

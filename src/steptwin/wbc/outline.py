@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from steptwin.diagnostics import Diagnostic
+from steptwin.messages import Message
 from steptwin.wbc import findings as f
 from steptwin.wbc.blocks import BLOCK_WORDS, BlockMatcher, Blocks
 from steptwin.wbc.dialect import Dialect
@@ -24,6 +25,27 @@ from steptwin.wbc.tree import (
     ProgramTree,
     StatementNode,
 )
+
+A_PREDEFINED_NAME = Message("wbc.a-predefined-name", "a predefined name")
+NOTHING_FOLLOWS_THE_LABEL = Message("wbc.nothing-follows-the-label", "nothing follows the label {name}")
+NOT_AN_INTERRUPT_LABEL = Message(
+    "wbc.not-an-interrupt-label", "{name} is not an interrupt label, although it begins with INT_ or HARDINT_"
+)
+INTERRUPT_LABELS = Message(
+    "wbc.interrupt-labels", "{names}; firmware 1.70 also INT_TICK100, INT_TICK1000, INT_M1…INT_M4 and HARDINT_…"
+)
+EVENT_HAS_ONE_LABEL = Message("wbc.event-has-one-label", "an event has one label")
+LINES_OF_FIRMWARE = Message("wbc.lines-of-firmware", "firmware {firmware} holds {limit} executable lines")
+CANNOT_BE_A_LABEL = Message("wbc.cannot-be-a-label", "{name} cannot be a label: it is {reason}")
+PUT_AFTER_IT = Message("wbc.put-after-it", "put {end} after it")
+LABEL_IS_DEFINED_TWICE = Message("wbc.label-is-defined-twice", "the label {name} is defined twice")
+GIVE_ONE_OF_THEM_ANOTHER_NAME = Message("wbc.give-one-of-them-another-name", "give one of them another name")
+A_VARIABLE = Message("wbc.a-variable", "a variable")
+LABEL_NEEDS_FIRMWARE = Message("wbc.label-needs-firmware", "the label {name} needs firmware {since}")
+BREAKS_IN = Message("wbc.breaks-in", "checked for {firmware}; {label} breaks into the statement in progress")
+LABELS_OF_ONE_EVENT = Message("wbc.labels-of-one-event", "{name} and {other} are labels of one event")
+ROW_IS_OUTSIDE_THE_POSITION_TABLE = Message("wbc.row-is-outside-the-position-table", "row {index} is outside the position table")
+EXECUTABLE_LINES = Message("wbc.executable-lines", "{count} executable lines")
 
 
 @dataclass(slots=True)
@@ -81,8 +103,8 @@ class _Outliner:
         result.writes_row_0 = any(self._scope.family(name) in ROW_0 for name in assigned.values())
         if last is not None:
             end = "RETURN" if last.name.key in BY_LABEL else "END"
-            message = f"nothing follows the label {last.name.text}"
-            self._report(f.LABEL_AT_END.at(last.name, message, f"put {end} after it", f.after(last, f"\n{end}")))
+            message = NOTHING_FOLLOWS_THE_LABEL(name=last.name.text)
+            self._report(f.LABEL_AT_END.at(last.name, message, PUT_AFTER_IT(end=end), f.after(last, f"\n{end}")))
         self._check_length()
         result.blocks = self._matcher.finish()
         return result
@@ -111,7 +133,7 @@ class _Outliner:
     def _define_label(self, label: Label) -> None:
         name, key = label.name, label.name.key
         if key in self._defined:
-            self._report(f.DUPLICATE_LABEL.at(name, f"the label {name.text} is defined twice", "give one of them another name"))
+            self._report(f.DUPLICATE_LABEL.at(name, LABEL_IS_DEFINED_TWICE(name=name.text), GIVE_ONE_OF_THEM_ANOTHER_NAME()))
             return
         self._defined.add(key)
         self._outline.labels[key] = len(self._outline.lines)
@@ -126,16 +148,16 @@ class _Outliner:
         key = name.key
         reason = _reserved_label(key)
         if key.startswith((PREFIX, HARD_PREFIX)) and key not in PREDEFINED:
-            message = f"{name.text} is not an interrupt label, although it begins with INT_ or HARDINT_"
+            message = NOT_AN_INTERRUPT_LABEL(name=name.text)
             known = f"INT_IN1…INT_IN{INPUT_LABELS}, INT_MODBUS, INT_TICK"
-            hint = f"{known}; firmware 1.70 also INT_TICK100, INT_TICK1000, INT_M1…INT_M4 and HARDINT_…"
+            hint = INTERRUPT_LABELS(names=known)
             self._report(f.RESERVED_LABEL.at(name, message, hint))
         elif key in self._scope.constants or key in self._scope.variables:
-            kind = "a constant" if key in self._scope.constants else "a variable"
-            message = f"{name.text} cannot be a label: it is {kind}"
-            self._report(f.RESERVED_LABEL.at(name, message, "give one of them another name"))
+            reason = f.A_CONSTANT() if key in self._scope.constants else A_VARIABLE()
+            message = CANNOT_BE_A_LABEL(name=name.text, reason=reason)
+            self._report(f.RESERVED_LABEL.at(name, message, GIVE_ONE_OF_THEM_ANOTHER_NAME()))
         elif reason is not None:
-            self._report(f.RESERVED_LABEL.at(name, f"{name.text} cannot be a label: it is {reason}", "take another name"))
+            self._report(f.RESERVED_LABEL.at(name, CANNOT_BE_A_LABEL(name=name.text, reason=reason), f.TAKE_ANOTHER_NAME()))
 
     def _define_entry(self, label: Label, event: InterruptEvent, hard: bool) -> None:
         """The label of an interrupt is a step of its own."""
@@ -143,14 +165,13 @@ class _Outliner:
         since = HARD_SINCE if hard else event.since
         if not self._dialect.has(since):
             soft = PREFIX + event.name if hard and self._dialect.has(event.since) else None
-            hint = f"checked for {self._dialect.firmware}"
-            if soft is not None:
-                hint += f"; {soft} breaks into the statement in progress"
-            self._report(f.NOT_IN_FIRMWARE.at(name, f"the label {name.text} needs firmware {since}", hint, fix=soft))
+            firmware = self._dialect.firmware
+            hint = f.CHECKED_FOR(firmware=firmware) if soft is None else BREAKS_IN(firmware=firmware, label=soft)
+            self._report(f.NOT_IN_FIRMWARE.at(name, LABEL_NEEDS_FIRMWARE(name=name.text, since=since), hint, fix=soft))
         if event in entries:
             other = (PREFIX if hard else HARD_PREFIX) + event.name
-            hint = "an event has one label"
-            self._report(f.DUPLICATE_LABEL.at(name, f"{name.text} and {other} are labels of one event", hint))
+            hint = EVENT_HAS_ONE_LABEL()
+            self._report(f.DUPLICATE_LABEL.at(name, LABELS_OF_ONE_EVENT(name=name.text, other=other), hint))
         else:
             entries[event] = len(self._outline.lines)
         self._outline.lines.append(label)
@@ -158,14 +179,14 @@ class _Outliner:
     def _check_record(self, record: PositionRecord) -> None:
         rows = self._dialect.max_positions if self._positions is None else len(self._positions.rows)
         if record.index >= rows:
-            hint = f"the table has {rows_text(rows)}, numbered from 0"
-            self._report(f.OUT_OF_RANGE.at(record, f"row {record.index} is outside the position table", hint))
+            hint = f.NUMBERED_ROWS_OF_TABLE(rows=rows_text(rows))
+            self._report(f.OUT_OF_RANGE.at(record, ROW_IS_OUTSIDE_THE_POSITION_TABLE(index=record.index), hint))
 
     def _check_length(self) -> None:
         lines, limit = self._outline.lines, self._dialect.max_steps
         if len(lines) > limit:
-            hint = f"firmware {self._dialect.firmware} holds {limit} executable lines"
-            self._report(f.TOO_MANY_LINES.at(lines[limit], f"{len(lines)} executable lines", hint))
+            hint = LINES_OF_FIRMWARE(firmware=self._dialect.firmware, limit=limit)
+            self._report(f.TOO_MANY_LINES.at(lines[limit], EXECUTABLE_LINES(count=len(lines)), hint))
 
     def _report(self, diagnostic: Diagnostic) -> None:
         self._diagnostics.append(diagnostic)
@@ -173,11 +194,11 @@ class _Outliner:
 
 def _reserved_label(key: str) -> str | None:
     if key in KEYWORDS:
-        return "a statement"
+        return f.A_STATEMENT()
     if parts(key) is not None:
-        return "a register"
+        return f.A_REGISTER()
     if key in PREDEFINED:
-        return "a predefined name"
+        return A_PREDEFINED_NAME()
     if key in FUNCTIONS:
-        return "a function"
+        return f.A_FUNCTION()
     return None

@@ -4,8 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from steptwin.messages import Message
 from steptwin.tables import complete
 from steptwin.wbc.statements import LINES, ROW_MOTIONS
+
+PATH_VELOCITY = Message("wbc.path-velocity", "the path velocity p3 must be greater than 0")
+MISSING = Message("wbc.missing", "{names} missing")
+RADIUS = Message("wbc.radius", "the radius p3 is {radius:g} and must be greater than 0")
+ARC_SIDE = Message("wbc.arc-side", "p4 is {side:g} and must be 0 (external arc) or 1 (internal arc)")
 
 Parameters = tuple[float | None, ...]
 
@@ -25,7 +31,7 @@ def _any_row(values: Parameters) -> str | None:
 
 def _line(values: Parameters) -> str | None:
     velocity = values[2]
-    return "the path velocity p3 must be greater than 0" if velocity is not None and velocity <= 0 else None
+    return PATH_VELOCITY() if velocity is not None and velocity <= 0 else None
 
 
 def _begin_of_circle(values: Parameters) -> str | None:
@@ -39,17 +45,17 @@ def _circle(values: Parameters) -> str | None:
 def _arc(values: Parameters) -> str | None:
     side = values[3]
     wrong = side is not None and side not in (0, 1)
-    return _circle(values) or (f"p4 is {side:g} and must be 0 (external arc) or 1 (internal arc)" if wrong else None)
+    return _circle(values) or (ARC_SIDE(side=side) if wrong else None)
 
 
 def _lacking(values: Parameters) -> str | None:
     missing = [f"p{number}" for number, value in enumerate(values, 1) if value is None]
-    return f"{', '.join(missing)} missing" if missing else None
+    return MISSING(names=", ".join(missing)) if missing else None
 
 
 def _radius(values: Parameters) -> str | None:
     radius = values[2]
-    return f"the radius p3 is {radius:g} and must be greater than 0" if radius is not None and radius <= 0 else None
+    return RADIUS(radius=radius) if radius is not None and radius <= 0 else None
 
 
 _PROBLEMS: Mapping[str, Callable[[Parameters], str | None]] = complete(

@@ -13,10 +13,27 @@ from dataclasses import dataclass, field
 
 from steptwin.diagnostics import Diagnostic, Fix, Span, split_lines
 from steptwin.errors import Misuse
+from steptwin.messages import Message
 from steptwin.wbc import findings as f
 from steptwin.wbc.dialect import MAX_POSITIONS
 from steptwin.wbc.lexer import is_name, plain_name
 from steptwin.wbc.registers import REAL_MAX
+
+WRITE_A_CELL = Message("wbc.write-a-cell", "write a number like 20, -70, 20.5 or 20,5, or x to leave the axis alone")
+NOTHING = Message("wbc.nothing", "nothing")
+ONE_ROW = Message("wbc.one-row", "1 row")
+ROWS = Message("wbc.rows", "{count} rows")
+ROWS_ARE_COUNTED = Message("wbc.rows-are-counted", "remove it: rows are counted by lines")
+NUMBER_OF_COLUMNS = Message("wbc.number-of-columns", "{count} columns instead of {wanted}")
+NAME_OF_ANOTHER_ROW = Message("wbc.name-of-another-row", "{name} is already the name of row {index}")
+EMPTY_LINE = Message("wbc.empty-line", "an empty line")
+A_ROW = Message("wbc.a-row", "a row is name;p1;p2;p3;p4")
+CANNOT_BE_WRITTEN_AFTER = Message("wbc.cannot-be-written-after", "{name!r} cannot be written after @")
+NO_NUMBER_AND_NO_X = Message("wbc.no-number-and-no-x", "p{number} is {found}, neither a number nor x")
+BEYOND_REAL = Message("wbc.beyond-real", "p{number} is beyond the range of REAL, ±{most:.3g}")
+NAMES_DIFFER = Message("wbc.names-differ", "names differ in more than case")
+MORE_THAN_ROWS = Message("wbc.more-than-rows", "more than {most} rows")
+TABLE_HOLDS = Message("wbc.table-holds", "the table holds {most}")
 
 PARAMETERS = 4
 _NUMBER = re.compile(r"[+-]?[0-9]+(?:[.,][0-9]+)?$")
@@ -63,7 +80,7 @@ class PositionTable:
 
 def rows_text(count: int) -> str:
     """A number of rows in words."""
-    return "1 row" if count == 1 else f"{count} rows"
+    return ONE_ROW() if count == 1 else ROWS(count=count)
 
 
 def row_text(name: str, values: Sequence[float | None]) -> str:
@@ -112,18 +129,18 @@ def parse_positions(text: str) -> tuple[PositionTable, list[Diagnostic]]:
         if not content:
             blanks.append(Span(span.start, start))
             continue
-        hint = "remove it: rows are counted by lines"
-        diagnostics += [f.TABLE_BLANK.at(blank, "an empty line", hint, Fix(blank, "")) for blank in blanks]
+        hint = ROWS_ARE_COUNTED()
+        diagnostics += [f.TABLE_BLANK.at(blank, EMPTY_LINE(), hint, Fix(blank, "")) for blank in blanks]
         blanks.clear()
         row = _row(content, span, diagnostics)
         key = row.name.upper()
         if key in names:
-            message = f"{row.name} is already the name of row {names[key]}"
-            diagnostics.append(f.TABLE_DUPLICATE.at(_cell(span.start, content), message, "names differ in more than case"))
+            message = NAME_OF_ANOTHER_ROW(name=row.name, index=names[key])
+            diagnostics.append(f.TABLE_DUPLICATE.at(_cell(span.start, content), message, NAMES_DIFFER()))
         elif key:
             names[key] = len(rows)
         if len(rows) == MAX_POSITIONS:
-            diagnostics.append(f.TABLE_TOO_LONG.at(span, f"more than {MAX_POSITIONS} rows", f"the table holds {MAX_POSITIONS}"))
+            diagnostics.append(f.TABLE_TOO_LONG.at(span, MORE_THAN_ROWS(most=MAX_POSITIONS), TABLE_HOLDS(most=MAX_POSITIONS)))
         rows.append(row)
     return PositionTable(tuple(rows), text), diagnostics
 
@@ -138,17 +155,17 @@ def _row(content: str, span: Span, diagnostics: list[Diagnostic]) -> PositionRow
     if len(cells) == PARAMETERS + 2 and not cells[-1].strip():
         cells.pop()
     if len(cells) != PARAMETERS + 1:
-        message = f"{len(cells)} columns instead of {PARAMETERS + 1}"
+        message = NUMBER_OF_COLUMNS(count=len(cells), wanted=PARAMETERS + 1)
         kept, more = cells[: PARAMETERS + 1], cells[PARAMETERS + 1 :]
         # A value that is missing is none, which is written x; one that is too many is removed if it is empty.
         whole = ";".join([*kept, *["x"] * (PARAMETERS + 1 - len(kept))])
         fix = None if any(cell.strip() for cell in more) else whole
-        diagnostics.append(f.TABLE_COLUMNS.at(span, message, "a row is name;p1;p2;p3;p4", fix=fix))
+        diagnostics.append(f.TABLE_COLUMNS.at(span, message, A_ROW(), fix=fix))
     name = cells[0].strip()
     if name and not is_name(name):
-        hint = "names have letters without accents, digits and _, and do not begin with a digit"
+        hint = f.NAMES_HAVE_LETTERS()
         place = _cell(span.start, content)
-        diagnostics.append(f.TABLE_NAME.at(place, f"{name!r} cannot be written after @", hint, plain_name(name)))
+        diagnostics.append(f.TABLE_NAME.at(place, CANNOT_BE_WRITTEN_AFTER(name=name), hint, plain_name(name)))
     values: list[float | None] = []
     at = span.start + len(cells[0]) + 1
     for number, cell in enumerate(cells[1 : PARAMETERS + 1], 1):
@@ -162,15 +179,15 @@ def _value(cell: str, number: int, span: Span, diagnostics: list[Diagnostic]) ->
     text = cell.strip()
     if text.lower() == _LEFT_ALONE:
         return None
-    hint = "write a number like 20, -70, 20.5 or 20,5, or x to leave the axis alone"
+    hint = WRITE_A_CELL()
     if not _NUMBER.match(text):
-        found = repr(text) if text else "nothing"
+        found = repr(text) if text else NOTHING()
         joined = "".join(text.split())
         fix = joined if _NUMBER.match(joined) else None if text else _LEFT_ALONE
-        diagnostics.append(f.TABLE_NUMBER.at(span, f"p{number} is {found}, neither a number nor x", hint, fix))
+        diagnostics.append(f.TABLE_NUMBER.at(span, NO_NUMBER_AND_NO_X(number=number, found=found), hint, fix))
         return None
     value = float(text.replace(",", "."))
     if abs(value) > REAL_MAX:
-        diagnostics.append(f.TABLE_NUMBER.at(span, f"p{number} is beyond the range of REAL, ±{REAL_MAX:.3g}", hint))
+        diagnostics.append(f.TABLE_NUMBER.at(span, BEYOND_REAL(number=number, most=REAL_MAX), hint))
         return None
     return value

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import reduce
 
+from steptwin.messages import Message
 from steptwin.wbc.dialect import Dialect
+
+OR = Message("wbc.or", "{one} or {other}")
+GREATER_THAN_0 = Message("wbc.greater-than-0", "greater than 0")
 
 REAL_MAX = 3.4028234663852886e38
 """Largest REAL (IEEE-754 single)."""
@@ -26,12 +31,14 @@ class Domain:
             return value in self.choices
         return self.low <= value <= self.high and (value > 0 or not self.positive)
 
-    def __str__(self) -> str:
+    @property
+    def text(self) -> str:
         if self.choices:
-            return " or ".join(f"{choice:g}" for choice in self.choices)
-        if self.positive:
-            return "greater than 0"
-        return f"{self.low:.10g}…{self.high:.10g}"
+            return reduce(lambda one, other: OR(one=one, other=other), (f"{choice:g}" for choice in self.choices))
+        return GREATER_THAN_0() if self.positive else f"{self.low:.10g}…{self.high:.10g}"
+
+    def __str__(self) -> str:
+        return self.text
 
 
 REAL = Domain(-REAL_MAX, REAL_MAX)

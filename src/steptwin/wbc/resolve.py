@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import cast
 
 from steptwin.diagnostics import Diagnostic, Severity
+from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.tables import complete
 from steptwin.wbc import findings as f
@@ -18,7 +19,8 @@ from steptwin.wbc.memory import StepMemory
 from steptwin.wbc.outline import outline
 from steptwin.wbc.paths import names_no_axis, row_problem
 from steptwin.wbc.positions import PositionTable, number_text, rows_text
-from steptwin.wbc.registers import parts
+from steptwin.wbc.real import DIVISION_BY_ZERO
+from steptwin.wbc.registers import POSITIVE, parts
 from steptwin.wbc.scope import ProgramScope
 from steptwin.wbc.statements import HALTS, MOTIONS, ROW_MOTIONS, SET, STATEMENTS
 from steptwin.wbc.tree import (
@@ -38,6 +40,40 @@ from steptwin.wbc.tree import (
     StatementNode,
 )
 
+PERMITTED = Message("wbc.permitted", "permitted: {domain}")
+HOW_LONG_IT_IS = Message("wbc.how-long-it-is", "{keyword} {value:.10g} is {minutes:.0f} min {rest:.10g} s")
+IN_SECONDS_NOT_MS = Message("wbc.in-seconds-not-ms", "the time is in seconds: {value:.10g} ms are {milliseconds}")
+ROWS_OF_TABLE = Message("wbc.rows-of-table", "the table has {rows}")
+DOES_NOT_EXIST = Message("wbc.value-does-not-exist", "{text}({argument:g}) does not exist")
+DELAY_WAITS = Message("wbc.delay-waits", "DELAY {value:g} waits {shortest:g} s")
+DEFINE_THE_LABEL = Message("wbc.define-the-label", "define the label as {name}: on a line of its own")
+SIDES_OF_HOME = Message("wbc.sides-of-home", "negative homes to KL, positive to KR")
+NEEDS_A_DRIVE = Message("wbc.needs-a-drive", "{keyword} needs a drive; {name} is not one")
+GIVE_THE_POSITION_TABLE = Message(
+    "wbc.give-the-position-table", "give the position table to check names and rows; the program does not start without it"
+)
+ROW_N = Message("wbc.row-n", "row {index}")
+THERE_IS_NO_POSITION = Message("wbc.there-is-no-position", "there is no position {name}")
+THERE_IS_NO_ROW = Message("wbc.there-is-no-row", "there is no row {value:g}")
+BECOMES_NEAREST = Message("wbc.becomes-nearest", "{name} becomes {nearest:.10g}, not {value:.10g}")
+IS_OUT_OF_RANGE_FOR = Message("wbc.is-out-of-range-for", "{value:.10g} is out of range for {name}")
+STOPS_HERE = Message("wbc.stops-here", "the program stops here with an error")
+STATEMENT_NEEDS_FIRMWARE = Message("wbc.statement-needs-firmware", "{keyword} needs firmware {since}")
+SHORTEST_DELAY = Message("wbc.shortest-delay", "the shortest delay is {shortest:g} s")
+THERE_IS_NO_LABEL = Message("wbc.there-is-no-label", "there is no label {name}")
+HOME_NEEDS_A_VELOCITY = Message("wbc.home-needs-a-velocity", "HOME needs a velocity other than 0")
+PULSE_IS_TOO_SHORT = Message("wbc.pulse-is-too-short", "PULSE cannot last {value:g} s")
+POSITIONS_ARE_NOT_CHECKED = Message("wbc.positions-are-not-checked", "positions are not checked")
+CANNOT_USE = Message("wbc.cannot-use", "{keyword} cannot use {name}: {problem}")
+STOPS_WHEN_IT_GETS_HERE = Message("wbc.stops-when-it-gets-here", "the program stops with an error when it gets here")
+PULSE_NEEDS_AN_OUTPUT = Message("wbc.pulse-needs-an-output", "PULSE needs an output")
+NAMES_NO_AXIS = Message("wbc.names-no-axis", "{name} names no axis: nothing moves")
+GIVE_A_NUMBER = Message("wbc.give-a-number", "give p1…p4 a number")
+UNKNOWN_RECORD = Message("wbc.unknown-record", "an unknown record cannot be executed")
+
+_MEANINGS = {
+    keyword: Message(f"wbc.{keyword.lower().replace('_', '-')}", STATEMENTS[keyword].meaning)() for keyword in ROW_MOTIONS
+}
 _LOOKS_LIKE_MS = 100
 """From this number of seconds on a time is reported as probably milliseconds."""
 _BRANCHING = frozenset({"IF", "ELSE", IF_UNKNOWN, "WHILE", "ENDWHILE", "JUMP", "RETURN", "END", "PROGRESET"})
@@ -112,8 +148,8 @@ class _Resolver:
             event, hard = BY_LABEL[statement.name.key]
             made = s.InterruptStep(start, end, event, hard)
         elif isinstance(statement, ImageRecord):
-            hint = "the program stops with an error when it gets here"
-            self._report(f.NOT_EXECUTABLE.at(statement, "an unknown record cannot be executed", hint))
+            hint = STOPS_WHEN_IT_GETS_HERE()
+            self._report(f.NOT_EXECUTABLE.at(statement, UNKNOWN_RECORD(), hint))
             made = s.IllegalStep(start, end, statement.data, True)
         elif isinstance(statement, Broken):
             keyword = SET if statement.target is not None else statement.keyword
@@ -137,11 +173,11 @@ class _Resolver:
         place = statement.value
         nearest = domain.low if value <= domain.low else domain.high
         fix = number_text(nearest) if isinstance(place, DecimalNumber) and domain.has(nearest) else None
-        hint = f"permitted: {domain}"
+        hint = PERMITTED(domain=domain.text)
         if target.row.saturates:
-            self._report(f.SATURATES.at(place, f"{target.name} becomes {nearest:.10g}, not {value:.10g}", hint, fix))
+            self._report(f.SATURATES.at(place, BECOMES_NEAREST(name=target.name, nearest=nearest, value=value), hint, fix))
         else:
-            self._report(f.OUT_OF_RANGE.at(place, f"{value:.10g} is out of range for {target.name}", hint, fix))
+            self._report(f.OUT_OF_RANGE.at(place, IS_OUT_OF_RANGE_FOR(value=value, name=target.name), hint, fix))
 
     def _expression(self, node: Binary | FunctionCall) -> s.Operation | s.FunctionOperation | None:
         value = self._scope.value
@@ -150,7 +186,7 @@ class _Resolver:
             if left is None or right is None:
                 return None
             if node.operator in "/%" and isinstance(right, s.Literal) and right.value == 0:
-                self._report(f.ALWAYS_FAILS.at(node, "division by zero", "the program stops here with an error"))
+                self._report(f.ALWAYS_FAILS.at(node, DIVISION_BY_ZERO(), STOPS_HERE()))
             return s.Operation(left, node.operator, right)
         arguments = [value(argument) for argument in node.arguments]
         found = [argument for argument in arguments if argument is not None]
@@ -162,8 +198,8 @@ class _Resolver:
         # WBC-5
         impossible = argument < 0 if node.function.key == "SQRT" else node.function.key in ("ASIN", "ACOS") and abs(argument) > 1
         if impossible:
-            message = f"{node.function.text}({argument:g}) does not exist"
-            self._report(f.ALWAYS_FAILS.at(node, message, "the program stops here with an error"))
+            message = DOES_NOT_EXIST(text=node.function.text, argument=argument)
+            self._report(f.ALWAYS_FAILS.at(node, message, STOPS_HERE()))
 
     def _comparison(self, node: OperandNode) -> s.StepCondition | None:
         relation = cast("Relation", node)  # as the row of the statement says
@@ -175,8 +211,8 @@ class _Resolver:
         keyword = statement.keyword
         row = STATEMENTS[keyword]
         if not self._dialect.has(row.since):
-            hint = f"checked for {self._dialect.firmware}"
-            self._report(f.NOT_IN_FIRMWARE.at(statement, f"{keyword} needs firmware {row.since}", hint))
+            hint = f.CHECKED_FOR(firmware=self._dialect.firmware)
+            self._report(f.NOT_IN_FIRMWARE.at(statement, STATEMENT_NEEDS_FIRMWARE(keyword=row.keyword, since=row.since), hint))
         return _STEPS[keyword](self, number, statement)
 
     def _if(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:
@@ -211,9 +247,9 @@ class _Resolver:
     def _delay(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:
         seconds = self._value(statement.operands[0])
         if isinstance(seconds, s.Literal) and seconds.value < s.SHORTEST_DELAY_S:
-            message = f"DELAY {seconds.value:g} waits {s.SHORTEST_DELAY_S:g} s"
+            message = DELAY_WAITS(value=seconds.value, shortest=s.SHORTEST_DELAY_S)
             fix = f"{s.SHORTEST_DELAY_S:g}" if isinstance(statement.operands[0], DecimalNumber) else None
-            self._report(f.SHORT_DELAY.at(statement.operands[0], message, f"the shortest delay is {s.SHORTEST_DELAY_S:g} s", fix))
+            self._report(f.SHORT_DELAY.at(statement.operands[0], message, SHORTEST_DELAY(shortest=s.SHORTEST_DELAY_S), fix))
         self._check_time("DELAY", statement.operands[0], seconds)
         return None if seconds is None else s.DelayStep(statement.start, statement.end, seconds)
 
@@ -221,11 +257,11 @@ class _Resolver:
         """Warn of hundreds of seconds, which are probably milliseconds, unless they are whole minutes."""
         if not isinstance(seconds, s.Literal) or seconds.value < _LOOKS_LIKE_MS or seconds.value % 60 == 0:
             return
-        whole, rest = divmod(seconds.value, 60)
-        message = f"{keyword} {seconds.value:.10g} is {whole:.0f} min {rest:.10g} s"
+        minutes, rest = divmod(seconds.value, 60)
+        message = HOW_LONG_IT_IS(keyword=keyword, value=seconds.value, minutes=minutes, rest=rest)
         milliseconds = f"{seconds.value / 1000:.10g}"
         fix = milliseconds if isinstance(operand, DecimalNumber) else None
-        hint = f"the time is in seconds: {seconds.value:.10g} ms are {milliseconds}"
+        hint = IN_SECONDS_NOT_MS(value=seconds.value, milliseconds=milliseconds)
         self._report(f.LONG_TIME.at(operand, message, hint, fix=fix))
 
     def _jump(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:
@@ -235,8 +271,8 @@ class _Resolver:
             return s.JumpStep(statement.start, statement.end, target)
         if not self._outline.has_broken_labels:
             meant = self._near.of(name.text, self._outline.labels)
-            hint = f"define the label as {name.text}: on a line of its own"
-            self._report(f.UNKNOWN_LABEL.at(name, f"there is no label {name.text}", hint, meant=meant))
+            hint = DEFINE_THE_LABEL(name=name.text)
+            self._report(f.UNKNOWN_LABEL.at(name, THERE_IS_NO_LABEL(name=name.text), hint, meant=meant))
         return None
 
     def _motion(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:
@@ -246,8 +282,8 @@ class _Resolver:
         if axis is None or value is None:
             return None
         if statement.keyword == "HOME" and isinstance(value, s.Literal) and value.value == 0:
-            hint = "negative homes to KL, positive to KR"
-            self._report(f.OUT_OF_RANGE.at(operand, "HOME needs a velocity other than 0", hint))
+            hint = SIDES_OF_HOME()
+            self._report(f.OUT_OF_RANGE.at(operand, HOME_NEEDS_A_VELOCITY(), hint))
         return s.MotionStep(statement.start, statement.end, statement.keyword, axis, value)
 
     def _halt(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:
@@ -266,8 +302,8 @@ class _Resolver:
         family = parts(name.key)
         if register is not None or family is None or family[0].key != "M":
             finding = f.HALT_WITHOUT_DRIVE if keyword in HALTS else f.MOTION_WITHOUT_DRIVE
-            message = f"{keyword} needs a drive; {name.text} is not one"
-            self._report(finding.at(name, message, f"write {STATEMENTS[keyword].usage}, M1…M4"))
+            message = NEEDS_A_DRIVE(keyword=keyword, name=name.text)
+            self._report(finding.at(name, message, f.WRITE(text=f"{STATEMENTS[keyword].usage}, M1…M4")))
         return None
 
     def _pulse(self, number: int, statement: KeywordStatement) -> s.ProgramStep | None:
@@ -276,10 +312,12 @@ class _Resolver:
         register = self._scope.register(name) if isinstance(name, Identifier) else None
         if register is None or register.row.key != "OUT":
             if register is not None or (isinstance(name, Identifier) and parts(name.key) is None):
-                self._report(f.WRONG_ARGUMENT.at(name, "PULSE needs an output", f"write {STATEMENTS['PULSE'].usage}, OUT1…OUT8"))
+                self._report(
+                    f.WRONG_ARGUMENT.at(name, PULSE_NEEDS_AN_OUTPUT(), f.WRITE(text=f"{STATEMENTS['PULSE'].usage}, OUT1…OUT8"))
+                )
             return None
         if isinstance(seconds, s.Literal) and seconds.value <= 0:
-            self._report(f.OUT_OF_RANGE.at(operand, f"PULSE cannot last {seconds.value:g} s", "permitted: greater than 0"))
+            self._report(f.OUT_OF_RANGE.at(operand, PULSE_IS_TOO_SHORT(value=seconds.value), PERMITTED(domain=POSITIVE.text)))
         self._check_time("PULSE", operand, seconds)
         return None if seconds is None else s.PulseStep(statement.start, statement.end, register.number, seconds)
 
@@ -313,22 +351,22 @@ class _Resolver:
         if index is not None:
             return s.Literal(float(index))
         meant = self._near.of(name.text, self._positions.names())
-        hint = f"the table has {rows_text(len(self._positions.rows))}"
-        self._report(f.UNKNOWN_POSITION.at(position, f"there is no position {name.text}", hint, meant=meant and f"@{meant}"))
+        hint = ROWS_OF_TABLE(rows=rows_text(len(self._positions.rows)))
+        self._report(f.UNKNOWN_POSITION.at(position, THERE_IS_NO_POSITION(name=name.text), hint, meant=meant and f"@{meant}"))
         return None
 
     def _report_unchecked(self, place: OperandNode) -> None:
         if not self._has_reported_unchecked:
-            hint = "give the position table to check names and rows; the program does not start without it"
-            self._report(f.POSITIONS_UNCHECKED.at(place, "positions are not checked", hint))
+            hint = GIVE_THE_POSITION_TABLE()
+            self._report(f.POSITIONS_UNCHECKED.at(place, POSITIONS_ARE_NOT_CHECKED(), hint))
         self._has_reported_unchecked = True
 
     def _row_index(self, place: OperandNode, value: float) -> int | None:
         rows = 0 if self._positions is None else len(self._positions.rows)
         if (0 <= value < rows and value == int(value)) or (value == 0 and self._outline.writes_row_0):
             return int(value)
-        hint = f"the table has {rows_text(rows)}, numbered from 0"
-        self._report(f.UNKNOWN_POSITION.at(place, f"there is no row {value:g}", hint))
+        hint = f.NUMBERED_ROWS_OF_TABLE(rows=rows_text(rows))
+        self._report(f.UNKNOWN_POSITION.at(place, THERE_IS_NO_ROW(value=value), hint))
         return None
 
     def _check_row(self, statement: KeywordStatement, index: int) -> None:
@@ -336,13 +374,17 @@ class _Resolver:
         if self._positions is None or index in self._outline.records or (index == 0 and self._outline.writes_row_0):
             return
         values = self._positions.rows[index].values
-        name = self._positions.rows[index].name or f"row {index}"
+        name = self._positions.rows[index].name or ROW_N(index=index)
         problem = row_problem(statement.keyword, values)
         if problem is not None:
-            hint = STATEMENTS[statement.keyword].meaning
-            self._report(f.ROW_PARAMETERS.at(statement.operands[0], f"{statement.keyword} cannot use {name}: {problem}", hint))
+            hint = _MEANINGS[statement.keyword]
+            self._report(
+                f.ROW_PARAMETERS.at(
+                    statement.operands[0], CANNOT_USE(keyword=statement.keyword, name=name, problem=problem), hint
+                )
+            )
         elif names_no_axis(statement.keyword, values):
-            self._report(f.NO_AXIS.at(statement.operands[0], f"{name} names no axis: nothing moves", "give p1…p4 a number"))
+            self._report(f.NO_AXIS.at(statement.operands[0], NAMES_NO_AXIS(name=name), GIVE_A_NUMBER()))
 
     def _value(self, operand: OperandNode, *, is_row: bool = False) -> s.ValueSource | None:
         return self._scope.value(operand, is_row=is_row) if isinstance(operand, Identifier | DecimalNumber) else None

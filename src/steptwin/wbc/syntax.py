@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 
 from steptwin.diagnostics import Diagnostic, split_lines
+from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.wbc import findings as f
 from steptwin.wbc.foreign import LABEL, ForeignLine, declared, explain
@@ -14,6 +15,13 @@ from steptwin.wbc.lexer import BLANKS as _BLANKS
 from steptwin.wbc.lexer import STRANGE, Lexeme, tokens
 from steptwin.wbc.reader import Rejected, StatementReader
 from steptwin.wbc.tree import Broken, Comment, Identifier, ImageRecord, PositionRecord, ProgramTree, SourceLine, StatementNode
+
+MALFORMED = Message("wbc.malformed", "malformed {word}")
+WRITE_RECORD = Message("wbc.write-record", "write //!record and 32 hexadecimal digits")
+WRITE_POSITION_RECORD = Message("wbc.write-position-record", "write //!position INDEX and 36 hexadecimal digits")
+WRITE_A_BLANK = Message("wbc.write-a-blank", "write a blank")
+REMOVE_IT = Message("wbc.remove-it", "remove it")
+IS = Message("wbc.is", "{shown} is {what}")
 
 RECORD_MARK = "//!record"
 POSITION_MARK = "//!position"
@@ -101,8 +109,8 @@ class Parser:
         for word in strange[:_MOST_LOOK_ALIKES]:
             what, meant = LOOK_ALIKES[word.text]
             shown = f"{word.text} (U+{ord(word.text):04X})" if word.text.isprintable() else f"U+{ord(word.text):04X}"
-            hint = f"write {meant}" if meant.strip() else "write a blank" if meant else "remove it"
-            self.diagnostics.append(f.ILLEGAL_CHARACTER.at(word, f"{shown} is {what}", hint, fix=meant))
+            hint = f.WRITE(text=meant) if meant.strip() else WRITE_A_BLANK() if meant else REMOVE_IT()
+            self.diagnostics.append(f.ILLEGAL_CHARACTER.at(word, IS(shown=shown, what=what), hint, fix=meant))
         return "".join(LOOK_ALIKES.get(character, ("", character))[1] for character in code)
 
     def _reject(
@@ -148,8 +156,6 @@ def _record(comment: Comment, diagnostics: list[Diagnostic]) -> StatementNode | 
     word = text.split(None, 1)[0].lower()
     if word not in (RECORD_MARK, POSITION_MARK):
         return None
-    usage = (
-        f"{RECORD_MARK} and 32 hexadecimal digits" if word == RECORD_MARK else f"{POSITION_MARK} INDEX and 36 hexadecimal digits"
-    )
-    diagnostics.append(f.BAD_RECORD.at(comment, f"malformed {word}", f"write {usage}"))
+    usage = WRITE_RECORD() if word == RECORD_MARK else WRITE_POSITION_RECORD()
+    diagnostics.append(f.BAD_RECORD.at(comment, MALFORMED(word=word), usage))
     return Broken(comment.start, comment.end, text)

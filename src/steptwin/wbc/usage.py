@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import copysign, floor, inf, log10
 
 from steptwin.diagnostics import Diagnostic, Fix, Span
+from steptwin.messages import Message, MessageText
 from steptwin.wbc import findings as f
 from steptwin.wbc import steps as s
 from steptwin.wbc.conditions import outcome
@@ -15,6 +16,35 @@ from steptwin.wbc.positions import PositionTable, number_text
 from steptwin.wbc.real import real_text
 from steptwin.wbc.statements import CIRCLES, LINES
 from steptwin.wbc.tree import Assign, DecimalNumber, KeywordStatement, ProgramTree
+
+HOME_WITHOUT_INPUT = Message("wbc.home-without-input", "HOME M{axis} goes to {side}, but the configuration has no input for it")
+GIVE_AN_INPUT = Message("wbc.give-an-input", "give In{side} of [Axis{axis}] an input")
+HOME_NEGATIVE = Message(
+    "wbc.home-negative", "give In{side} of [Axis{axis}] an input, or home to {other} with a negative velocity"
+)
+HOME_POSITIVE = Message(
+    "wbc.home-positive", "give In{side} of [Axis{axis}] an input, or home to {other} with a positive velocity"
+)
+GEARS_OF_AXES = Message("wbc.gears-of-axes", "GEAR of M1 is {one:g}, of M2 {other:g} pulses per unit")
+WAIT_NEVER_ENDS = Message("wbc.wait-never-ends", "this WAIT never ends: its condition is never true")
+READS = Message("wbc.reads", "{name} reads {domain}")
+ABOVE_OUTPUTS = Message("wbc.above-outputs", "{value} u/s at GEAR {gear:g} of M{axis} are {speed_p:.10g} pulses/s")
+OUTPUTS_GIVE = Message("wbc.outputs-give", "the outputs give {most_p:g} pulses/s, {most:.6g} u/s")
+ENABLED_WITHOUT_LABEL = Message(
+    "wbc.enabled-without-label", "the interrupt of {name} is enabled, but there is no label INT_{name}"
+)
+INTERRUPT_IS_NEVER_ENABLED = Message("wbc.interrupt-is-never-enabled", "the interrupt of {name} is never enabled")
+MOVED_BUT_NEVER_ENABLED = Message("wbc.moved-but-never-enabled", "M{axis} is moved, but the program never enables it")
+INPUTS_OF_CONTROLLER = Message("wbc.inputs-of-controller", "the controller has the inputs IN1…IN{inputs}")
+SAME_GEARS_FOR_A_CIRCLE = Message("wbc.same-gears-for-a-circle", "a circle needs the same GEAR on both axes to be round")
+RAMPS_OF_AXES = Message("wbc.ramps-of-axes", "{name} of M1 is {one:g}, of M2 {other:g} u/s²")
+WRITE_INTERRUPT_LABEL = Message("wbc.write-interrupt-label", "write INT_{name}: and its lines up to RETURN")
+CONFIGURATION_ENABLES_IT = Message(
+    "wbc.configuration-enables-it", "IN{input} interrupts only if the configuration enables it (Int)"
+)
+SET_TO_ENABLE_IT = Message("wbc.set-to-enable-it", "set {register} to enable it")
+ENABLE_DRIVE = Message("wbc.enable-drive", "write M{axis} = ON, unless a master enables the drive")
+SAME_RAMPS_FOR_A_LINE = Message("wbc.same-ramps-for-a-line", "give both axes of a line the same ramps")
 
 _RAMPS = frozenset({"ACCM", "DECM"})
 _PLANAR_AXES = (1, 2)
@@ -39,16 +69,16 @@ class Setup:
 
 def endless_waits(executable: s.Executable) -> list[Diagnostic]:
     return [
-        f.NEVER_ENDS.at(step, "this WAIT never ends: its condition is never true", _domain_hint(step.condition))
+        f.NEVER_ENDS.at(step, WAIT_NEVER_ENDS(), _domain_hint(step.condition))
         for step in executable.steps
         if isinstance(step, s.WaitStep) and outcome(step.condition) is False
     ]
 
 
-def _domain_hint(condition: s.StepCondition) -> str | None:
+def _domain_hint(condition: s.StepCondition) -> MessageText | None:
     for side in (condition.left, condition.right):
         if isinstance(side, s.RegisterOperand):
-            return f"{side.name} reads {side.row.reads}"
+            return READS(name=side.name, domain=side.row.reads.text)
     return None
 
 
@@ -62,9 +92,9 @@ def axes_never_enabled(executable: s.Executable, positions: PositionTable | None
         for axis in _moved(step, positions):
             if axis not in enabled and axis not in reported:
                 reported.add(axis)
-                message = f"M{axis} is moved, but the program never enables it"
+                message = MOVED_BUT_NEVER_ENABLED(axis=axis)
                 fix = f.before(executable.steps[0], f"M{axis} = ON\n")
-                found.append(f.NEVER_ENABLED.at(step, message, f"write M{axis} = ON, unless a master enables the drive", fix))
+                found.append(f.NEVER_ENABLED.at(step, message, ENABLE_DRIVE(axis=axis), fix))
     return found
 
 
@@ -123,13 +153,11 @@ def homing_without_end(executable: s.Executable, setup: Setup) -> list[Diagnosti
         to_kl, to_kr = setup.homing_ends[step.axis - 1]
         if not signs or 0 in signs or (to_kl and -1 in signs) or (to_kr and 1 in signs):
             continue
-        names = ("KR", "KL") if 1 in signs else ("KL", "KR")
-        message = f"HOME M{step.axis} goes to {names[0]}, but the configuration has no input for it"
+        sides = ("KR", "KL") if 1 in signs else ("KL", "KR")
+        message = HOME_WITHOUT_INPUT(axis=step.axis, side=sides[0])
         other = to_kl if 1 in signs else to_kr
-        hint = f"give In{names[0]} of [Axis{step.axis - 1}] an input"
-        if other:
-            hint += f", or home to {names[1]} with a {'negative' if 1 in signs else 'positive'} velocity"
-        found.append(f.HOME_WITHOUT_SWITCH.at(step, message, hint))
+        hint = GIVE_AN_INPUT if not other else HOME_NEGATIVE if 1 in signs else HOME_POSITIVE
+        found.append(f.HOME_WITHOUT_SWITCH.at(step, message, hint(side=sides[0], axis=step.axis - 1, other=sides[1])))
     return found
 
 
@@ -148,9 +176,9 @@ def too_fast(executable: s.Executable, program: ProgramTree, setup: Setup) -> li
         gear = setup.gears[axis - 1]
         speed_p = abs(value.value) * gear
         if speed_p > setup.most_speed_p:
-            message = f"{real_text(value.value)} u/s at GEAR {gear:g} of M{axis} are {speed_p:.10g} pulses/s"
+            message = ABOVE_OUTPUTS(value=real_text(value.value), gear=gear, axis=axis, speed_p=speed_p)
             most = setup.most_speed_p / gear
-            hint = f"the outputs give {setup.most_speed_p:g} pulses/s, {most:.6g} u/s"
+            hint = OUTPUTS_GIVE(most_p=setup.most_speed_p, most=most)
             number = _number_of(program, step)
             text = number_text(copysign(_six_digits_below(most), value.value))
             found.append(
@@ -186,18 +214,18 @@ def interrupts(executable: s.Executable, setup: Setup | None) -> list[Diagnostic
         switched_on.add(event)
         if event not in executable.entries and event not in reported:
             reported.add(event)
-            message = f"the interrupt of {event.name} is enabled, but there is no label INT_{event.name}"
+            message = ENABLED_WITHOUT_LABEL(name=event.name)
             fix = f.after(executable.steps[-1], f"{_end_of(executable)}\nINT_{event.name}:\nRETURN")
-            found.append(f.NO_HANDLER.at(step, message, f"write INT_{event.name}: and its lines up to RETURN", fix))
+            found.append(f.NO_HANDLER.at(step, message, WRITE_INTERRUPT_LABEL(name=event.name), fix))
     for event, entry in executable.entries.items():
         if event not in switched_on and _stays_off(event, setup):
             if event.input > INPUTS:
-                hint = f"the controller has the inputs IN1…IN{INPUTS}"
+                hint = INPUTS_OF_CONTROLLER(inputs=INPUTS)
             elif event.register is None:
-                hint = f"IN{event.input} interrupts only if the configuration enables it (Int)"
+                hint = CONFIGURATION_ENABLES_IT(input=event.input)
             else:
-                hint = f"set {event.register} to enable it"
-            message = f"the interrupt of {event.name} is never enabled"
+                hint = SET_TO_ENABLE_IT(register=event.register)
+            message = INTERRUPT_IS_NEVER_ENABLED(name=event.name)
             found.append(f.INTERRUPT_OFF.at(executable.steps[entry], message, hint))
     return found
 
@@ -224,11 +252,11 @@ def unequal_axes(executable: s.Executable, setup: Setup) -> list[Diagnostic]:
     ramps_set = any(register.row.key in _RAMPS and register.number in _PLANAR_AXES for register in written)
     found: list[Diagnostic] = []
     if circle is not None and setup.gears[0] != setup.gears[1]:
-        message = f"GEAR of M1 is {setup.gears[0]:g}, of M2 {setup.gears[1]:g} pulses per unit"
-        found.append(f.GEARS_DIFFER.at(circle, message, "a circle needs the same GEAR on both axes to be round"))
+        message = GEARS_OF_AXES(one=setup.gears[0], other=setup.gears[1])
+        found.append(f.GEARS_DIFFER.at(circle, message, SAME_GEARS_FOR_A_CIRCLE()))
     if line is not None and not ramps_set:
         for name, ramps in (("Acc", setup.accelerations), ("Dec", setup.decelerations)):
             if ramps[0] != ramps[1]:
-                message = f"{name} of M1 is {ramps[0]:g}, of M2 {ramps[1]:g} u/s²"
-                found.append(f.RAMPS_DIFFER.at(line, message, "give both axes of a line the same ramps"))
+                message = RAMPS_OF_AXES(name=name, one=ramps[0], other=ramps[1])
+                found.append(f.RAMPS_DIFFER.at(line, message, SAME_RAMPS_FOR_A_LINE()))
     return found

@@ -6,6 +6,10 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message, MessageText, read_message_text, with_messages
+
+SINCE_BEFORE = Message("why.since-before", "since before {time:.6f} s")
+FROM_THE_BEGINNING = Message("why.from-the-beginning", "from the beginning")
 
 MOST_LINKS = 8
 
@@ -15,7 +19,10 @@ class ChainLink(NamedTuple):
 
     time: Nanos
     subject: str
-    text: str
+    text: MessageText
+
+    def plain(self) -> dict[str, Any]:
+        return with_messages({"time_ns": str(self.time), "subject": self.subject, "text": self.text})
 
 
 class Answer(NamedTuple):
@@ -23,7 +30,7 @@ class Answer(NamedTuple):
 
     question: str
     at: Nanos
-    state: str
+    state: MessageText
     since: Nanos | None
     links: tuple[ChainLink, ...]
     is_complete: bool
@@ -46,29 +53,37 @@ class Answer(NamedTuple):
 
     def plain(self) -> dict[str, Any]:
         """The answer as plain data, for JSON; moments in ns, as text."""
-        return {
+        plain = {
             "question": self.question,
             "at_ns": str(self.at),
             "state": self.state,
             "since_ns": None if self.since is None else str(self.since),
-            "links": [{"time_ns": str(link.time), "subject": link.subject, "text": link.text} for link in self.links],
+            "links": [link.plain() for link in self.links],
             "complete": self.is_complete,
             "known_from_ns": str(self.known_from),
             "cut": self.is_cut,
             "text": self.text(),
         }
+        return with_messages(plain)
 
 
 def read_answer(plain: Mapping[str, Any]) -> Answer:
     """An answer from its plain data."""
-    links = tuple(ChainLink(int(link["time_ns"]), link["subject"], link["text"]) for link in plain["links"])
+    links = tuple(ChainLink(int(link["time_ns"]), link["subject"], read_message_text(link, "text")) for link in plain["links"])
     since = None if plain["since_ns"] is None else int(plain["since_ns"])
     known_from = int(plain["known_from_ns"])
     return Answer(
-        plain["question"], int(plain["at_ns"]), plain["state"], since, links, plain["complete"], known_from, plain["cut"]
+        plain["question"],
+        int(plain["at_ns"]),
+        read_message_text(plain, "state"),
+        since,
+        links,
+        plain["complete"],
+        known_from,
+        plain["cut"],
     )
 
 
-def since_before(begin: Nanos) -> str:
+def since_before(begin: Nanos) -> MessageText:
     """Sentence about what has not changed in a past that is known from a moment on."""
-    return f"since before {begin / SECOND:.6f} s" if begin else "from the beginning"
+    return SINCE_BEFORE(time=begin / SECOND) if begin else FROM_THE_BEGINNING()

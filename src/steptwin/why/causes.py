@@ -8,6 +8,7 @@ from functools import partial
 from typing import NamedTuple, TypeAlias
 
 from steptwin.machine import SECOND, Nanos
+from steptwin.messages import Message, MessageText, text_of
 from steptwin.motion.divisions import profile_of
 from steptwin.simulation.components.logic import BoardPart
 from steptwin.simulation.components.registry import ELEMENTS
@@ -22,6 +23,28 @@ from steptwin.why.answer import ChainLink, since_before
 from steptwin.why.log import Act, CauseLog, Change
 from steptwin.why.sentences import Frames, statement, words_of
 
+BECAME = Message("why.became", "{signal} became {value:g}{how}")
+IS_SINCE = Message("why.is-since", "{signal} is {value:g} {since}{how}")
+IS = Message("why.is", "{signal} is {value}")
+FAULT = Message("why.fault", "fault {name}: {what}")
+FOLLOWS_AFTER = Message("why.follows-after", ", {name} follows after {delay_ms:g} ms")
+HAS_ACTED_SINCE = Message("why.has-acted-since", ", on which {name} has acted since")
+IS_WIRED_TO = Message("why.is-wired-to", ", which is wired to {pin}")
+CONTACT_OF = Message("why.contact-of", ", a contact of {pin}")
+CONTACT_BOUNCED = Message("why.contact-bounced", ", and the contact bounced")
+DRIVES = Message("why.drives", "[[{kind}]] in {where} drives {pin}")
+CLIENT = Message("why.client", "client {place}: {meaning}")
+REQUEST = Message("why.request", "request: {meaning}")
+SCRIPT = Message("why.script", "script {name}: {what}")
+FROM_OUTSIDE = Message("why.from-outside", "from outside: {what}")
+BEGAN_TO_MOVE = Message("why.began-to-move", "{axis} began to move")
+STOPPED = Message("why.stopped", "{axis} stopped")
+MOTION_ENDED = Message("why.motion-ended", "the motion of {axis} ended, which began at {time:.6f} s")
+WAS_EXECUTED = Message("why.was-executed", "{statement} was executed")
+WAS_IN_EXECUTION = Message("why.was-in-execution", "{statement} was in execution before")
+ENDED = Message("why.ended", "{statement} ended")
+DECIDED = Message("why.decided", "{statement} decided")
+PROGRAM_STARTED = Message("why.program-started", "the program started")
 MOST_LOOKED_BACK = 20_000
 """Limit of what is looked at for one cause."""
 MOST_UNDECIDED = 5000
@@ -66,16 +89,16 @@ class Causes:
 
     # ------------------------------------------------------------------ signals
 
-    def change(self, signal: str, change: Change, how: str = "") -> Cause:
+    def change(self, signal: str, change: Change, how: MessageText | None = None) -> Cause:
         """A signal took its value."""
         owner = signal.partition(".")[0]
         if self._log.is_first(signal, change):
-            text = f"{signal} is {change.value:g} {since_before(self._log.begin)}{how}"
+            text = IS_SINCE(signal=signal, value=change.value, since=since_before(self._log.begin), how=how or "")
             return Cause(ChainLink(change.time, owner, text), self._at_begin)
-        text = f"{signal} became {change.value:g}{how}"
+        text = BECAME(signal=signal, value=change.value, how=how or "")
         return Cause(ChainLink(change.time, owner, text), partial(self._of_change, signal, change))
 
-    def last(self, signals: Sequence[str], until: Nanos, how: str = "") -> FoundCause:
+    def last(self, signals: Sequence[str], until: Nanos, how: MessageText | None = None) -> FoundCause:
         """The last change among signals by a moment."""
         found = [(change, signal) for signal in signals if (change := self._log.last_change(signal, until))]
         if not found:
@@ -102,7 +125,7 @@ class Causes:
         for group in (self._log.group(owner), -1):
             for _, record in self._log.at(group, time):
                 if record.kind == "fault" and record.machine == owner and (named is None or named in str(record.value).split()):
-                    link = ChainLink(record.time, record.machine, f"fault {record.subject}: {record.value}")
+                    link = ChainLink(record.time, record.machine, FAULT(name=record.subject, what=record.value))
                     return Cause(link, partial(self._of_fault, record))
         return None
 
@@ -126,7 +149,7 @@ class Causes:
         if held is None or (first is not None and time <= first.link.time):
             return first
 
-        link = ChainLink(time, signal.partition(".")[0], f"{signal} is {held.words()}")
+        link = ChainLink(time, signal.partition(".")[0], IS(signal=signal, value=held.words()))
 
         def before() -> FoundCause:
             return first or self._at_begin()
@@ -151,11 +174,11 @@ class Causes:
             ]
             if exact:
                 latest, source = max(exact, key=lambda found: found[0].position)
-                return self.change(source, latest, f", {name} follows after {delay / SECOND * 1000:g} ms" if delay else "")
+                return self.change(source, latest, FOLLOWS_AFTER(name=name, delay_ms=delay / SECOND * 1000) if delay else None)
         if not last:
             return None
         latest, source = max(last, key=lambda found: (found[0].time, found[0].position))
-        return self.change(source, latest, f", on which {name} has acted since")
+        return self.change(source, latest, HAS_ACTED_SINCE(name=name))
 
     def _before(self, signal: str, change: Change, until: Nanos) -> tuple[Change, str] | None:
         """The last change of a signal by a moment and before ``change``."""
@@ -181,19 +204,19 @@ class Causes:
         if wire is not None:
             found = self._before(self._name(wire.source), change, change.time - wire.delay)
             if found is not None and found[0].time == change.time - wire.delay:
-                return self.change(found[1], found[0], f", which is wired to {pin}")
+                return self.change(found[1], found[0], IS_WIRED_TO(pin=str(pin)))
         lanes = [found for lane in self._sources(pin) if (found := self._before(lane, change, change.time))]
         at_once = [found for found in lanes if found[0].time == change.time]
         if at_once:
             latest, lane = max(at_once, key=lambda found: found[0].position)
-            return self.change(lane, latest, f", a contact of {pin}")
+            return self.change(lane, latest, CONTACT_OF(pin=str(pin)))
         act = next((act for act in self._log.acts_at(change.time) if _sets(act, pin)), None)
         if act is not None:
             return _acted(act)
         path = self._world.parts.driven.get(pin)
         if path is not None:
             where = self._world.spec.text.where(path)
-            return Cause(ChainLink(change.time, pin.machine, f"[[{path[0]}]] in {where} drives {pin}"), nothing)
+            return Cause(ChainLink(change.time, pin.machine, DRIVES(kind=path[0], where=where, pin=str(pin))), nothing)
         return self.in_machine(pin.machine, change, Resource(ResourceKind.PIN, pin.pin))
 
     def _operated(self, name: str, change: Change) -> FoundCause:
@@ -204,7 +227,7 @@ class Causes:
                     return _acted(act)
         earlier = self._log.last_change(name, change.time - 1)
         if earlier is not None and change.time - earlier.time < SECOND:
-            return self.change(name, earlier, ", and the contact bounced")
+            return self.change(name, earlier, CONTACT_BOUNCED())
         return None
 
     def drivers(self, signal: str, at: Nanos) -> list[str]:
@@ -286,7 +309,9 @@ class Causes:
             elif record.kind == "event":
                 event = record
         if event is not None:
-            return Cause(ChainLink(change.time, machine, str(event.value)), after)
+            return Cause(
+                ChainLink(change.time, machine, text_of(event.value if isinstance(event.value, str) else str(event.value))), after
+            )
         return self._fault(machine, change.time) or self._ended(machine, change.time, wanted) or after()
 
     def _ended(self, machine: str, time: Nanos, wanted: Resource | None) -> FoundCause:
@@ -324,10 +349,10 @@ class Causes:
 
     def _frame(self, record: TraceRecord) -> Cause:
         place = record.subject.rpartition("/")[0]
-        sender, before = f"client {place}", nothing
+        meaning = self._frames.meaning(record)
         if place == SCRIPTS:
-            sender, before = "request", partial(self._requested, record)
-        return Cause(ChainLink(record.time, record.machine, f"{sender}: {self._frames.meaning(record)}"), before)
+            return Cause(ChainLink(record.time, record.machine, REQUEST(meaning=meaning)), partial(self._requested, record))
+        return Cause(ChainLink(record.time, record.machine, CLIENT(place=place, meaning=meaning)), nothing)
 
     def _requested(self, record: TraceRecord) -> FoundCause:
         """The step that made a request, which a line with timing carries later."""
@@ -341,7 +366,7 @@ class Causes:
         act = next(self._log.acts_at(record.time), None)
         if act is not None:
             return _acted(act)
-        return Cause(ChainLink(record.time, record.machine, f"from outside: {record.subject} {record.value}"), nothing)
+        return Cause(ChainLink(record.time, record.machine, FROM_OUTSIDE(what=f"{record.subject} {record.value}")), nothing)
 
     # ------------------------------------------------------------------ motions
 
@@ -356,15 +381,15 @@ class Causes:
         shown = f"{mechanics} ({name})" if mechanics else name
         is_before = not self._log.is_whole and plan.time == self._log.begin
         if is_before and profile.start < plan.time and profile.segments:
-            return Cause(ChainLink(profile.start, machine, f"{shown} began to move"), unknown)
+            return Cause(ChainLink(profile.start, machine, BEGAN_TO_MOVE(axis=shown)), unknown)
         if is_before and not profile.segments:
             return None
         if not profile.segments:
-            link = ChainLink(plan.time, machine, f"{shown} stopped")
+            link = ChainLink(plan.time, machine, STOPPED(axis=shown))
         elif profile.end is not None and profile.end <= until:
-            link = ChainLink(profile.end, machine, f"the motion of {shown} ended, which began at {plan.time / SECOND:.6f} s")
+            link = ChainLink(profile.end, machine, MOTION_ENDED(axis=shown, time=plan.time / SECOND))
         else:
-            link = ChainLink(plan.time, machine, f"{shown} began to move")
+            link = ChainLink(plan.time, machine, BEGAN_TO_MOVE(axis=shown))
         return Cause(link, partial(self.in_machine, machine, plan, Resource(ResourceKind.AXIS, record.subject)))
 
     def _end(self, plan: Change) -> tuple[float, Nanos]:
@@ -392,8 +417,8 @@ class Causes:
         executed = self._log.executed[machine][index]
         text = statement(self._log, executed)
         if self._log.is_in_progress(executed):
-            return Cause(ChainLink(executed.time, machine, f"{text} was in execution before"), unknown)
-        return Cause(ChainLink(executed.time, machine, f"{text} was executed"), partial(self._of_statement, machine, index))
+            return Cause(ChainLink(executed.time, machine, WAS_IN_EXECUTION(statement=text)), unknown)
+        return Cause(ChainLink(executed.time, machine, WAS_EXECUTED(statement=text)), partial(self._of_statement, machine, index))
 
     def _of_statement(self, machine: str, index: int) -> FoundCause:
         """The wait or condition that let a statement be executed."""
@@ -405,17 +430,17 @@ class Causes:
                 number = executed[earlier].place.number
             ended = executed[earlier + 1].time
             if use.waits and ended - executed[earlier].time > self._world.programs[machine].statement_time:
-                return self._decided(machine, earlier, ended, "ended")
+                return self._decided(machine, earlier, ended, ENDED)
             if number in use.governs or (use.is_loop and executed[earlier + 1].place.number >= use.governs.stop):
-                return self._decided(machine, earlier, executed[earlier].time, "decided")
+                return self._decided(machine, earlier, executed[earlier].time, DECIDED)
         self.is_far = index >= MOST_UNDECIDED
         return None if self.is_far else self._started(machine)
 
-    def _decided(self, machine: str, index: int, time: Nanos, how: str) -> Cause:
+    def _decided(self, machine: str, index: int, time: Nanos, how: Message) -> Cause:
         executed, use = self._log.executed[machine][index], self.use(machine, index)
         if use.is_loop:  # its condition is written where it begins
             executed = executed._replace(place=executed.place._replace(number=use.governs.start - 1))
-        link = ChainLink(time, machine, f"{statement(self._log, executed)} {how}")
+        link = ChainLink(time, machine, how(statement=statement(self._log, executed)))
         return Cause(link, partial(self._of_decision, machine, index, time))
 
     def _of_decision(self, machine: str, index: int, time: Nanos) -> FoundCause:
@@ -442,7 +467,7 @@ class Causes:
         if not self._log.is_whole:
             return None
         executed = self._log.executed[machine]
-        return Cause(ChainLink(executed[0].time, machine, "the program started"), nothing)
+        return Cause(ChainLink(executed[0].time, machine, PROGRAM_STARTED()), nothing)
 
 
 def _inputs(part: BoardPart) -> list[str]:
@@ -457,8 +482,9 @@ def _matches(writes: Sequence[Resource], wanted: Resource | None) -> bool:
 
 
 def _acted(act: Act) -> Cause:
-    by = f"script {act.script}" if act.script else "from outside"
-    return Cause(ChainLink(act.time, act.script or "outside", f"{by}: {words_of(act.what)}"), nothing)
+    what = words_of(act.what)
+    text = SCRIPT(name=act.script, what=what) if act.script else FROM_OUTSIDE(what=what)
+    return Cause(ChainLink(act.time, act.script or "outside", text), nothing)
 
 
 def _sets(act: Act, pin: PinName) -> bool:

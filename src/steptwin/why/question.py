@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import partial, reduce
 from typing import TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
-from steptwin.messages import Message
+from steptwin.messages import Message, MessageText
 from steptwin.points import LivePoint
 from steptwin.simulation.kinds.programs import Resource, ResourceKind
 from steptwin.simulation.logic.condition import Signal, SignalCondition
@@ -21,7 +21,7 @@ from steptwin.simulation.world.plant import Plant
 from steptwin.simulation.world.plantsnapshot import RecordedInput
 from steptwin.why import points
 from steptwin.why.answer import MOST_LINKS, Answer, ChainLink, since_before
-from steptwin.why.causes import Cause, Causes, nothing
+from steptwin.why.causes import IS, IS_SINCE, Cause, Causes, nothing
 from steptwin.why.courses import Courses, CourseTurns, watch_truth, watch_value
 from steptwin.why.log import MOST_NOTED, CauseLog, in_parts
 from steptwin.why.search import Asked
@@ -81,6 +81,20 @@ def _last_flip(condition: SignalCondition, times: Iterable[Nanos], at: Nanos) ->
     return next((time for time in sorted(times, reverse=True) if condition.holds(time - 1) is not value), None)
 
 
+IS_NUMBER = Message("why.is-number", "{name} is {value:g}")
+IS_TRUE = Message("why.is-true", "{name} is true")
+IS_FALSE = Message("why.is-false", "{name} is false")
+IS_IN_UNIT = Message("why.is-in-unit", "{name} is {value:.6g} {unit}")
+IS_HELD = Message("why.is-held", "{signal} is {held} since {time:.6f} s")
+SINCE = Message("why.since", "since {time:.6f} s")
+DRIVEN_BY = Message("why.driven-by", ", driven by {names}")
+AND = Message("why.and", "{one} and {other}")
+WAITS = Message("why.waits", "{machine} waits at {statement}")
+DOES_NOT_WAIT = Message("why.does-not-wait", "{machine} does not wait: {statement}")
+WAITS_FOR_A_TIME = Message("why.waits-for-a-time", "it waits for a time only")
+DEPENDS_ON = Message("why.depends-on", "it depends on {name}")
+ANY_PIN = Message("why.any-pin", "any pin")
+NO_AXIS_HAS_MOVED = Message("why.no-axis-has-moved", "no axis has moved until {time:g} s")
 FORM_OF_A_QUESTION = Message(
     "why.form-of-a-question", "a question is a signal, a condition, or a controller: table.OUT3, 'table.OUT3 == 0', table"
 )
@@ -186,7 +200,7 @@ class Why:
             value, since = self._from_log(asked, canonical, at, is_bare=is_bare)
         else:
             value, since = yield from self._from_run(asked, canonical, at, is_bare=is_bare)
-        state = f"{asked} is {value:g}" if is_bare else f"{asked} is {'true' if value else 'false'}"
+        state = IS_NUMBER(name=asked, value=value) if is_bare else IS_TRUE(name=asked) if value else IS_FALSE(name=asked)
         signals = tuple(canonical.values())
         first = self._causes.lasting(signals, at, None if since is None else self._changed(signals, since))
         return (yield from self._answer(text, at, state, since, first))
@@ -363,7 +377,8 @@ class Why:
         for _ in in_parts(other, self._inputs[state.inputs :], at):
             yield
         value, full = other.read(signal), self._canonical(signal)
-        state = f"{signal} is {value:.6g} {world.signal(signal).unit}".rstrip()
+        unit = world.signal(signal).unit
+        state = IS_IN_UNIT(name=signal, value=value, unit=unit) if unit else IS(signal=signal, value=f"{value:.6g}")
         standing = other.signal(signal)
         if self._point(signal) is not None and isinstance(standing, SignalOf) and rest_of(standing, at) is not None:
             _, since = yield from self._from_run(f"{signal} == {value!r}", {signal: full}, at, is_bare=False)
@@ -385,15 +400,15 @@ class Why:
         use = causes.use(machine, index)
         text, since = statement(log, here), None if log.is_in_progress(here) else here.time
         if not use.waits or at - here.time <= log.world.programs[machine].statement_time:
-            state = f"{machine} does not wait: {text}"
+            state = DOES_NOT_WAIT(machine=machine, statement=text)
             return (yield from self._answer(machine, at, state, since, causes.statement(machine, index)))
         links = [link for resource in use.reads for link in self._awaited(machine, resource, at)]
         if not use.reads:
-            links.append(ChainLink(here.time, machine, "it waits for a time only"))
+            links.append(ChainLink(here.time, machine, WAITS_FOR_A_TIME()))
         found = [cause for resource in use.reads if (cause := causes.resource(machine, resource, at, index))]
         changed = [cause for cause in found if cause.link.time > here.time]
         first = max(changed, key=lambda cause: cause.link.time, default=None) or causes.statement(machine, index)
-        answer = yield from self._answer(machine, at, f"{machine} waits at {text}", since, first)
+        answer = yield from self._answer(machine, at, WAITS(machine=machine, statement=text), since, first)
         return answer._replace(links=tuple(dict.fromkeys((*links, *answer.links)))[:MOST_LINKS])
 
     def _awaited(self, machine: str, resource: Resource, at: Nanos) -> Iterator[ChainLink]:
@@ -402,9 +417,9 @@ class Why:
             yield from self._states(f"{machine}.{resource.name}", at)
         elif resource.kind is ResourceKind.AXIS:
             motion = self._causes.motion(machine, resource.name, at)
-            yield ChainLink(at, machine, f"no axis has moved until {at / SECOND:g} s") if motion is None else motion.link
+            yield ChainLink(at, machine, NO_AXIS_HAS_MOVED(time=at / SECOND)) if motion is None else motion.link
         else:
-            yield ChainLink(at, machine, f"it depends on {resource.name or 'any pin'}")
+            yield ChainLink(at, machine, DEPENDS_ON(name=resource.name or ANY_PIN()))
 
     def _states(self, signal: str, at: Nanos) -> Iterator[ChainLink]:
         """The level of a signal and, one after the other, of the signals that drive it."""
@@ -417,18 +432,18 @@ class Why:
             since = self.log.since(name, at)
             drivers = self._causes.drivers(name, at)
             waiting += drivers
-            when = since_before(self.log.begin) if since is None else f"since {since / SECOND:.6f} s"
-            driven = f", driven by {' and '.join(drivers)}" if drivers else ""
+            when = since_before(self.log.begin) if since is None else SINCE(time=since / SECOND)
+            driven = DRIVEN_BY(names=reduce(lambda one, other: AND(one=one, other=other), drivers)) if drivers else ""
             hold = self.log.hold(name, at)
             if hold is not None and hold.held is not None:
-                level = f"{hold.held.words()} since {hold.time / SECOND:.6f} s"
+                text = IS_HELD(signal=name, held=hold.held.words(), time=hold.time / SECOND)
             else:
-                level = f"{self.log.level(name, at):g} {when}{driven}"
-            yield ChainLink(at, name.partition(".")[0], f"{name} is {level}")
+                text = IS_SINCE(signal=name, value=self.log.level(name, at), since=when, how=driven)
+            yield ChainLink(at, name.partition(".")[0], text)
 
     # ------------------------------------------------------------------ the chain
 
-    def _answer(self, question: str, at: Nanos, state: str, since: Nanos | None, first: Cause | None) -> Asking:
+    def _answer(self, question: str, at: Nanos, state: MessageText, since: Nanos | None, first: Cause | None) -> Asking:
         links: list[ChainLink] = []
         cause, last = first, None
         while cause is not None and len(links) < MOST_LINKS and cause.link not in links:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from steptwin.diagnostics import visible
+from steptwin.messages import Message, MessageText
 from steptwin.simulation.kinds.lines import LineWords
 from steptwin.simulation.kinds.registry import line_kinds
 from steptwin.simulation.scheduler.trace import TraceRecord
@@ -17,39 +18,60 @@ from steptwin.why.log import CauseLog, Executed
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
 
-_WORDS: Mapping[type, Callable[[Any], str]] = {
-    do.Set: lambda step: "sets " + ", ".join(f"{machine}.{pin.upper()} = {value:g}" for machine, pin, value in step.levels),
-    do.Press: lambda step: f"presses {step.button}",
-    do.Release: lambda step: f"releases {step.button}",
-    do.Write: lambda step: "writes " + ", ".join(f"{machine}.{name} = {value:g}" for machine, name, value in step.values),
-    do.PowerCycle: lambda step: f"switches {step.machine} off and on",
-    Halt: lambda given: (
-        f"stops {given.machine}"
-        + (f".M{given.axis}" if given.axis is not None else "" if given.program is None else f"'s program ({given.program})")
-    ),
-    do.Turn: lambda step: f"turns the encoder of {step.machine}.M{step.axis} by {step.counts}",
-    do.SetFault: lambda step: f"sets the fault {step.fault.name or step.fault.kind.name}",
-    do.ClearFault: lambda step: f"clears the fault {step.name}",
-    SetVariable: lambda given: f"sets the variable {given.name} = {given.value:g}",
-    Download: lambda given: f"puts a text into {given.place}",
-    Bytes: lambda given: f"sends {given.data.hex(' ')} from {given.place}",
+SETS = Message("why.sets", "sets {levels}")
+PRESSES = Message("why.presses", "presses {button}")
+RELEASES = Message("why.releases", "releases {button}")
+WRITES = Message("why.writes", "writes {values}")
+SWITCHES_OFF_AND_ON = Message("why.switches-off-and-on", "switches {machine} off and on")
+STOPS = Message("why.stops", "stops {name}")
+STOPS_A_PROGRAM = Message("why.stops-a-program", "stops {machine}'s program ({program})")
+TURNS = Message("why.turns", "turns the encoder of {axis} by {counts}")
+SETS_A_FAULT = Message("why.sets-a-fault", "sets the fault {name}")
+CLEARS_A_FAULT = Message("why.clears-a-fault", "clears the fault {name}")
+SETS_A_VARIABLE = Message("why.sets-a-variable", "sets the variable {name} = {value:g}")
+PUTS_A_TEXT = Message("why.puts-a-text", "puts a text into {place}")
+SENDS = Message("why.sends", "sends {data} from {place}")
+REPLACED_STATEMENT = Message("why.replaced-statement", "a statement of a program that was replaced since")
+LINE = Message("why.line", "line {line} `{code}`")
+END_OF_PROGRAM = Message("why.end-of-program", "the end of the program")
+
+
+def _halted(given: Halt) -> MessageText:
+    if given.axis is None and given.program is not None:
+        return STOPS_A_PROGRAM(machine=given.machine, program=given.program)
+    return STOPS(name=given.machine if given.axis is None else f"{given.machine}.M{given.axis}")
+
+
+_WORDS: Mapping[type, Callable[[Any], MessageText]] = {
+    do.Set: lambda step: SETS(levels=[f"{machine}.{pin.upper()} = {value:g}" for machine, pin, value in step.levels]),
+    do.Press: lambda step: PRESSES(button=step.button),
+    do.Release: lambda step: RELEASES(button=step.button),
+    do.Write: lambda step: WRITES(values=[f"{machine}.{name} = {value:g}" for machine, name, value in step.values]),
+    do.PowerCycle: lambda step: SWITCHES_OFF_AND_ON(machine=step.machine),
+    Halt: _halted,
+    do.Turn: lambda step: TURNS(axis=f"{step.machine}.M{step.axis}", counts=step.counts),
+    do.SetFault: lambda step: SETS_A_FAULT(name=step.fault.name or step.fault.kind.name),
+    do.ClearFault: lambda step: CLEARS_A_FAULT(name=step.name),
+    SetVariable: lambda given: SETS_A_VARIABLE(name=given.name, value=given.value),
+    Download: lambda given: PUTS_A_TEXT(place=given.place),
+    Bytes: lambda given: SENDS(data=given.data.hex(" "), place=given.place),
 }
 
 
-def words_of(what: ExternalInput) -> str:
+def words_of(what: ExternalInput) -> MessageText:
     """An action in words."""
     words = _WORDS.get(type(what))
-    return type(what).__name__ if words is None else words(what)
+    return MessageText(type(what).__name__) if words is None else words(what)
 
 
-def statement(log: CauseLog, executed: Executed) -> str:
+def statement(log: CauseLog, executed: Executed) -> MessageText:
     """A statement with its line: "line 12 `OUT3 = OFF`"."""
     if not log.is_of_present_text(executed):
-        return "a statement of a program that was replaced since"
+        return REPLACED_STATEMENT()
     programs, place = log.world.programs[executed.machine], executed.place
     found, source = programs.statements(place.text)[place.number], programs.texts[place.text]
     text = visible(source.text[found.start : found.end].strip())
-    return f"line {found.line} `{text}`" if text else "the end of the program"
+    return LINE(line=found.line, code=text) if text else END_OF_PROGRAM()
 
 
 class Frames:

@@ -7,6 +7,7 @@ vi.mock("./polish.json", () => ({
     names: "{name!r} z {names!r}: {problem}",
     inner: "wewnątrz {text}",
     note: "uwaga: {note}",
+    lines: "{lines:\n}",
   },
 }));
 
@@ -26,6 +27,12 @@ test("messages in a message are translated, texts of users and from elsewhere ar
   );
   const elsewhere = { text: "no such file" };
   expect(inPolish({ id: "names", values: { name: "x", names: [], problem: elsewhere } })).toBe("'x' z : no such file");
+});
+
+test("a list has between its members what its format says", () => {
+  expect(
+    inPolish({ id: "lines", values: { lines: ["a", { id: "note", values: { note: "b" }, text: "note: b" }] } }),
+  ).toBe("a\nuwaga: b");
 });
 
 test("words of a user are not translated, whatever they are like", () => {

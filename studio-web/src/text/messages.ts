@@ -1,14 +1,24 @@
 import type { Sentence } from "../lib/protocol/types";
-import { polishOf } from "./sentences";
-import { POLISH as WORDS } from "./words";
 import { pl } from "./pl";
 import polish from "./polish.json";
+import { language } from "./texts.svelte";
+import { POLISH as WORDS } from "./words";
 
 /** A text of the service, and which message it is, where it is one with an id. */
 export interface Said {
   text: string;
   message?: Sentence;
 }
+
+/** A message inside of another one, or in what the editor server says; without an id it is only a text. */
+export interface Inner {
+  text: string;
+  id?: string;
+  values?: Values;
+}
+
+export const saidBy = ({ text, id, values = {} }: Inner): Said =>
+  id === undefined ? { text } : { text, message: { id, values } };
 
 /** Messages in Polish, by id: of the page itself, and of the service (src/steptwin/messages.py; tests/test_messages.py), with the places of the English ones. */
 const POLISH: Readonly<Record<string, string>> = {
@@ -17,10 +27,10 @@ const POLISH: Readonly<Record<string, string>> = {
 };
 
 /** A value of a message: what somebody gave or a program measured, which stays as it is; an object is a message. */
-type Value = string | number | readonly Value[] | { text: string; id?: string; values?: Values };
+type Value = string | number | readonly Value[] | Inner;
 type Values = Readonly<Record<string, Value>>;
 
-/** `{name}`, `{name!r}` in quotes, `{name:FORMAT}`; doubled brackets stand for one. */
+/** `{name}`, `{name!r}` in quotes, `{name:FORMAT}` (of a list what is between its members); doubled brackets stand for one. */
 const PLACE = /\{\{|\}\}|\{(\w+)(!r)?(?::([^}]*))?\}/g;
 
 /** The message in Polish; null where there is none. */
@@ -38,12 +48,10 @@ function shown(value: Value, isQuoted: boolean, format?: string): string {
   if (typeof value === "string") return isQuoted ? quoted(value) : value;
   if ("text" in value) {
     const found =
-      value.id === undefined
-        ? (WORDS[value.text] ?? polishOf(value.text))
-        : inPolish({ id: value.id, values: value.values ?? {} });
+      value.id === undefined ? (WORDS[value.text] ?? null) : inPolish({ id: value.id, values: value.values ?? {} });
     return isQuoted ? quoted(found ?? value.text) : (found ?? value.text);
   }
-  return value.map((one) => shown(one, isQuoted, format)).join(", ");
+  return value.map((one) => shown(one, isQuoted)).join(format ?? ", ");
 }
 
 /** As Python quotes a text. */
@@ -72,4 +80,11 @@ function general(size: number, digits: number): string {
   const short = (text: string) => (text.includes(".") ? text.replace(/\.?0+$/, "") : text);
   if (exponent >= -4 && exponent < digits) return short(size.toFixed(digits - 1 - exponent));
   return `${short(mantissa)}e${exponent < 0 ? "-" : "+"}${String(Math.abs(exponent)).padStart(2, "0")}`;
+}
+
+/** In the language of the page as far as it is known; else in English, marked as English. A text without a message may be a word of data sheets. */
+export function sentence(english: string, message?: Sentence): { text: string; lang: "pl" | "en" | undefined } {
+  const polish = language() !== "pl" ? null : message === undefined ? (WORDS[english] ?? null) : inPolish(message);
+  if (polish !== null) return { text: polish, lang: undefined };
+  return { text: english, lang: "en" };
 }

@@ -6,9 +6,8 @@ import re
 from collections import deque
 from collections.abc import Callable
 
-from steptwin.m1486.characterlog import REPORTS, CharacterLog, LineSplitter
+from steptwin.m1486.characterlog import REPORTS, CharacterLog, LineSplitter, uploaded
 from steptwin.m1486.receiver import CR, EMPTY, THREE_FREE
-from steptwin.m1486.registers import UPLOADS
 from steptwin.m1486.variants import variant
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.wire.frameline import FrameLine
@@ -125,7 +124,7 @@ class M1486Decoder:
         self._is_reported = False
         while len(self._typed) > self._count - count:
             self._typed.popleft()  # an echo would have come before
-        meaning = f"U{number} {UPLOADS.get(number, 'reserved')} = {byte}"
+        meaning = uploaded(number, byte)
         self._sink(FrameLine(now, "", FrameDirection.OUT, bytes((byte,)), meaning))
 
     def deadline(self) -> Nanos | None:

@@ -8,7 +8,7 @@ from weakref import WeakSet
 
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
-from steptwin.messages import NONE, Message
+from steptwin.messages import NONE, Message, MessageText
 from steptwin.simulation.faults.table import Fault, Layer
 from steptwin.simulation.scheduler.chance import Chance
 from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
@@ -114,15 +114,18 @@ def addresses(pdu: bytes) -> range | None:
     return range(first, first + (1 if single else pdu[3] << 8 | pdu[4]))
 
 
+HELD_AT = Message("simulation.held-at", "held at {level:g} by fault {fault}")
+
+
 class HeldLevel(NamedTuple):
     """What keeps a pin or terminal at a level; ``fault``: its name."""
 
     fault: str
     level: float
 
-    def words(self) -> str:
+    def words(self) -> MessageText:
         """As "held at 0 by fault stuck"."""
-        return f"held at {self.level:g} by fault {self.fault}"
+        return HELD_AT(level=self.level, fault=self.fault)
 
 
 FaultReporter: TypeAlias = Callable[[ActiveFault, str], None]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias, TypedDict, Unpack
 
 from steptwin.errors import Misuse
-from steptwin.messages import Message, text_of
+from steptwin.messages import Message, MessageText, with_messages
 from steptwin.numerals import read_whole
 
 FaultValue: TypeAlias = int | float | str | tuple[int, int]
@@ -65,6 +65,16 @@ class ParameterForm(enum.Enum):
     TEXT = "text"
 
 
+_PERMITTED = {
+    ParameterForm.WHOLE: Message("simulation.whole-numbers", "whole numbers"),
+    ParameterForm.NUMBER: Message("simulation.numbers", "numbers"),
+    ParameterForm.SPAN: Message("simulation.numbers-or-spans", "numbers or spans N-M"),
+    ParameterForm.TEXT: Message("simulation.text", "text"),
+}
+TO = Message("simulation.to", "{what} {least} to {most}")
+AND_MORE = Message("simulation.and-above", "{what} {least} and more")
+
+
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """``least`` and ``most`` bound numbers; ``words`` are the permitted ones; ``otherwise`` is what holds without a default."""
@@ -80,36 +90,28 @@ class Parameter:
     is_required: bool = False
 
     @property
-    def permitted(self) -> str:
+    def permitted(self) -> MessageText:
         """What it takes, in words."""
         if self.words:
-            return ", ".join(self.words)
-        bounds = _plain(self.least) if self.least is not None else ""
-        if self.most is not None:
-            bounds += f" to {_plain(self.most)}"
-        elif bounds:
-            bounds += " and more"
-        if self.form is ParameterForm.TEXT:
-            return "text"
-        what = (
-            "whole numbers"
-            if self.form is ParameterForm.WHOLE
-            else "numbers"
-            if self.form is ParameterForm.NUMBER
-            else "numbers or spans N-M"
-        )
-        return f"{what} {bounds}".rstrip()
+            return MessageText(", ".join(self.words))
+        what = _PERMITTED[self.form]()
+        if self.least is None:
+            return what
+        least = _plain(self.least)
+        return AND_MORE(what=what, least=least) if self.most is None else TO(what=what, least=least, most=_plain(self.most))
 
     def plain(self) -> dict[str, object]:
         """As JSON. ``default`` is the text of the value that holds without one, or names its source."""
-        return {
-            "name": self.name,
-            "meaning": self.meaning,
-            "permitted": self.permitted,
-            "default": self.otherwise if self.default is None else f"{self.default}",
-            "words": list(self.words),
-            "required": self.is_required,
-        }
+        return with_messages(
+            {
+                "name": self.name,
+                "meaning": self.meaning,
+                "permitted": self.permitted,
+                "default": self.otherwise if self.default is None else f"{self.default}",
+                "words": list(self.words),
+                "required": self.is_required,
+            }
+        )
 
 
 def _plain(number: float) -> str:
@@ -295,7 +297,7 @@ def check(parameter: Parameter, value: object, where: str) -> FaultValue:
     """``value`` if the parameter takes it. `Misuse` names it, ``where`` and what is permitted."""
     form = parameter.form
     if isinstance(value, int) and abs(value) >= LARGEST_WHOLE:
-        raise Misuse(NUMBER_HAS_TOO_MANY_BITS(where=where, permitted=text_of(parameter.permitted)))
+        raise Misuse(NUMBER_HAS_TOO_MANY_BITS(where=where, permitted=parameter.permitted))
     if form is ParameterForm.SPAN:
         return _span(parameter, value, where)
     if form is ParameterForm.NUMBER and isinstance(value, int) and not isinstance(value, bool):
@@ -306,7 +308,7 @@ def check(parameter: Parameter, value: object, where: str) -> FaultValue:
             return value
     elif isinstance(value, str) and value != "" and (not parameter.words or value in parameter.words):
         return value
-    raise Misuse(VALUE_OF_A_FAULT(where=where, value=repr(value), permitted=text_of(parameter.permitted)))
+    raise Misuse(VALUE_OF_A_FAULT(where=where, value=repr(value), permitted=parameter.permitted))
 
 
 def _is_within(parameter: Parameter, value: float) -> bool:
@@ -320,5 +322,5 @@ def _span(parameter: Parameter, value: object, where: str) -> tuple[int, int]:
     if first is None or last is None or len(ends) > 2:
         first, last = 1, 0
     if first > last or not _is_within(parameter, first) or not _is_within(parameter, last):
-        raise Misuse(VALUE_OF_A_FAULT(where=where, value=repr(value), permitted=text_of(parameter.permitted)))
+        raise Misuse(VALUE_OF_A_FAULT(where=where, value=repr(value), permitted=parameter.permitted))
     return first, last

@@ -1,4 +1,4 @@
-import type { Requests, SubjectEvent } from "../../lib/protocol/types";
+import type { Requests, Sentence, SubjectEvent } from "../../lib/protocol/types";
 
 export type FrameEvent = Extract<SubjectEvent, { kind: "frame" }>;
 
@@ -10,6 +10,7 @@ export interface Frame {
   direction: "in" | "out";
   data: Uint8Array;
   words: string;
+  message: Sentence | undefined;
   isError: boolean;
 }
 
@@ -42,6 +43,7 @@ export function frameOf(event: FrameEvent, isModbus: boolean): Frame {
     direction: event.direction,
     data,
     words: event.words,
+    message: event.messages?.words,
     isError: data.length === 0 || (isModbus && event.direction === "out" && code >= 0x80),
   };
 }

@@ -1,4 +1,4 @@
-import { sentence } from "../../text";
+import { meaningOf } from "../../text";
 import type { Datasheet, Point } from "../../lib/state/model";
 
 /** How addresses are written: counted from 0 as the manuals do, from 1 as many masters do, or with the number of their space. */
@@ -76,7 +76,9 @@ export function isMeant({ path, point }: Row, typed: string): boolean {
   if (!wanted) return true;
   if (
     path.toLowerCase().includes(wanted) ||
-    [point.meaning, sentence(point.meaning).text].some((meaning) => meaning.toLowerCase().includes(wanted))
+    [point.meaning, meaningOf("points", point.path, point.meaning)].some((meaning) =>
+      meaning.toLowerCase().includes(wanted),
+    )
   )
     return true;
   return BASES.some((base) => shownAddress(point, base).toLowerCase().split(" ").includes(wanted));

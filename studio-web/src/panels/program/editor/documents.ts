@@ -1,6 +1,7 @@
 import { LSPPlugin, Workspace, type LSPClient, type WorkspaceFile } from "@codemirror/lsp-client";
 import { ChangeSet, Text, type EditorState, type TransactionSpec } from "@codemirror/state";
 import type { EditorView } from "@codemirror/view";
+import type { Said } from "../../../text";
 
 type Update = ReturnType<Workspace["syncFiles"]>[number];
 
@@ -12,7 +13,8 @@ export interface Finding {
   end: { line: number; character: number };
   severity: "error" | "warning" | "info" | "hint";
   code: string;
-  message: string;
+  /** What is wrong, and what is permitted. */
+  lines: readonly Said[];
 }
 
 /** A text that is open: it stays open while another one is shown. */

@@ -18,7 +18,7 @@ import {
 import { highlightSelectionMatches, search, searchKeymap } from "@codemirror/search";
 import { EditorState, type Extension, type Text } from "@codemirror/state";
 import { EditorView, drawSelection, highlightActiveLine, keymap } from "@codemirror/view";
-import { sentence } from "../../../text";
+import { saidBy, sentence, type Inner, type Said } from "../../../text";
 import { breakpoints, handlersOf, marksAre, type GutterEvents, type Mark } from "./breakpoints";
 import { Documents, OpenText, textOf, type Finding } from "./documents";
 import { runningLine, runsAt } from "./running";
@@ -38,10 +38,11 @@ interface Range {
 interface Published {
   uri: string;
   version?: number;
-  diagnostics: { range: Range; severity?: 1 | 2 | 3 | 4; code?: string; message: string }[];
+  diagnostics: { range: Range; severity?: 1 | 2 | 3 | 4; code?: string; message: string; data?: Inner[] }[];
 }
 interface CodeAction {
   title: string;
+  data?: Inner;
   diagnostics?: { range: Range; code?: string }[];
   edit?: { changes?: Record<string, { range: Range; newText: string }[]> };
 }
@@ -62,6 +63,8 @@ export interface TextKind {
   readonly language: string;
   readonly has_statements: boolean;
 }
+
+const worded = ({ text, message }: Said): string => sentence(text, message).text;
 
 const SEVERITIES = ["error", "warning", "info", "hint"] as const;
 const SYNC_MS = 150;
@@ -266,13 +269,13 @@ export class ProgramEditor {
     const file = this.find(params.uri);
     if (file === null || (params.version ?? file.version) !== file.version) return;
     file.checked = file.version;
-    file.findings = params.diagnostics.map(({ range, severity, code, message }) => ({
+    file.findings = params.diagnostics.map(({ range, severity, code, message, data }) => ({
       line: range.start.line + 1,
       column: range.start.character + 1,
       end: range.end,
       severity: SEVERITIES[(severity ?? 1) - 1] as Finding["severity"],
       code: code ?? "",
-      message,
+      lines: (data ?? [{ text: message }]).map(saidBy),
     }));
     this.mark(file);
     this.events.changed();
@@ -310,8 +313,11 @@ export class ProgramEditor {
         to: Math.max(from, end),
         severity: finding.severity,
         source: finding.code,
-        message: sentence(finding.message).text,
-        actions: own.map((fix): Action => ({ name: sentence(fix.title).text, apply: () => this.apply(fix, at) })),
+        message: finding.lines.map(worded).join("\n"),
+        actions: own.map((fix): Action => ({
+          name: worded(saidBy(fix.data ?? { text: fix.title })),
+          apply: () => this.apply(fix, at),
+        })),
       };
     });
     file.view.dispatch(setDiagnostics(file.view.state, found));
