@@ -37,7 +37,7 @@ class Section:
     name: str
     """``Axis0``."""
     title: str
-    """What it is about: ``M1``."""
+    """Title of the section: ``M1``."""
     settings: tuple[ConfigurationKey, ...]
 
 

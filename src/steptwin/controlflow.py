@@ -87,8 +87,11 @@ class ControlFlow:
 
     @cached_property
     def next(self) -> list[tuple[int, ...]]:
-        """What can be executed right after each statement: what a call calls, and after the end of a call what follows the calls
-        that can lead there. Takes a pass over the graph for each target of a call."""
+        """Statements that can be executed right after each statement.
+
+        Behind a call stands what it calls; behind the end of a call what follows the calls that can lead there. Takes a pass over
+        the graph for each target of a call.
+        """
         back: dict[int, set[int]] = {number: set() for number in self.ends}
         sites: dict[int, set[int]] = {}
         for number, targets in self.calls.items():

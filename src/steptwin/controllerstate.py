@@ -21,7 +21,7 @@ from steptwin.nearmiss import NearMiss
 
 M = TypeVar("M", bound=MotionController)
 DetailValue: TypeAlias = bool | int | float | str | tuple[int, ...] | Mapping[str, int] | None
-"""Of the type that its `Detail` has."""
+"""Value of the type that its `Detail` has."""
 
 
 class StatusLevel(enum.Enum):
@@ -42,7 +42,7 @@ class ProgramActivity(enum.Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StateStatus:
-    """What a controller or an axis reports of itself."""
+    """Status that a controller or an axis reports of itself."""
 
     code: int | None = None
     """The number that it shows; None where it has no numbers."""
@@ -117,14 +117,14 @@ class ControllerState:
     """The name of the kind of controller, as in its data sheet."""
     variant: str
     time_s: float | None
-    """Of its clock, which begins at 0."""
+    """Time of its clock, which begins at 0."""
     status: StateStatus
     program: StateProgram
     axes: tuple[StateAxis, ...]
     pins: Mapping[str, float | None]
     """Levels: 0, 1, volts."""
     details: Mapping[str, DetailValue]
-    """What only this kind has, by the names of ``details`` in its data sheet."""
+    """Details that only this kind has, by the names of ``details`` in its data sheet."""
 
     def plain(self) -> dict[str, object]:
         """As JSON has values. It is made for every sample of a gateway, so nothing is looked for in it."""
@@ -205,7 +205,7 @@ class StateReader(ABC, Generic[M]):
 
 
 PARTS = ("status", "program", "pins", "details")
-"""Of a state, beside its axes."""
+"""Parts of a state beside its axes."""
 
 
 UNKNOWN_PART = Message("controllerstate.unknown-part", "parts: a state has no part {name!r}{hint}; there are {names}")

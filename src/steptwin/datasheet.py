@@ -13,7 +13,7 @@ from typing import Any
 
 
 class PointEffect(enum.Enum):
-    """What a write does."""
+    """Effect of a write."""
 
     NONE = "none"
     """It cannot be written."""
@@ -70,7 +70,7 @@ class AxisDescription:
     name: str
     """``M1``."""
     unit: str
-    """Of its positions; velocities are in it per second."""
+    """Unit of its positions; velocities are in it per second."""
     pulses_per_unit: float | None
     """None where it is not known: of a device without its configuration."""
     round_p: int | None = None
@@ -125,11 +125,11 @@ class Point:
     type: str
     unit: str = ""
     limits: Limits | None = None
-    """Of what may be written; None where nothing may."""
+    """Limits of what may be written; None where nothing may."""
     values: Mapping[int, str]
     """Texts of enumerated values."""
     conditions: Mapping[int, Condition] = field(default_factory=dict)
-    """Of a status: what its values mean."""
+    """Meanings of the values of a status."""
     access: Access
     effect: PointEffect
     addresses: tuple[PointAddress, ...] = ()
@@ -152,7 +152,7 @@ class Argument:
 class CommandDescription:
     name: str
     code: str
-    """What is sent: the letter of a chip, the name of a register."""
+    """Code that is sent: the letter of a chip, the name of a register."""
     meaning: str
     arguments: tuple[Argument, ...] = ()
     effect: PointEffect
@@ -160,7 +160,7 @@ class CommandDescription:
 
 
 class FactType(enum.Enum):
-    """Of a field of an event, or of a detail of the state."""
+    """Type of a field of an event, or of a detail of the state."""
 
     WHOLE = "whole number"
     NUMBER = "number"
@@ -222,7 +222,7 @@ class Datasheet:
     end_switches_off: bool = False
     """Whether the end of its program switches drives and outputs off."""
     details: tuple[Detail, ...] = ()
-    """Of its state (`steptwin.controllerstate`)."""
+    """Details of its state (`steptwin.controllerstate`)."""
     also_change: Mapping[str, tuple[str, ...]] | None = None
     """By the name of a pin or an axis: other parts of the state (`steptwin.controllerstate.StateReader`) that may change with its
     level or its motion; pins and axes that are not named change nothing else. None: any part may change."""

@@ -28,7 +28,7 @@ from steptwin.plaintypes import shown
 LONGEST_TEXT = 4096
 """Characters of a text; the longest that are meant are paths."""
 MOST_ITEMS = 1000
-"""Of a list or a table."""
+"""Most items of a list or a table."""
 FASTEST, SLOWEST = 1000.0, 0.001
 """Virtual seconds in a second."""
 

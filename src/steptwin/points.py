@@ -28,7 +28,7 @@ class MemoryCells:
     """The whole memory, as it is now."""
     cells: range
     value: Callable[[Sequence[int]], float]
-    """What these words mean together."""
+    """Value that these words mean together."""
 
     def read(self, now: Nanos) -> float:
         return self.value(self.words()[self.cells.start : self.cells.stop])

@@ -18,7 +18,7 @@ for _one in (HISTORY_TABLE, GATEWAY_TABLES):
 
 
 class Services(NamedTuple):
-    """What the tables of a description ask for."""
+    """Services for which the tables of a description ask."""
 
     gateways: tuple[GatewaySpec, ...]
     history: HistorySpec | None

@@ -1,4 +1,4 @@
-"""What operating systems have and lack. Other modules ask here, so that they need not know on which system they run."""
+"""Features of operating systems. Other modules ask here, so that they need not know on which system they run."""
 
 from __future__ import annotations
 

@@ -14,12 +14,12 @@ Attribute: TypeAlias = str | int | float | bool
 
 class TraceSpan(Protocol):
     def note(self, name: str, value: Attribute) -> None:
-        """What is known after its begin."""
+        """Note what is known after its begin."""
         ...
 
 
 class NoSpan:
-    """Of what is not traced."""
+    """Span of what is not traced."""
 
     def note(self, name: str, value: Attribute) -> None:
         """Nobody asks."""

@@ -52,7 +52,7 @@ class SendNext(NamedTuple):
 
 
 class ExchangeCounts(NamedTuple):
-    """Of a line since it was made: ``requests`` that were sent, also again, and ``errors``: those that were refused or failed."""
+    """Counts of a line since it was made: ``requests`` that were sent, also again, and those that were refused or failed."""
 
     requests: int
     errors: int

@@ -133,11 +133,11 @@ class DeviceMotion(Generic[D]):
     begin: Callable[[D, set[int], Callable[[], object]], object]
     """Begin it, and put each axis that has begun into the set. The function is called immediately before each motion."""
     end: Callable[[D, EndedMotion], EndedMotion] = lambda driver, ended: ended
-    """What remains to be done when an axis has arrived."""
+    """Rest of the work when an axis has arrived."""
     must_wait: str = ""
     """Why a program has to wait for its end; empty if it need not."""
     stop_note: str = ""
-    """What a stop spoils, as the end of a sentence."""
+    """Effect that a stop spoils, as the end of a sentence."""
 
 
 class DeviceHeldJog(Protocol):

@@ -21,7 +21,7 @@ def register(kind: AnyDriverKind) -> None:
 
 
 def others_there(kind: AnyDriverKind) -> str:
-    """What else an address may lead to where a device of this kind does not answer, as the end of a message."""
+    """Other things to which an address may lead where a device of this kind does not answer, as the end of a message."""
     others = [other for other in DRIVERS.values() if other is not kind and other.offers(DriverKind.clear)]
     return "".join(f". If it is {other.title}, put ',kind={other.name}' behind the address" for other in others)
 

@@ -37,7 +37,7 @@ class DriverLine(Protocol[Q, A]):
 
     @property
     def counts(self) -> ExchangeCounts:
-        """What has been sent over it."""
+        """Traffic over it."""
         ...
 
     async def open(self) -> None:

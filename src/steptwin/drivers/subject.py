@@ -103,7 +103,7 @@ class DevicePart(Protocol):
         ...
 
     def ended_by(self, wanted: steps.Request | steps.Write) -> frozenset[int]:
-        """What it ends if it is a stop: the numbers of axes, and 0 for the program. Raises `Misuse` for an unknown register."""
+        """Motions that it ends if it is a stop: numbers of axes, 0 for the program. Raises `Misuse` for an unknown register."""
         ...
 
     async def ignoring(self, request: steps.Request) -> frozenset[int]:
@@ -120,7 +120,7 @@ class DevicePart(Protocol):
         ...
 
     def unknown(self) -> list[SamplePayload]:
-        """Of each axis: that nothing is known of it."""
+        """A sample for each axis that says that nothing is known of it."""
         ...
 
     def forget(self) -> None:
@@ -132,7 +132,7 @@ class DevicePart(Protocol):
         ...
 
     async def settings_text(self) -> str:
-        """What can be read and written, as JSON, to keep it before it is changed."""
+        """Settings that can be read and written, as JSON, to keep them before they are changed."""
         ...
 
     def configuration(self) -> SourceText | None:

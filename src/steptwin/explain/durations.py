@@ -29,7 +29,7 @@ _PARAMETERS = frozenset({"ACCM", "DECM", "VMAXM", "LIMLM", "LIMRM", "ENC"})
 
 
 def move_duration(axis: AxisConfig, distance_p: int) -> Nanos | None:
-    """Of a move from rest with ramps and velocity of the configuration; None where it cannot be planned."""
+    """Duration of a move from rest with ramps and velocity of the configuration; None where it cannot be planned."""
     speed, up, down = (value * axis.gear for value in (axis.vel, axis.acc, axis.dec))
     try:
         profile = plan_position(
@@ -45,13 +45,13 @@ def move_duration(axis: AxisConfig, distance_p: int) -> Nanos | None:
 
 
 class _KnownAxis(NamedTuple):
-    """What is known of a drive: whether it is on and at rest, and the position it has or goes to [pulses]."""
+    """Known state of a drive: whether it is on and at rest, and the position it has or goes to [pulses]."""
 
     on: bool = False
     at_rest: bool = False
     position_p: int | None = None
     end: Nanos | None = None
-    """Of the move in progress, counted from the beginning of the piece; None: not known. Not valid at rest."""
+    """End of the move in progress, counted from the beginning of the piece; None: not known. Not valid at rest."""
 
     def joined(self, other: _KnownAxis) -> _KnownAxis:
         same = self.position_p if self.position_p == other.position_p else None
@@ -94,7 +94,7 @@ class Durations:
         return isinstance(step, s.SetStep) and _register(step) in _PARAMETERS and _number(step) == number
 
     def timings(self, flow: ControlFlow, blocks: Sequence[FlowBlock]) -> list[Timing]:
-        """Of all steps; those that cannot be reached take the statement time."""
+        """Durations of all steps; those that cannot be reached take the statement time."""
         entered = self._entered(flow, blocks)
         found = [Timing(self._statement_time)] * len(self._steps)
         for block in blocks:
@@ -106,7 +106,7 @@ class Durations:
         return found
 
     def _entered(self, flow: ControlFlow, blocks: Sequence[FlowBlock]) -> dict[int, _State]:
-        """What is known of the drives when a block begins, on every path."""
+        """Known states of the drives when a block begins, on every path."""
         by_first = {block.first: block for block in blocks}
         entered: dict[int, _State] = {block.first: _UNKNOWN if block.first else _AT_START for block in blocks if block.is_entry}
         work = list(entered)

@@ -46,7 +46,7 @@ def explain(
 
 
 def move_duration(state: Settings, variant: Variant) -> Nanos | None:
-    """Of a move with these settings; None where one of them is not known."""
+    """Duration of a move with these settings; None where one of them is not known."""
     settings = state.start_stop, state.acceleration, state.profile, state.velocity
     if None in settings or state.qualification not in HIGHEST_SPEED or state.distance is None:
         return None
@@ -59,7 +59,7 @@ def move_duration(state: Settings, variant: Variant) -> Nanos | None:
 
 
 class _Chip:
-    """What one chip receives. Statements are its commands; those that act when received or compressed take no time."""
+    """Commands of one chip. Statements are its commands; those that act when received or compressed take no time."""
 
     def __init__(
         self, source: SourceText, stream: CommandStream, variant: Variant, interface: Interface, statement_time: Nanos

@@ -24,7 +24,7 @@ from steptwin.wbc.positions import PositionTable
 
 STATEMENT_BYTES = 16
 POSITION_BYTES = 18
-"""Of a statement and of a position in a compiled image."""
+"""Size of a statement and of a position in a compiled image."""
 _INPUTS = frozenset({"IN", "INPUTS", "AIN"})
 _OUTPUTS = frozenset({"OUT", "OUTPUTS"})
 _USER = frozenset({"$I", "$D", "$R"})
@@ -112,7 +112,7 @@ def _names(executable: s.Executable) -> dict[int, list[str]]:
 
 
 def memory_of(executable: s.Executable, positions: PositionTable | None, dialect: Dialect) -> list[MemoryPart]:
-    """What a program takes of the memories of a controller."""
+    """Use of the memories of a controller by a program."""
     bank, image = position_memory(0 if positions is None else len(positions.rows), dialect)
     registers = {word for step in executable.steps for source in _operands(step) for word in _words(source)}
     return [
@@ -126,7 +126,7 @@ def memory_of(executable: s.Executable, positions: PositionTable | None, dialect
 
 
 def position_memory(rows: int, dialect: Dialect) -> tuple[MemoryPart, MemoryPart]:
-    """What a table of positions takes: of its bank, and in an image."""
+    """Use of memory by a table of positions: of its bank, and in an image."""
     bank = MemoryPart("position bank", rows, dialect.max_positions, "positions")
     return bank, MemoryPart("positions in an image", POSITION_BYTES * rows, None, "bytes")
 

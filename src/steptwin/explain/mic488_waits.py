@@ -13,7 +13,7 @@ from steptwin.wbc import steps as s
 from steptwin.wbc.conditions import outcome
 
 _OUTSIDE = frozenset({"IN", "INPUTS", "AIN", "VISIONNEW", "VISIONNO", "VISIONX", "VISIONY", "VISIONA", "$I", "$D", "$R"})
-"""What inputs, a vision system or a master change, and otherwise only the program."""
+"""Values that inputs, a vision system or a master change, and otherwise only the program."""
 _TIMERS = frozenset({"TIMA", "TIMB"})
 _STARTS = frozenset({"VABS", "VREL"})
 
@@ -62,7 +62,7 @@ def _way_out(executable: s.Executable, flow: ControlFlow) -> str:
 
 
 def _changed(executable: s.Executable, numbers: Collection[int]) -> set[s.ValueSource]:
-    """What steps give a value to."""
+    """Values that steps change."""
     steps = (executable.steps[number] for number in numbers if number < len(executable.steps))
     return {step.target for step in steps if isinstance(step, s.SetStep)}
 

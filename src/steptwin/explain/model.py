@@ -1,4 +1,4 @@
-"""What is explained of a program, for both languages. Statements are known by their numbers, from 0 in the order of the text."""
+"""Explanation of a program, for both languages. Statements are known by their numbers, from 0 in the order of the text."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class FlowBlock:
 
 
 class MemoryPart(NamedTuple):
-    """What something takes of a memory; ``unit`` of ``used`` and ``most``."""
+    """Use of a memory; ``unit`` is that of ``used`` and ``most``."""
 
     what: str
     used: int

@@ -89,7 +89,7 @@ class EditorLanguage(OptionalMethods, ABC):
         return True
 
     def around(self, session: OtherTexts, uri: str, /) -> tuple[object, ...]:
-        """What the analysis of a text depends on beside the text."""
+        """Sources of the analysis of a text beside the text."""
         return ()
 
     @abstractmethod

@@ -113,7 +113,7 @@ def _nearest(command: ChipCommand, number: int, variant: Variant) -> Fix | None:
 
 
 def _lines_reached(number: int) -> MessageText:
-    """What a number that names no lines would name."""
+    """Name for a number that names no lines."""
     first, count = divmod(number, 10)
     if count == 0:
         return NO_LINE(number=number)
@@ -123,7 +123,7 @@ def _lines_reached(number: int) -> MessageText:
 
 
 def _on(permitted: MessageText, key: str, number: int, variant: Variant) -> MessageText:
-    """What the variant takes, and who would take the number."""
+    """Permitted numbers of the variant, and the variants that would take the number."""
     title = variant.title
     others = [v.title for v in VARIANTS if v.clock == variant.clock and find(key, number, v)]
     return ON_OTHERS(permitted=permitted, title=title, others=others) if others else ON(permitted=permitted, title=title)

@@ -95,12 +95,12 @@ class CommandSpec:
         return group or range(0)
 
     def use_with(self, number: int | None) -> CommandUse:
-        """What it does with this number; None: with the internal variable, or without number."""
+        """Its use with this number; None: with the internal variable, or without number."""
         named = self._named(number)
         return replace(self.use, reads=self.use.reads & named, writes=self.use.writes & named)
 
     def _named(self, number: int | None) -> ChipState:
-        """What a command can read and change whose number names one of several things."""
+        """State that a command can read and change whose number names one of several things."""
         if number is None:
             return EVERYTHING
         if self.kind is ArgType.REGISTER:
@@ -258,7 +258,7 @@ _NEEDS_ARGUMENT = frozenset("@IX")
 """Keys whose number may not be left out: it is not numeric, or the command has no meaning without it."""
 
 LARGEST_LABEL = 80
-"""Of all variants; it decides the size of a label in the memory of each."""
+"""Largest label of all variants; it decides the size of a label in the memory of each."""
 _LARGEST_ADDRESS = 15
 
 
@@ -348,7 +348,7 @@ def when(key: str, argument: int | None) -> When:
 
 @lru_cache(_USES_KEPT)
 def use_of(key: str, number: int | None) -> CommandUse:
-    """What a command does with a number; with the internal variable, for which None stands, what any number can make of it."""
+    """Use of a command with a number; with the internal variable, for which None stands, what any number can make of it."""
     uses = [spec.use_with(number) for spec in meant(key, number)]
     if not uses:
         return _REFUSED

@@ -1,4 +1,4 @@
-"""What the commands of the M1486 read, change, wait for and do to the course of the program: the terms of the command table.
+"""Uses of the commands of the M1486: what they read, change, wait for, and do to the course of the program.
 
 Checkers, explanations, the debugger and ``why`` read these facts. Where they have a rule for each member of an enumeration here,
 its table is complete: a new member is refused at import until each has one.
@@ -66,7 +66,7 @@ TO_LABEL = frozenset({Control.JUMP, Control.BRANCH, Control.CALL})
 
 
 class Wait(enum.Enum):
-    """What a command waits for besides its own duration. A motion in progress holds what would begin one."""
+    """Wait of a command besides its own duration. A motion in progress holds what would begin one."""
 
     NOTHING = "nothing"
     TIME = "a time"
@@ -86,7 +86,7 @@ class Motion(enum.Enum):
 
 
 class NextMove(enum.Enum):
-    """What a command makes of the next move."""
+    """Effect of a command on the next move."""
 
     UNCHANGED = "unchanged"
     FORWARD = "the number in positive direction"
@@ -98,7 +98,7 @@ class NextMove(enum.Enum):
 
 
 class Setting(enum.Enum):
-    """What the number of a command becomes; the values are names of `steptwin.m1486.flow.Settings`, but for the waveform."""
+    """Setting that a command's number becomes; the values are names of `steptwin.m1486.flow.Settings`, but for the waveform."""
 
     START_STOP = "start_stop"
     ACCELERATION = "acceleration"
@@ -112,7 +112,7 @@ class Setting(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class CommandUse:
-    """What a command reads and what it can change, for any number, besides the place of the program and its time."""
+    """Reads and possible changes of a command, for any number, besides the place of the program and its time."""
 
     reads: ChipState
     writes: ChipState

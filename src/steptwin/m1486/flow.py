@@ -39,7 +39,7 @@ class Settings(NamedTuple):
     profile: int | None
     acceleration: int | None
     distance: int | None
-    """Of the next move; None also for a move to a position."""
+    """Distance of the next move; None also for a move to a position."""
     variable: int | None
     runsign: int | None
     """Functions 40, 46 and 58: 1 is ON, 0 is OFF."""

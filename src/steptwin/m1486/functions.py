@@ -35,7 +35,7 @@ class AuxiliaryFunction:
     on: str = ""
     off: str = ""
     acts_on: ChipState = NOTHING
-    """What changes at once when it is switched, besides the function itself."""
+    """State that changes at once when it is switched, besides the function itself."""
 
     @property
     def default(self) -> bool:

@@ -25,7 +25,7 @@ _POWERS = {"W": -1, "S": 1, "V": 1, "P": 1, "A": 2}
 
 
 def differences(old: Variant, new: Variant) -> Iterator[str]:
-    """What a program may notice, as sentences."""
+    """Differences that a program may notice, as sentences."""
     if old.labels != new.labels:
         yield f"labels 1 to {new.labels}, not to {old.labels}"
     if old.memory_bits != new.memory_bits:
@@ -51,7 +51,7 @@ def differences(old: Variant, new: Variant) -> Iterator[str]:
 
 
 def findings(text: str, old: Variant, new: Variant, interface: Interface = STEP_DIRECTION) -> list[Diagnostic]:
-    """What the checker finds for the new type only, and numbers that are converted for the other clock."""
+    """Findings of the checker for the new type only, and numbers that are converted for the other clock."""
     known = {(d.code, d.span) for d in check(text, old, interface).diagnostics}
     found = [d for d in check(text, new, interface).diagnostics if (d.code, d.span) not in known]
     if old.clock == new.clock:

@@ -101,7 +101,7 @@ def _is_refused(command: ChipCommand, variant: Variant) -> bool:
 
 
 def _after(stream: CommandStream, state: _State) -> Sequence[_State]:
-    """What comes after a command that is followed; places are not brought to the next such command."""
+    """States after a command that is followed; places are not brought to the next such command."""
     return _AFTER[stream.commands[state.index].use.control](stream, state)
 
 
@@ -123,7 +123,7 @@ def _moved(command: ChipCommand, position: int | None, distance: int | None) -> 
 
 
 def _set_to(command: ChipCommand) -> int | None:
-    """What a command without motion makes of the position counter, if the text says it."""
+    """Value that a command without motion gives the position counter, if the text says it."""
     if command.number is None:
         return None
     (spec,) = meant(command.key, command.number)

@@ -1,4 +1,4 @@
-"""What ``<``, ``>`` and ``U`` name: the registers 1 to 10 and the bytes 1 to 20 (manual chapters VII.1 Upload and VII.7)."""
+"""Names of ``<``, ``>`` and ``U``: the registers 1 to 10 and the bytes 1 to 20 (manual chapters VII.1 Upload and VII.7)."""
 
 from __future__ import annotations
 

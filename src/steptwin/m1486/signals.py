@@ -1,4 +1,4 @@
-"""What the driver interface puts on its pins: STEP pulses, data for the converters. Projections of the motion, not state."""
+"""Signals of the driver interface on its pins: STEP pulses, data for the converters. Projections of the motion, not state."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def step_pulses(train: StepTrain, after: Nanos, until: Nanos) -> PulseTimes:
 
 
 def strobes(train: StepTrain, characteristic: int, after: Nanos, until: Nanos) -> Iterator[Strobe]:
-    """What the Dual DAC interface gives for the steps with ``after`` < time <= ``until``: both channels for each, in turn."""
+    """Strobes of the Dual DAC interface for the steps with ``after`` < time <= ``until``: both channels for each, in turn."""
     position = train.count(after)
     stretches = train.stretches()
     _, end, grid = next(stretches)

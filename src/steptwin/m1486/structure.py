@@ -113,7 +113,7 @@ class CommandStream:
 
 
 def streams(program: ParsedProgram) -> list[CommandStream]:
-    """What each chip gets. Without ``X`` there is one stream; with it one for each address named, and commands sent while all
+    """Commands of each chip. Without ``X`` there is one stream; with it one for each address named, and commands sent while all
     listen go to each of them."""
     commands = program.all_commands
     addresses = sorted({c.number for c in commands if c.key == "X" and c.number is not None})

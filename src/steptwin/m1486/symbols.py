@@ -14,7 +14,7 @@ from steptwin.m1486.syntax import ChipCommand, JumpCondition, ParsedProgram
 from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
 
 _NAMED = ChipState.LINES | ChipState.FLAGS | ChipState.FUNCTIONS | ChipState.REGISTERS
-"""What the numbers of commands name."""
+"""State that the numbers of commands name."""
 FLAGS = range(USER_FLAGS.start, CARRY + 1)
 
 

@@ -99,7 +99,7 @@ class ChipCommand:
 
     @property
     def use(self) -> CommandUse:
-        """What it reads, changes and waits for."""
+        """Its reads, changes and waits."""
         return use_of(self.key, self.number)
 
     @property

@@ -42,7 +42,7 @@ class Uart(Stateful):
         return line.bits * SECOND // line.baud if self._is_timed else 0
 
     def set_baud(self, baud: int) -> None:
-        """What is on its way at the old rate is lost."""
+        """Change the rate. Characters on their way at the old rate are lost."""
         self._incoming = CharacterClock(SerialLine(baud))
         self._outgoing = CharacterClock(SerialLine(baud))
         self.clear()

@@ -29,7 +29,7 @@ class NumericUnit(Stateful):
         self.variable = 0
         self.carry = False
         self.remainder = 0
-        """Of the last division: register 10."""
+        """Remainder of the last division: register 10."""
         self.flags = [False] * len(USER_FLAGS)
         """User flags from 80 on."""
         self.functions = list(_DEFAULTS)

@@ -149,7 +149,7 @@ class Axis(Stateful):
         self.enabled: bool
         """Whether the EN output is on."""
         self.status: AxisStatus
-        """What the register of the status shows."""
+        """Status that the register shows."""
         self.arrival: AxisStatus
         """The status at the end of the profile; the present one if the axis rests or its motion has no end."""
         self._blocked_leg: tuple[Nanos, int] | None

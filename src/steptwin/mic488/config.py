@@ -161,7 +161,7 @@ class ConfigKey:
     name: str
     attribute: str
     meaning: str
-    """What it sets, with its unit."""
+    """Quantity that it sets, with its unit."""
     permitted: ValueRange
     whole: bool = True
     choices: Mapping[int, str] = field(default_factory=dict)

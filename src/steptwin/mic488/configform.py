@@ -82,8 +82,8 @@ _REGISTERS = {"Acc": "ACC", "Dec": "DEC", "Vel": "VMAX"}
 
 
 def config_form(text: str, name: str, firmware: str = DEFAULT_FIRMWARE, gears: Sequence[float | None] = ()) -> Form:
-    """Of the text of a file. ``gears``: pulses in a unit of the running axes, in whose units points are written; None where it is
-    not known. Nothing is wrong in an empty text. Raises `Misuse` for an unknown firmware."""
+    """Form of the text of a file. ``gears``: pulses in a unit of the running axes, in whose units points are written; None where
+    it is not known. Nothing is wrong in an empty text. Raises `Misuse` for an unknown firmware."""
     file = IniFile.of_text(text, name)
     config, findings = examine_config(file, firmware)
     units = _units(file, config, gears)

@@ -30,7 +30,7 @@ def datasheet(device: Mic488Device) -> Datasheet:
 
 @lru_cache(MOST_KEPT)
 def datasheet_of(firmware: str, scales: tuple[tuple[str, float | None], ...] = DEFAULT_SCALES) -> Datasheet:
-    """Of a firmware; ``scales`` are unit and pulses per unit of each axis, None where these are not known.
+    """Data sheet of a firmware; ``scales`` are unit and pulses per unit of each axis, None where these are not known.
     Raises `Misuse` for one that is not known."""
     registers, units = register_map(firmware), [unit for unit, _ in scales]
     return Datasheet(

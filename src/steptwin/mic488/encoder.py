@@ -15,7 +15,7 @@ from steptwin.state import Stateful
 
 
 class Coupling(enum.Enum):
-    """What turns the encoder's shaft, apart from manual turning."""
+    """Motion that turns the encoder's shaft, apart from manual turning."""
 
     DRIVE = "drive"
     """The drive, without loss."""

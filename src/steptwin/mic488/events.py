@@ -17,7 +17,7 @@ def _of_axis(code: str, severity: EventSeverity, meaning: str, *, stops: bool | 
 
 
 def _of_motion(code: str, severity: EventSeverity, meaning: str, *, stops: bool | None = None) -> EventDescription:
-    """Of one or several axes."""
+    """Kind of event of one or several axes."""
     return EventDescription(code=code, meaning=meaning, facts=_AXIS_OR_NONE, severity=severity, stops_motor=stops)
 
 

@@ -58,7 +58,7 @@ class ShortName(NamedTuple):
     """The function that reads it; needed if some firmware has no readable register for it."""
     conditions: Mapping[int, Condition] = MappingProxyType({})
     kind: QuantityKind = QuantityKind.NUMBER
-    """Of a value that no register of the firmware shows."""
+    """Kind of a value that no register of the firmware shows."""
     values: Mapping[int, str] = MappingProxyType({})
     """Its texts."""
 

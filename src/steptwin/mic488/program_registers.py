@@ -51,7 +51,7 @@ class ProgramRegisters(Stateful):
         self.ticks: dict[int, Nanos]
         """Next moment of the ticks that are switched on."""
         self.timers: dict[str, tuple[tuple[int, Nanos], ...]]
-        """Of each family: the number at a moment, from which it counts on."""
+        """Timers of each family: the number at a moment, from which it counts on."""
         self.lin_acc_u: float | None
 
     def forget_record(self) -> None:

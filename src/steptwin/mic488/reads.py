@@ -1,4 +1,4 @@
-"""What a read request shows: a request is compiled once into a short plan that computes only what it asks for.
+"""Answers to read requests: a request is compiled once into a short plan that computes only what it asks for.
 
 Values of a block are packed little-endian and then every 16-bit word is byte-swapped, which gives big-endian registers with
 the low word first (manual 3.2).

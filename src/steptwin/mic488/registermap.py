@@ -1,4 +1,4 @@
-"""What a register is, and a register map that checks itself when built and never changes afterwards.
+"""Registers, and a register map that checks itself when built and never changes afterwards.
 
 A map is a pure description: no device state, no values. `steptwin.mic488.registers` holds the rows.
 Addresses are the ones on the wire (counted from 0) in their `Space`. A ``size`` is the number of addresses one value takes.

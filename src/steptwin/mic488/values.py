@@ -301,7 +301,7 @@ def starts_program(registers: RegisterMap, request: pdu.ModbusRequest) -> bool:
 
 
 def halted(registers: RegisterMap, request: pdu.ModbusRequest) -> tuple[int, ...]:
-    """What a write ends: axes by a stop or the end of a jog, `PROGRAM` by its stop or pause. Nothing where it may begin a
+    """Motions that a write ends: axes by a stop or the end of a jog, `PROGRAM` by its stop or pause. Nothing where it may begin a
     motion as well."""
     if isinstance(request, pdu.ReadRequest):
         return ()

@@ -50,12 +50,12 @@ class VisionReceiver(Stateful):
         return [VisionRecord(*(float(number.replace(b",", b".")) for number in match.groups())) for match in found if match]
 
     def forget(self) -> None:
-        """What has come of the present line is not part of a record."""
+        """Forget the beginning of the present line: it is not part of a record."""
         self._line = b""
 
 
 class SeeingDevice(Protocol):
-    """What takes records of the vision system."""
+    """Receiver of records of the vision system."""
 
     def see(self, record: VisionRecord, now: Nanos) -> None: ...
 

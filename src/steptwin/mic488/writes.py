@@ -1,4 +1,4 @@
-"""What a write does. A request is checked whole before any of it takes effect (MIC-4, MIC-7)."""
+"""Effects of writes. A request is checked whole before any of it takes effect (MIC-4, MIC-7)."""
 
 from __future__ import annotations
 

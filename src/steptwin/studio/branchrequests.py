@@ -14,7 +14,7 @@ from steptwin.subject.shapes import MOMENT, TEXT, WHOLE, list_of, members
 
 
 class Branches(Protocol):
-    """Of one world. Awaits only `steptwin.later.Later`."""
+    """Branches of one world. Awaits only `steptwin.later.Later`."""
 
     def plain(self) -> Sequence[Mapping[str, object]]:
         """As `_BRANCH`."""

@@ -13,7 +13,7 @@ from steptwin.subject.shapes import FLAG, NUMBER, TEXT, WHOLE, list_of, members,
 
 
 class Campaigns(Protocol):
-    """Of one description of a world. Awaits only `steptwin.later.Later`."""
+    """Campaigns of one description of a world. Awaits only `steptwin.later.Later`."""
 
     async def plain(self) -> Sequence[Mapping[str, object]]:
         """As `_CAMPAIGN`."""

@@ -14,7 +14,7 @@ from steptwin.subject.shapes import TEXT, members, or_null
 
 
 class Arrangement(Protocol):
-    """Of one world."""
+    """Arrangement of one world."""
 
     def plain(self) -> Mapping[str, object]:
         """As `_DRAWING`."""

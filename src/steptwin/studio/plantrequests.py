@@ -15,7 +15,7 @@ from steptwin.subject.shapes import FLAG, NUMBER, TEXT, WHOLE, list_of, members,
 
 
 class PlantRecords(Protocol):
-    """Of one world. Awaits only `steptwin.later.Later`."""
+    """History of one world. Awaits only `steptwin.later.Later`."""
 
     def gateways(self) -> Sequence[Mapping[str, object]]:
         """As `_GATEWAY`."""

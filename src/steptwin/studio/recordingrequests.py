@@ -13,7 +13,7 @@ from steptwin.subject.shapes import FLAG, MOMENT, TEXT, WHOLE, list_of, members,
 
 
 class Recordings(Protocol):
-    """Of one world. Awaits only `steptwin.later.Later`."""
+    """Recordings of one world. Awaits only `steptwin.later.Later`."""
 
     async def plain(self) -> Mapping[str, object]:
         """As `_RECORDINGS`."""

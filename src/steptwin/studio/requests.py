@@ -1,4 +1,4 @@
-"""What a viewer can ask for beside the commands of a subject, and the reading of both.
+"""Requests of viewers beside the commands of a subject, and the reading of both.
 
 A request is as at the control endpoint: ``{"do": NAME, FIELD: VALUE, ..., "id": ANY}``. The commands of a subject stand in
 `steptwin.subject.commands`; `jog` has another answer here, because it is a lease.
@@ -35,7 +35,7 @@ from steptwin.subject.shapes import FLAG, MOMENT, TEXT, WHOLE, list_of, members,
 FASTEST_RATE = 30.0
 """Updates in a second of the wall clock."""
 MOST_ENTRIES = 1000
-"""Of the audit log in one answer."""
+"""Most entries of the audit log in one answer."""
 
 
 LEASE: Schema = members({"lease": WHOLE, "lasts_ms": {**WHOLE, "description": "Renew it in a third of this. [ms]"}})
@@ -361,5 +361,5 @@ def request_called(name: str) -> RequestType:
 
 
 def permit_of(name: str) -> Permit:
-    """What the request called ``name`` needs."""
+    """Permission that the request called ``name`` needs."""
     return REQUESTS[name].permit if name in REQUESTS else PERMITS[name]

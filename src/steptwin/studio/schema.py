@@ -12,7 +12,7 @@ from steptwin.subject.schema import DIALECT, definitions, request_schema
 
 
 def schema() -> dict[str, object]:
-    """Of what the studio sends; requests under ``$defs`` by their name, their answers under ``NAME answer``, messages under
+    """Schema of what the studio sends. Under ``$defs`` are requests by their name, their answers as ``NAME answer``, messages as
     ``NAME message``."""
     defs = definitions()
     requests = {name: _request(name) for name in (*COMMANDS, *REQUESTS)}
@@ -47,7 +47,7 @@ def _of_subject(name: str) -> tuple[str, tuple[Field, ...]]:
 
 
 def answer_schemas() -> dict[str, object]:
-    """Of requests whose answer has a schema; those of other commands of a subject are described in words."""
+    """Schemas of the answers to requests; those of other commands of a subject are described in words."""
     return {"jog": LEASE, **{row.name: row.answer for row in REQUESTS.values()}}
 
 

@@ -1,4 +1,4 @@
-"""What a studio is about and what is around it: its subject, and the parts that it is given by the program that serves it."""
+"""Subject of a studio and its surroundings: its subject, and the parts that it is given by the program that serves it."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ class LongWork(Protocol):
         ...
 
     def plain(self) -> dict[str, object] | None:
-        """What was begun last, as JSON."""
+        """Work that was begun last, as JSON."""
         ...
 
     def cancel(self) -> None: ...
@@ -107,7 +107,7 @@ class LongWork(Protocol):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Surroundings:
-    """What a hub is given besides its subject."""
+    """Parts that a hub is given besides its subject."""
 
     moment: Callable[[], PresentMoment]
     gate: AccessGate
@@ -122,15 +122,15 @@ class Surroundings:
     lookback: KeptPast | None = None
     """The past, where one is kept."""
     recordings: Recordings | None = None
-    """Of the world, where there is one."""
+    """None without a world."""
     branches: Branches | None = None
-    """Of the world, where there is one."""
+    """None without a world."""
     arrangement: Arrangement | None = None
-    """Of the world, where there is one."""
+    """None without a world."""
     plant: PlantRecords | None = None
-    """Of the world, where there is one."""
+    """None without a world."""
     campaigns: Campaigns | None = None
-    """Of the description of the world, where it is in a file."""
+    """None without a world whose description is in a file."""
     traffic: Callable[[], Sequence[Mapping[str, object]]] | None = None
-    """Of the world, where there is one."""
+    """None without a world."""
     on_internal: Callable[[Exception], object] = lambda error: None

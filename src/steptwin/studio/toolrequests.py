@@ -34,7 +34,7 @@ from steptwin.wire.pcapng import CapturedFrame
 LONGEST_FILE = 48_000
 """Characters of a configuration; those of the vendor have 3000."""
 MOST_FRAMES = 5000
-"""Of a capture: as many as the page keeps."""
+"""Most frames of a capture: as many as the page keeps."""
 
 
 _NUMBERS: Schema = {"type": "object", "additionalProperties": NUMBER}

@@ -24,7 +24,7 @@ from steptwin.subject.debugcommands import DebugCommand
 from steptwin.subject.payloads import KINDS
 
 VERSION = 1
-"""Of the commands, their answers and the events; a request may name the one that it was written for."""
+"""Version of the commands, their answers and the events; a request may name the one that it was written for."""
 
 STEP_HAS_TWO_ENDS = Message("subject.step-has-two-ends", "step: for_ns and to_ns exclude each other")
 

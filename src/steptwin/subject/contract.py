@@ -98,7 +98,7 @@ class MechanicsPart:
     """Hard stops, in units of the axis."""
     switches: tuple[SwitchPart, ...] = ()
     pulses_per_unit: float = 1.0
-    """Of its drive; negative if positive pulses move it in the negative direction."""
+    """Pulses per unit of its drive; negative if positive pulses move it in the negative direction."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +144,7 @@ class ElementPart:
     """Those that are no terminals."""
     drawing: DrawingPart | None = None
     function: str | None = None
-    """What it does among those of its kind: ``and`` of a gate, ``on-delay`` of a timer."""
+    """Function among those of its kind: ``and`` of a gate, ``on-delay`` of a timer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,7 +278,7 @@ def _read_control(data: Mapping[str, Any]) -> ControlDescription:
 
 
 class Subject(Protocol):
-    """What faces hold; they do not know what is behind it. Commands are answered at once."""
+    """Subject of a face, which does not know what is behind it. Commands are answered at once."""
 
     @property
     def description(self) -> Description: ...

@@ -27,7 +27,7 @@ _FIELDS_WITH: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
     "label": ((), ("condition", "hits")),
     "value": (("machine",), ("condition",)),
 }
-"""Of a breakpoint: what else is needed and what is permitted."""
+"""Further needs and permitted values of a breakpoint."""
 
 
 BREAKPOINT_GIVE_ONE = Message("subject.breakpoint-give-one", "breakpoint: give one of line, label and value; given are {given}")

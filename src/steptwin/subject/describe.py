@@ -27,7 +27,7 @@ from steptwin.subject.controls import controls_of
 
 
 def describe(world: Plant) -> Description:
-    """What is in a world."""
+    """Description of a world."""
     moved = set().union(*(axis.mechanism.may_turn for axis in world.axes.values()))
     return Description(
         world.spec.name,

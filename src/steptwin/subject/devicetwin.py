@@ -1,4 +1,4 @@
-"""What a twin of a device is made of."""
+"""Parts from which a twin of a device is made."""
 
 from __future__ import annotations
 

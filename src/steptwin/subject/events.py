@@ -87,7 +87,7 @@ class Event:
 
 
 def line_of(time: Nanos, machine: str, text: str) -> str:
-    """What happened, in one line."""
+    """Line that says what happened."""
     return f"{time / SECOND:12.6f} s  {machine:<10} {text}".rstrip()
 
 
@@ -211,7 +211,7 @@ def read_event(data: Mapping[str, Any]) -> Event:
 
 
 _CAUSES = (StatementPayload, ButtonPayload, InputPayload, FaultPayload)
-"""What can be a cause of what follows at the same moment, besides frames that come in."""
+"""Possible causes of what follows at the same moment, besides frames that come in."""
 
 
 class Numbering:

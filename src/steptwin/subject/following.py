@@ -11,7 +11,7 @@ from steptwin.subject.events import Event
 from steptwin.subject.payloads import KINDS
 
 USUAL = frozenset(KINDS) - {"frame", "write", "statement", "stopped", "log", "breakpoints"}
-"""What is followed where no kinds are named: frames and writes are as frequent as requests, statements as milliseconds; a
+"""Kinds that are followed where none are named: frames and writes are as frequent as requests, statements as milliseconds; a
 debugger is there for followers that name its events."""
 
 

@@ -1,4 +1,4 @@
-"""What events carry: one class for each kind, with its content as plain data and as text."""
+"""Payloads of events: one class for each kind, with its content as plain data and as text."""
 
 from __future__ import annotations
 

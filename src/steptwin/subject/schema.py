@@ -113,7 +113,7 @@ _PAYLOADS: Mapping[str, Mapping[str, object]] = complete(
 
 
 def schema() -> dict[str, object]:
-    """Of requests, with those of answers and events under ``$defs``."""
+    """Schema of requests, with those of answers and events under ``$defs``."""
     requests = {row.name: _request(row) for row in COMMANDS.values()}
     return {
         "$schema": DIALECT,
@@ -124,7 +124,7 @@ def schema() -> dict[str, object]:
 
 
 def definitions() -> dict[str, dict[str, object]]:
-    """Of what is sent, by the names under which schemas of messages refer to it."""
+    """Schemas of what is sent, by the names under which schemas of messages refer to it."""
     return {
         "(sentence)": _sentence(),
         "(answer)": _answer(),
@@ -145,7 +145,7 @@ def _request(row: CommandType) -> dict[str, object]:
 
 
 def request_schema(name: str, meaning: str, fields: Iterable[Field]) -> dict[str, object]:
-    """Of a request with these fields."""
+    """Schema of a request with these fields."""
     fields = list(fields)
     properties = {field.name: _field_schema(field) for field in fields}
     return {

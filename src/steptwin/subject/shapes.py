@@ -26,7 +26,7 @@ _PLAIN: Mapping[object, dict[str, object]] = {
 
 
 def shape(kind: Any) -> dict[str, object]:
-    """Of the type ``kind``: plain types, enumerations, tuples of one type, mappings, unions, dataclasses of them.
+    """Schema of the type ``kind``: plain types, enumerations, tuples of one type, mappings, unions, dataclasses of them.
 
     Raises `TypeError` for another one.
     """

@@ -69,7 +69,7 @@ class WorldSubject:
         """Who is at a place of a line, for writes; a place that is not named here stands for itself."""
         self._words: dict[str, LineWords] = {}
         self._writes: list[Callable[[], None]] = []
-        """What ends the observation of writes; empty while they are not followed."""
+        """Functions that end the observation of writes; empty while they are not followed."""
         self._machine_of = {(line.name, unit): name for name, (line, unit) in world.parts.line_of.items()}
         self._is_watching = False
         self._statements: StatementFollower | None = None

@@ -279,7 +279,7 @@ class Interpreter(Stateful):
         self._hooked = None
 
     def _with_hooks(self, code: Code) -> Code:
-        """What is executed for it."""
+        """Code that is executed for it, with hooks."""
         if not self._hooks:
             return code
         self._repeated = self.pc if self.waiting else -1

@@ -32,7 +32,7 @@ def first_change(side: Side, begin: Nanos, period: Nanos, stretches: Iterable[Na
 
 
 def _within(side: Side, seen: float, at: Nanos, period: Nanos, last: int) -> Nanos | None:
-    """Of ``at + k · period`` up to k = ``last``, all in one stretch, where ``seen`` is seen at ``at``."""
+    """Moments of ``at + k · period`` up to k = ``last``, all in one stretch, where ``seen`` is seen at ``at``."""
     same, step = 0, 1
     # Most changes are near, and some stretches have no end: steps of growing size first, then halving.
     while same < last:

@@ -21,7 +21,7 @@ _CAME_WITH = {
 
 
 def differences(old: Dialect, new: Dialect) -> Iterator[str]:
-    """What a program may notice, as sentences."""
+    """Differences that a program may notice, as sentences."""
     if old.user_registers != new.user_registers:
         yield f"{new.user_registers} user registers, not {old.user_registers}"
     if old.max_steps != new.max_steps:
@@ -35,6 +35,6 @@ def differences(old: Dialect, new: Dialect) -> Iterator[str]:
 def findings(
     text: str, old: Dialect, new: Dialect, positions: PositionTable | None = None, setup: Setup | None = None
 ) -> list[Diagnostic]:
-    """What the checker finds for the new firmware only."""
+    """Findings of the checker for the new firmware only."""
     known = {(d.code, d.span) for d in check(text, positions, setup, old).diagnostics}
     return [d for d in check(text, positions, setup, new).diagnostics if (d.code, d.span) not in known]

@@ -1,4 +1,4 @@
-"""What MOVEPTP, lines, circles and arcs ask of a row of the position table. Checker and machine refuse for the same reasons."""
+"""Needs of MOVEPTP, lines, circles and arcs in a row of the position table. Checker and machine refuse for the same reasons."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the names of one program mean: constants, variables, registers, predefined names, positions."""
+"""Meanings of the names of one program: constants, variables, registers, predefined names, positions."""
 
 from __future__ import annotations
 

@@ -115,7 +115,7 @@ FLOW = frozenset(
     for row in _ROWS
     if not {operand.kind for operand in row.operands} & {OperandKind.AXIS, OperandKind.OUTPUT, OperandKind.ROW}
 )
-"""What acts on neither drives nor outputs."""
+"""Statements that act on neither drives nor outputs."""
 LINES = frozenset({"MOVELIN", "MOVELIN_REL"})
 CIRCLES = frozenset({"MOVETOCIRC", "DOCIRC", "DOARC"})
 OPENING = frozenset({"IF", "WHILE"})

@@ -71,7 +71,7 @@ class FunctionOperation:
 
 
 class StepWait(enum.Enum):
-    """What a step waits for besides the time of a statement."""
+    """Wait of a step besides the time of a statement."""
 
     NOTHING = "nothing"
     TIME = "a time"
@@ -81,7 +81,7 @@ class StepWait(enum.Enum):
 
 
 class StepEffect(NamedTuple):
-    """What a step acts on besides the target of SET: an output or a drive, from 1, or any drive, or everything of the program."""
+    """Effect of a step besides the target of SET: an output or a drive, from 1, or any drive, or everything of the program."""
 
     output: int | None = None
     drive: int | None = None

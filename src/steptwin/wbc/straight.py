@@ -19,7 +19,7 @@ _RETURN = "return "
 
 
 def straight_of(codes: Sequence[StepCode], steps: Sequence[s.ProgramStep], cell_of: CellOf) -> Iterator[StraightSteps | None]:
-    """What begins at each step, of two or more. ``codes``: of the steps."""
+    """Straight code that begins at each step, of two or more steps. ``codes``: those of the steps."""
     lines = [_line(step, number, cell_of) for number, step in enumerate(steps)]
     entered = _entered(steps)
     first = 0

@@ -38,7 +38,7 @@ def uses(program: ProgramTree, scope: ProgramScope) -> Iterator[Use]:
 
 
 def kind_of(key: str, scope: ProgramScope) -> SymbolKind | None:
-    """What a name in upper case is as a value or target; None for one that means nothing."""
+    """Kind of a name in upper case as a value or target; None for one that means nothing."""
     if key in scope.constants:
         return SymbolKind.CONSTANT
     if key in scope.variables:

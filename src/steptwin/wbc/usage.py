@@ -52,7 +52,7 @@ _PLANAR_AXES = (1, 2)
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """What the checker needs of a configuration (`.cfg`): per axis GEAR in pulses per unit and the ramps in u/s², per input
+    """Values of a configuration (`.cfg`) for the checker: per axis GEAR in pulses per unit and the ramps in u/s², per input
     the interrupt preset ``Int`` (0 off).
 
     ``homing_ends``: per axis whether homing to KL and to KR comes to an end, by a switch or without needing one.
@@ -231,7 +231,7 @@ def interrupts(executable: s.Executable, setup: Setup | None) -> list[Diagnostic
 
 
 def _end_of(executable: s.Executable) -> str:
-    """What ends the lines above a label that is appended."""
+    """Line end of the lines above a label that is appended."""
     ends = isinstance(executable.steps[-1], s.EndStep | s.JumpStep | s.ReturnStep | s.ProgResetStep)
     return "" if ends else "\nEND"
 

@@ -62,7 +62,7 @@ class ChipConversation:
         return line.upper().startswith("K")
 
     def answer(self, line: str, *, waits: bool) -> Iterator[str]:
-        """What chips send is shown when it arrives."""
+        """Type a line; characters of chips are shown when they arrive."""
         word, _, rest = line.partition(" ")
         if word == "sleep":
             time.sleep(_seconds(rest, line))

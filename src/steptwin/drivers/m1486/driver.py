@@ -39,7 +39,7 @@ LARGEST = 16_000_000
 
 @dataclass(frozen=True, slots=True)
 class ChipStatus:
-    """What is known of a chip at rest; None: not read since the last command that may have changed it."""
+    """Known state of a chip at rest; None: not read since the last command that may have changed it."""
 
     type: str
     interface: str | None
@@ -88,7 +88,7 @@ FUNCTION_IS_OF_THE_DRIVER = Message(
 MARK = "u15"
 """The last command of a block: uploads the driver interface, a byte that is not a type letter."""
 START_BITS = sum(map(memory_bits, ":JU"))
-"""What `AsyncM1486.start_program` stores: the label, the jump and the question whether it runs."""
+"""Bits that `AsyncM1486.start_program` stores: the label, the jump and the question whether it runs."""
 _TYPED = frozenset(
     spec.letter.lower()
     for spec in TABLE
@@ -322,7 +322,7 @@ class AsyncM1486:
         return self.known()
 
     def known(self) -> ChipStatus:
-        """What is known of the chip, as `status` returns it. Nothing is sent."""
+        """Known state of the chip, as `status` returns it. Nothing is sent."""
         notes = self._unit.notes
         counter, flags, is_valid = notes.reading(1), notes.readings.get(14), notes.is_position_valid
         return ChipStatus(

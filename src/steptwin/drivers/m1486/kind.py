@@ -330,7 +330,7 @@ class _ChipJog:
 
 
 def _started(text: str) -> str | None:
-    """What a downloaded program already does, as the end of a sentence; None if it cannot move the motor."""
+    """Action of a downloaded program that has already begun, as the end of a sentence; None if it cannot move the motor."""
     keys = {command.key for command in parse(text).program.commands}
     if "]" in keys:
         return " and was started by its ]: the motor may move; 'steptwin stop --program' ends it"

@@ -19,9 +19,9 @@ from steptwin.m1486.microsteps import UNIT
 
 NAMES = ("POSITION", "COUNTER", "VARIABLE", "FLAGS", "FUNCTIONS", "TYPE", "INTERFACE", "SERIES")
 USUAL_POINTS = ("counter", "velocity", "variable")
-"""Of a twin. Its point ``position`` is not what `POSITION` is: it counts from power-on."""
+"""Usual points of a twin. Its point ``position`` is not what `POSITION` is: it counts from power-on."""
 ONLY_OF_DRIVER = frozenset({"POSITION", "FLAGS", "FUNCTIONS", "TYPE", "INTERFACE", "SERIES"})
-"""What the driver reads and is no point of the data sheet, or in another unit and from another origin."""
+"""Values that the driver reads and that are no points of the data sheet, or are in another unit and from another origin."""
 _SETTINGS = {letter.upper(): name for name, letter in COMMANDS.items()}
 _SWITCHES = {"ON": True, "TRUE": True, "1": True, "OFF": False, "FALSE": False, "0": False}
 SETTABLE = "POSITION, VARIABLE, B1…B21, FLAG80…FLAG86, F40…F63, S, A, V, P, M, Q, N"
@@ -119,4 +119,4 @@ _SWITCHED: Sequence[tuple[str, Sequence[int], Callable[..., object]]] = (
     ("B", LINES, lambda chip, number, on: chip.set_output(number, on)),
     ("F", FUNCTIONS, lambda chip, number, on: chip.set_function(number, on)),
 )
-"""What begins the names of switches, their numbers, and what sets them."""
+"""Beginnings of the names of switches, their numbers, and the functions that set them."""

@@ -1,4 +1,4 @@
-"""What drivers of one chip know of it together."""
+"""Common knowledge of the drivers of one chip."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was downloaded into the command memory of a chip, and how much of it is still there.
+"""Commands that were downloaded into the command memory of a chip, and how much of it is still there.
 
 The command memory is a ring (M-12): each command that is sent, also a question, overwrites the oldest one. Behind the last
 command of a program lies everything that was sent since, in the end the J that starts it.
@@ -18,7 +18,7 @@ from steptwin.m1486.variants import Variant
 
 
 class LabelledPart(NamedTuple):
-    """What can be executed from a label on. ``begins_at``: the bits that had been sent before its first command."""
+    """Commands that can be executed from a label on. ``begins_at``: the bits that had been sent before its first command."""
 
     begins_at: int
     has_end: bool
@@ -50,7 +50,7 @@ class SentCommands:
         return not here.issuperset(jumps) or (label is not None and label not in here)
 
     def part(self, label: int, variant: Variant, interface: Interface | None) -> LabelledPart | None:
-        """What can be executed from a label on; None for a label that was not downloaded."""
+        """Commands that can be executed from a label on; None for a label that was not downloaded."""
         stream = stream_of(None, self._commands)
         places = stream.labels.get(label)
         if places is None:

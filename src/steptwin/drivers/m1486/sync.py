@@ -136,7 +136,7 @@ class M1486(Blocking):
         return self._driver.settings
 
     def known(self) -> ChipStatus:
-        """What is known of the chip, as `status` returns it. Nothing is sent."""
+        """Known state of the chip, as `status` returns it. Nothing is sent."""
         return self._driver.known()
 
     def download(self, text: str, *, progress: DownloadProgress | None = None, name: str = "program") -> bytes:

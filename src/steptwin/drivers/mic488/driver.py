@@ -326,8 +326,9 @@ class AsyncMic488:
                 await unit.write(item, unit.travelling(item, value, data_type), data_type=data_type, permission=permission)
 
     def ended_by(self, name: str, value: float) -> tuple[int, ...]:
-        """What `set` with these ends: the numbers of axes, and 0 for the program. Such a write precedes all waiting requests.
-        Raises `Misuse` for an unknown name."""
+        """Motions that `set` with these ends: the numbers of axes, and 0 for the program.
+
+        Such a write precedes all waiting requests. Raises `Misuse` for an unknown name."""
         return self._unit.ended_by(named(self._unit.registers, name), value)
 
     async def registers(self, address: int, count: int) -> tuple[int, ...]:

@@ -22,7 +22,7 @@ _DONE = {
     "stopped": Message("drivers.mic488.stopped", "stopped"),
     "switched off": Message("drivers.mic488.switched-off", "switched off"),
 }
-"""What was to be done to an axis or a program."""
+"""Wanted action on an axis or a program."""
 UNKNOWN = Message("drivers.mic488.unknown-exception", "unknown")
 AT_PLACE = Message("drivers.mic488.at-place", "{place}: {what}")
 REFUSED = Message("drivers.mic488.refused", "'{request}' was refused: {why} (exception {code:02X}, {name})")

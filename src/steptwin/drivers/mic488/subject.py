@@ -38,7 +38,7 @@ from steptwin.subject.payloads import EdgePayload, Payload, SamplePayload, Statu
 from steptwin.wire import pdu
 
 LINE, CONFIG = "line", "device.cfg"
-"""Of the world of a twin."""
+"""Names in the world of a twin."""
 MOST_NAMED = 9
 """Most points listed in a message."""
 NO_CONFIGURATION = Message(

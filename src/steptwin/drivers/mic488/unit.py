@@ -85,7 +85,7 @@ class UnitNotes:
         """Number of stops of the program (at 0, `PROGRAM`) and of each axis: a motion requested before a stop must not begin
         after it."""
         self.unanswered: list[tuple[int, ...]] = []
-        """What each stop ends that has not been answered."""
+        """Axes and program that each stop ends that has not been answered."""
         self.control: ControlRegisters | None = None
 
 
@@ -245,7 +245,7 @@ class Unit:
         await self.ask(request, urgent=urgent, permission=permission, timeout_ns=timeout_ns, most_attempts=most_attempts)
 
     def ended_by(self, item: RegisterItem, value: RegisterValue) -> tuple[int, ...]:
-        """What writing ``value`` ends: see `halted`."""
+        """Axes and program that writing ``value`` ends: see `halted`."""
         register = item.register
         if register.type not in (Type.BIT, Type.WORD) or not register.accepts or not register.permits(value):
             return ()

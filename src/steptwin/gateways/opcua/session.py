@@ -353,7 +353,7 @@ class GatewaySession(InternalSession):
         await self._service.call(self._client, self, one.ObjectId, one.MethodId, one.InputArguments)
 
     async def _code(self, action: Awaitable[None], do: str, asked: ua.WriteValue | ua.CallMethodRequest) -> _Outcome:
-        """What becomes of what is done. What the gateway itself refuses is in the audit log, too."""
+        """Status of an action. What the gateway itself refuses is in the audit log, too."""
         try:
             await action
         except ua.UaStatusCodeError as error:

@@ -19,7 +19,7 @@ class BuildMemo:
         self._known: dict[Path, Any] = {}
 
     def once(self, path: Path, make: Callable[[], T]) -> T:
-        """What ``make`` gives, which is called in the first world only. ``path``: a place in the description, or one beyond it.
+        """Result of ``make``, which is called in the first world only. ``path``: a place in the description, or one beyond it.
 
         The value must follow from the description and its files, and nothing may change it.
         """

@@ -31,15 +31,15 @@ class WorldParts:
     record: RecordSink
     kernels: list[Kernel] = field(default_factory=list)
     kernel_of: dict[str, Kernel] = field(default_factory=dict)
-    """Of machines, lines and elements with terminals."""
+    """Kernels of machines, lines and elements with terminals."""
     machines: dict[str, MotionController] = field(default_factory=dict)
     kind_of: dict[str, AnyKind] = field(default_factory=dict)
-    """Of machines."""
+    """Kinds of machines."""
     lines: dict[str, Line] = field(default_factory=dict)
     line_of: dict[str, tuple[Line, int]] = field(default_factory=dict)
     """Line and unit (or address) of each machine."""
     terminals: dict[str, Terminals] = field(default_factory=dict)
-    """Of elements that have some."""
+    """Terminals of elements that have some."""
     driven: dict[PinName, Path] = field(default_factory=dict)
     """Place in the description of what drives an input."""
     circuits: dict[PinName, Circuit] = field(default_factory=dict)
@@ -47,7 +47,7 @@ class WorldParts:
     elements: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Built elements with names: by the name of the kind, then by their own."""
     signals_of: dict[str, Callable[[], Mapping[str, SignalOf]]] = field(default_factory=dict)
-    """Of built elements with names."""
+    """Signals of built elements with names."""
     supplied: dict[str, str] = field(default_factory=dict)
     """The power supplies of machines that have one."""
 

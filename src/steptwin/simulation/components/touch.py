@@ -1,4 +1,4 @@
-"""What touches, by a condition, and is reported or jams: a collision, and a gantry that is too skewed."""
+"""Contacts by a condition, which are reported or jam: a collision, and a gantry that is too skewed."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Touch(BoardPart):
         return HIT
 
     def touching(self) -> str:
-        """What happens when they touch, as text."""
+        """Text of what happens when they touch."""
         return TOUCH(zone=self.board.name, axes=" and ".join(self._axes)) if self._axes else PARTS_TOUCH(zone=self.board.name)
 
     def update(self, now: Nanos) -> None:

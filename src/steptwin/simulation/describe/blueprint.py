@@ -1,4 +1,4 @@
-"""What all worlds of one description have in common: its values, the contents of its files, and the programs read from them.
+"""Common part of all worlds of one description: its values, the contents of its files, and the programs read from them.
 Nothing of it changes, so that any number of worlds may share it."""
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Blueprint:
         self.makers: dict[str, Callable[[bytes | None], Any]] = {}
         """Make the machine of each controller whose files have no errors, as `ControllerKind.build`."""
         self.joined: Sequence[Sequence[str]] | None = None
-        """What shares a kernel, by name (`joined_names`), once a world was built."""
+        """Groups that share a kernel, by name (`joined_names`), once a world was built."""
         self.memo = BuildMemo()
         for controller in spec.controllers:
             spec.text.unless_wrong(controller.path, partial(self._prepare, controller))
@@ -58,7 +58,7 @@ class Blueprint:
 
     @property
     def findings(self) -> Sequence[tuple[SourceText, Sequence[Diagnostic]]]:
-        """What was found in each file that controllers name, in the order of its text; of a controller, up to the first file with
+        """Findings in each file that controllers name, in the order of its text; of a controller, up to the first file with
         errors."""
         return [(source, in_order(found)) for source, found in self._findings.values()]
 

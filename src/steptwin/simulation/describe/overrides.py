@@ -108,7 +108,7 @@ def _inside(holder: Any, wanted: str, key: str) -> Any:
 
 
 def _known(holder: Any) -> Mapping[str, Any]:
-    """What is in a table, or the tables of a list by their numbers and names."""
+    """Members of a table, or the tables of a list by their numbers and names."""
     if isinstance(holder, dict):
         return holder
     known: dict[str, Any] = {str(number): table for number, table in enumerate(holder if isinstance(holder, list) else ())}

@@ -17,7 +17,7 @@ from steptwin.simulation.describe.tables import all_keys, written
 from steptwin.simulation.faults.table import Fault, value_text
 
 LINE = "bus"
-"""What the line is called."""
+"""Name of the line."""
 _COMMENT = 44
 """The column of comments."""
 MOST_IN_A_ROW = 8
@@ -38,7 +38,7 @@ class TomlTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Whole:
-    """What a small world has besides its controllers. ``line`` are values of ``[[line]]``."""
+    """Parts of a small world besides its controllers. ``line`` are values of ``[[line]]``."""
 
     name: str
     line: Mapping[str, object] = field(default_factory=dict)

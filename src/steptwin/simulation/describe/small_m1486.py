@@ -44,7 +44,7 @@ def m1486_world(
 
 
 def chip_name(address: int) -> str:
-    """What a chip is called: ``chip7``, ``chipF``."""
+    """Name of a chip: ``chip7``, ``chipF``."""
     return f"chip{address:X}"
 
 

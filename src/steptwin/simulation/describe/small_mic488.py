@@ -8,7 +8,7 @@ from typing import NamedTuple
 from steptwin.simulation.describe.small import LINE, InputChange, TomlTable, Whole, small_world
 
 AXES = "xyzu"
-"""What the spindles of `demo` are called."""
+"""Names of the spindles of `demo`."""
 GEAR = 100.0
 """Pulses per mm of `demo`."""
 KL_MM, KR_MM = -10.0, 250.0

@@ -118,7 +118,7 @@ HELD_AT = Message("simulation.held-at", "held at {level:g} by fault {fault}")
 
 
 class HeldLevel(NamedTuple):
-    """What keeps a pin or terminal at a level; ``fault``: its name."""
+    """Level at which a fault keeps a pin or terminal; ``fault``: its name."""
 
     fault: str
     level: float

@@ -31,7 +31,7 @@ def rows(*layers: Layer) -> Iterator[FaultKind]:
 
 
 def shared() -> list[tuple[Parameter, str]]:
-    """What kinds have in common: each parameter, and the layers or occasions that have it."""
+    """Common parameters of kinds: each parameter, and the layers or occasions that have it."""
     found: dict[Parameter, list[str]] = {}
     layers = {kind.layer for kind in KINDS.values()}
     for layer, where in WHERE.items():

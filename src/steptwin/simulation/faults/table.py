@@ -12,7 +12,7 @@ from steptwin.messages import Message, MessageText, with_messages
 from steptwin.numerals import read_whole
 
 FaultValue: TypeAlias = int | float | str | tuple[int, int]
-"""Of a parameter. A range is (first, last)."""
+"""Value of a parameter. A range is (first, last)."""
 
 
 class Layer(enum.StrEnum):
@@ -21,36 +21,36 @@ class Layer(enum.StrEnum):
     PROTOCOL = "protocol"
     PHYSICS = "physics"
     ELEMENT = "element"
-    """What is around controllers: elements bring their own."""
+    """Elements around controllers, which bring their own faults."""
 
 
 class Occasion(enum.StrEnum):
-    """What a fault waits for: what ``nth`` and ``every`` count and ``probability`` is of."""
+    """Occasion for which a fault waits: what ``nth`` and ``every`` count and ``probability`` is of."""
 
     BYTE = "byte"
     DELIVERY = "delivery"
-    """What is handed over at once: an answer, or what one read of a link brought."""
+    """Bytes that are handed over at once: an answer, or what one read of a link brought."""
     ANSWER = "answer"
     REQUEST = "request"
     MOMENT = "moment"
     """At ``at_s``, and every ``period_s`` from then on."""
     CHANGE = "change"
-    """Of the pin."""
+    """Change of the pin."""
     SAVE = "save"
-    """Of a memory that survives power-off."""
+    """Save of a memory that survives power-off."""
     ALWAYS = "always"
     """From ``from_s`` to ``until_s``."""
 
 
 class Need(enum.Enum):
-    """What some machines have and others have not."""
+    """Ability that some machines have and others have not."""
 
     ENCODER = "encoder"
     MODBUS_MASTER = "Modbus master of its own"
 
 
 class LineProtocol(enum.StrEnum):
-    """What faults but those of physics can happen on."""
+    """Protocols on which faults but those of physics can happen."""
 
     RTU = "Modbus RTU"
     TCP = "Modbus TCP"
@@ -91,7 +91,7 @@ class Parameter:
 
     @property
     def permitted(self) -> MessageText:
-        """What it takes, in words."""
+        """Permitted values, in words."""
         if self.words:
             return MessageText(", ".join(self.words))
         what = _PERMITTED[self.form]()
@@ -134,7 +134,7 @@ class FaultKind:
     own: tuple[Parameter, ...] = ()
     lines: tuple[LineProtocol, ...] = ()
     effect: Any = None
-    """What it does: one of the effects that fit the occasion. A kind without it is refused when the table is built."""
+    """Its effect: one of those that fit the occasion. A kind without it is refused when the table is built."""
     needs: Need | None = None
     check: Callable[[Any, Fault], None] | None = None
 
@@ -214,7 +214,7 @@ def value_text(value: FaultValue) -> str:
 
 
 class ParameterOptions(TypedDict, total=False):
-    """What a parameter that is a number may have besides its range; see `Parameter`."""
+    """Options of a parameter that is a number, besides its range; see `Parameter`."""
 
     default: FaultValue | None
     otherwise: str

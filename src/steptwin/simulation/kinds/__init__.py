@@ -1,1 +1,1 @@
-"""What a controller, its line and its programs are to a simulation, with a folder for each. Sees scripts and what is below."""
+"""Interface of a simulation to controllers, their lines and programs, with a folder for each. Sees scripts and what is below."""

@@ -200,7 +200,7 @@ class NamedRegisters(ABC, Generic[M]):
 
     @abstractmethod
     def dialect(self, machine: M, /) -> Hashable:
-        """What requests depend on besides names and values."""
+        """Settings on which requests depend besides names and values."""
 
     @abstractmethod
     def execute(self, machine: M, pdu: bytes, now: Nanos, /) -> bytes:
@@ -208,7 +208,7 @@ class NamedRegisters(ABC, Generic[M]):
 
     @abstractmethod
     def ended_by(self, machine: M, pdu: bytes, /) -> tuple[int, ...]:
-        """What a PDU ends if it is a stop: the numbers of axes, and 0 for the program."""
+        """Motions that a PDU ends if it is a stop: the numbers of axes, and 0 for the program."""
 
 
 SeenRecord: TypeAlias = tuple[float, float, float, float]
@@ -489,7 +489,7 @@ class ControllerKind(OptionalMethods, ABC, Generic[S, M, V]):
     """How its configuration file becomes a form; None for a kind that has none."""
 
     def texts(self, spec: S, machine: M, context: TextContext, /) -> Sequence[ProgramText]:
-        """What is in its program memory, one text for each place there; the machine is at the present."""
+        """Texts in its program memory, one text for each place there; the machine is at the present."""
         return ()
 
     def programs(self, spec: S, machine: M, context: TextContext, /) -> Programs | None:
@@ -576,7 +576,7 @@ class LineKind(ABC, Generic[M, L]):
 
     @abstractmethod
     def words(self, line: L, prefix: str, sink: Callable[[FrameLine], None], /) -> LineWords:
-        """What goes over a line, in words for a function; ``prefix`` is put before the name of a place."""
+        """Words for the traffic on a line, for a function; ``prefix`` is put before the name of a place."""
 
     def writes(self, line: L, take: Callable[[LineWrite], None], /) -> Callable[[], None] | None:
         """Call a function with what programs write over a line, until the returned function is called; None where that is not
@@ -585,7 +585,7 @@ class LineKind(ABC, Generic[M, L]):
 
     @property
     def opened_by(self) -> Mapping[str, LinkKind]:
-        """What each key of ``[[line]]`` opens that can open it."""
+        """Links by the keys of ``[[line]]`` that can open it."""
         alike = {
             key.name: LinkKind(self.links[key.like].place_kind, key.name, f"{self.links[key.like].protocol}, {key.name}")
             for key in LINK_KEYS.values()
@@ -599,7 +599,7 @@ AnyLineKind: TypeAlias = LineKind[Any, Any]
 
 @dataclass(frozen=True, slots=True)
 class LinkKind:
-    """What a key of ``[[line]]`` opens."""
+    """Link that a key of ``[[line]]`` opens."""
 
     place_kind: str
     """The kind of its places on the line, one of `steptwin.simulation.kinds.lines.Line.kinds`."""

@@ -55,7 +55,7 @@ class LineTraffic(NamedTuple):
 
 
 class LineWrite(NamedTuple):
-    """What a program has sent that is no read. ``units``: the controllers that it addresses; empty where that is not known.
+    """Request of a program that is no read. ``units``: the controllers that it addresses; empty where that is not known.
 
     ``outcome``: ``done``, ``refusal``; empty where there is no answer.
     """
@@ -146,7 +146,7 @@ class Line(Stateful, ABC):
         self.places: dict[str, LineEndPoint] = {}
         self._followers: list[FrameFollower] = []
         self._before = LineTraffic()
-        """Of programs that have disconnected."""
+        """Traffic of programs that have disconnected."""
         self._busy: dict[str, LineEndPoint] = {}
         """Places that may send without a request, or later."""
 
@@ -231,7 +231,7 @@ class Line(Stateful, ABC):
 
     @property
     def traffic(self) -> LineTraffic:
-        """Of all programs, scripts included."""
+        """Traffic of all programs, scripts included."""
         traffic = self._before
         for place in self.places.values():
             traffic = traffic.plus(self._traffic_of(place))

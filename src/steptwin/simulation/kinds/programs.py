@@ -41,7 +41,7 @@ class Frame(NamedTuple):
 
 
 class ResourceKind(enum.Enum):
-    """What a statement reads or changes."""
+    """Kind of a thing that a statement reads or changes."""
 
     PIN = "pin"
     AXIS = "axis"
@@ -56,7 +56,7 @@ class Resource(NamedTuple):
 
 
 class StatementUse(NamedTuple):
-    """What a statement reads and changes, and which statements depend on it."""
+    """Reads and changes of a statement, and the statements that depend on it."""
 
     reads: tuple[Resource, ...] = ()
     writes: tuple[Resource, ...] = ()
@@ -77,7 +77,7 @@ class Programs(Protocol):
 
     @property
     def statement_time(self) -> Nanos:
-        """What a statement takes."""
+        """Time that a statement takes."""
         ...
 
     @property
@@ -116,7 +116,7 @@ class Programs(Protocol):
         ...
 
     def place(self, number: int) -> Place | None:
-        """Of a statement that a hook was called for, at that moment; None where it comes from no text."""
+        """Place of a statement for which a hook was called, at that moment; None where it comes from no text."""
         ...
 
     def depth(self) -> int:
@@ -136,7 +136,7 @@ class Programs(Protocol):
     def variables(self, now: Nanos) -> Mapping[str, float]: ...
 
     def read(self, name: str, now: Nanos) -> float | None:
-        """What a name of the program means to the statement of this moment; None where it means nothing."""
+        """Value of a name of the program for the statement of this moment; None where it means nothing."""
         ...
 
     def has_name(self, name: str) -> bool:

@@ -18,9 +18,9 @@ class TextLanguage(NamedTuple):
     name: str
     """For editors."""
     suffix: str
-    """Of files in it."""
+    """Suffix of files in it."""
     key: str
-    """Of the table of a controller, which names these files."""
+    """Key of the table of a controller that names these files."""
     in_banks: bool = False
     """Whether the value of the key is a table with the number of the bank of each."""
     is_shared: bool = False
@@ -46,14 +46,14 @@ class ProgramText:
     """One of those of the kind of its controller."""
     source: SourceText
     check: Callable[[], Sequence[Diagnostic]]
-    """What the checker of its language finds, in the order of the text."""
+    """Findings of the checker of its language, in the order of the text."""
     memory: Callable[[str], Sequence[MemoryPart]]
-    """What another text would take of the memory at this place; empty for one with errors."""
+    """Use of the memory at this place by another text; empty for one with errors."""
     is_empty: bool = False
     """Whether nothing is there; the text is empty then."""
     is_running: bool = False
     line: int | None = None
-    """Of the present statement, from 1, while it runs or is paused; None where that is not known."""
+    """Line of the present statement, from 1, while it runs or is paused; None where that is not known."""
 
 
 class Destination(NamedTuple):
@@ -69,6 +69,6 @@ class Downloading(NamedTuple):
     """How a text that was checked comes to its place."""
 
     put: Callable[[Nanos], None] = lambda now: None
-    """What happens at once."""
+    """Action at once."""
     typed: tuple[Step, ...] = ()
-    """What a host types after that."""
+    """Characters that a host types after that."""

@@ -261,7 +261,7 @@ class Switch(Contact):
         super().__init__(circuit, normally_closed=normally_closed, bounce_ns=bounce_ns, bounces=bounces, chance=chance, lane=lane)
         self._carriage = carriage
         self._version: object = None
-        """Of the carriage when its next change was computed; None before, `_RESTORED` after a restored snapshot."""
+        """Version of the carriage when its next change was computed; None before, `_RESTORED` after a restored snapshot."""
         self.zone = zone
         self.on = not circuit.is_blank and zone.on(carriage.place(now), was_on=False)
         self.rest_at(self.on is not normally_closed)

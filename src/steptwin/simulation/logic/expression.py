@@ -341,7 +341,7 @@ class ConditionParser:
         return SignalName(text)
 
     def _enclosed(self, inner: Callable[[], Quantity]) -> Quantity:
-        """What is between parentheses, the first of which was read."""
+        """Quantity between parentheses, the first of which was read."""
         self._enter()
         node = inner()
         self._depth -= 1

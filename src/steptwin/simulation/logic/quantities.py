@@ -1,4 +1,4 @@
-"""What an expression calculates with: numbers with units, signals, and what is made of them; and when a comparison changes."""
+"""Quantities of expressions: numbers with units, signals, and what is made of them; and when a comparison changes."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ class Product:
 
 @dataclass(frozen=True, slots=True)
 class Remainder:
-    """Of a division whose quotient is rounded towards 0; of one by 0 it is no number."""
+    """Remainder of a division whose quotient is rounded towards 0; for one by 0 it is no number."""
 
     left: Quantity
     right: Quantity

@@ -172,7 +172,7 @@ class Course:
         return self._piece(now).rotor_follows
 
     def _lead(self, now: Nanos) -> int:
-        """What the rotor follows: the field, or the free motion."""
+        """Position that the rotor follows: that of the field, or of the free motion."""
         return self.field(now) if self.free is None else self.build.sign * self.free.count(now) + self.build.zero
 
     def at(self, now: Nanos) -> MechanicalState:
@@ -322,7 +322,7 @@ class Course:
         return (build.low is None or min(places) >= build.low) and (build.high is None or max(places) <= build.high)
 
     def _lay_at_distance(self, profile: Profile) -> None:
-        """What the pieces are where nothing can come between field, rotor and load: most axes, most of the time."""
+        """Lay the pieces where nothing can come between field, rotor and load: most axes, most of the time."""
         behind = self._state.behind
         for begin, direction in profile.legs(self.begin):
             self._laid.append(CoursePiece(begin, direction * self.build.sign, True, -behind, True, -behind, False, behind))
@@ -342,7 +342,7 @@ class Course:
             self._laid.append(CoursePiece(max(free.end, self.begin), 1, False, rest, False, rest + away, stalled, behind))
 
     def _segment(self, s: Segment, begin: Nanos, end: Nanos | None) -> None:
-        """What happens while the field goes one way."""
+        """Lay the pieces while the field goes one way."""
         direction = s.direction * self.build.sign
         motor, start = self.build.motor, profile_of(self.plan).start
         if self.blocked:

@@ -21,7 +21,7 @@ _NEAR_P = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class FreeMotion:
-    """What acts on a rotor, in pulses of its drive. Torques in N·m, ``inertia`` in N·m per pulse/s², above 0.
+    """Torques on a free rotor, in pulses of its drive. Torques in N·m, ``inertia`` in N·m per pulse/s², above 0.
 
     ``load`` is positive if it pulls towards lower positions, ``friction`` acts against motion, and as much of it as is needed at
     rest. Stops are inelastic.

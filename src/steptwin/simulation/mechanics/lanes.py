@@ -38,7 +38,7 @@ cam, of the frequency of a slack belt."""
 
 
 class MovedLane(NamedTuple):
-    """What an axis moves besides its load, as a function of the pulses P of the load (`Mechanics`).
+    """Lane of what an axis moves besides its load, as a function of the pulses P of the load (`Mechanics`).
 
     A shaft is at ``offset`` + ``per_pulse`` · P. A follower is lifted by that angle, as ``points`` say. A carriage swings about
     it, with ``spring``. A gantry and a tool are moved by the load of ``other``, too.

@@ -46,7 +46,7 @@ class Looseness(Stateful):
 
     @property
     def why(self) -> Message:
-        """What a rotor does that is free, for events."""
+        """Message for events about what a free rotor does."""
         if self._overruns:
             return RUNS_ON
         return MOVES_WITH_LITTLE_CURRENT if self.has_current else MOVES_WITHOUT_CURRENT

@@ -130,7 +130,7 @@ class Mechanism(Stateful):
         self._stop_due: Nanos | None = None
         """When that changes next."""
         self._blockers: tuple[str, ...] = ()
-        """What blocks the rotor."""
+        """Names of what blocks the rotor."""
         self._brake = 0.0
         """Torque of the brake, N·m."""
         self._burdens: dict[str, Burden] = {}
@@ -304,11 +304,11 @@ class Mechanism(Stateful):
 
     @property
     def _carried(self) -> Burden:
-        """What the motor moves besides its own: a further load, and the friction of the brake."""
+        """Burden of the motor besides its own: a further load, and the friction of the brake."""
         return self._burden.plus(Burden(0.0, self._brake))
 
     def _loaded(self) -> Build:
-        """What a powered motor has to move."""
+        """Build with all that a powered motor has to move."""
         motor, more = self.build.motor, self._carried
         if motor is None or more == NO_BURDEN:
             return self.build

@@ -130,7 +130,7 @@ class StepperMotor:
         return self.curve[0][1]
 
     def parts(self, s: Any, begin_s: float, end_s: float, sign: int) -> Iterator[MotionPart]:
-        """What a segment is for its resonance, between passages of the band and of corners of the curve."""
+        """Parts of a segment for its resonance, between passages of the band and of corners of the curve."""
         band = () if self.resonance is None else (self.resonance.low, self.resonance.high)
         if not isinstance(s, Segment):
             for t, speed, need in self._looks(s, begin_s, end_s, sign):

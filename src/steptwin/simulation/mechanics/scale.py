@@ -60,7 +60,7 @@ class Scale:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GivenScale:
-    """What the table of an axis gives of its scale; None for the rest."""
+    """Scale as the table of an axis gives it; None for the rest."""
 
     machine: str
     """The controller of the axis, for messages."""
@@ -70,7 +70,7 @@ class GivenScale:
     pitch: float | None
     pulses_per_rev: int | None
     full_steps: int | None
-    """Of its motor, per revolution."""
+    """Full steps of its motor per revolution."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,9 +78,9 @@ class DriveScale:
     """How a controller counts the position of an axis."""
 
     pulses_per_rev: int
-    """Of the motor: from the description, otherwise from the configuration of the controller."""
+    """Pulses per revolution of the motor: from the description, otherwise from the configuration of the controller."""
     full_steps: int
-    """Of the motor, per revolution."""
+    """Full steps of the motor per revolution."""
     unit: str | None = None
     """The unit in the configuration of the controller; None if it has pulses only."""
     pulses_per_unit: Fraction = Fraction(1)
@@ -125,7 +125,7 @@ def _arm(scale: Scale, what: str) -> float:
 
 
 class Loading(NamedTuple):
-    """What a motor moves: at the motor in kg·m² and N·m, on a linear axis also in kg and N."""
+    """Load of a motor: at the motor in kg·m² and N·m, on a linear axis also in kg and N."""
 
     inertia: float = 0.0
     mass: float = 0.0
@@ -136,7 +136,7 @@ class Loading(NamedTuple):
 
 
 def burden_of(loading: Loading, scale: Scale, what: str) -> Burden:
-    """What that is for a motor, in pulses. Raises `Misuse` for masses and forces on an axis whose unit is no length."""
+    """Burden of a motor, in pulses. Raises `Misuse` for masses and forces on an axis whose unit is no length."""
     has_forces = loading.mass or loading.force or loading.friction_force
     arm = _arm(scale, what) if has_forces else 0.0
     inertia = loading.inertia + loading.mass * arm * arm

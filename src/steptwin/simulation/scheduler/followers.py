@@ -21,7 +21,7 @@ class KernelFollower(Protocol):
 
 
 class KernelFollowers:
-    """Of one kernel."""
+    """Followers of one kernel."""
 
     __slots__ = ("by_name", "leaving", "news")
 

@@ -50,7 +50,7 @@ class Board(Stateful):
         self.inputs, self.outputs = tuple(inputs), tuple(outputs)
         self.levels: dict[str, float] = dict.fromkeys((*self.inputs, *self.outputs), 0.0)
         self._wanted: dict[str, float] = {}
-        """What the element gives its outputs, and its inputs are driven to."""
+        """Levels that the element gives its outputs, and to which its inputs are driven."""
         self._held: dict[str, float] = {}
         """Terminals that faults hold."""
         self._recorded: tuple[str, ...] = ()
@@ -58,7 +58,7 @@ class Board(Stateful):
 
     @property
     def source(self) -> Source:
-        """What its levels, and the signals of its element, depend on."""
+        """Source of its levels and of the signals of its element."""
         return self.kernel.source(self.name)
 
     def set_pin(self, pin: str, level: float, now: Nanos) -> None:
@@ -141,7 +141,7 @@ class Kernel:
         self.on_change: Callable[[Kernel], None] | None = None
         """Called with the kernel after each of its events and after each change from outside."""
         self.followers: KernelFollowers | None = None
-        """What is notified of each event; None: there has been nothing yet."""
+        """Followers that are notified of each event; None: there have been none yet."""
         self._changed: set[str] = set()
         """The machines, lines and elements that were looked at since the last `take_changed`."""
         self._is_checked, self.is_blank = is_checked, is_blank
@@ -156,7 +156,7 @@ class Kernel:
         self._names: list[str] = []
         """The names of the machines, by number."""
         self._pin_names: dict[str, tuple[str, ...]] = {}
-        """Of machines and elements whose pins were asked for."""
+        """Pins of machines and elements that were asked for."""
         self._numbers: dict[str, int] = {}
         """The numbers of the machines, by name."""
         self._sources: dict[str, Source] = {}

@@ -1,4 +1,4 @@
-"""What a kernel runs between its machines, and the state of a kernel as plain values."""
+"""Parts that a kernel runs between its machines, and the state of a kernel as plain values."""
 
 from __future__ import annotations
 

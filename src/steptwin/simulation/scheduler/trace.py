@@ -1,4 +1,4 @@
-"""What happened in a world, exactly and compactly: profiles instead of pulses, edges instead of samples.
+"""Record of a world, exact and compact: profiles instead of pulses, edges instead of samples.
 
 Each machine's records come in the order in which they happened to it. Machines that share a kernel are advanced together, so
 their records are merged by (time, order in which they happened): a cause stands before its effect of the same nanosecond.
@@ -247,7 +247,7 @@ class _Stream:
     def __init__(self) -> None:
         self.records: list[TraceRecord] = []
         self.numbers: list[int] = []
-        """Of each record its number among those of all machines."""
+        """Number of each record among those of all machines."""
         self.count = 0
         self.latest: Nanos = 0
         self.hash = blake2b(digest_size=DIGEST_BYTES)

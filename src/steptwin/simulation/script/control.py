@@ -103,14 +103,14 @@ class Halt:
 
     @property
     def scope(self) -> str:
-        """What it stops, in the words of records and events (`steptwin.subject.payloads.InputPayload`)."""
+        """Text of what it stops, in the words of records and events (`steptwin.subject.payloads.InputPayload`)."""
         if self.program is not None:
             return "program, paused" if self.program == "pause" else "program"
         return "all axes" if self.axis is None else f"axis {self.axis}"
 
 
 def ended(machine: str, numbers: Iterable[int]) -> list[Halt]:
-    """What a write of registers ends, by the numbers of axes, and 0 for the program."""
+    """Halts that a write of registers means, by the numbers of axes, and 0 for the program."""
     return [Halt(machine, number) if number else Halt(machine, program="stop") for number in sorted(numbers)]
 
 

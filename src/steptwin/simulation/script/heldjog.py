@@ -18,7 +18,7 @@ STOP_NS: Nanos = 270 * MILLISECOND
 """The rest of `REST_NS` is for the stop to get over a line."""
 
 Given: TypeAlias = Sequence[do.Write | do.Send]
-"""What goes to the controller at the present moment."""
+"""Steps for the controller at the present moment."""
 
 
 class HeldJog(Protocol):

@@ -16,7 +16,7 @@ class Unknown(Misuse):
 
 
 class UnknownSignal(Misuse):
-    """What is there has no signal ``name``; ``meant``: the one that was probably meant."""
+    """Error for an existing part without a signal ``name``; ``meant``: the one that was probably meant."""
 
     def __init__(self, name: str, text: str, meant: str | None) -> None:
         self.name = name

@@ -38,7 +38,7 @@ _VALUE = re.compile(
     re.DOTALL,
 )
 _BEGINS = re.compile(_GAP + r"(?P<comma>)(?P<end>[\]}]?)")
-"""Of an array or a table in a line: its first item, or its end."""
+"""Begin of an array or a table in a line: its first item, or its end."""
 _FOLLOWS = re.compile(_GAP + r"(?:,(?P<comma>)" + _GAP + r")?(?P<end>[\]}]?)")
 """After an item: the next one, or the end."""
 
@@ -63,7 +63,7 @@ def find_places(text: str) -> dict[Path, Span]:
 
 
 class _NotToml(Exception):
-    """What comes next is not TOML."""
+    """Error: what comes next is not TOML."""
 
 
 class _Finder:

@@ -263,4 +263,4 @@ class NameOf:
 
 INPUT_PIN = PinOf(DIGITAL_INPUT)
 OUTPUT_PIN = PinOf(OUTPUT)
-"""What drives an input."""
+"""Pin that drives an input."""

@@ -122,7 +122,7 @@ class Watchers:
         """All that were watched ever, by number."""
         self._numbers: dict[Kernel, int] = {}
         self._dues = Dues()
-        """Of kernels on which a script depends."""
+        """Deadlines of kernels on which a script depends."""
 
     def set(self, script: Waiter, sources: tuple[Source, ...]) -> None:
         """Replace what a script depends on."""

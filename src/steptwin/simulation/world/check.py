@@ -19,7 +19,7 @@ LONGEST_MESSAGE = 500
 
 
 class Diagnosis(NamedTuple):
-    """What was found in a description, and in each file of programs, positions and configurations that it names."""
+    """Findings in a description, and in each file of programs, positions and configurations that it names."""
 
     findings: Sequence[Diagnostic]
     files: Sequence[tuple[SourceText, Sequence[Diagnostic]]] = ()

@@ -84,7 +84,7 @@ class PastState(NamedTuple):
     inputs: int
     """Number of inputs before it."""
     changed: frozenset[Changed] = frozenset()
-    """What has changed since the state before, or may have."""
+    """Things that have changed since the state before, or may have."""
 
 
 class StatesByAge:
@@ -326,7 +326,7 @@ class Past:
         if not world.trace.is_recorded:
             self.world.stop_recording()
         self._branch: int | None = None
-        """Of the history, when it was brought there."""
+        """Number of the branch of the history, when it was brought there."""
         self._inputs = 0
         """Number of inputs applied to it."""
         self._near = StatesByAge(MOST_NEAR)

@@ -1,4 +1,4 @@
-"""What comes from outside a world: steps, and what programs on lines, debuggers and vision systems do."""
+"""Inputs from outside a world: steps, and what programs on lines, debuggers and vision systems do."""
 
 from __future__ import annotations
 

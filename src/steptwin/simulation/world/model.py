@@ -76,7 +76,7 @@ class Model:
         self._signals: dict[str, SignalOf | Idle] = {}
         self._conditions: dict[str, SignalCondition] = {}
         self.downloaded: dict[tuple[str, str], SourceText] = {}
-        """What has been put into controllers since the beginning, by machine and place, as it was written."""
+        """Texts that have been put into controllers since the beginning, by machine and place, as it was written."""
         self.given = GivenFiles(spec.lines, self.files, self.downloaded)
         self.rigging = Rigging(self.parts)
 

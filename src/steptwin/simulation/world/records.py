@@ -45,7 +45,7 @@ def shown_kind(record: TraceRecord) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """What a user wants to see: of some controllers, elements and lines, and some kinds; None: all."""
+    """Selection of what a user wants to see: of some controllers, elements and lines, and some kinds; None: all."""
 
     names: frozenset[str] | None = None
     kinds: frozenset[str] | None = None
@@ -62,7 +62,7 @@ class Selection:
 
 
 def names_of(record: TraceRecord) -> Iterator[str]:
-    """What a record is about: who reports it, the button or pin of an input, what its facts name."""
+    """Names of what a record is about: who reports it, the button or pin of an input, what its facts name."""
     yield record.machine
     if record.kind == "input":
         yield record.subject
@@ -99,7 +99,7 @@ def owner_of(machine: str, facts: Iterable[Fact]) -> str:
 
 
 def describe(record: TraceRecord) -> str:
-    """What happened, in one line."""
+    """Describe a record in one line."""
     what = f"{record.subject}: " if record.kind != "event" or record.subject in _NAMED else ""
     value = record.value.hex(" ") if isinstance(record.value, bytes) else record.value
     return f"{record.time / SECOND:12.6f} s  {owner_of(record.machine, record.facts):<10} {what}{value}".rstrip()

@@ -21,7 +21,7 @@ class PendingRequests(NamedTuple):
 
 
 class ScriptWait(NamedTuple):
-    """What a script waits for: a moment, or a condition or answers before that moment."""
+    """Wait of a script: a moment, or a condition or answers before that moment."""
 
     until: Nanos | None
     condition: str | None = None

@@ -27,7 +27,7 @@ MOST_STEPS_PER_INSTANT = 10_000
 
 
 StepResult: TypeAlias = tuple[ScriptWait | None, Any]
-"""What a step waits for; if it does not wait, its result."""
+"""Wait of a step; if it does not wait, its result."""
 
 
 class ScriptsState(NamedTuple):

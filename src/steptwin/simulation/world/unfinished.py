@@ -1,4 +1,4 @@
-"""What stands still in a world: what its programs and scripts wait for, and which inputs never changed."""
+"""Search for what stands still in a world: what its programs and scripts wait for, and which inputs never changed."""
 
 from __future__ import annotations
 

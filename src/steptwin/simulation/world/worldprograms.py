@@ -14,7 +14,7 @@ from steptwin.simulation.kinds.programtexts import ProgramText, TextLanguage
 from steptwin.simulation.world.model import Model
 
 FINDING = ("line", "column", "end_line", "end_column", "severity", "code", "message", "hint")
-"""Of a diagnostic as plain values (`steptwin.diagnostics.to_json`)."""
+"""Fields of a diagnostic as plain values (`steptwin.diagnostics.to_json`)."""
 
 
 def address_of(machine: str, place: str, language: TextLanguage) -> str:
@@ -26,7 +26,7 @@ NO_SUCH_CONTROLLER = Message("simulation.no-such-controller", "there is no contr
 
 
 def program_texts(model: Model, machine: str) -> Sequence[ProgramText]:
-    """Of a controller by name, at the present moment of the world; empty without any. Raises `Misuse` for another name."""
+    """Program texts of a controller, at the present moment of the world; empty without any. Raises `Misuse` for another name."""
     if machine not in model.machines:
         raise Misuse(NO_SUCH_CONTROLLER(machine=machine, names=list(model.machines)))
     model.touch(machine)
@@ -48,7 +48,7 @@ def text_at(model: Model, machine: str, place: str) -> ProgramText:
 
 
 def name_of_text(model: Model, machine: str, place: str) -> str:
-    """Of the text at a place, or of the place where nothing is there yet. Raises `Misuse`."""
+    """Name of the text at a place, or of the place where nothing is there yet. Raises `Misuse`."""
     return text_at(model, machine, place).source.name
 
 
@@ -61,7 +61,7 @@ def configuration_text(model: Model, machine: str) -> SourceText | None:
 
 
 class WorldPrograms:
-    """Of a world, as plain values."""
+    """Programs of a world, as plain values."""
 
     def __init__(self, model: Model) -> None:
         self._model = model
@@ -77,11 +77,11 @@ class WorldPrograms:
         return {**_plain(machine, text), "text": text.source.text, "diagnostics": findings}
 
     def memory(self, machine: str, place: str, text: str) -> Sequence[Mapping[str, object]]:
-        """What a text takes of the memory at a place; empty for one with errors. Raises `Misuse`."""
+        """Use of the memory at a place by a text; empty for one with errors. Raises `Misuse`."""
         return [part._asdict() for part in text_at(self._model, machine, place).memory(text)]
 
     def files(self) -> Mapping[str, bytes]:
-        """What an editor server needs by address: texts, configurations, and a description of their controllers."""
+        """Files that an editor server needs, by address: texts, configurations, and a description of their controllers."""
         model = self._model
         data: Any = model.spec.text.data
         found: dict[str, bytes] = {}
@@ -119,7 +119,7 @@ def _keys(spec: ControllerSpec, texts: Sequence[ProgramText]) -> Iterator[str]:
 
 
 def _name(machine: str, text: ProgramText) -> str:
-    """Of a text, seen from the description."""
+    """Name of a text, seen from the description."""
     return address_of(machine, text.place, text.language).removeprefix("steptwin:///")
 
 

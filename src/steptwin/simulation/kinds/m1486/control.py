@@ -52,7 +52,7 @@ IS_NOT_AT_REST = Message("simulation.m1486.is-not-at-rest", "{name} is not at re
 
 
 def refuse_busy(chip: M1486Chip, name: str) -> None:
-    """What is typed now would be done at a moment, and from a place, that are not known."""
+    """Refuse a command: what is typed now would be done at a moment, and from a place, that are not known."""
     if not chip.is_idle():
         raise Refusal(IS_NOT_AT_REST(name=name, words=text_of(program_words(chip, chip.now))))
 

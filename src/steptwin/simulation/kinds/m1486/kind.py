@@ -212,7 +212,7 @@ class M1486Kind(ControllerKind[M1486Spec, M1486Chip, M1486View]):
         return Halt(command.machine, program=command.action)
 
     def motion_ends(self, name: str, axis: int, line: str | None, seek: Seek | None) -> MotionEnds:
-        """What was typed has been executed, and no move was stopped before its end; a seek has come to its line."""
+        """Whether what was typed has been executed, and no move was stopped before its end; a seek has come to its line."""
         pending = "" if line is None else f" and {line}.idle"
         sought = ""
         if seek is not None:

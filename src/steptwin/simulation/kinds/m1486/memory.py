@@ -24,7 +24,7 @@ COMMANDS = TextLanguage("m1486", ".m1486", "program", has_statements=True, is_ty
 
 
 def given_text(spec: M1486Spec, context: TextContext) -> SourceText | None:
-    """What the description gives, if anything."""
+    """Text that the description gives, if any."""
     return None if spec.program is None else SourceText(spec.program, text_of(context, spec.program))
 
 

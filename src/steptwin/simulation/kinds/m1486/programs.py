@@ -39,7 +39,7 @@ class _Text:
         self._chip = chip
         self._stream: CommandStream | None = None
         self._indices: list[int] = []
-        """Of the stream, where each command stands."""
+        """Indices of the commands in the stream."""
         self.commands: list[ChipCommand] = []
         self.offsets: list[int] = []
         """Where each command lies."""
@@ -49,7 +49,7 @@ class _Text:
         if source is not None:
             self._read(source)
         self.numbers: dict[int, list[int]] = {}
-        """Of the commands that come to lie at a place, one after the other where a reset empties the memory."""
+        """Numbers of the commands that come to lie at a place, one after the other where a reset empties the memory."""
         for number, place in enumerate(self.offsets):
             self.numbers.setdefault(place, []).append(number)
         self._named = sorted((number, name) for name, number in self.labels.items())
@@ -92,7 +92,7 @@ class _Text:
         return flow_of(stream, self._chip.variant, self._chip.interface)
 
     def name(self, number: int) -> str:
-        """Of the label at or before a statement."""
+        """Name of the label at or before a statement."""
         found = bisect_right(self._named, number, key=lambda row: row[0])
         return self._named[found - 1][1] if found else BEGIN
 
@@ -192,7 +192,7 @@ class ChipPrograms:
         return program.waiting is not WaitReason.NOTHING or program.ready - now > program.statement_ns
 
     def _place_in_progress(self) -> Place | None:
-        """What waits goes on at the command after it."""
+        """Place in progress: what waits goes on at the command after it."""
         pc, text = self._chip.program.pc, self._text
         before = bisect_right(text.offsets, pc - 1) - 1
         return self.place(text.offsets[before]) if before >= 0 and pc <= text.end else None

@@ -1,4 +1,4 @@
-"""What the commands of an M1486 read and change, in the terms of all programs."""
+"""Reads and changes of the commands of an M1486, in the terms of all programs."""
 
 from __future__ import annotations
 

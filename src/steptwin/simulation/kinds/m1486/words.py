@@ -1,4 +1,4 @@
-"""What goes over a line of M1486 chips in words."""
+"""Words for the traffic on a line of M1486 chips."""
 
 from __future__ import annotations
 

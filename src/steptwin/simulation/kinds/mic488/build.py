@@ -35,7 +35,7 @@ def configured(spec: Mic488Spec, context: BuildContext) -> ControllerConfig:
 def banks(
     spec: Mic488Spec, config: ControllerConfig, context: BuildContext
 ) -> tuple[dict[int, LoadedProgram], dict[int, PositionTable]]:
-    """What is in the banks. Names of positions are found in the table of the same bank, or else in the only one there is."""
+    """Contents of the banks. Names of positions are found in the table of the same bank, or else in the only one there is."""
     sources, tables = _texts(spec, context)
     programs: dict[int, LoadedProgram] = {}
     for bank, name in spec.all_programs:

@@ -154,7 +154,7 @@ class ProgramWatch:
             self._tell(edge.time, "output", f"{edge.pin} {'on' if edge.value else 'off'}", self._caused(edge.time))
 
     def deadline(self) -> Nanos | None:
-        """Of the part of the kernel that watches the axes: it only looks."""
+        """None: the part of the kernel only watches the axes."""
         return None
 
     def update(self, now: Nanos) -> None:

@@ -185,7 +185,7 @@ class _Bank:
         return parse(self.program.source.text)[0]
 
     def meaning(self, name: str, dialect: Dialect) -> ValueSource | None:
-        """What a name in the text is; its place in the text does not matter."""
+        """Meaning of a name in the text; its place in the text does not matter."""
         key = name.upper()
         for index, variable in enumerate(self.program.variables):
             if variable.upper() == key:
@@ -198,6 +198,6 @@ class _Bank:
         return self._flow.comes_back(number)
 
     def name(self, number: int) -> str:
-        """Of the label at or before a statement."""
+        """Name of the label at or before a statement."""
         found = bisect_right(self._named, number, key=lambda row: row[0])
         return self._named[found - 1][1] if found else BEGIN

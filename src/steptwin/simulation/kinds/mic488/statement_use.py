@@ -1,4 +1,4 @@
-"""What the steps of a WBC program read and change."""
+"""Reads and changes of the steps of a WBC program."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _ANY_PIN = Resource(ResourceKind.PIN, "")
 
 
 def use_of(steps: Sequence[s.ProgramStep], number: int) -> StatementUse:
-    """Of a step by its number; the one after the last is the end of the program."""
+    """Use of a step by its number; the one after the last is the end of the program."""
     if number >= len(steps):
         return StatementUse()
     step = steps[number]
@@ -43,7 +43,7 @@ def _acted_on(effect: s.StepEffect) -> Iterable[Resource]:
 
 
 def _awaited(step: s.ProgramStep) -> Iterable[Resource]:
-    """What decides besides the operands."""
+    """Resources that decide besides the operands."""
     match step:
         case s.InterruptStep(event=event) if event.input:
             return (Resource(ResourceKind.PIN, f"IN{event.input}"),)
@@ -73,7 +73,7 @@ def _return_after(steps: Sequence[s.ProgramStep], number: int) -> int:
 
 
 def _set_by(step: s.SetStep) -> tuple[tuple[Resource, ...], bool]:
-    """What SET changes, and whether that is only kept."""
+    """Resources that SET changes, and whether they are only kept."""
     (target,) = _operands((step.target,))
     if isinstance(step.target, s.Variable) or not ACCESS[step.target.row.key].quiet:
         return (target,), False

@@ -1,4 +1,4 @@
-"""What goes over a Modbus line in words."""
+"""Words for the traffic on a Modbus line."""
 
 from __future__ import annotations
 
