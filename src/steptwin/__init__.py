@@ -19,6 +19,7 @@ __all__ = ["LineFailure", "Misuse", "Refusal", "SteptwinError", "World", "__vers
 
 def __getattr__(name: str) -> Any:
     if name == "World":  # late, for the command line answers within 0.2 s
+        import steptwin.services  # noqa: F401  its tables of descriptions are checked, too
         from steptwin.files.world import World
 
         return World

@@ -118,6 +118,10 @@ def test_errors_that_the_chip_finds_are_named() -> None:
     assert not any(note.startswith("steptwin check finds errors") for note in explained(f"[\n{late}]\n").notes)
 
 
+def test_a_register_that_there_is_not_is_neither_read_nor_written() -> None:
+    assert [used.name for used in explained("<1\n>9\n<11\n").usage["registers"]] == ["register 1", "register 9"]
+
+
 def test_wrong_commands_are_refused() -> None:
     with pytest.raises(Misuse, match=r"p\.m1486:2: .* steptwin check shows all errors"):
         explained("[\n%5\n]\n")

@@ -216,6 +216,12 @@ def test_options_need_no_library() -> None:
     assert not {"asyncio", "socket", "ssl"} & loaded
 
 
+def test_a_program_that_uses_worlds_alone_has_their_tables_checked() -> None:
+    code = "from steptwin import World; World.from_toml('[gateway.epcs]')"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "there is no [gateway.epcs] (did you mean 'epics'?)" in ran.stderr
+
+
 @pytest.mark.parametrize("kind", KINDS.values(), ids=list(KINDS))
 def test_each_has_what_serves_it_and_its_extra(kind: type[GatewaySpec]) -> None:
     assert callable(import_module(f"steptwin.gateways.{name_of(kind)}.gateway").make)

@@ -1,6 +1,7 @@
 """``steptwin check``: everything wrong or doubtful in a file, at once. Exit code 1 if there are errors.
 
-From Python: `steptwin.m1486.check.check`, `steptwin.wbc.check.check`, `steptwin.simulation.world.check.diagnose`.
+From Python: `steptwin.m1486.check.check`, `steptwin.wbc.check.check`, `steptwin.simulation.world.check.diagnose`;
+`[history]` and gateways are checked where `steptwin.services` is imported.
 The JSON is described in docs/reference/check-json.md.
 """
 

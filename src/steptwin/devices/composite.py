@@ -130,7 +130,7 @@ class CompositeSubject:
     def _part_of(self, wanted: Command) -> SubjectPart:
         """Raises `Misuse`, and `Refusal` if no part can execute it."""
         if self._world is not None and len(self._parts) == 1:
-            return self._world
+            return self._world  # there is nothing else that a command could be for
         found: list[SubjectPart] = []
         if isinstance(wanted, steps.Request) and (there := self._of_unit.get((wanted.line, wanted.unit))) is not None:
             return there  # several devices share the line

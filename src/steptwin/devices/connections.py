@@ -12,7 +12,7 @@ from steptwin.devices.composite import THERE_ARE, CompositeSubject
 from steptwin.devices.device import ConnectedDevice, DeviceSurroundings
 from steptwin.diagnostics import SourceText
 from steptwin.drivers.exchange import ExchangeCounts, NoAnswer
-from steptwin.drivers.kind import DeviceAddress
+from steptwin.drivers.kind import DeviceAddress, DriverKind
 from steptwin.drivers.kinds import DRIVERS, others_there
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart
@@ -77,7 +77,7 @@ class DeviceConnections:
                 "is_searched": kind.search is not None,
             }
             for kind in DRIVERS.values()
-            if kind.offers(kind.part)
+            if kind.offers(DriverKind.part)
         ]
 
     async def ports(self) -> Sequence[Mapping[str, object]]:

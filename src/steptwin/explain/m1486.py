@@ -199,7 +199,8 @@ class _Chip:
             command, line = self._commands[index], self._statements[index].line
             for used in command.lines:
                 (written if _writes_lines(command) else read).setdefault(used, set()).add(line)
-            if command.number is not None and find_rows(command.key)[0].kind is ArgType.REGISTER:
+            is_executed = bool(command.use.reads | command.use.writes)  # a number that no register has is wrong data
+            if command.number is not None and is_executed and find_rows(command.key)[0].kind is ArgType.REGISTER:
                 writes = ChipState.VARIABLE not in command.use.writes
                 registers.setdefault(command.number, (set(), set()))[writes].add(line)
         lines = [

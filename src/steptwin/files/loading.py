@@ -15,13 +15,15 @@ MOST_KNOWN = 8
 class DescriptionKey(NamedTuple):
     """Settings that a description depends on, besides the files that it names.
 
-    ``path``: its name in messages; ``overrides``: as text.
+    ``path``: its name in messages; ``overrides``: as text; ``services``: the tables of services that are checked
+    (`steptwin.simulation.describe.servicetables`).
     """
 
     path: str
     text: str
     seed: int | None
     overrides: str
+    services: tuple[str, ...]
 
 
 _KNOWN: dict[DescriptionKey, Blueprint] = {}

@@ -26,6 +26,7 @@ from steptwin.simulation.describe.blueprint import Blueprint, memory_file
 from steptwin.simulation.describe.description import describe, read_world
 from steptwin.simulation.describe.overrides import NO_OVERRIDES, Overrides
 from steptwin.simulation.describe.pieces import given_files
+from steptwin.simulation.describe.servicetables import SERVICE_TABLES
 from steptwin.simulation.describe.spec import WorldSpec
 from steptwin.simulation.faults import Fault
 from steptwin.simulation.faults import read as read_fault
@@ -143,7 +144,7 @@ class World(Plant):
             return files[name]
 
         text = read_text(place, MOST_DESCRIPTION_BYTES).source.text
-        loaded = DescriptionKey(str(path), text, seed, repr(overrides))
+        loaded = DescriptionKey(str(path), text, seed, repr(overrides), tuple(SERVICE_TABLES))
         known = known_blueprint(loaded, read) if state is None else None
         if known is not None:
             return cls(known, keep_trace=keep_trace, keep_inputs=keep_inputs)

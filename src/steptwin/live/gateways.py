@@ -66,15 +66,15 @@ async def open_gateways(
     Raises `Misuse` or `LineFailure` for one that cannot be opened.
     """
     opened: list[OpenGateway] = []
+    if services.history is not None:
+        keeper = _make_keeper(services.history, subject, folder)
+        details = await keeper.open(listen_any=listen_any, notice=server.notice)
+        server.join(keeper, EndPoint(HISTORY, str(details["url"]), keeper.protocol, details))
+        opened.append(OpenGateway(HISTORY, str(details["url"]), keeper))
+        subject.past = keeper.past
+        if audit is not None:
+            audit.watchers.append(keeper.note)
     with without_collections():
-        if services.history is not None:
-            keeper = _make_keeper(services.history, subject, folder)
-            details = await keeper.open(listen_any=listen_any, notice=server.notice)
-            server.join(keeper, EndPoint(HISTORY, str(details["url"]), keeper.protocol, details))
-            opened.append(OpenGateway(HISTORY, str(details["url"]), keeper))
-            subject.past = keeper.past
-            if audit is not None:
-                audit.watchers.append(keeper.note)
         for spec in services.gateways:
             gateway = make_gateway(spec, subject, folder)
             details = await gateway.open(listen_any=listen_any, notice=server.notice)

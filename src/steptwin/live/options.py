@@ -26,7 +26,10 @@ AuditInto: TypeAlias = Annotated[
     Path | None,
     Option("Append every command of a gateway and its client to a file of JSON lines.", metavar="FILE", is_written=True),
 ]
-ListenAny: TypeAlias = Annotated[bool, Option("Permit addresses that other computers can reach.")]
+ListenAny: TypeAlias = Annotated[
+    bool,
+    Option("Permit addresses that other computers can reach; 'serve' without any address then listens on all interfaces."),
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +49,7 @@ class LiveOptions(OptionGroup):
         str | None,
         Option(
             "Write a trace to a file or into a directory; 'ring N' keeps the last N records for 'save'; 'off' keeps none. "
-            "Default: that of the description.",
+            "Default: that of the description, if there is one.",
             metavar="FILE",
             is_written=True,
         ),

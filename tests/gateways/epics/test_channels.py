@@ -15,12 +15,13 @@ from steptwin.access.roles import Role
 from steptwin.errors import Misuse
 from steptwin.gateways.epics.channels import PvDatabase
 from steptwin.gateways.epics.controller import EpicsController
+from steptwin.gateways.epics.motorfields import ProgressBit
 from steptwin.gateways.epics.pointrecord import PointRecord
 from steptwin.gateways.epics.records import FieldValue
 from steptwin.gateways.leases import JogLeases
 from steptwin.gateways.points import points_of
 from steptwin.gateways.sampling import Sampler
-from steptwin.subject.commands import Command, Enable, ReadState
+from steptwin.subject.commands import Command, Enable, Move, ReadState
 from steptwin.subject.contract import Result
 
 
@@ -29,6 +30,17 @@ async def ends(rig: MotorRig, name: str) -> list[object]:
     metadata: Any = (await PvDatabase({"x": rig.record})[name].read(ChannelType.CTRL_DOUBLE))[0]
     limits = (metadata.lower_disp_limit, metadata.upper_disp_limit, metadata.lower_ctrl_limit, metadata.upper_ctrl_limit)
     return [metadata.units, *limits]
+
+
+def test_the_highest_bit_of_mip_is_no_sign() -> None:
+    async def act(rig: MotorRig) -> None:
+        rig.world.inner.do(Move("table", 1, to=20.0))
+        await rig.tick()
+        read: Any = await PvDatabase({"x": rig.record})["x.MIP"].read(ChannelType.LONG)
+        assert [*read[1]] == [ProgressBit.EXTERNAL]
+        await rig.stands()
+
+    check(act)
 
 
 def test_units_are_as_long_as_there_is_room() -> None:

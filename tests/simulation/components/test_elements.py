@@ -23,13 +23,15 @@ from steptwin.live.running import up
 from steptwin.machine import MILLISECOND
 from steptwin.simulation.components.button import BUTTON
 from steptwin.simulation.components.contact import ContactSpec
+from steptwin.simulation.components.elementspec import NamedSpec
 from steptwin.simulation.components.registry import ELEMENTS, register
 from steptwin.simulation.components.source import SOURCE
 from steptwin.simulation.components.wire import WIRE
 from steptwin.simulation.faults import KINDS, read
 from steptwin.simulation.script.steps import SetFault
 from steptwin.simulation.toml.reader import WorldError
-from steptwin.simulation.toml.table import table
+from steptwin.simulation.toml.table import key, table
+from steptwin.simulation.toml.values import word
 from steptwin.tables import IncompleteTable
 
 TEXT = """
@@ -204,9 +206,16 @@ class Unread(ContactSpec):
     colour: str = "green"
 
 
+class Undeclared(NamedSpec):
+    """A key without ``@table``, which nobody reads."""
+
+    colour: str = key(word("green", "red"), "colour", default="green")
+
+
 @pytest.mark.parametrize(
     ("element", "changed", "text"),
     [
+        (BUTTON, {"spec": Undeclared}, "Undeclared lacks its header"),
         (BUTTON, {"spec": Unread}, "element button: no key becomes colour, name of Unread"),
         (BUTTON, {"signals": None}, "element button has a name and lacks its signals"),
         (WIRE, {"signals": lambda part: {}}, "element wire has signals and lacks a name"),

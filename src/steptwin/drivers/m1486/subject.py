@@ -278,7 +278,7 @@ class M1486Part:
         raise Refusal(self.no_twin)
 
     async def settings_text(self) -> str:
-        """Readable settings of the chip: S, A, V and other settings cannot, so only those are known that this driver has made."""
+        """Known settings of the chip. S, A, V and others cannot be read, so only those are known that this driver has made."""
         if not await self._is_busy():
             for numbers in (COUNTER, (4, 5, 6), (14,), (15,), (16,), FUNCTION_BYTES):
                 await self._read(numbers)

@@ -45,7 +45,7 @@ def _rows() -> Iterator[FieldRow]:
     yield _double("DIFF", "DVAL - DRBV.", FieldQuantity.LENGTH)
     yield _short("DMOV", "1 when the whole motion is over.")
     yield _short("MOVN", "1 while the motor moves.")
-    yield _short("MIP", "What the record does, as bits of motorRecord.cc; 0: nothing.")
+    yield _long("MIP", "What the record does, as bits of motorRecord.cc; 0: nothing.")
     yield _short("TDIR", "1 where the last motion went in the positive direction of the controller.")
     yield _short("STOP", "1 stops; it is 0 again then.", put=True)
     yield _states("SPMG", "Whether motions may be made.", "Stop", "Pause", "Move", "Go", put=True)

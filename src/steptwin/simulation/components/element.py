@@ -70,6 +70,8 @@ class Element(ElementTable[S, B]):
         ElementTable.__post_init__(self)
         object.__setattr__(self, "is_named", any(key.name == "name" for key in self.rows.keys))
         where = f"element {self.name}"
+        if not self.rows.written:
+            raise IncompleteTable(f'{self.spec.__name__} lacks its header: @table("[[NAME]]")')
         if left_over := sorted({one.name for one in fields(self.spec)} - {*self.rows.attributes, "path"}):
             raise IncompleteTable(f"{where}: no key becomes {', '.join(left_over)} of {self.spec.__name__}")
         if self.is_named and self.signals is None:
