@@ -13,6 +13,7 @@ import pytest
 from toy import lamp
 from whole_world import everything
 
+from steptwin.messages import MessageText
 from steptwin.motion.elastic import Response
 from steptwin.motion.profile import Profile
 from steptwin.simulation.logic.contacts import Zone
@@ -66,8 +67,8 @@ def test_a_branch_does_not_compute_again_when_switches_change(whole_trace: list[
     assert list(other.trace) == whole_trace
 
 
-VALUES = (Profile, Course, Response)
-"""Immutable, although they keep what they have computed of their course."""
+VALUES = (Profile, Course, Response, MessageText)
+"""Immutable, although they keep what they have computed of their course, or their values."""
 CHANGING = (list, dict, set, deque, bytearray, array, Stateful, Kernel, Plant)
 
 

@@ -45,7 +45,7 @@ Begin = Callable[[LiveWorld, Cell], Callable[[bytes], None]]
 
 
 def fill(live: LiveWorld) -> None:
-    """Fill the stores whose size is bounded by a number, however long requests would take to do so."""
+    """Fill the stores whose size is bounded by a number, whatever requests have put there."""
     chips = [view.chip for view in live.world.m1486.values()]
     for machine in (*chips, *(view.device for view in live.world.mic488.values())):
         for _ in range(EVENTS_KEPT):
@@ -66,7 +66,6 @@ async def _grown(live: LiveWorld, begin: Begin, sent: Iterator[bytes], requests:
     loop: Any = asyncio.get_running_loop()
     cell = Cell(live, loop.clock())
     live.world.trace.watchers.append(lambda record: None)
-    fill(live)
     send = begin(live, cell)
     cell.start()
 
@@ -75,6 +74,7 @@ async def _grown(live: LiveWorld, begin: Begin, sent: Iterator[bytes], requests:
             send(data)
             await asyncio.sleep(pause_s)
         await asyncio.sleep(10.0)
+        fill(live)  # the events that are kept are as long as those of the other level
         return held(live, cell, send)
 
     levels = await level(FIRST), await level(requests)

@@ -144,7 +144,11 @@ UNITS = {
     unit: Message(f"m1486.unit.{id_}", unit)()
     for id_, unit in (("ms", "ms"), ("times", "times"), ("speed", "step/s"), ("acceleration", "step/s²"), ("distance", UNIT))
 }
-_KINDS = {kind: Message(f"m1486.kind.{kind.value}", kind.value)() for kind in (ArgType.LINE, ArgType.FUNCTION, ArgType.FLAG)}
+_KINDS = {
+    kind: Message(f"m1486.kind.{kind.name.lower()}", kind.value)()
+    for kind in ArgType
+    if kind not in (ArgType.NONE, ArgType.NUMBER, ArgType.ADDRESS, ArgType.LINES, ArgType.CONDITION)
+}
 
 _ROWS: tuple[CommandSpec, ...] = (
     # Program control
@@ -392,4 +396,4 @@ def range_text(spec: CommandSpec, variant: Variant, *, named: bool = False) -> M
     text = TO(low=grouped(values[0]), high=grouped(values[-1])) if isinstance(values, range) else RANGES(ranges=list(values))
     if spec.unit:
         text = WITH_UNIT(range=text, unit=UNITS[spec.unit])
-    return NAMED(range=text, name=_KINDS.get(spec.kind, spec.name)) if named else text
+    return NAMED(range=text, name=spec.name if spec.kind is ArgType.NUMBER else _KINDS[spec.kind]) if named else text
