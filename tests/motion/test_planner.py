@@ -226,6 +226,7 @@ def test_a_velocity_is_reached_by_the_shortest_ramps(phase: float, v: float, to:
 
 
 @given(phase=phases, v=velocities, dec=rates)
+@example(phase=0.0, v=23537.564822130615, dec=0.0010000000230258512)
 def test_a_stop_takes_speed_over_deceleration_and_half_that_way(phase: float, v: float, dec: float) -> None:
     profile = plan_stop(MotionState(0, 0, phase, v), dec)
     assert profile.end == pytest.approx(abs(v) / dec * 1e9, rel=1e-12, abs=1)
@@ -233,7 +234,7 @@ def test_a_stop_takes_speed_over_deceleration_and_half_that_way(phase: float, v:
     assert profile.position(profile.end) == pytest.approx(phase + v * abs(v) / (2 * dec), rel=1e-12, abs=1e-9)
     assert profile.velocity(profile.end) == 0.0
     if profile.end:
-        assert profile.velocity(profile.end - 1) * v >= 0.0
+        assert profile.velocity(profile.end - 1) * v >= -(2**-52) * v * v  # the rounding of v - dec · t
 
 
 @given(move=moves, share=st.floats(0.0, 1.0))
