@@ -1,5 +1,5 @@
 """The cost of a world by its size: 1, 10, 100 and 1000 machines, each with a program, a waiting script and a conveyor; 60 virtual
-seconds. Separate machines share nothing; joined ones are wired in a chain, so that one kernel runs them all.
+seconds. Separate machines share nothing; joined ones are wired in a chain, so that one scheduler runs them all.
 
 ``SIZES`` (such as ``1,10``) and ``SECONDS`` in the environment make it smaller.
 """

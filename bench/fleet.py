@@ -14,7 +14,7 @@ from steptwin.live.descriptors import descriptors
 from steptwin.live.tcp_epoll import EpollConnection
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.toml.addresses import Address
 from steptwin.wire.slave import TcpSlavePort
 
@@ -33,12 +33,12 @@ async def main(port: int) -> None:
     def accept() -> None:
         client, peer = listener.accept()
         client.setblocking(False)
-        kernel = Kernel(clock.now())
+        scheduler = Scheduler(clock.now())
         device = Mic488Device(config)
-        kernel.add("1", device)
+        scheduler.add("1", device)
         for request in (ENABLE_ALL, *RUN):
-            device.execute(request, kernel.now)
-        EpollConnection(client, Address(*peer), Cell(kernel, clock), TcpSlavePort({1: device}), clients)
+            device.execute(request, scheduler.now)
+        EpollConnection(client, Address(*peer), Cell(scheduler, clock), TcpSlavePort({1: device}), clients)
 
     descriptors().await_input(listener.fileno(), accept)
     gc.freeze()

@@ -9,7 +9,7 @@ from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program_banks import load
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.wires import PinName, Wire
 from steptwin.wbc.check import check
 from steptwin.wbc.positions import parse_positions
@@ -121,15 +121,15 @@ def cell_hour() -> tuple[float, int]:
     table, _ = parse_positions(ROWS)
     machine = Mic488Device(CONFIG, programs={0: load(check(MACHINE, table))}, positions={0: table})
     feeder = Mic488Device(CONFIG, programs={0: load(check(FEEDER))})
-    kernel = Kernel()
-    kernel.add("machine", machine)
-    kernel.add("feeder", feeder)
-    kernel.connect(Wire(PinName("feeder", "OUT1"), PinName("machine", "IN1")))
-    kernel.connect(Wire(PinName("machine", "OUT2"), PinName("feeder", "IN1")))
+    scheduler = Scheduler()
+    scheduler.add("machine", machine)
+    scheduler.add("feeder", feeder)
+    scheduler.connect(Wire(PinName("feeder", "OUT1"), PinName("machine", "IN1")))
+    scheduler.connect(Wire(PinName("machine", "OUT2"), PinName("feeder", "IN1")))
     for device in (machine, feeder):
         device.command(partial(device.program.command, 1), 0)
     begin = perf_counter()
-    kernel.advance(3600 * SECOND)
+    scheduler.advance(3600 * SECOND)
     return perf_counter() - begin, machine.user[0]
 
 

@@ -36,7 +36,7 @@ import steptwin.services  # noqa: F401  descriptions are checked for their table
 from steptwin.live.cell import Cell
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 
 T = TypeVar("T")
 
@@ -295,8 +295,8 @@ def make_cell() -> Callable[[], tuple[Cell, Mic488Device]]:
         loop = asyncio.get_running_loop()
         assert isinstance(loop, VirtualLoop)
         device = Mic488Device(ControllerConfig())
-        kernel = Kernel()
-        kernel.add("1", device)
-        return Cell(kernel, loop.clock()), device
+        scheduler = Scheduler()
+        scheduler.add("1", device)
+        return Cell(scheduler, loop.clock()), device
 
     return make

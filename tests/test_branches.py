@@ -18,8 +18,8 @@ from steptwin.motion.elastic import Response
 from steptwin.motion.profile import Profile
 from steptwin.simulation.logic.contacts import Zone
 from steptwin.simulation.mechanics.course import Course
-from steptwin.simulation.scheduler.kernel import Kernel
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.scheduler.scheduler import Scheduler
+from steptwin.simulation.world.simulation import Simulation
 from steptwin.state import Stateful
 
 
@@ -69,7 +69,7 @@ def test_a_branch_does_not_compute_again_when_switches_change(whole_trace: list[
 
 VALUES = (Profile, Course, Response, MessageText)
 """Immutable, although they keep what they have computed of their course, or their values."""
-CHANGING = (list, dict, set, deque, bytearray, array, Stateful, Kernel, Plant)
+CHANGING = (list, dict, set, deque, bytearray, array, Stateful, Scheduler, Simulation)
 
 
 def reached(*roots: object, beyond: frozenset[int] = frozenset()) -> dict[int, object]:
@@ -110,5 +110,5 @@ def test_worlds_leave_their_blueprint_as_it_is() -> None:
     before = {key: list(thing) for key, thing in whole.items() if isinstance(thing, list | dict | set | deque)}
     for world in (one, one.branch()):
         world.run(until=1.6)
-    assert not [thing for thing in whole.values() if isinstance(thing, Stateful | Kernel | Plant)]
+    assert not [thing for thing in whole.values() if isinstance(thing, Stateful | Scheduler | Simulation)]
     assert before == {key: list(thing) for key, thing in whole.items() if isinstance(thing, list | dict | set | deque)}

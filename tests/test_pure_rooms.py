@@ -42,17 +42,17 @@ for package in PURE:
 from steptwin.wire.crc import crc16, table_crc16
 from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.description import read_world
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 
 assert crc16 is table_crc16
 examples = pathlib.Path(EXAMPLES)
 text = (examples / "worlds/feeder.toml").read_text()
 files = {name: (examples / "worlds" / name).read_bytes() for name in read_world("feeder.toml", text).files()}
 
-plant = Plant(Blueprint(read_world("feeder.toml", text), files))
-plant.advance(20_000_000_000)
-plant.settle_all()
-print(plant.trace.digest())
+simulation = Simulation(Blueprint(read_world("feeder.toml", text), files))
+simulation.advance(20_000_000_000)
+simulation.settle_all()
+print(simulation.trace.digest())
 print(sorted(name for name in sys.modules if name.partition(".")[0] in BLOCKED))
 """
 

@@ -196,7 +196,7 @@ def test_everything_that_has_state_is_in_these_tests() -> None:
     plan: Any = world.parts
     seen: dict[int, Stateful] = {}
     parts([Ports(), plan.faults, plan.lines], seen)
-    for kernel in plan.kernels:
-        parts([kernel.machines, kernel.parts], seen)
+    for scheduler in plan.schedulers:
+        parts([scheduler.machines, scheduler.parts], seen)
     missing = {found.__name__ for found in product_classes()} - {type(part).__name__ for part in seen.values()}
     assert not missing, f"state of {', '.join(sorted(missing))} is in no snapshot test"

@@ -65,7 +65,7 @@ def test_a_complete_table_is_read_only() -> None:
         *(
             (
                 f"import steptwin.simulation.script.steps as t\nclass New: ...\n{change}",
-                "steptwin.simulation.world.plant",
+                "steptwin.simulation.world.simulation",
                 message,
             )
             for change, message in (

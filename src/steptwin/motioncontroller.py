@@ -34,7 +34,7 @@ class Drive(Protocol):
 
 
 class MotionController(Machine, Protocol):
-    """A machine with named pins and axes: the interface of a controller to kernel, mechanics, faults and snapshots.
+    """A machine with named pins and axes: the interface of a controller to scheduler, mechanics, faults and snapshots.
 
     Inputs take timestamped changes, outputs give timestamped edges. STEP is never an edge: it stays a plan of its axis.
     """

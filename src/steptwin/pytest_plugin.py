@@ -18,7 +18,7 @@ from steptwin.errors import Misuse, SteptwinError
 if TYPE_CHECKING:
     from steptwin.campaign.summary import CampaignSummary
     from steptwin.files.coverage import CoverageReports
-    from steptwin.simulation.world.plant import Plant
+    from steptwin.simulation.world.simulation import Simulation
     from steptwin.testing.m1486 import M1486Rig
     from steptwin.testing.mic488 import Mic488Rig
     from steptwin.testing.rig import Rig
@@ -207,7 +207,7 @@ def _rig(request: pytest.FixtureRequest, name: str, make: Callable[[], Rig]) -> 
             request.config.stash[_coverage].close()
 
 
-def _observe(request: pytest.FixtureRequest, world: Plant, folder: Path) -> None:
+def _observe(request: pytest.FixtureRequest, world: Simulation, folder: Path) -> None:
     """Count what programs of a world execute, if that is to be reported."""
     if _coverage in request.config.stash:
         request.config.stash[_coverage].observe(world, folder)
@@ -297,7 +297,7 @@ def steptwin_campaign(request: pytest.FixtureRequest, tmp_path: Path) -> Campaig
 
 
 @pytest.fixture
-def steptwin_coverage(request: pytest.FixtureRequest) -> Iterator[Callable[[Plant], None]]:
+def steptwin_coverage(request: pytest.FixtureRequest) -> Iterator[Callable[[Simulation], None]]:
     """Call it with a world that the test has made, so that ``--steptwin-coverage`` counts what that executes until the test ends.
 
     Names of its files are relative to the folder of the test.

@@ -16,7 +16,7 @@ from steptwin.debug.values import DataPoint, Events, LabelPoint, LinePoint, Stop
 from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 
 
 def line(debugger: Debugger, machine: str = "m") -> int:
@@ -27,12 +27,12 @@ def at(number: int, **more: str) -> LinePoint:
     return LinePoint(machine="m", text="program 0", line=number, **more)
 
 
-def state(world: Plant) -> str:
+def state(world: Simulation) -> str:
     """All state of a world, as text. A controller at rest may know a moment before: looking at it does not count as a change."""
     for machine in world.machines.values():
         machine.advance(world.now)
     found = world.snapshot(with_inputs=False)
-    text = repr((found.now, found.kernels, found.scripts, found.faults_state, world.trace.digest()))
+    text = repr((found.now, found.schedulers, found.scripts, found.faults_state, world.trace.digest()))
     return re.sub(r" at 0x[0-9a-f]+", "", text)
 
 

@@ -14,7 +14,7 @@ from steptwin.m1486.variants import variant
 from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.status import AxisStatus
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 
 Make = Callable[[], tuple[Cell, Mic488Device]]
 Run = Callable[..., Any]
@@ -51,11 +51,11 @@ def test_what_a_machine_does_by_itself_is_done_though_nothing_is_ever_sent(run: 
     async def scene() -> list[tuple[str, Nanos]]:
         loop: Any = asyncio.get_running_loop()
         image = image_of(check("[\nw300\nu20\nw300\nu16\n]").program, variant("B"))
-        chip, kernel = M1486Chip(variant("B"), image=image), Kernel()
+        chip, scheduler = M1486Chip(variant("B"), image=image), Scheduler()
         done: list[tuple[str, Nanos]] = []
         chip.on_event = lambda event: done.append((event.text, loop.now_ns // MILLISECOND))
-        kernel.add("F", chip)
-        cell = Cell(kernel, loop.clock())
+        scheduler.add("F", chip)
+        cell = Cell(scheduler, loop.clock())
         cell.start()
         await asyncio.sleep(2.0)
         cell.close()

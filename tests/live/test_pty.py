@@ -20,7 +20,7 @@ from steptwin.live.clock import Clock
 from steptwin.live.pty import PtyLink
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import RtuSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
@@ -40,7 +40,7 @@ POSITION_ANSWER = bytes.fromhex("010304 00000000 FA33".replace(" ", ""))
 
 
 def on_link(path: Path, play: Callable[[PtyLink], Awaitable[Any]], *, timed: bool = False) -> Any:
-    """Play a scene on an open link. The kernel passes a pty's bytes on in its own time, so this is real time."""
+    """Play a scene on an open link. The system passes a pty's bytes on in its own time, so this is real time."""
 
     async def scene() -> Any:
         link = make_link(path, timed=timed)
@@ -54,11 +54,11 @@ def on_link(path: Path, play: Callable[[PtyLink], Awaitable[Any]], *, timed: boo
 
 
 def make_link(path: Path, *, timed: bool = False) -> PtyLink:
-    kernel = Kernel()
+    scheduler = Scheduler()
     devices = {1: Mic488Device(ControllerConfig())}
-    kernel.add("1", devices[1])
+    scheduler.add("1", devices[1])
     units = TimedUnits(devices, LineTiming(SerialLine(38400)))
-    return PtyLink(Cell(kernel, Clock()), path, lambda: TimedRtuSlavePort(units) if timed else RtuSlavePort(devices))
+    return PtyLink(Cell(scheduler, Clock()), path, lambda: TimedRtuSlavePort(units) if timed else RtuSlavePort(devices))
 
 
 class Program:

@@ -18,7 +18,7 @@ from steptwin.live.clock import Clock
 from steptwin.live.serialport import SerialLink
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.wire.slave import RtuSlavePort
 
 Run = Callable[..., Any]
@@ -59,10 +59,10 @@ class Adapter:
 def on_line(device: Path, play: Callable[[SerialLink, list[str]], Awaitable[Any]]) -> Any:
     async def scene() -> Any:
         mic = Mic488Device(ControllerConfig())
-        kernel = Kernel()
-        kernel.add("1", mic)
+        scheduler = Scheduler()
+        scheduler.add("1", mic)
         notices: list[str] = []
-        link = SerialLink(Cell(kernel, Clock()), str(device), 19200, lambda: RtuSlavePort({1: mic}), notices.append)
+        link = SerialLink(Cell(scheduler, Clock()), str(device), 19200, lambda: RtuSlavePort({1: mic}), notices.append)
         try:
             await link.open()
             return await play(link, notices)

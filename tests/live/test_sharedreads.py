@@ -78,7 +78,7 @@ def test_what_is_written_is_read(run: Run, make_cell: Make) -> None:
 
 
 def test_what_signals_settle_to_is_read(run: Run, make_cell: Make) -> None:
-    """Something other than a request changes the controller within a batch, and the kernel is told."""
+    """Something other than a request changes the controller within a batch, and the scheduler is told."""
 
     def play(cell: Cell, device: Mic488Device, counted: Counted, shared: Any) -> list[bytes]:
         batches().current = 1

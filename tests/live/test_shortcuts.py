@@ -23,7 +23,7 @@ from steptwin.machine import MILLISECOND
 from steptwin.simulation.kinds.mic488.line import ModbusBus
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.world.inputs import Bytes
-from steptwin.simulation.world.plantsnapshot import RecordedInput
+from steptwin.simulation.world.snapshot import RecordedInput
 from steptwin.wire import mbap
 from steptwin.wire.crc import with_crc
 from steptwin.wire.pdu import READS

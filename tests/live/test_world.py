@@ -25,7 +25,7 @@ from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.simulation.faults import Faults, FaultyPort
 from steptwin.simulation.faults import LineProtocol as FaultLine
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.inputs import Bytes, See
 from steptwin.wire.frameline import FrameLine
@@ -35,7 +35,7 @@ LINE = '[[line]]\nname = "bus"\ntcp = "127.0.0.1:0"\n[[mic488]]\nname = "twin"\n
 READ = bytes.fromhex("00 01 00 00 00 06 01 03 27 24 00 0a")
 UNFRAMED = "9 bytes that belong to no frame"
 MORE_CALLS = 8
-"""Of a read through a world: the world around the kernel, the place, its line."""
+"""Of a read through a world: the world around the scheduler, the place, its line."""
 
 
 class Client:
@@ -70,9 +70,9 @@ def test_a_read_through_a_world_takes_few_more_calls_than_one_of_a_served_contro
         live = LiveWorld(world)
         cell = Cell(live, Clock())
         live.share_reads(cell)
-        kernel, device = Kernel(), Mic488Device(ControllerConfig(), "1.70")
-        kernel.add("twin", device)
-        served = Cell(kernel, Clock())
+        scheduler, device = Scheduler(), Mic488Device(ControllerConfig(), "1.70")
+        scheduler.add("twin", device)
+        served = Cell(scheduler, Clock())
         port = FaultyPort(TcpSlavePort(share_reads({1: device}, served)), "tcp-1", Faults(), FaultLine.TCP)
         clients = Client(), Client()
         feeds = Feed(served, port, clients[0]), Feed(cell, PlacePort(live, "bus", "tcp-1", "tcp"), clients[1])
@@ -88,7 +88,7 @@ def test_a_read_through_a_world_takes_few_more_calls_than_one_of_a_served_contro
     asyncio.run(run())
 
 
-def test_a_request_visits_no_other_kernel() -> None:
+def test_a_request_visits_no_other_scheduler() -> None:
     controllers = "".join(f'[[mic488]]\nname = "other-{i}"\n' for i in range(20))
     live = LiveWorld(World.from_toml(LINE + controllers))
     port = PlacePort(live, "bus", "tcp-1", "tcp")
@@ -102,11 +102,11 @@ def test_a_request_visits_no_other_kernel() -> None:
     read()
     found = calls(read)
     assert found["Mic488Device.execute"] == 1
-    assert found["Kernel.deadline"] + found["Kernel.advance"] < 5, found
+    assert found["Scheduler.deadline"] + found["Scheduler.advance"] < 5, found
 
 
-def test_what_is_due_in_many_kernels_is_done_when_it_is_due() -> None:
-    """Outputs that a script sets run along wires with delays, each in a kernel of its own."""
+def test_what_is_due_in_many_schedulers_is_done_when_it_is_due() -> None:
+    """Outputs that a script sets run along wires with delays, each in a scheduler of its own."""
     pairs = "".join(
         f'[[mic488]]\nname = "a{i}"\n[[wire]]\nfrom = "a{i}.OUT1"\nto = "a{i}.IN1"\ndelay = "{7 + 5 * i % 11} ms"\n'
         for i in range(8)

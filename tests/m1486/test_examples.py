@@ -9,7 +9,7 @@ from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.line import SerialChain
 from steptwin.m1486.variants import variant
 from steptwin.machine import MILLISECOND, SECOND
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.wires import PinName, Wire
 
 STEP = 64
@@ -109,7 +109,7 @@ def test_example_5_bcd_digits_through_a_multiplexer(manual_examples: dict[int, s
 @pytest.mark.parametrize("is_timed", [False, True])
 def test_example_6_two_chips_joined_by_a_wire(manual_examples: dict[int, str], is_timed: bool) -> None:
     chips = {n: M1486Chip(variant("B"), address=n, is_timed=is_timed) for n in (0, 7)}
-    world = Kernel()
+    world = Scheduler()
     for n, chip in chips.items():
         world.add(f"chip {n}", chip)
     world.connect(Wire(PinName("chip 0", "B1"), PinName("chip 7", "B3")))

@@ -228,7 +228,7 @@ def test_the_count_is_the_sum_of_the_pulses_of_replaced_profiles(steps: list[tup
 
     for (key, value), pause in steps:
         end = rig.now + pause
-        while (due := rig.kernel.deadline()) is not None and due <= end:
+        while (due := rig.scheduler.deadline()) is not None and due <= end:
             rig.wait_ns(due - rig.now)
             look()
         rig.wait_ns(end - rig.now)

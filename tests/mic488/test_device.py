@@ -81,7 +81,7 @@ def test_mic_27_power_cycle_forgets_everything_but_terminals_shafts_and_stored_r
     revision = rig.device.axes[1].revision
 
     rig.device.power_cycle(rig.now)
-    rig.kernel.deadline()
+    rig.scheduler.deadline()
     rig.dint = False
     fresh = Rig(rig.device.config)
     for block, count in ((10000, 14), (10020, 40), (10100, 16), (10120, 16), (0, 125), (1000, 125)):

@@ -99,7 +99,7 @@ def test_a_command_at_a_moment_comes_after_what_is_due_then() -> None:
     rig = Rig()
     rig.enable(1)
     rig.set("POS_ABS", 1000.0)
-    rig.kernel.advance(2 * SECOND)
+    rig.scheduler.advance(2 * SECOND)
     assert rig.device.execute(word_pdu(rig.address("M_STOP"), 1), 2 * SECOND)
     assert rig.device.axes[0].status == 1
     assert rig.device.axes[0].coordinate_p(2 * SECOND) == 1000
@@ -162,7 +162,7 @@ SCRIPTS = st.lists(st.tuples(PDUS, st.integers(0, 3 * SECOND)), min_size=2, max_
 
 
 class Played:
-    """A controller to which a script is played without a kernel between."""
+    """A controller to which a script is played without a scheduler between."""
 
     def __init__(self, config: ControllerConfig = BUSY) -> None:
         self.rig = Rig(config)

@@ -29,7 +29,7 @@ def test_the_axis_follows_the_handwheel() -> None:
     rig.until(1, POSITION)
     rig.until(1, REACHED)
     assert rig.position() == 600.0
-    assert rig.kernel.deadline() is None
+    assert rig.scheduler.deadline() is None
 
 
 def test_following_is_planned_anew_every_10_ms_while_the_wheel_turns() -> None:
@@ -139,9 +139,9 @@ def test_an_axis_that_nobody_disturbs_needs_no_control_loop() -> None:
     """An idle machine costs nothing, in any mode."""
     for mode in (CONTROL_OFF, ENCODER, ENCFOLLOW):
         rig = encoder_rig(mode)
-        assert rig.kernel.deadline() is None
+        assert rig.scheduler.deadline() is None
         rig.set("VEL_ABS", 100.0)
-        assert rig.kernel.deadline() is None
+        assert rig.scheduler.deadline() is None
 
 
 def test_a_slip_between_two_moves_is_corrected_by_the_second() -> None:
@@ -173,4 +173,4 @@ def test_a_move_that_arrives_where_it_should_needs_no_control_loop() -> None:
     rig.until(1, REACHED)
     rig.wait_ns(1)
     assert rig.status() == REACHED
-    assert rig.kernel.deadline() is None
+    assert rig.scheduler.deadline() is None

@@ -49,7 +49,7 @@ def test_what_is_shorter_than_the_filter_time_does_not_show() -> None:
         rig.wait(0.001)
     rig.wait(1.0)
     assert shown(rig, 1) == 0
-    assert rig.kernel.deadline() is None
+    assert rig.scheduler.deadline() is None
 
 
 def test_a_level_that_goes_back_is_nothing_that_is_due() -> None:

@@ -121,7 +121,7 @@ def test_a_slip_is_corrected_after_settling() -> None:
     assert abs(rig.get("ENC_IMP") - 250) <= 4
     assert rig.velocity() == 0.0
     assert motor(rig) == rig.position() + 400
-    assert rig.kernel.deadline() is None
+    assert rig.scheduler.deadline() is None
 
 
 @pytest.mark.parametrize(("counts", "status"), [(4, REACHED), (-4, REACHED), (5, CORRECTION), (-5, CORRECTION)])
@@ -181,7 +181,7 @@ def test_stop_ends_the_correction() -> None:
     rig.stop()
     rig.wait(5.0)
     assert rig.status() == ON
-    assert rig.kernel.deadline() is None
+    assert rig.scheduler.deadline() is None
 
 
 def test_mic_13_position_written_during_a_correction_does_not_change_where_it_ends() -> None:

@@ -16,7 +16,7 @@ from steptwin.mic488.axis import MAX_SPEED_P
 from steptwin.mic488.config import AxisConfig, ControllerConfig, ProgramConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program_banks import load, setup_of
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.wires import PinName, Wire
 from steptwin.wbc.check import check
 from steptwin.wbc.positions import parse_positions
@@ -315,17 +315,17 @@ def test_controllers_share_a_program_and_nothing_else() -> None:
 def test_outputs_of_programs_travel_over_wires_and_back_in_one_world() -> None:
     ping, table = loaded("L:\nOUT1 = ON\nWAIT IN1 = ON\nOUT1 = OFF\nWAIT IN1 = OFF\nn = n + 1\n$R0 = n\nJUMP L\n")
     pong, _ = loaded("L:\nWAIT IN1 = ON\nOUT1 = ON\nWAIT IN1 = OFF\nOUT1 = OFF\nJUMP L\n")
-    kernel = Kernel()
+    scheduler = Scheduler()
     one, other = (Mic488Device(ControllerConfig(), programs={0: program}, positions={0: table}) for program in (ping, pong))
-    kernel.add("one", one)
-    kernel.add("other", other)
-    kernel.connect(Wire(PinName("one", "OUT1"), PinName("other", "IN1")))
-    kernel.connect(Wire(PinName("other", "OUT1"), PinName("one", "IN1")))
+    scheduler.add("one", one)
+    scheduler.add("other", other)
+    scheduler.connect(Wire(PinName("one", "OUT1"), PinName("other", "IN1")))
+    scheduler.connect(Wire(PinName("other", "OUT1"), PinName("one", "IN1")))
     seen: list[PinEdge] = []
-    kernel.observers.append(lambda name, edge: seen.append(edge))
+    scheduler.observers.append(lambda name, edge: seen.append(edge))
     for device in (one, other):
         device.command(partial(device.program.command, 1), 0)
-    kernel.advance(SECOND)
+    scheduler.advance(SECOND)
     rounds = one.program.interpreter.cells[0]
     # Every way takes the filter of the input and a statement or two.
     assert 18 <= rounds <= 22

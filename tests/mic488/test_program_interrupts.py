@@ -90,7 +90,7 @@ def test_hardint_during_a_wait_is_not_left_behind_by_a_program_that_runs_ahead(w
         rig.pin("IN1", 1.0)
         rig.wait(0.0504)
         rig.pin("IN2", 1.0)
-    ahead.wait(0.8)  # the kernel advances it to its next change
+    ahead.wait(0.8)  # the scheduler advances it to its next change
     for _ in range(800):
         slow.wait(0.001)
     assert ahead.changes("OUT1") == slow.changes("OUT1")

@@ -134,7 +134,7 @@ def test_mic_14_positions_that_the_counter_holds_after_rounding(gear: float) -> 
 def test_a_loop_that_writes_what_is_there_already_rests(assignment: str) -> None:
     rig = started(f"MAIN:\n{assignment}\nJUMP MAIN\nINT_IN1:\nRETURN\nINT_MODBUS:\nRETURN\nINT_M1:\nRETURN\n")
     rig.wait(0.1)
-    assert (rig.state, rig.kernel.deadline()) == (RUNNING, None)
+    assert (rig.state, rig.scheduler.deadline()) == (RUNNING, None)
 
 
 @pytest.mark.parametrize(
@@ -148,7 +148,7 @@ def test_a_loop_that_changes_a_register_and_changes_it_back_does_not_rest(name: 
     values = "10" if name in ("OUT1", "M1") else "12"
     rig = started(f"MAIN:\n{name} = {values[0]}\n{name} = {values[1]}\nJUMP MAIN\n")
     rig.wait(0.1)
-    deadline = rig.kernel.deadline()
+    deadline = rig.scheduler.deadline()
     assert (rig.state, deadline) == (RUNNING, rig.now + 1_000_000)
 
 
@@ -174,7 +174,7 @@ COUNT_TICKS = "MAIN:\n$I1 = $I1 + 1\nJUMP MAIN\nINT_TICK:\n$I0 = $I0 + 1\nRETURN
 )
 def test_what_a_write_leads_to_comes_at_its_moment_although_the_program_could_run_ahead(text: str, count: int) -> None:
     rig = programmed(text)
-    rig.kernel.connect(Wire(PinName("m", "OUT1"), PinName("m", "IN1")))
+    rig.scheduler.connect(Wire(PinName("m", "OUT1"), PinName("m", "IN1")))
     rig.start()
     rig.wait(6.0)
     assert rig.i(0) == pytest.approx(count, abs=1)

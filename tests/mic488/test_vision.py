@@ -67,7 +67,7 @@ def test_a_program_sees_records() -> None:
     port = Com1Port(rig.device)
     for number in (1, 2):
         port.exchange(f"N{number} X12.5 Y-7 A90\r\n".encode(), rig.now)
-        rig.kernel.deadline()
+        rig.scheduler.deadline()
         rig.wait(1)
         assert [rig.r(n) for n in (0, 2, 4, 6, 8)] == [number, 12.5, -7, 90, number]
     assert (port.to_send(rig.now), port.deadline(), port.unframed) == ([], None, 0)
@@ -91,7 +91,7 @@ def test_wbc_15_modbus_and_records_on_one_port() -> None:
         for piece in pieces:
             rig.wait(0.005)
             answered += bool(port.exchange(piece, rig.now))
-        rig.kernel.deadline()
+        rig.scheduler.deadline()
         rig.wait(0.5)
         assert port.to_send(rig.now) == []
         answers.append(answered)
@@ -117,7 +117,7 @@ def test_wbc_15_a_frame_that_came_in_pieces_leaves_nothing_of_a_record() -> None
     rig.wait(0.1)
     assert rig.r(8) == 0
     port.exchange(b"N4 X1 Y2 A3\r", rig.now)
-    rig.kernel.deadline()
+    rig.scheduler.deadline()
     rig.wait(0.1)
     assert (rig.r(0), rig.r(8)) == (4, 1)
 
@@ -150,7 +150,7 @@ def test_wbc_15_a_frame_before_a_record_leaves_it_whole() -> None:
     port.exchange(encode_frame(1, read_pdu(3, 0, 2)) + b"N4 X1 ", rig.now)
     port.to_send(rig.now)
     port.exchange(b"Y2 A3\r", rig.now)
-    rig.kernel.deadline()
+    rig.scheduler.deadline()
     rig.wait(0.1)
     assert (rig.r(0), rig.r(8)) == (4, 1)
 

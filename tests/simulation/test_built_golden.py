@@ -113,7 +113,7 @@ to = "a.IN6"
 
 
 def described(world: World) -> Iterator[str]:
-    yield f"kernels: {'; '.join(' '.join(names) for names in world.blueprint.joined or ())}"
+    yield f"schedulers: {'; '.join(' '.join(names) for names in world.blueprint.joined or ())}"
     for name, axis in world.parts.built(AXIS).items():
         yield f"axis {name}: {axis.mechanism.build}, {float(axis.scale.pulses_per_unit):.12g} imp/{axis.scale.unit}"
     yield from (f"view {'.'.join(name)}: {view}" for name, view in axis_views(world).items())
@@ -131,10 +131,10 @@ def described(world: World) -> Iterator[str]:
                 yield f"  {name}.{signal}: {of.unit} {of.bounds} of {sources}"
             if element.moved is not None:
                 yield from (f"  {name} is moved by {axis}: {lane}" for axis, lane in element.moved(built))
-    for kernel in world.kernels:
-        for number, part in enumerate(kernel.parts):
-            watched = sorted(name for name, numbers in kernel._parts.by_name.items() if number in numbers)
-            yield f"part {number} {type(part).__name__} of {kernel._parts.computes[number]}: {' '.join(watched)}"
+    for scheduler in world.schedulers:
+        for number, part in enumerate(scheduler.parts):
+            watched = sorted(name for name, numbers in scheduler._parts.by_name.items() if number in numbers)
+            yield f"part {number} {type(part).__name__} of {scheduler._parts.computes[number]}: {' '.join(watched)}"
 
 
 def test_what_is_built_is_the_reviewed() -> None:

@@ -7,12 +7,12 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from steptwin.files.world import World
-from steptwin.simulation.world.plantsnapshot import PlantSnapshot
+from steptwin.simulation.world.snapshot import SimulationSnapshot
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 
 
-def go_on(world: World, snapshot: PlantSnapshot, until: float) -> tuple[str, str]:
+def go_on(world: World, snapshot: SimulationSnapshot, until: float) -> tuple[str, str]:
     """The digests of a world that came from another process: as it goes on, and after it went back to a snapshot."""
     world.run(until=until)
     went_on = world.trace.digest()

@@ -1,5 +1,5 @@
 """Scripts are evaluated only when something has changed on which their conditions depend. The result is that of evaluating all of
-them at every event, in random worlds of machines and elements that share a kernel."""
+them at every event, in random worlds of machines and elements that share a scheduler."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 
 SLICES_S = (0.31, 0.0007, 0.52, 0.9)
 NUMBERS = (0, 1, 2, 4, 10, 45, 120, 3000)
@@ -234,5 +234,5 @@ def test_to_evaluate_everything_at_every_event_changes_nothing(random: Random) -
     layout = Layout(random)
     text = layout.text + "".join(layout.scripts(layout.signals()))
     usual = history(text)
-    with mock.patch.object(Kernel, "take_changed", lambda kernel: set(kernel._sources)):
+    with mock.patch.object(Scheduler, "take_changed", lambda scheduler: set(scheduler._sources)):
         assert history(text) == usual

@@ -1,4 +1,4 @@
-"""A controller that only the tests know passes through kernel, wires, snapshots, mechanics, faults and a line."""
+"""A controller that only the tests know passes through scheduler, wires, snapshots, mechanics, faults and a line."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.simulation.faults import Faults, read, rig
 from steptwin.simulation.mechanics.course import Build
 from steptwin.simulation.mechanics.mechanics import Mechanism
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 from steptwin.simulation.scheduler.wires import PinName, Wire
 
@@ -51,26 +51,26 @@ commands = st.lists(
 
 @given(commands, st.lists(st.integers(0, SECOND), max_size=8))
 def test_time_in_pieces_is_time_at_once(inputs: list[tuple[Nanos, bytes | str]], looks: list[Nanos]) -> None:
-    """Both kernels get the same inputs; one is advanced to moments in between, too."""
+    """Both schedulers get the same inputs; one is advanced to moments in between, too."""
     traces = []
     for moments in ([], looks):
         trace = Trace()
-        kernel, toy = Kernel(record=trace.add), Toy()
-        kernel.add("toy", toy)
+        scheduler, toy = Scheduler(record=trace.add), Toy()
+        scheduler.add("toy", toy)
         now = 0
         for wait, what in inputs:
             for look in sorted(look for look in moments if look < wait):
-                kernel.advance(now + look)
-                due = kernel.deadline()
+                scheduler.advance(now + look)
+                due = scheduler.deadline()
                 assert due is None or due > now + look
             now += wait
-            kernel.advance(now)
+            scheduler.advance(now)
             if isinstance(what, bytes):
                 toy.execute(what, now)
             else:
                 toy.set_pin("STOP", float(what == "stop"), now)
-        kernel.advance(now + 10 * SECOND)
-        assert kernel.deadline() is None
+        scheduler.advance(now + 10 * SECOND)
+        assert scheduler.deadline() is None
         traces.append(trace.digest())
     assert traces[0] == traces[1]
 
@@ -78,88 +78,88 @@ def test_time_in_pieces_is_time_at_once(inputs: list[tuple[Nanos, bytes | str]],
 # ---------------------------------------------------------------------- wires
 
 
-def wired() -> tuple[Kernel, Toy, Mic488Device]:
-    kernel, toy, mic = Kernel(), Toy(), Mic488Device(ControllerConfig())
-    kernel.add("toy", toy)
-    kernel.add("mic", mic)
-    kernel.connect(Wire(PinName("toy", "BUSY"), PinName("mic", "IN5")))
-    kernel.connect(Wire(PinName("mic", "OUT1"), PinName("toy", "STOP"), delay=MILLISECOND))
-    return kernel, toy, mic
+def wired() -> tuple[Scheduler, Toy, Mic488Device]:
+    scheduler, toy, mic = Scheduler(), Toy(), Mic488Device(ControllerConfig())
+    scheduler.add("toy", toy)
+    scheduler.add("mic", mic)
+    scheduler.connect(Wire(PinName("toy", "BUSY"), PinName("mic", "IN5")))
+    scheduler.connect(Wire(PinName("mic", "OUT1"), PinName("toy", "STOP"), delay=MILLISECOND))
+    return scheduler, toy, mic
 
 
 def test_wires_join_it_with_another_controller_in_both_directions() -> None:
-    kernel, toy, mic = wired()
+    scheduler, toy, mic = wired()
     toy.execute(GO, 0)
-    kernel.advance(100 * MILLISECOND)
+    scheduler.advance(100 * MILLISECOND)
     assert mic.pins()["IN5"] == 1.0
     mic.execute(bytes.fromhex("05 1770 FF00"), 100 * MILLISECOND)  # OUT1 on
-    kernel.advance(SECOND)
+    scheduler.advance(SECOND)
     assert toy.axis.plan.end == 202 * MILLISECOND  # 101 ms up, and as long down
     assert mic.pins()["IN5"] == 0.0
     assert toy.execute(GO, SECOND) == b"E\x0a"
 
 
-def test_a_snapshot_of_both_continues_as_the_kernel_itself() -> None:
-    kernel, toy, mic = wired()
+def test_a_snapshot_of_both_continues_as_the_scheduler_itself() -> None:
+    scheduler, toy, mic = wired()
     toy.execute(GO, 0)
-    kernel.advance(50 * MILLISECOND)
+    scheduler.advance(50 * MILLISECOND)
     mic.execute(bytes.fromhex("05 1770 FF00"), 50 * MILLISECOND)
-    kernel.settle()
-    kept = pickle.loads(pickle.dumps(kernel.snapshot()))
+    scheduler.settle()
+    kept = pickle.loads(pickle.dumps(scheduler.snapshot()))
     others, other, _ = wired()
     others.restore(kept)
-    for one in (kernel, others):
+    for one in (scheduler, others):
         one.advance(SECOND)
-    assert others.snapshot() == kernel.snapshot()
+    assert others.snapshot() == scheduler.snapshot()
     assert other.axis.plan.count(SECOND) == toy.axis.plan.count(SECOND) < 10
 
 
 # ---------------------------------------------------------------------- mechanics and faults
 
 
-def faulty(*faults: str) -> tuple[Kernel, Toy, Mechanism, Faults]:
-    kernel, toy, there = Kernel(), Toy(), Faults()
-    kernel.add("toy", toy)
-    mechanism = Mechanism(kernel, "toy", 1, Build())
-    kernel.add_part(mechanism)
-    rig(kernel, "toy", there, ToyBody([mechanism]))
+def faulty(*faults: str) -> tuple[Scheduler, Toy, Mechanism, Faults]:
+    scheduler, toy, there = Scheduler(), Toy(), Faults()
+    scheduler.add("toy", toy)
+    mechanism = Mechanism(scheduler, "toy", 1, Build())
+    scheduler.add_part(mechanism)
+    rig(scheduler, "toy", there, ToyBody([mechanism]))
     for fault in faults:
         there.add(read(fault))
-    return kernel, toy, mechanism, there
+    return scheduler, toy, mechanism, there
 
 
 def test_its_shaft_is_blocked_and_loses_pulses() -> None:
-    kernel, toy, mechanism, _ = faulty("stall at_s=1 for_s=2", "lost-steps at_s=4 pulses=4")
-    kernel.advance(SECOND)
+    scheduler, toy, mechanism, _ = faulty("stall at_s=1 for_s=2", "lost-steps at_s=4 pulses=4")
+    scheduler.advance(SECOND)
     toy.execute(GO, SECOND)
-    kernel.advance(2 * SECOND)
+    scheduler.advance(2 * SECOND)
     assert (toy.axis.plan.count(2 * SECOND), mechanism.place(2 * SECOND)) == (100, 0)
-    kernel.advance(3 * SECOND)
+    scheduler.advance(3 * SECOND)
     assert (mechanism.place(3 * SECOND), mechanism.lost(3 * SECOND)) == (0, 100)
-    kernel.advance(5 * SECOND)
+    scheduler.advance(5 * SECOND)
     assert (mechanism.place(5 * SECOND), mechanism.lost(5 * SECOND)) == (-4, 104)
 
 
 def test_its_input_sticks_and_bounces() -> None:
-    kernel, toy, _, faults = faulty("stuck pin=stop value=1 until_s=1", "bounce pin=STOP bounces=1 for_ms=2 from_s=2")
+    scheduler, toy, _, faults = faulty("stuck pin=stop value=1 until_s=1", "bounce pin=STOP bounces=1 for_ms=2 from_s=2")
     seen: list[TraceRecord] = []
     faults.sinks.append(seen.append)
-    kernel.advance(MILLISECOND)
+    scheduler.advance(MILLISECOND)
     assert toy.execute(GO, MILLISECOND) == b"E\x0a"
-    kernel.advance(2 * SECOND)
+    scheduler.advance(2 * SECOND)
     assert toy.pins()["STOP"] == 0.0
-    kernel.machines["toy"].set_pin("STOP", 1.0, 2 * SECOND)
-    kernel.advance(3 * SECOND)
+    scheduler.machines["toy"].set_pin("STOP", 1.0, 2 * SECOND)
+    scheduler.advance(3 * SECOND)
     assert [value for *_, value in told(seen, "edge")] == [1.0, 0.0, 0.0, 1.0]
     assert [text for *_, text in told(seen, "fault")] == ["STOP is stuck at 1", "STOP is free", "STOP bounces 1 times in 2 ms"]
 
 
 def test_its_supply_drops() -> None:
-    kernel, toy, _, _ = faulty("supply-drop at_s=0.1 for_s=0.5")
+    scheduler, toy, _, _ = faulty("supply-drop at_s=0.1 for_s=0.5")
     toy.execute(GO, 0)
-    kernel.advance(200 * MILLISECOND)
+    scheduler.advance(200 * MILLISECOND)
     assert (toy.is_off, toy.axis.plan.count(200 * MILLISECOND)) == (True, 5)
-    kernel.advance(SECOND)
+    scheduler.advance(SECOND)
     assert toy.execute(GO, SECOND) == GO
 
 
@@ -179,54 +179,54 @@ def test_what_cannot_fail_is_refused(fault: str, why: str) -> None:
 
 
 def test_a_snapshot_with_faults_continues_alike_and_one_from_before_them_has_none() -> None:
-    kernel, toy, _, _ = faulty()
-    before = kernel.snapshot()
-    kernel, toy, _, there = faulty("stuck pin=STOP value=1 from_s=0.1", "stall at_s=0.05 for_s=3")
+    scheduler, toy, _, _ = faulty()
+    before = scheduler.snapshot()
+    scheduler, toy, _, there = faulty("stuck pin=STOP value=1 from_s=0.1", "stall at_s=0.05 for_s=3")
     toy.execute(GO, 0)
-    kernel.advance(200 * MILLISECOND)
-    kept = kernel.snapshot()
-    kernel.advance(SECOND)
-    first = kernel.snapshot()
-    kernel.restore(kept)
-    kernel.advance(SECOND)
-    assert kernel.snapshot() == first
+    scheduler.advance(200 * MILLISECOND)
+    kept = scheduler.snapshot()
+    scheduler.advance(SECOND)
+    first = scheduler.snapshot()
+    scheduler.restore(kept)
+    scheduler.advance(SECOND)
+    assert scheduler.snapshot() == first
     there.clear(SECOND)
-    kernel.restore(before)
+    scheduler.restore(before)
     assert (toy.now, toy.pins()) == (0, {"STOP": 0.0, "BUSY": 0.0})
-    assert kernel.snapshot() == before
+    assert scheduler.snapshot() == before
 
 
 def test_a_snapshot_from_before_it_could_fail_is_restored() -> None:
-    kernel, toy = Kernel(), Toy()
-    kernel.add("toy", toy)
-    before = kernel.snapshot()
-    rig(kernel, "toy", there := Faults(), ToyBody())
+    scheduler, toy = Scheduler(), Toy()
+    scheduler.add("toy", toy)
+    before = scheduler.snapshot()
+    rig(scheduler, "toy", there := Faults(), ToyBody())
     there.add(read("stuck pin=STOP value=1"))
-    kernel.advance(SECOND)
+    scheduler.advance(SECOND)
     there.clear(SECOND)
-    kernel.restore(before)
+    scheduler.restore(before)
     assert toy.snapshot() == before.machines[0]
 
 
 # ---------------------------------------------------------------------- a line
 
 
-def lined(*faults: str) -> tuple[Kernel, Toy, ToyLine]:
-    kernel, toy, there = Kernel(), Toy(), Faults()
+def lined(*faults: str) -> tuple[Scheduler, Toy, ToyLine]:
+    scheduler, toy, there = Scheduler(), Toy(), Faults()
     for fault in faults:
         there.add(read(fault))
-    kernel.add("toy", toy)
-    line = ToyLine(kernel, "bus", toy, there)
-    kernel.add_part(line)
-    return kernel, toy, line
+    scheduler.add("toy", toy)
+    line = ToyLine(scheduler, "bus", toy, there)
+    scheduler.add_part(line)
+    return scheduler, toy, line
 
 
 def test_a_line_of_a_world_carries_its_protocol() -> None:
-    kernel, _, line = lined()
+    scheduler, _, line = lined()
     line.receive("pty", b"M", 0)
     line.receive("tcp-1", b"P\0", 0)
     line.receive("pty", b"\x0aP", 0)
-    kernel.advance(SECOND)
+    scheduler.advance(SECOND)
     line.receive("pty", b"\0", SECOND)
     assert line.places["pty"].take(SECOND) == [(0, GO), (SECOND, b"P\x0a")]
     assert line.places["tcp-1"].take(SECOND) == [(0, b"P\0")]
@@ -235,17 +235,17 @@ def test_a_line_of_a_world_carries_its_protocol() -> None:
 
 
 def test_bytes_of_its_protocol_go_wrong_on_the_way() -> None:
-    kernel, _, line = lined("gap nth=1 for_ms=5 direction=in")
+    scheduler, _, line = lined("gap nth=1 for_ms=5 direction=in")
     line.receive("pty", b"P\0", 0)
-    assert kernel.deadline() == 5 * MILLISECOND
-    kernel.advance(SECOND)
+    assert scheduler.deadline() == 5 * MILLISECOND
+    scheduler.advance(SECOND)
     assert line.places["pty"].take(SECOND) == [(5 * MILLISECOND, b"P\0")]
 
 
 def test_half_a_command_is_part_of_a_snapshot() -> None:
-    kernel, _, line = lined()
+    scheduler, _, line = lined()
     line.receive("pty", b"M", 0)
     other, _, its_line = lined()
-    other.restore(kernel.snapshot())
+    other.restore(scheduler.snapshot())
     its_line.receive("pty", b"\x05", 0)
     assert its_line.places["pty"].take(0) == [(0, b"M\x05")]

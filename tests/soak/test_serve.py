@@ -1,4 +1,4 @@
-"""A world of `serve` holds as much after many requests as after few: ports, kernel, events and the log of frames."""
+"""A world of `serve` holds as much after many requests as after few: ports, scheduler, events and the log of frames."""
 
 from __future__ import annotations
 

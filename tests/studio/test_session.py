@@ -260,7 +260,7 @@ class _Bounds(Mock):
 )
 def test_a_stretch_of_the_history_goes_from_its_beginning_to_its_end(name: str, fields: dict[str, Any]) -> None:
     studio = Studio()
-    studio.hub.around = replace(studio.hub.around, plant=_Bounds())
+    studio.hub.around = replace(studio.hub.around, services=_Bounds())
     tab = studio.open()
     assert tab.error(name, **fields, from_s=1, to_s=2.5) == ("refusal", "1.0 to 2.5")
     assert tab.error(name, **fields) == ("refusal", "0.0 to None")

@@ -27,7 +27,7 @@ from steptwin.live.cell import Cell
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program import ProgramState
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.script.steps import Write
 from steptwin.subject.events import Numbering
 from steptwin.wire.slave import TcpSlavePort
@@ -116,10 +116,10 @@ class BridgeRig(BridgedDevice):
     def __init__(self) -> None:
         program, _ = loaded(PROGRAM)
         self.device = Mic488Device(controller(MM), "1.70", programs={0: program})
-        kernel = Kernel()
-        kernel.add("table", self.device)
+        scheduler = Scheduler()
+        scheduler.add("table", self.device)
         loop: Any = asyncio.get_running_loop()
-        self.cell = Cell(kernel, loop.clock())
+        self.cell = Cell(scheduler, loop.clock())
         self.line = SilentLine(self.cell, self.device)
 
     async def open(self) -> None:
@@ -145,7 +145,7 @@ class BridgeRig(BridgedDevice):
     @property
     def is_moving(self) -> bool:
         self.cell.enter()
-        return self.device.axes[AXIS - 1].profile.moving(self.cell.kernel.now)
+        return self.device.axes[AXIS - 1].profile.moving(self.cell.scheduler.now)
 
     @property
     def is_running(self) -> bool:
@@ -154,7 +154,7 @@ class BridgeRig(BridgedDevice):
     @property
     def position(self) -> float:
         self.cell.enter()
-        return self.device.axes[AXIS - 1].profile.position(self.cell.kernel.now)
+        return self.device.axes[AXIS - 1].profile.position(self.cell.scheduler.now)
 
 
 class ChipBridgeRig(BridgedDevice):

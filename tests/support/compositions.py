@@ -22,7 +22,7 @@ from steptwin.files.world import World
 from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.kinds.mic488.build import _loaded
 from steptwin.simulation.mechanics.course import Course
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.toml.reader import WorldError
 from steptwin.simulation.world.history import History
@@ -399,12 +399,12 @@ def general_way() -> Generator[Callable[[World], World]]:
     laid in pieces. What is given makes a world general that was made meanwhile."""
 
     def general(world: World) -> World:
-        for kernel in world.kernels:
-            kernel._join()
-            kernel.is_attentive = True
-            mark = partial(Kernel.mark, kernel)
-            kernel.mark = lambda name=None, mark=mark: mark()  # type: ignore[method-assign]
-            for machine in kernel.machines.values():
+        for scheduler in world.schedulers:
+            scheduler._join()
+            scheduler.is_attentive = True
+            mark = partial(Scheduler.mark, scheduler)
+            scheduler.mark = lambda name=None, mark=mark: mark()  # type: ignore[method-assign]
+            for machine in scheduler.machines.values():
                 machine.changed = mark
         for programs in world.programs.values():
             programs.execute_all(True, world.now)

@@ -7,7 +7,7 @@ from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.simulation.faults import ActiveFault, Faults, FaultyMachine, FaultyPort, LineProtocol, read, rig
 from steptwin.simulation.kinds.mic488.faults import Mic488Body
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.wire.gateway import ModbusGateway, TcpGatewayPort
@@ -55,14 +55,14 @@ class FaultRig:
         is_timed: bool = False,
         config: ControllerConfig | None = None,
     ) -> None:
-        self.kernel = Kernel()
+        self.scheduler = Scheduler()
         self.faults = Faults(seed)
         self.devices = {unit: Mic488Device(config or ControllerConfig()) for unit in units}
         self.machines: dict[int, FaultyMachine] = {}
         for unit, device in self.devices.items():
             device.execute(bytes.fromhex("06 00 64 12 34"), 0)
-            self.kernel.add(str(unit), device)
-            self.machines[unit] = rig(self.kernel, str(unit), self.faults, Mic488Body(device, unit))
+            self.scheduler.add(str(unit), device)
+            self.machines[unit] = rig(self.scheduler, str(unit), self.faults, Mic488Body(device, unit))
         self.records: list[TraceRecord] = []
         self.faults.sinks.append(self.records.append)
         if line is LineProtocol.TCP and is_timed:
@@ -84,16 +84,16 @@ class FaultRig:
         return next(iter(self.devices.values()))
 
     def add(self, *faults: str) -> list[ActiveFault]:
-        self.kernel.advance(self.now)
+        self.scheduler.advance(self.now)
         added = [self.faults.add(read(fault), self.now) for fault in faults]
-        self.kernel.settle()
+        self.scheduler.settle()
         return added
 
     def send(self, data: bytes) -> bytes:
         """What comes at once."""
-        self.kernel.advance(self.now)
+        self.scheduler.advance(self.now)
         answer = self.port.exchange(data, self.now)
-        self.kernel.settle()
+        self.scheduler.settle()
         return answer
 
     def ask(self, pdu: bytes = READ, unit: int = 1, ms: float = 10.0) -> bytes:
@@ -108,26 +108,26 @@ class FaultRig:
         end = self.now + round(seconds * SECOND)
         out = []
         while True:
-            dues = [due for due in (self.port.deadline(), self.kernel.deadline()) if due is not None]
+            dues = [due for due in (self.port.deadline(), self.scheduler.deadline()) if due is not None]
             due = min(dues, default=end + 1)
             if due > end:
                 break
             self.now = max(due, self.now)
-            self.kernel.advance(self.now)
+            self.scheduler.advance(self.now)
             out += self.port.to_send(self.now)
         self.now = end
-        self.kernel.advance(end)
+        self.scheduler.advance(end)
         return out
 
     def wait(self, seconds: float) -> None:
         self.now += round(seconds * SECOND)
-        self.kernel.advance(self.now)
+        self.scheduler.advance(self.now)
 
     def pin(self, pin: str, level: float, unit: int = 1) -> None:
         """Something outside drives an input."""
-        self.kernel.advance(self.now)
-        self.kernel.drive(PinName(str(unit), pin), level)
-        self.kernel.settle()
+        self.scheduler.advance(self.now)
+        self.scheduler.drive(PinName(str(unit), pin), level)
+        self.scheduler.settle()
 
     def level(self, pin: str) -> float:
         return self.device.pins()[pin]

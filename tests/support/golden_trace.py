@@ -111,13 +111,13 @@ class _Trace:
             case "pin":
                 rig.pin(arguments[0], float(arguments[1]))
             case "turn":
-                rig.kernel.advance(rig.now)
+                rig.scheduler.advance(rig.now)
                 rig.device.turn_encoder(int(arguments[0]), int(arguments[1]), rig.now)
-                rig.kernel.deadline()
+                rig.scheduler.deadline()
             case "couple":
-                rig.kernel.advance(rig.now)
+                rig.scheduler.advance(rig.now)
                 rig.device.couple_encoder(int(arguments[0]), Coupling(arguments[1]), rig.now)
-                rig.kernel.deadline()
+                rig.scheduler.deadline()
             case "user":
                 rig.write_words(int(arguments[0]), int(arguments[1]) & 0xFFFF)
             case _:
@@ -133,7 +133,7 @@ class _Trace:
             rig.device.advance(end)
         middle = (rig.now + end) // 2
         while rig.now < end:
-            due = rig.kernel.deadline()
+            due = rig.scheduler.deadline()
             ahead = [moment for moment in (due, middle, end) if moment is not None and moment > rig.now]
             rig.wait_ns(min(ahead) - rig.now)
             yield from self.look()

@@ -19,7 +19,7 @@ from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.program_banks import LoadedProgram, load
 from steptwin.simulation.logic.contacts import PositionSwitch, place
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.wbc.check import check
 from steptwin.wbc.dialect import dialect_for
@@ -87,15 +87,15 @@ class Refused(AssertionError):
 
 
 class Rig:
-    """A controller in a kernel, its present moment, and everything that came out of it."""
+    """A controller in a scheduler, its present moment, and everything that came out of it."""
 
     def __init__(self, config: ControllerConfig | None = None, firmware: str = "1.70", **options: Any) -> None:
         self.device = Mic488Device(config or ControllerConfig(), firmware, **options)
         self.base = OFFSETS[firmware]
-        self.kernel = Kernel()
-        self.kernel.add("m", self.device)
+        self.scheduler = Scheduler()
+        self.scheduler.add("m", self.device)
         self.edges: list[PinEdge] = []
-        self.kernel.observers.append(lambda name, edge: self.edges.append(edge))
+        self.scheduler.observers.append(lambda name, edge: self.edges.append(edge))
         self.now = 0
         self.dint = False
 
@@ -106,30 +106,30 @@ class Rig:
 
     def wait_ns(self, nanoseconds: int) -> None:
         self.now += nanoseconds
-        self.kernel.advance(self.now)
+        self.scheduler.advance(self.now)
         self.device.advance(self.now)
 
     def until(self, axis: int, *statuses: int, within: float = 100.0) -> None:
         """Wait from event to event until ``axis`` has one of ``statuses``."""
         end = self.now + round(within * SECOND)
         while self.status(axis) not in statuses:
-            due = self.kernel.deadline()
+            due = self.scheduler.deadline()
             assert due is not None, f"nothing will happen; status of M{axis} is {self.status(axis)}"
             assert due <= end, f"M{axis} has status {self.status(axis)} after {within} s"
             self.wait_ns(due - self.now)
 
     def pin(self, pin: str, value: float) -> None:
-        self.kernel.advance(self.now)
+        self.scheduler.advance(self.now)
         self.device.set_pin(pin, value, self.now)
-        self.kernel.deadline()
+        self.scheduler.deadline()
 
     def pins(self) -> Mapping[str, float]:
         return self.device.pins()
 
     def switch(self, axis: int, low: int | None, high: int | None, pin: str, *, normally_closed: bool = False) -> None:
-        self.kernel.advance(self.now)
-        place(self.kernel, PositionSwitch("m", axis, low, high, PinName("m", pin), normally_closed))
-        self.kernel.deadline()
+        self.scheduler.advance(self.now)
+        place(self.scheduler, PositionSwitch("m", axis, low, high, PinName("m", pin), normally_closed))
+        self.scheduler.deadline()
 
     def events(self, code: str) -> list[Mic488Event]:
         return [event for event in self.device.events if event.code == code]
@@ -137,9 +137,9 @@ class Rig:
     # -------------------------------------------------------------- requests
 
     def ask(self, pdu: bytes) -> bytes:
-        self.kernel.advance(self.now)
+        self.scheduler.advance(self.now)
         response = self.device.execute(pdu, self.now)
-        self.kernel.deadline()
+        self.scheduler.deadline()
         return response
 
     def _ask(self, pdu: bytes) -> bytes:
@@ -276,7 +276,7 @@ class Rig:
         """Wait from event to event until ``pin`` has ``level``; the moment in seconds."""
         end = self.now + round(within * SECOND)
         while self.pins()[pin] != level:
-            due = self.kernel.deadline()
+            due = self.scheduler.deadline()
             assert due is not None, f"nothing will happen, and {pin} is {self.pins()[pin]:g}"
             assert due <= end, f"{pin} is {self.pins()[pin]:g} after {within} s"
             self.wait_ns(due - self.now)
@@ -316,15 +316,15 @@ def encoder_rig(mode: int = 1, reaction: int = 1, /, **config: float) -> Rig:
 
 
 def couple(rig: Rig, coupling: Coupling, axis: int = 1) -> None:
-    rig.kernel.advance(rig.now)
+    rig.scheduler.advance(rig.now)
     rig.device.couple_encoder(axis, coupling, rig.now)
-    rig.kernel.deadline()
+    rig.scheduler.deadline()
 
 
 def turn(rig: Rig, counts: int, axis: int = 1) -> None:
-    rig.kernel.advance(rig.now)
+    rig.scheduler.advance(rig.now)
     rig.device.turn_encoder(axis, counts, rig.now)
-    rig.kernel.deadline()
+    rig.scheduler.deadline()
 
 
 def run(text: str, seconds: float = 1.0, **options: object) -> Rig:

@@ -32,7 +32,7 @@ from steptwin.simulation.world.actions import ACTIONS
 from steptwin.simulation.world.check import diagnose
 from steptwin.simulation.world.history import History, Past
 from steptwin.simulation.world.inputs import Bytes, Download, Leave, See, SetVariable
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.unfinished import waiting
 from steptwin.simulation.world.views import MechanicsView
 from steptwin.simulation.world.worldprograms import WorldPrograms
@@ -163,12 +163,12 @@ def do_from_outside(world: World, text: str, files: Mapping[str, bytes]) -> None
                 world.line[line].send(with_crc(bytes.fromhex(data)))
 
 
-def shown(world: Plant) -> list[str]:
+def shown(world: Simulation) -> list[str]:
     """What a viewer sees of it, and what scripts wait for."""
     return [f"stopped: {world.stopped}", *seen_of_machines(world), *(repr(one) for one in waiting(world))]
 
 
-def seen_of_machines(world: Plant) -> list[str]:
+def seen_of_machines(world: Simulation) -> list[str]:
     """Signals of elements, controllers and axes."""
     found = [f"{world.now}"]
     for name in world.parts.element_names:

@@ -10,8 +10,8 @@ from why_worlds import PROGRAM, WAITS
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.simulation.script import steps as do
-from steptwin.simulation.world.plant import Plant
-from steptwin.simulation.world.plantsnapshot import RecordedInput
+from steptwin.simulation.world.simulation import Simulation
+from steptwin.simulation.world.snapshot import RecordedInput
 from steptwin.why import courses, log, points, states
 from steptwin.why.question import Why
 
@@ -75,7 +75,7 @@ def runs(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """The ends of the parts of the past that are run again."""
     found: list[int] = []
 
-    def in_parts(world: Plant, inputs: Sequence[RecordedInput], end: int) -> Iterator[bool]:
+    def in_parts(world: Simulation, inputs: Sequence[RecordedInput], end: int) -> Iterator[bool]:
         found.append(end)
         return log.in_parts(world, inputs, end)
 
@@ -122,7 +122,7 @@ MOVES = (
 @pytest.mark.parametrize("program", [COUNTS, MOVES])
 @pytest.mark.parametrize("wired", ["", '[[button]]\nname = "go"\nto = "m.IN1"\n'])
 def test_what_is_noted_of_points_is_what_a_run_shows(program: str, wired: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Both alone and with others in the kernel; where too much changes, the past is run again instead."""
+    """Both alone and with others in the scheduler; where too much changes, the past is run again instead."""
     world = World.from_toml(WORLD + wired, {"m.prg": program.encode()})
     world.run(1.7)
     world.apply_input(do.Write((("m", "USER_REGISTER[4]", 90.0), ("m", "M2_ACC", 500.0))))

@@ -12,7 +12,7 @@ from steptwin.simulation.faults.kinds import KINDS
 from steptwin.simulation.faults.table import FaultKind, FaultValue, Layer
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.script.steps import Repeat, Set, Step
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 
 STUCK_INPUT, STUCK_OUTPUT = "stuck-input", "stuck-output"
 TRIED: dict[str, tuple[dict[str, FaultValue], ...]] = {
@@ -81,7 +81,7 @@ class PossibleFault:
         return replace(self.fault, given={**self.fault.given, "nth": nth})
 
 
-def possible_faults(world: Plant) -> list[PossibleFault]:
+def possible_faults(world: Simulation) -> list[PossibleFault]:
     """Every kind of fault at every place of a world, in the order of kinds, then places.
 
     ``world`` is prepared for faults by this; it is not for other use.
@@ -89,7 +89,7 @@ def possible_faults(world: Plant) -> list[PossibleFault]:
     return [found for kind in KINDS.values() for found in _of_kind(world, kind)]
 
 
-def _of_kind(world: Plant, kind: FaultKind) -> Iterator[PossibleFault]:
+def _of_kind(world: Simulation, kind: FaultKind) -> Iterator[PossibleFault]:
     for where, place in _places(world, kind):
         for more in TRIED.get(kind.name, ({},)):
             given: dict[str, object] = {**where, **more}
@@ -108,7 +108,7 @@ def _mode(kind: FaultKind, more: dict[str, FaultValue], where: dict[str, FaultVa
     )
 
 
-def _part(world: Plant, kind: FaultKind, where: dict[str, FaultValue]) -> FaultyPart:
+def _part(world: Simulation, kind: FaultKind, where: dict[str, FaultValue]) -> FaultyPart:
     if kind.layer not in (Layer.PHYSICS, Layer.ELEMENT):
         return FaultyPart.LINE
     if kind.name == STUCK_OUTPUT:
@@ -118,7 +118,7 @@ def _part(world: Plant, kind: FaultKind, where: dict[str, FaultValue]) -> Faulty
     return _OF_KIND.get(kind.name, FaultyPart.ACTUATOR)
 
 
-def _places(world: Plant, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue], str]]:
+def _places(world: Simulation, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue], str]]:
     """Parameters that choose each place at which a kind of fault may be, and its name."""
     if kind.layer is Layer.ELEMENT:
         yield from _elements(world, kind)
@@ -128,7 +128,7 @@ def _places(world: Plant, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValu
         yield from _lines(world, kind)
 
 
-def _elements(world: Plant, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue], str]]:
+def _elements(world: Simulation, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue], str]]:
     key, used = {STUCK_OUTPUT: ("output", _sources(world)), STUCK_INPUT: ("input", _contacted(world))}.get(kind.name, ("", []))
     for name in world.parts.faults.elements:
         if not key:
@@ -138,19 +138,19 @@ def _elements(world: Plant, kind: FaultKind) -> Iterator[tuple[dict[str, FaultVa
             yield {"element": name, key: terminal.lower()}, f"{name}.{terminal.lower()}"
 
 
-def _sources(world: Plant) -> list[tuple[str, str]]:
+def _sources(world: Simulation) -> list[tuple[str, str]]:
     """The outputs that a wire leads away from, in the order of terminals: what is stuck elsewhere has no effect."""
-    led = {tuple(wire.source) for kernel in world.kernels for wire in kernel.wires}
+    led = {tuple(wire.source) for scheduler in world.schedulers for wire in scheduler.wires}
     outputs = ((name, pin) for name, its in world.parts.terminals.items() for pin in its.outputs)
     return [one for one in outputs if one in led]
 
 
-def _contacted(world: Plant) -> list[tuple[str, str]]:
+def _contacted(world: Simulation) -> list[tuple[str, str]]:
     """The inputs of elements with contacts: one that a wire drives is stuck where the output is."""
     return [tuple(pin) for pin in world.parts.circuits if pin.machine in world.parts.terminals]
 
 
-def _machines(world: Plant, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue], str]]:
+def _machines(world: Simulation, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue], str]]:
     for name, machine in world.machines.items():
         where: dict[str, FaultValue] = {"machine": name}
         if kind.parameter("pin") is not None:
@@ -163,13 +163,13 @@ def _machines(world: Plant, kind: FaultKind) -> Iterator[tuple[dict[str, FaultVa
             yield where, name
 
 
-def _axes(world: Plant, machine: str, count: int) -> list[int]:
+def _axes(world: Simulation, machine: str, count: int) -> list[int]:
     """The axes that move something; all where the world has no elements."""
     moving = {axis.mechanism.number for axis in world.axes.values() if axis.spec.drive[0] == machine}
     return sorted(moving) if any(world.parts.elements.values()) else list(range(1, count + 1))
 
 
-def _inputs(world: Plant, machine: str) -> list[str]:
+def _inputs(world: Simulation, machine: str) -> list[str]:
     """The inputs that a wire, a switch or a script changes, in the order of the pins."""
     led = {pin.pin for pin in (*world.parts.driven, *world.parts.circuits) if pin.machine == machine}
     led |= {pin.upper() for script in world.spec.scripts for name, pin in _set_by(script.steps) if name == machine}
@@ -184,7 +184,7 @@ def _set_by(steps: Iterable[Step]) -> Iterator[tuple[str, str]]:
             yield from _set_by(step.steps)
 
 
-def _lines(world: Plant, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue], str]]:
+def _lines(world: Simulation, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue], str]]:
     directions = ("in", "out") if kind.parameter("direction") is not None else ("",)
     for spec in world.spec.lines:
         where: dict[str, FaultValue] = {"line": spec.name}
@@ -201,7 +201,7 @@ def _lines(world: Plant, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue
 # ---------------------------------------------------------------------- occasions and moments
 
 
-def occasions(world: Plant, possible: Iterable[PossibleFault], end_ns: int, until: str | None = None) -> dict[str, int]:
+def occasions(world: Simulation, possible: Iterable[PossibleFault], end_ns: int, until: str | None = None) -> dict[str, int]:
     """How often it comes to each counted fault (by its text) in a run of ``world`` from now to ``end_ns``: every byte, request,
     edge, save. The run is that without faults."""
     counted: list[tuple[str, str]] = []

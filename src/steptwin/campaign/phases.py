@@ -13,7 +13,7 @@ from steptwin.motion.divisions import StepTrain
 from steptwin.motion.profile import Profile
 from steptwin.simulation.components.button import BUTTON
 from steptwin.simulation.scheduler.trace import TraceRecord
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 
 MOST_PHASES = 12
 SHOWN = 3
@@ -47,7 +47,7 @@ class CyclePhase:
         }
 
 
-def cycle_phases(world: Plant, begin: Nanos = 0, most: int = MOST_PHASES) -> list[CyclePhase]:
+def cycle_phases(world: Simulation, begin: Nanos = 0, most: int = MOST_PHASES) -> list[CyclePhase]:
     """The phases of what a world did from ``begin`` until now, in order; of more than ``most`` those that take longest.
 
     Two times are of the same phase if the same outputs of controllers, elements and buttons are on and the same axes move. The
@@ -65,7 +65,7 @@ def cycle_phases(world: Plant, begin: Nanos = 0, most: int = MOST_PHASES) -> lis
     return [CyclePhase(n, *longest[state][:2], totals[state], longest[state][2]) for n, state in enumerate(ordered, start=1)]
 
 
-def _acting(world: Plant) -> frozenset[str]:
+def _acting(world: Simulation) -> frozenset[str]:
     """The outputs that tell phases apart, as records call them; inputs follow from them."""
     found = {f"{name}.{output.lower()}" for name, one in world.parts.terminals.items() for output in one.outputs}
     for name, machine in world.machines.items():

@@ -26,8 +26,8 @@ from steptwin.simulation.describe.pieces import given_files
 from steptwin.simulation.faults import read as read_fault
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.toml.reader import TomlText
-from steptwin.simulation.world.plantsnapshot import PlantSnapshot
 from steptwin.simulation.world.references import check_step
+from steptwin.simulation.world.snapshot import SimulationSnapshot
 
 MOST_BLUEPRINTS = 16
 """So many descriptions that differ are kept, for cases that have the same values."""
@@ -45,7 +45,7 @@ class CaseRunner:
         self.description = description
         self._paths = frozenset(one.name for one in description.vary if one.is_path)
         self._blueprints: OrderedDict[str, Blueprint] = OrderedDict()
-        self._beginning: PlantSnapshot | None = None
+        self._beginning: SimulationSnapshot | None = None
         self._properties = [read_property(one.text, one.name) for one in description.properties]
         self._seen: list[WatchState | None] = [None] * len(self._properties)
         """State after the common beginning, by property."""

@@ -13,20 +13,20 @@ from steptwin.coverage.counts import END, Coverage, TextCoverage, Way
 from steptwin.diagnostics import SourceText
 from steptwin.machine import Nanos
 from steptwin.simulation.kinds.programs import Place, Programs
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 
 
 class WorldCoverage:
     """Adds to ``coverage`` until `close`. ``locate`` gives the path of a text by its name in the description."""
 
-    def __init__(self, plant: Plant, coverage: Coverage, locate: Callable[[str], str] = str) -> None:
-        self._plant = plant
-        self._counters = [_Counter(programs, coverage, locate, plant.now) for programs in plant.programs.values()]
+    def __init__(self, simulation: Simulation, coverage: Coverage, locate: Callable[[str], str] = str) -> None:
+        self._simulation = simulation
+        self._counters = [_Counter(programs, coverage, locate, simulation.now) for programs in simulation.programs.values()]
 
     def close(self) -> None:
         """Closing twice has no effect."""
         for counter in self._counters:
-            counter.close(self._plant.now)
+            counter.close(self._simulation.now)
         self._counters.clear()
 
 

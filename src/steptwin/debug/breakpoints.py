@@ -15,7 +15,7 @@ from steptwin.machine import Nanos
 from steptwin.messages import NONE, Message, text_of
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.kinds.programs import Place, Programs
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 
 MOST_HITS = 1 << 16
 """Hits of one breakpoint that can be found again in the past; older ones are only counted."""
@@ -177,7 +177,7 @@ def _labels(programs: Mapping[str, Programs]) -> Iterator[tuple[str, str, str, i
                 yield machine, text, name, number
 
 
-def _why_not_reached(programs: Programs, place: Place, standing: Plant | None, machine: str) -> str:
+def _why_not_reached(programs: Programs, place: Place, standing: Simulation | None, machine: str) -> str:
     """Why a program will not come to a statement; empty where it can."""
     line = programs.statements(place.text)[place.number].line
     if place.number not in programs.reached(place.text, (0,)):
@@ -201,14 +201,14 @@ class Breakpoints:
         """By controller and statement."""
         self._next = 1
 
-    def set(self, asked: Sequence[AnyPoint], standing: Plant | None = None) -> list[SetPoint]:
+    def set(self, asked: Sequence[AnyPoint], standing: Simulation | None = None) -> list[SetPoint]:
         """Set these and no others. Those that were set before keep their number and their hits. ``standing``: the state
         from which programs continue, if only the debugger can start them."""
         known: dict[AnyPoint, Breakpoint] = {point.asked: point for point in self._all}
         self._all, self.watches, self.at = [], [], {}
         return [self._set(one, known, standing) for one in asked]
 
-    def _set(self, asked: AnyPoint, known: Mapping[AnyPoint, Breakpoint], standing: Plant | None) -> SetPoint:
+    def _set(self, asked: AnyPoint, known: Mapping[AnyPoint, Breakpoint], standing: Simulation | None) -> SetPoint:
         before = known.get(asked)
         number = self._next if before is None else before.number
         self._next += before is None

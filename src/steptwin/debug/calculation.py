@@ -20,7 +20,7 @@ from steptwin.simulation.components.signals import Idle
 from steptwin.simulation.logic.expression import ReadAt, parse_expression, value_of
 from steptwin.simulation.logic.quantities import unit_of_all
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 
 EXACT = 1e15
 """Whole numbers below it are shown with all their digits."""
@@ -31,7 +31,7 @@ _COUNTS: Mapping[str, Callable[[int, int], bool]] = {"=": eq, "==": eq, "<": lt,
 class ResolvedExpression:
     """An expression whose names are resolved for a controller of a world."""
 
-    def __init__(self, world: Plant, machine: str, text: str) -> None:
+    def __init__(self, world: Simulation, machine: str, text: str) -> None:
         """Raises `Misuse` for what is no expression, and for unknown signals; names of a program may get their meaning later."""
         node = parse_expression(text)
         names = dict.fromkeys(node.names())
@@ -46,9 +46,9 @@ class ResolvedExpression:
             return signals[name].unit if name in signals else ""
 
         self._value = value_of(node.in_unit(unit_of_all(node, unit_of), unit_of), reads, _checked)
-        self._own = world.parts.kernel_of[machine]
-        kernels = {source.kernel: None for signal in signals.values() for source in signal.bring(world.now)}
-        self._others = [kernel for kernel in kernels if kernel is not self._own]
+        self._own = world.parts.scheduler_of[machine]
+        schedulers = {source.scheduler: None for signal in signals.values() for source in signal.bring(world.now)}
+        self._others = [scheduler for scheduler in schedulers if scheduler is not self._own]
 
     def check_names(self) -> None:
         """Raises `Misuse` for a name that means nothing to the controller, and in none of its programs as they are now."""
@@ -64,27 +64,27 @@ class ResolvedExpression:
     def value(self, now: Nanos) -> float:
         """The value at the present moment of the world. Raises `Misuse` for a name that means nothing, a division by zero, and a
         result that is too large."""
-        for kernel in (self._own, *self._others):
-            kernel.advance(now)
+        for scheduler in (self._own, *self._others):
+            scheduler.advance(now)
         return float(self._value(now))
 
     def is_known_before_statement(self, now: Nanos) -> bool:
         """Whether `value_at_statement` can be asked: no controller that it depends on has gone ahead of the one that executes a
         statement at ``now``."""
-        return all(kernel.now < now for kernel in self._others)
+        return all(scheduler.now < now for scheduler in self._others)
 
     def value_at_statement(self, now: Nanos) -> float:
         """The value that the statement finds which is about to be executed; what has no connection to its controller is as it was
         before that moment. Raises `Misuse` as `value`."""
-        for kernel in self._others:
-            kernel.advance(now - 1)
+        for scheduler in self._others:
+            scheduler.advance(now - 1)
         return float(self._value(now))
 
 
 WRITE_ONLY = Message("debug.write-only", "{name} can only be written")
 
 
-def _signal(world: Plant, machine: str, name: str) -> SignalOf | Idle | None:
+def _signal(world: Simulation, machine: str, name: str) -> SignalOf | Idle | None:
     """The signal that a name means; None for a name of the program. Raises `Misuse`."""
     owner, dot, _ = name.partition(".")
     if not dot:
@@ -99,7 +99,7 @@ def _signal(world: Plant, machine: str, name: str) -> SignalOf | Idle | None:
 UNKNOWN_VARIABLE = Message("debug.unknown-variable", "{name!r} means nothing to {machine}{hint}: its variables are {names}")
 
 
-def _own_signal(world: Plant, machine: str, name: str) -> SignalOf | Idle:
+def _own_signal(world: Simulation, machine: str, name: str) -> SignalOf | Idle:
     try:
         return world.signal(f"{machine}.{name}")
     except Misuse:
@@ -108,11 +108,11 @@ def _own_signal(world: Plant, machine: str, name: str) -> SignalOf | Idle:
         raise Misuse(UNKNOWN_VARIABLE(name=name, machine=machine, hint=hint, names=list(variables) or NONE())) from None
 
 
-def _paths(world: Plant, machine: str) -> list[str]:
+def _paths(world: Simulation, machine: str) -> list[str]:
     return [point.path for point in world.kind(machine).datasheet(world.machine(machine)).points]
 
 
-def _read_by_program(world: Plant, machine: str, name: str) -> ReadAt:
+def _read_by_program(world: Simulation, machine: str, name: str) -> ReadAt:
     """Meaning of a name for the statement of a moment, or else for the controller."""
     programs = world.programs_of(machine)
 

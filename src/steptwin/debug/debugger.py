@@ -24,8 +24,8 @@ from steptwin.messages import Message
 from steptwin.simulation.kinds.programs import Place, Programs
 from steptwin.simulation.world.history import History, outside_past
 from steptwin.simulation.world.inputs import ExternalInput
-from steptwin.simulation.world.plant import Plant
-from steptwin.simulation.world.plantsnapshot import PlantSnapshot
+from steptwin.simulation.world.simulation import Simulation
+from steptwin.simulation.world.snapshot import SimulationSnapshot
 from steptwin.subject.time import next_due
 from steptwin.why.answer import Answer
 from steptwin.why.kept import PastQuestions
@@ -66,10 +66,10 @@ class Debugger:
 
     def __init__(
         self,
-        world: Plant,
+        world: Simulation,
         history: History | None = None,
         apply_input: Callable[[ExternalInput], None] | None = None,
-        go_back: Callable[[PlantSnapshot], None] | None = None,
+        go_back: Callable[[SimulationSnapshot], None] | None = None,
     ) -> None:
         debugged = {name: programs for name, programs in world.programs.items() if programs.texts}
         if not debugged:
@@ -111,7 +111,7 @@ class Debugger:
     # ------------------------------------------------------------------ where it stands
 
     @property
-    def view(self) -> Plant:
+    def view(self) -> Simulation:
         """The world as it is where the debugger stands; to look at only."""
         return self._scout.world if self._is_past else self._world
 
@@ -196,7 +196,7 @@ class Debugger:
             self._go_back(self._scout.world.snapshot(with_inputs=False))
             self.gone_back()
 
-    def _take_back(self, snapshot: PlantSnapshot) -> None:
+    def _take_back(self, snapshot: SimulationSnapshot) -> None:
         self._world.restore(snapshot)
         self._history.gone_back()
 

@@ -10,7 +10,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.simulation.kinds.programs import Place, Programs
 from steptwin.simulation.scheduler.trace import TraceRecord
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 from steptwin.statements import StatementHook
 
 
@@ -55,7 +55,7 @@ class Observer:
     Of controllers in ``stepping`` every statement is noted; of others those at breakpoints. It notes only while ``is_on``.
     """
 
-    def __init__(self, world: Plant, points: Breakpoints) -> None:
+    def __init__(self, world: Simulation, points: Breakpoints) -> None:
         self.world = world
         self.points = points
         self.is_on = False
@@ -91,8 +91,8 @@ class Observer:
             if places != frozenset():
                 programs.hook(self._hooks[machine], places)
                 self._hooked[machine] = places
-        kernel_of = self.world.parts.kernel_of
-        self.world.settled_first = [kernel_of[machine] for machine in self.points.reading_others()]
+        scheduler_of = self.world.parts.scheduler_of
+        self.world.settled_first = [scheduler_of[machine] for machine in self.points.reading_others()]
 
     def release(self) -> None:
         """Have no hooks: breakpoints or texts may be others by the next `observe`."""

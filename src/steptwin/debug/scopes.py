@@ -16,7 +16,7 @@ from steptwin.points import LivePoint
 from steptwin.simulation.kinds.kind import AnyKind
 from steptwin.simulation.script.steps import Set, Write
 from steptwin.simulation.world.inputs import ExternalInput, SetVariable
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 from steptwin.subject.debugcommands import SCOPES
 
 VARIABLES, AXES, PINS, CONTROLLER, REGISTERS, PARTS = SCOPES
@@ -25,7 +25,7 @@ VARIABLES, AXES, PINS, CONTROLLER, REGISTERS, PARTS = SCOPES
 UNKNOWN_GROUP = Message("debug.unknown-group", "no group of values is called {name!r}: there are {names}")
 
 
-def scope(world: Plant, machine: str, name: str) -> Scope:
+def scope(world: Simulation, machine: str, name: str) -> Scope:
     """One of `SCOPES` of a controller, at the present moment of its world. Raises `Misuse`."""
     world.touch(machine)
     if name not in SCOPES:
@@ -33,7 +33,7 @@ def scope(world: Plant, machine: str, name: str) -> Scope:
     return Scope(name, [value._replace(expression=_expression(world, machine, value)) for value in _VALUES[name](world, machine)])
 
 
-def _expression(world: Plant, machine: str, value: ShownValue) -> str:
+def _expression(world: Simulation, machine: str, value: ShownValue) -> str:
     """Expression of a value: its name, or what follows the name of the axis where a controller has but one."""
     _, _, last = value.name.partition(".")
     for text in (value.name, last):
@@ -44,12 +44,12 @@ def _expression(world: Plant, machine: str, value: ShownValue) -> str:
     return ""
 
 
-def _variables(world: Plant, machine: str) -> Iterator[ShownValue]:
+def _variables(world: Simulation, machine: str) -> Iterator[ShownValue]:
     for name, value in world.programs_of(machine).variables(world.now).items():
         yield ShownValue(name, number_text(value), value, is_settable=True)
 
 
-def _axes(world: Plant, machine: str) -> Iterator[ShownValue]:
+def _axes(world: Simulation, machine: str) -> Iterator[ShownValue]:
     for axis in world.kind(machine).state(world.machine(machine), world.now).axes:
         yield from _axis(axis)
 
@@ -69,7 +69,7 @@ def _measured(name: str, value: float | None, unit: str) -> ShownValue:
     return ShownValue(name, "not known") if value is None else ShownValue(name, f"{number_text(value)} {unit}".rstrip(), value)
 
 
-def _pins(world: Plant, machine: str) -> Iterator[ShownValue]:
+def _pins(world: Simulation, machine: str) -> Iterator[ShownValue]:
     kind, device = world.kind(machine), world.machine(machine)
     units = {name: pin.unit for name, pin in kind.pins(device).items()}
     inputs = {*kind.terminals.digital_inputs, *kind.terminals.analog_inputs}
@@ -77,7 +77,7 @@ def _pins(world: Plant, machine: str) -> Iterator[ShownValue]:
         yield ShownValue(name, f"{number_text(level)} {units.get(name, '')}".rstrip(), level, is_settable=name in inputs)
 
 
-def _controller(world: Plant, machine: str) -> Iterator[ShownValue]:
+def _controller(world: Simulation, machine: str) -> Iterator[ShownValue]:
     state = world.kind(machine).state(world.machine(machine), world.now)
     yield ShownValue("time", f"{world.now / 1e9:.9f} s", world.now / 1e9)
     yield _status("status", state.status)
@@ -86,7 +86,7 @@ def _controller(world: Plant, machine: str) -> Iterator[ShownValue]:
         yield ShownValue(name, detail_text(detail))
 
 
-def _registers(world: Plant, machine: str) -> Iterator[ShownValue]:
+def _registers(world: Simulation, machine: str) -> Iterator[ShownValue]:
     kind, device = world.kind(machine), world.machine(machine)
     for point in kind.datasheet(device).points:
         live = _live(kind, device, point.path)
@@ -104,7 +104,7 @@ def _live(kind: AnyKind, device: MotionController, path: str) -> LivePoint | Non
         return None
 
 
-def _parts(world: Plant, machine: str) -> Iterator[ShownValue]:
+def _parts(world: Simulation, machine: str) -> Iterator[ShownValue]:
     """Mechanics, by axis."""
     for axis in world.axes:
         name = f"{axis}.position"
@@ -116,7 +116,7 @@ _VALUES = {
 }  # fmt: skip
 
 
-def evaluate(world: Plant, machine: str, text: str) -> ShownValue:
+def evaluate(world: Simulation, machine: str, text: str) -> ShownValue:
     """The value of an expression. Raises `Misuse`."""
     world.touch(machine)
     name = text.strip()
@@ -130,7 +130,7 @@ CANNOT_BE_SET = Message(
 )
 
 
-def setting(world: Plant, machine: str, name: str, value: float) -> ExternalInput:
+def setting(world: Simulation, machine: str, name: str, value: float) -> ExternalInput:
     """Input that gives a variable, an input or a register another value. Raises `Misuse` for what cannot be set."""
     own = world.programs_of(machine)
     variables = {known.upper(): known for known in own.variables(world.now)}

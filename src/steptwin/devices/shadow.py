@@ -21,7 +21,7 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.description import read_world
 from steptwin.simulation.script import steps
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Command, type_of
 from steptwin.subject.devicetwin import DeviceTwin
@@ -81,7 +81,7 @@ class Shadow:
         self.name = name
         self.begin = now
         self._twin = twin
-        self._world = Plant(Blueprint(read_world("twin", twin.text), twin.files), keep_trace=False, keep_inputs=False)
+        self._world = Simulation(Blueprint(read_world("twin", twin.text), twin.files), keep_trace=False, keep_inputs=False)
         self._world.stop_recording()
         self._subject = WorldSubject(self._world)
         self._axes = {axis.number: _ComparedAxis(axis) for axis in sheet.axes}

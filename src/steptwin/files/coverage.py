@@ -15,7 +15,7 @@ from steptwin.coverage.table import table
 from steptwin.coverage.watch import WorldCoverage
 from steptwin.errors import Misuse
 from steptwin.files.textfiles import check_writable, write_bytes
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 
 STANDARD_OUTPUT = "-"
 """The target of the table."""
@@ -33,7 +33,7 @@ class CoverageReports:
         for target in self._targets:
             _check(target)
 
-    def observe(self, world: Plant, folder: Path) -> None:
+    def observe(self, world: Simulation, folder: Path) -> None:
         """Count from now on what a world executes, if that is to be reported. Its description lies in ``folder``."""
         if self._targets:
             self._watches.append(WorldCoverage(world, self.coverage, lambda name: _shown(folder / name, self._here, name)))

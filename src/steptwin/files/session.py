@@ -30,7 +30,7 @@ from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.actions import ACTIONS
 from steptwin.simulation.world.history import replay
 from steptwin.simulation.world.inputs import ExternalInput
-from steptwin.simulation.world.plantsnapshot import RecordedInput
+from steptwin.simulation.world.snapshot import RecordedInput
 
 FORMAT = 1
 LONGEST_NUMBER = 100

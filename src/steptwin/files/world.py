@@ -35,9 +35,9 @@ from steptwin.simulation.kinds.m1486.view import M1486View
 from steptwin.simulation.kinds.mic488.view import Mic488View
 from steptwin.simulation.kinds.registry import M1486, MIC488
 from steptwin.simulation.script import steps as do
-from steptwin.simulation.world.plant import Plant
-from steptwin.simulation.world.plantsnapshot import PlantSnapshot
 from steptwin.simulation.world.running import Script
+from steptwin.simulation.world.simulation import Simulation
+from steptwin.simulation.world.snapshot import SimulationSnapshot
 from steptwin.simulation.world.views import LineView, MechanicsView, Views
 from steptwin.why.answer import Answer
 from steptwin.why.repeated import RepeatedPast
@@ -64,7 +64,7 @@ Reaction: TypeAlias = do.Step | tuple[do.Step, ...] | Callable[[], object]
 """The action of `World.at` and `World.when`: steps, or a function of the world."""
 
 
-class World(Plant):
+class World(Simulation):
     """A world in virtual time. It begins at 0 s and runs only on request.
 
     Calls of its methods go into its session and can be replayed; direct changes of a `device` or `chip` cannot.
@@ -78,9 +78,9 @@ class World(Plant):
         keep_inputs: bool = True,
         state: StateDirectory | None = None,
         failing: Iterable[FailedSave] = (),
-        at: PlantSnapshot | None = None,
+        at: SimulationSnapshot | None = None,
     ) -> None:
-        """``failing``: saves of memory that fail, as they did in the run that is replayed. ``at``: as for `Plant`."""
+        """``failing``: saves of memory that fail, as they did in the run that is replayed. ``at``: as for `Simulation`."""
         self._state = state
         self._failing = {(failed.time, failed.machine): failed.reason for failed in failing}
         self.failed_saves: list[FailedSave] = []
@@ -110,7 +110,7 @@ class World(Plant):
 
     def views(self, kind: ControllerKind[S, M, V]) -> Views[V]:
         """The controllers of a kind by name."""
-        view: Callable[[Plant, str, Any], V] = kind.view
+        view: Callable[[Simulation, str, Any], V] = kind.view
         there = {name: view(self, name, machine) for name, machine in self.machines.items() if self.kind(name) is kind}
         return Views(self, kind.model, there)
 
@@ -267,7 +267,7 @@ class World(Plant):
 
     def due(self) -> Nanos | None:
         """The next moment (ns) at which anything happens without input; None if nothing will."""
-        dues = [due for kernel in self.kernels if (due := kernel.deadline()) is not None]
+        dues = [due for scheduler in self.schedulers if (due := scheduler.deadline()) is not None]
         own = self.next()
         return min(dues if own is None else [*dues, own], default=None)
 
@@ -338,12 +338,12 @@ class World(Plant):
 
     # ------------------------------------------------------------------ branches
 
-    def restore(self, snapshot: PlantSnapshot) -> None:
-        """As `Plant.restore`."""
+    def restore(self, snapshot: SimulationSnapshot) -> None:
+        """As `Simulation.restore`."""
         super().restore(snapshot)
         self.failed_saves = [failed for failed in self.failed_saves if failed.time <= snapshot.now]
 
-    def branch(self, snapshot: PlantSnapshot | None = None) -> Self:
+    def branch(self, snapshot: SimulationSnapshot | None = None) -> Self:
         """Another world in the state of this one, now or at a snapshot; both continue independently.
 
         Scripts go along. Functions given to `at` and `when` do what they did: those that name this world act on this one.
@@ -362,7 +362,7 @@ class World(Plant):
         return _revived, (type(self), self.spec.text.source.name, self.snapshot(), self.keeps_inputs)
 
 
-def _revived(kind: type[World], name: str, snapshot: PlantSnapshot, keep_inputs: bool) -> World:
+def _revived(kind: type[World], name: str, snapshot: SimulationSnapshot, keep_inputs: bool) -> World:
     text, seed, overrides, files = snapshot.description
     blueprint = Blueprint(read_world(name, text, seed, overrides, given_files(files)), files)
     return kind(blueprint, keep_inputs=keep_inputs, at=snapshot)

@@ -74,6 +74,6 @@ def parse_wire(text: str) -> Wire:
     if match is None:
         raise Misuse(f"--wire {text}: expected FROM=TO with chips by address, such as 0.B1=7.B3")
     source = match[2].strip().upper()
-    with suppress(Misuse):  # outputs that are no inputs are for the kernel to know
+    with suppress(Misuse):  # outputs that are no inputs are for the scheduler to know
         source = known_pin(source)
     return Wire(PinName(match[1].upper(), source), PinName(match[3].upper(), known_pin(match[4])))

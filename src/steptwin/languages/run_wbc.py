@@ -189,7 +189,7 @@ class RunWatch(ProgramWatch):
 
     def __init__(self, world: World) -> None:
         device = world.mic488[NAME].device
-        super().__init__(device, world.parts.kernel_of[NAME], NAME)
+        super().__init__(device, world.parts.scheduler_of[NAME], NAME)
         for event in device.events:  # those of power-on
             self._tell(event.time, event.code, event.text)
         world.trace.watchers.append(self._recorded)

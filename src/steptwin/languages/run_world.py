@@ -144,7 +144,7 @@ def _run_and_report(world: World, options: WorldRun, reports: CoverageReports, o
 def _watched(world: World) -> dict[str, ProgramReport]:
     """Watches for the programs of all controllers that have any."""
     found = {
-        name: world.kind(name).watch_program(machine, world.parts.kernel_of[name], name)
+        name: world.kind(name).watch_program(machine, world.parts.scheduler_of[name], name)
         for name, machine in world.machines.items()
     }
     return {name: watch for name, watch in found.items() if watch is not None}

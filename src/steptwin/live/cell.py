@@ -1,4 +1,4 @@
-"""A kernel in real time: `Cell.start` begins it, and an input for its machines comes between `Cell.enter` and `Cell.leave`."""
+"""A scheduler in real time: `Cell.start` begins it, and an input for its machines comes between `Cell.enter` and `Cell.leave`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LONGEST_DELAY_NS: Nanos = 500 * MILLISECOND
 
 
 class Advanceable(Protocol):
-    """Subject of a cell, which advances it in real time: a kernel or a whole world. The methods are those of `Kernel`."""
+    """Subject of a cell, which advances it in real time: a scheduler or a whole world. The methods are those of `Scheduler`."""
 
     stale: bool
 
@@ -34,10 +34,10 @@ class Cell:
     While the process does not run, virtual time stands still, so that there is no backlog; ``on_lag`` is called with the delay.
     """
 
-    __slots__ = ("_armed_for", "_batch", "_batches", "_loop", "_timer", "clock", "kernel", "moments", "on_lag")
+    __slots__ = ("_armed_for", "_batch", "_batches", "_loop", "_timer", "clock", "moments", "on_lag", "scheduler")
 
-    def __init__(self, kernel: Advanceable, clock: Clock) -> None:
-        self.kernel = kernel
+    def __init__(self, scheduler: Advanceable, clock: Clock) -> None:
+        self.scheduler = scheduler
         self.clock = clock
         self.on_lag: Callable[[Nanos], None] | None = None
         self._loop = asyncio.get_running_loop()
@@ -52,31 +52,31 @@ class Cell:
     def start(self) -> None:
         """Follow the clock from now on: machines act at their deadlines, also without inputs."""
         self.enter()
-        self._arm(self.kernel.deadline())
+        self._arm(self.scheduler.deadline())
 
     def enter(self) -> Nanos:
         """Advance the machines to the present. Apply inputs at the moment returned, then call `leave`."""
         batch = self._batches.current
         if batch and batch == self._batch:
-            return self.kernel.now
+            return self.scheduler.now
         self._batch = batch
         self.moments += 1
         now = self.clock.now()
         due = self._armed_for
         if due is not None and now - due > LONGEST_DELAY_NS * self.clock.speed:
             now = self._held_up(due, now)
-        self.kernel.advance(now)
+        self.scheduler.advance(now)
         return now
 
     def leave(self) -> None:
         """Let signals settle after an input, and set the timer for the next deadline."""
-        if self.kernel.stale:
+        if self.scheduler.stale:
             self._batch = 0  # something may be due at once
-            self._arm(self.kernel.deadline())
+            self._arm(self.scheduler.deadline())
 
     def _held_up(self, due: Nanos, now: Nanos) -> Nanos:
         """Continue at the moment at which the delay began."""
-        resumed = max(due, self.kernel.now)
+        resumed = max(due, self.scheduler.now)
         self.clock.lag(now - resumed)
         if self.on_lag is not None:
             self.on_lag(now - resumed)
@@ -93,7 +93,7 @@ class Cell:
     def _wake(self) -> None:
         self.enter()
         self._timer = self._armed_for = None
-        self._arm(self.kernel.deadline())
+        self._arm(self.scheduler.deadline())
 
     def close(self) -> None:
         if self._timer is not None:

@@ -27,7 +27,7 @@ from steptwin.machine import Nanos
 from steptwin.messages import NONE, Message, text_of
 from steptwin.simulation.world.inputs import Download
 from steptwin.simulation.world.model import WORLD
-from steptwin.simulation.world.plantsnapshot import PlantSnapshot, RecordedInput
+from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
 from steptwin.subject import debugcommands as command
 from steptwin.subject.dispatch import Action
 from steptwin.subject.payloads import BreakpointsPayload, LogPayload, StoppedPayload
@@ -345,7 +345,7 @@ class _OpenDebugger:
         debugger.branch()
         return self.place()
 
-    def _take_back(self, snapshot: PlantSnapshot) -> None:
+    def _take_back(self, snapshot: SimulationSnapshot) -> None:
         take_back(self._live, self._pace, snapshot)
 
     @property

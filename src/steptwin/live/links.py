@@ -40,7 +40,7 @@ class Feed:
         answer = self._port.exchange(data, cell.enter())
         if answer:
             self._writer.write(answer)
-        if cell.kernel.stale:
+        if cell.scheduler.stale:
             cell.leave()
         if self._talks is None:
             due = self._port.deadline()

@@ -17,7 +17,7 @@ from steptwin.live.world import LiveWorld
 from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.world.history import History, Past
-from steptwin.simulation.world.plantsnapshot import PlantSnapshot
+from steptwin.simulation.world.snapshot import SimulationSnapshot
 from steptwin.simulation.world.worldprograms import WorldPrograms
 from steptwin.subject.following import EventBatch, Filter
 from steptwin.subject.world import WorldSubject
@@ -76,7 +76,7 @@ class Lookback:
         later.then(look.close)
         return later
 
-    def state_at(self, moment: Nanos) -> Later[PlantSnapshot]:
+    def state_at(self, moment: Nanos) -> Later[SimulationSnapshot]:
         """The state of a moment, without inputs before it. Raises as `events`."""
         look = self.open()
         later = look.state_at(moment)
@@ -94,7 +94,7 @@ class Lookback:
         self._looks -= 1
 
 
-def take_back(live: LiveWorld, pace: Pace, snapshot: PlantSnapshot) -> None:
+def take_back(live: LiveWorld, pace: Pace, snapshot: SimulationSnapshot) -> None:
     """A world goes back to a state of its past; time stands there. Raises `Refusal`."""
     inputs = tuple(given for given in live.world.inputs if given.time <= snapshot.now)
     pace.go_back(replace(snapshot, inputs=inputs))
@@ -107,7 +107,7 @@ VIEW_OF_THE_PAST_WAS_CLOSED = Message("live.view-of-the-past-was-closed", "the v
 class Look:
     """A moment of the past, to be looked at in `subject` and `programs`."""
 
-    def __init__(self, past: Past, go_back: Callable[[PlantSnapshot], None], closed: Callable[[], None]) -> None:
+    def __init__(self, past: Past, go_back: Callable[[SimulationSnapshot], None], closed: Callable[[], None]) -> None:
         self._past = past
         self._go_back = go_back
         self._closed = closed
@@ -130,11 +130,11 @@ class Look:
         """To ``end``; see `Lookback.events`."""
         return self._begin(self._follow(begin, end, what, bound, at_begin))
 
-    def state_at(self, moment: Nanos) -> Later[PlantSnapshot]:
+    def state_at(self, moment: Nanos) -> Later[SimulationSnapshot]:
         """See `Lookback.state_at`."""
         return self._begin(self._state_at(moment))
 
-    def _state_at(self, moment: Nanos) -> Generator[None, None, PlantSnapshot]:
+    def _state_at(self, moment: Nanos) -> Generator[None, None, SimulationSnapshot]:
         yield from self._past.go(moment)
         return self._past.world.snapshot()
 

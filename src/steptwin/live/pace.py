@@ -24,7 +24,7 @@ from steptwin.messages import Message, text_of
 from steptwin.numerals import read_number
 from steptwin.simulation.logic.condition import SignalCondition
 from steptwin.simulation.world.model import WORLD
-from steptwin.simulation.world.plantsnapshot import PlantSnapshot
+from steptwin.simulation.world.snapshot import SimulationSnapshot
 from steptwin.subject import commands as command
 from steptwin.subject import events
 from steptwin.subject.dispatch import Action
@@ -180,7 +180,7 @@ class Pace:
             self._turn.cancel()
             self._turn = None
 
-    def go_back(self, snapshot: PlantSnapshot, name: str | None = None) -> None:
+    def go_back(self, snapshot: SimulationSnapshot, name: str | None = None) -> None:
         """To a state, under its name where it has one; time stands from now on. Raises `Refusal`."""
         self.pause()
         try:

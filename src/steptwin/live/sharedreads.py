@@ -36,5 +36,6 @@ class _SharedReads:
 
 
 def share_reads(devices: Mapping[int, SlaveDevice], cell: Cell) -> dict[int, SlaveDevice]:
-    """The units of a line for clients that a cell serves together. Units must not change each other but by the cell's kernel."""
+    """The units of a line for clients that a cell serves together. Units must not change each other but by the cell's
+    scheduler."""
     return {unit: _SharedReads(device, cell) for unit, device in devices.items()}

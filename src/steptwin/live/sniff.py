@@ -18,7 +18,7 @@ from steptwin.live.clock import Clock
 from steptwin.live.pty import PtyLink
 from steptwin.live.tcp import TcpLink
 from steptwin.machine import SECOND, Nanos, Port
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.toml.addresses import Address
 from steptwin.wire.slave import FrameDirection
 
@@ -126,7 +126,7 @@ async def sniff(
         raise Misuse("a Modbus TCP connection cannot be monitored from outside: use a relay, --listen HOST:PORT")
     tap = Tap(decoder, is_relay=listen is not None or pty is not None)
     transport = await place.endpoint.connect(lambda: tap)
-    cell = Cell(Kernel(), Clock())
+    cell = Cell(Scheduler(), Clock())
     links: list[TcpLink | PtyLink] = []
 
     def port() -> Port:

@@ -18,12 +18,12 @@ from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.kinds.lines import LineEndPoint
 from steptwin.simulation.kinds.registry import line_kinds
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.turns import Dues
 from steptwin.simulation.world.history import History
 from steptwin.simulation.world.inputs import Bytes, ExternalInput, Leave, See, size_of
 from steptwin.simulation.world.model import WORLD
-from steptwin.simulation.world.plantsnapshot import PlantSnapshot
+from steptwin.simulation.world.snapshot import SimulationSnapshot
 from steptwin.subject.payloads import StatusPayload
 from steptwin.subject.world import WorldSubject
 from steptwin.tracing import is_traced
@@ -113,8 +113,8 @@ class LiveWorld:
         """Whether the deadline must be computed again, because something may have happened."""
         self._next: Nanos | None = None
         """The deadline computed last, ns."""
-        self._dues = _Dues(world.kernels)
-        world.watch_kernels(self._changed)
+        self._dues = _Dues(world.schedulers)
+        world.watch_schedulers(self._changed)
         self.ring: Ring | None = None
         """The ring of last records, if kept."""
         self.history: History | None = None
@@ -169,7 +169,7 @@ class LiveWorld:
         world.inputs.clear()
         self.show(f"the session is full and ends at {world.time:g} s, after {len(self._full.inputs)} inputs")
 
-    def go_back(self, snapshot: PlantSnapshot, name: str | None) -> None:
+    def go_back(self, snapshot: SimulationSnapshot, name: str | None) -> None:
         """Go back to a state, under its name where it has one.
 
         Programs stay connected to their lines; what was under way there, at either moment, is lost.
@@ -185,7 +185,7 @@ class LiveWorld:
             raise Refusal(AXIS_IS_JOGGED())
         self.subject.go_back(snapshot, name)
         self._recorded_bytes = sum(size_of(given.what) for given in world.inputs)
-        self._dues = _Dues(world.kernels)
+        self._dues = _Dues(world.schedulers)
         if self.ring is not None:
             self.ring.clear()
         for line in world.spec.lines:
@@ -224,16 +224,16 @@ class LiveWorld:
 
     # ------------------------------------------------------------------ time
 
-    def _changed(self, kernel: Kernel) -> None:
+    def _changed(self, scheduler: Scheduler) -> None:
         self.stale = True
-        self._dues.changed[kernel] = None
+        self._dues.changed[scheduler] = None
 
     def advance(self, now: Nanos) -> None:
         world = self.world
         if self.run_control is not None:
             self._advance_controlled(self.run_control, now)
         elif not self.stale and (self._next is None or now < self._next) and world.stopped is None and now >= world.now:
-            world.now, world.is_settled = now, True  # as `Plant.advance` where nothing is due
+            world.now, world.is_settled = now, True  # as `Simulation.advance` where nothing is due
         else:
             self._advance(now)
 
@@ -295,31 +295,31 @@ class LiveWorld:
 
 
 class _Dues:
-    """The next deadline of many kernels, kept without a scan of all of them.
+    """The next deadline of many schedulers, kept without a scan of all of them.
 
-    ``changed``: kernels in which something has happened since.
+    ``changed``: schedulers in which something has happened since.
     """
 
-    def __init__(self, kernels: list[Kernel]) -> None:
-        self.changed = dict.fromkeys(kernels)
-        self._kernels = kernels
-        self._number_of = {kernel: number for number, kernel in enumerate(kernels)}
+    def __init__(self, schedulers: list[Scheduler]) -> None:
+        self.changed = dict.fromkeys(schedulers)
+        self._schedulers = schedulers
+        self._number_of = {scheduler: number for number, scheduler in enumerate(schedulers)}
         self._dues = Dues()
 
     def first(self) -> Nanos | None:
         while self.changed:
-            kernel, _ = self.changed.popitem()
-            due = kernel.deadline()  # signals may settle: it has changed again then
-            self._dues.put(self._number_of[kernel], due)
+            scheduler, _ = self.changed.popitem()
+            due = scheduler.deadline()  # signals may settle: it has changed again then
+            self._dues.put(self._number_of[scheduler], due)
         return self._dues.first()
 
     def advance(self, now: Nanos) -> None:
-        """Advance the kernels with deadlines up to ``now``, in order."""
+        """Advance the schedulers with deadlines up to ``now``, in order."""
         while (due := self.first()) is not None and due <= now:
             for number in self._dues.take(due):
-                kernel = self._kernels[number]
-                kernel.advance(now)
-                self.changed[kernel] = None
+                scheduler = self._schedulers[number]
+                scheduler.advance(now)
+                self.changed[scheduler] = None
 
 
 class VisionPort:
@@ -357,7 +357,7 @@ class PlacePort:
         self._live = live
         self._world = world
         self._line = world.lines[line]
-        self._kernel = world.parts.kernel_of[line]
+        self._scheduler = world.parts.scheduler_of[line]
         self._places = self._line.places
         self._name = place
         self._kind = kind
@@ -387,10 +387,10 @@ class PlacePort:
             self.on_output()
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
-        world, kernel = self._world, self._kernel
+        world, scheduler = self._world, self._scheduler
         now = world.now  # a world that was stopped stands
-        if kernel.now != now or kernel.stale:
-            kernel.advance(now)
+        if scheduler.now != now or scheduler.stale:
+            scheduler.advance(now)
         place = self._places.get(self._name)
         if place is None or place.on_output is None:
             place = self._connected()
@@ -398,7 +398,7 @@ class PlacePort:
             answer = self._recorded(place, data, now)
         else:
             answer = self._line.exchange(self._name, place, data, now)
-        if kernel.stale or place.received:
+        if scheduler.stale or place.received:
             answer = self._with_the_rest(place, answer, now)
         self.broken = place.inner.broken
         return answer
@@ -419,8 +419,8 @@ class PlacePort:
         """The answer between what came before and what has come with it."""
         before = place.take(now) if place.received else []
         place.on_output = None  # what comes at once is given back at once
-        if self._kernel.stale:
-            self._kernel.settle()
+        if self._scheduler.stale:
+            self._scheduler.settle()
         place.on_output = self._came
         if not before and not place.received:
             return answer
@@ -428,7 +428,7 @@ class PlacePort:
 
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
         now = self._live.world.now
-        self._kernel.advance(now)
+        self._scheduler.advance(now)
         place = self._places.get(self._name)
         return [] if place is None else place.take(now)
 

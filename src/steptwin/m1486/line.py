@@ -9,8 +9,8 @@ How a shell builds a line::
     port.exchange(b"x7\\rf12800\\rr\\r", now)
     port.to_send(later)  # [(moment, characters)], the same for every port
 
-Chips are machines of their own: a shell adds each to its `steptwin.simulation.scheduler.kernel.Kernel` and advances that before
-it hands over characters. Its actions are reported by its hooks (`steptwin.m1486.chip.M1486Chip`).
+Chips are machines of their own: a shell adds each to its `steptwin.simulation.scheduler.scheduler.Scheduler` and advances that
+before it hands over characters. Its actions are reported by its hooks (`steptwin.m1486.chip.M1486Chip`).
 """
 
 from __future__ import annotations

@@ -22,18 +22,18 @@ from steptwin.studio.campaignrequests import Campaigns
 from steptwin.studio.configurations import Configurations
 from steptwin.studio.drawingrequests import Arrangement
 from steptwin.studio.machines import Sheets
-from steptwin.studio.plantrequests import PlantRecords
 from steptwin.studio.recordingrequests import Recordings
 from steptwin.studio.requests import (
     OF_BRANCHES,
     OF_CAMPAIGNS,
     OF_DRAWINGS,
-    OF_PLANT,
     OF_RECORDINGS,
+    OF_SERVICES,
     OF_THE_PAST,
     REQUESTS,
     permit_of,
 )
+from steptwin.studio.servicerequests import WorldServices
 from steptwin.studio.streams import Streams
 from steptwin.studio.surroundings import Served, Surroundings
 from steptwin.studio.watches import Watches
@@ -173,11 +173,11 @@ class Hub:
         return self.around.arrangement
 
     @property
-    def plant(self) -> PlantRecords:
+    def services(self) -> WorldServices:
         """Raises `Refusal` where there is no world."""
-        if self.around.plant is None:
+        if self.around.services is None:
             raise Refusal(NO_WORLD_WITH_GATEWAYS())
-        return self.around.plant
+        return self.around.services
 
     @property
     def campaigns(self) -> Campaigns:
@@ -222,7 +222,7 @@ class Hub:
             (around.recordings, OF_RECORDINGS),
             (around.branches, OF_BRANCHES),
             (around.arrangement, OF_DRAWINGS),
-            (around.plant, OF_PLANT),
+            (around.services, OF_SERVICES),
             (around.campaigns, OF_CAMPAIGNS),
             (around.traffic, frozenset({"traffic"})),
         )

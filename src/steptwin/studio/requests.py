@@ -23,9 +23,9 @@ from steptwin.studio.branchrequests import BranchRequest
 from steptwin.studio.campaignrequests import CampaignRequest
 from steptwin.studio.devicerequests import DeviceRequest
 from steptwin.studio.drawingrequests import DrawingRequest
-from steptwin.studio.plantrequests import PlantRequest
 from steptwin.studio.recordingrequests import RecordingRequest
 from steptwin.studio.requesttype import ViewerRequestType, declared, request
+from steptwin.studio.servicerequests import ServiceRequest
 from steptwin.studio.toolrequests import FINDING, ToolRequest
 from steptwin.studio.workrequests import WorkRequest
 from steptwin.subject.commands import COMMANDS
@@ -319,7 +319,7 @@ StudioRequest: TypeAlias = (
     | RecordingRequest
     | BranchRequest
     | DrawingRequest
-    | PlantRequest
+    | ServiceRequest
     | CampaignRequest
     | DeviceRequest
 )
@@ -340,7 +340,7 @@ IN_THE_PAST = OF_THE_PAST | {"breakpoint", "clear_breakpoint", "stop_on", "step_
 """Requests that change something and are possible while the past is looked at: a debugger goes forwards from there, too."""
 OF_RECORDINGS = _names(RecordingRequest)
 """Requests that need a world whose sessions are kept."""
-OF_BRANCHES, OF_DRAWINGS, OF_PLANT = _names(BranchRequest), _names(DrawingRequest), _names(PlantRequest)
+OF_BRANCHES, OF_DRAWINGS, OF_SERVICES = _names(BranchRequest), _names(DrawingRequest), _names(ServiceRequest)
 """Requests that need a world."""
 OF_CAMPAIGNS = _names(CampaignRequest)
 """Requests that need a world of a file."""

@@ -24,9 +24,9 @@ from steptwin.studio import branchrequests as branch
 from steptwin.studio import campaignrequests as campaign
 from steptwin.studio import devicerequests as device
 from steptwin.studio import drawingrequests as drawing
-from steptwin.studio import plantrequests as plant
 from steptwin.studio import recordingrequests as recording
 from steptwin.studio import requests as ask
+from steptwin.studio import servicerequests as services
 from steptwin.studio import toolrequests as tool
 from steptwin.studio import workrequests as work
 from steptwin.studio.calculations import gear
@@ -485,11 +485,11 @@ class ViewerSession:
             branch.ListBranches: lambda self, _: self._hub.branches.plain(),
             branch.StartBranch: lambda self, wanted: self._hub.branches.start(wanted.moment),
             branch.EndBranch: lambda self, wanted: self._hub.branches.end(wanted.branch),
-            plant.ReadGateways: lambda self, _: self._hub.plant.gateways(),
-            plant.ReadHistory: lambda self, _: self._hub.plant.history(),
-            plant.ReadHistoryValues: lambda self, one: self._hub.plant.values(one.points, one.run, one.from_s, one.to_s),
-            plant.ReadHistoryWrites: lambda self, one: self._hub.plant.writes(one.run, one.from_s, one.to_s),
-            plant.CompareHistory: lambda self, one: self._hub.plant.compare(
+            services.ReadGateways: lambda self, _: self._hub.services.gateways(),
+            services.ReadHistory: lambda self, _: self._hub.services.history(),
+            services.ReadHistoryValues: lambda self, one: self._hub.services.values(one.points, one.run, one.from_s, one.to_s),
+            services.ReadHistoryWrites: lambda self, one: self._hub.services.writes(one.run, one.from_s, one.to_s),
+            services.CompareHistory: lambda self, one: self._hub.services.compare(
                 one.points, (one.run, one.other), one.from_s, one.to_s
             ),
             campaign.ListCampaigns: lambda self, _: self._hub.campaigns.plain(),

@@ -15,9 +15,9 @@ from steptwin.studio.branchrequests import Branches
 from steptwin.studio.campaignrequests import Campaigns
 from steptwin.studio.drawingrequests import Arrangement
 from steptwin.studio.looking import KeptPast
-from steptwin.studio.plantrequests import PlantRecords
 from steptwin.studio.programs import ProgramTexts
 from steptwin.studio.recordingrequests import Recordings
+from steptwin.studio.servicerequests import WorldServices
 from steptwin.subject.contract import AsyncSubject, Result
 
 
@@ -127,7 +127,7 @@ class Surroundings:
     """None without a world."""
     arrangement: Arrangement | None = None
     """None without a world."""
-    plant: PlantRecords | None = None
+    services: WorldServices | None = None
     """None without a world."""
     campaigns: Campaigns | None = None
     """None without a world whose description is in a file."""

@@ -9,7 +9,7 @@ from steptwin.simulation.components.button import BUTTON
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.mechanics.drawing import Drawing, SensorZone
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.wiring import connections, terminal_name
 from steptwin.subject.commands import COMMANDS
 from steptwin.subject.contract import (
@@ -26,7 +26,7 @@ from steptwin.subject.contract import (
 from steptwin.subject.controls import controls_of
 
 
-def describe(world: Plant) -> Description:
+def describe(world: Simulation) -> Description:
     """Description of a world."""
     moved = set().union(*(axis.mechanism.may_turn for axis in world.axes.values()))
     return Description(
@@ -41,7 +41,7 @@ def describe(world: Plant) -> Description:
     )
 
 
-def _machine(world: Plant, name: str, *, is_moved: bool) -> MachinePart:
+def _machine(world: Simulation, name: str, *, is_moved: bool) -> MachinePart:
     on = world.parts.line_of.get(name)
     line, unit = (None, None) if on is None else (on[0].name, on[1])
     kind = world.kind(name)
@@ -49,7 +49,7 @@ def _machine(world: Plant, name: str, *, is_moved: bool) -> MachinePart:
     return MachinePart(name, sheet, line, unit, controls_of(sheet, kind.commands), is_moved=is_moved)
 
 
-def _mechanics(world: Plant, name: str) -> MechanicsPart:
+def _mechanics(world: Simulation, name: str) -> MechanicsPart:
     fitted = world.axes[name]
     place = fitted.mechanism.machine, str(fitted.mechanism.number)
     points = tuple(f"{name}.{what}" for what in MECHANICS)
@@ -59,13 +59,13 @@ def _mechanics(world: Plant, name: str) -> MechanicsPart:
     return MechanicsPart(name, *place, fitted.scale.unit, points, spec.kind, spec.travel, switches, scale)
 
 
-def _elements(world: Plant) -> Iterator[ElementPart]:
+def _elements(world: Simulation) -> Iterator[ElementPart]:
     for kind, built in world.parts.elements.items():
         if kind not in (AXIS.name, BUTTON.name):
             yield from (_element(world, kind, name) for name in built)
 
 
-def _element(world: Plant, kind: str, name: str) -> ElementPart:
+def _element(world: Simulation, kind: str, name: str) -> ElementPart:
     drawn = ELEMENTS[kind].drawing
     drawing = None if drawn is None else _drawing(drawn(world.parts.elements[kind][name]))
     terminals = world.parts.terminals.get(name, Terminals())
@@ -79,7 +79,7 @@ def _element(world: Plant, kind: str, name: str) -> ElementPart:
     return ElementPart(name, kind, inputs, outputs, parts, drawing, function)
 
 
-def _connections(world: Plant) -> Iterator[ConnectionPart]:
+def _connections(world: Simulation) -> Iterator[ConnectionPart]:
     for one in connections(world.parts):
         target = terminal_name(world.parts, one.target)
         yield ConnectionPart(one.source, target, one.inverted, one.delay, one.join)

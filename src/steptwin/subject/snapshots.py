@@ -7,7 +7,7 @@ from itertools import count
 from steptwin.errors import Misuse
 from steptwin.messages import NONE, Message
 from steptwin.nearmiss import NearMiss
-from steptwin.simulation.world.plantsnapshot import PlantSnapshot
+from steptwin.simulation.world.snapshot import SimulationSnapshot
 from steptwin.subject.commands import DropSnapshot, RestoreSnapshot, TakeSnapshot
 
 MOST_SNAPSHOTS = 32
@@ -21,9 +21,9 @@ class Snapshots:
     """At most `MOST_SNAPSHOTS`, in the order in which they were taken."""
 
     def __init__(self) -> None:
-        self._kept: dict[str, PlantSnapshot] = {}
+        self._kept: dict[str, SimulationSnapshot] = {}
 
-    def add(self, wanted: TakeSnapshot, snapshot: PlantSnapshot) -> dict[str, object]:
+    def add(self, wanted: TakeSnapshot, snapshot: SimulationSnapshot) -> dict[str, object]:
         """Raises `Misuse` where there are too many."""
         name = wanted.name
         if name is None:
@@ -37,7 +37,7 @@ class Snapshots:
     def plain(self) -> list[dict[str, object]]:
         return [_plain(name, snapshot) for name, snapshot in self._kept.items()]
 
-    def find(self, wanted: RestoreSnapshot | DropSnapshot) -> PlantSnapshot:
+    def find(self, wanted: RestoreSnapshot | DropSnapshot) -> SimulationSnapshot:
         """Raises `Misuse` with those there are."""
         found = self._kept.get(wanted.name)
         if found is None:
@@ -51,5 +51,5 @@ class Snapshots:
         del self._kept[wanted.name]
 
 
-def _plain(name: str, snapshot: PlantSnapshot) -> dict[str, object]:
+def _plain(name: str, snapshot: SimulationSnapshot) -> dict[str, object]:
     return {"name": name, "time_ns": str(snapshot.now)}

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 from steptwin.subject.commands import Advance
 from steptwin.subject.following import Filter, Following, filter_of
 from steptwin.subject.payloads import SHOWN_KINDS, STEP_KINDS
@@ -21,7 +21,7 @@ MOST_SHOWN = 1000
 TIME_HAS_PASSED = Message("subject.time-has-passed", "to_ns = {end}: this world is at {now} ns already")
 
 
-def advance(world: Plant, follow: Callable[[Filter, int], Following], wanted: Advance) -> Mapping[str, object]:
+def advance(world: Simulation, follow: Callable[[Filter, int], Following], wanted: Advance) -> Mapping[str, object]:
     """Execute a step in virtual time. ``follow``: `WorldSubject.follow`."""
     if wanted.until is not None:
         world.condition(wanted.until)  # raises `Misuse` here
@@ -51,7 +51,7 @@ def happened(following: Following) -> dict[str, object]:
     return {"events": [event.plain() for event in events if event.is_shown or event.kind not in SHOWN_KINDS], "missed": missed}
 
 
-def end_of(world: Plant, wanted: Advance, due: Nanos | None) -> Nanos | None:
+def end_of(world: Simulation, wanted: Advance, due: Nanos | None) -> Nanos | None:
     """The moment to which a step goes; without a time that is ``due``, when something happens next by itself, None for never."""
     if wanted.to is not None:
         return wanted.to
@@ -60,9 +60,9 @@ def end_of(world: Plant, wanted: Advance, due: Nanos | None) -> Nanos | None:
     return due if wanted.until is None else world.now + LONGEST_RUN_NS
 
 
-def next_due(world: Plant) -> Nanos | None:
+def next_due(world: Simulation) -> Nanos | None:
     """The next moment at which anything happens by itself; None when nothing will."""
-    dues = [due for kernel in world.kernels if (due := kernel.deadline()) is not None]
+    dues = [due for scheduler in world.schedulers if (due := scheduler.deadline()) is not None]
     own = world.next()
     due = min(dues if own is None else [*dues, own], default=None)
     return None if due is None else max(due, world.now)

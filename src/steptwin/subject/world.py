@@ -23,8 +23,8 @@ from steptwin.simulation.script.heldjog import HeldJog
 from steptwin.simulation.world.inputs import Download, EndScripts, ExternalInput, See
 from steptwin.simulation.world.model import WORLD
 from steptwin.simulation.world.motions import ordered
-from steptwin.simulation.world.plant import Plant
-from steptwin.simulation.world.plantsnapshot import PlantSnapshot
+from steptwin.simulation.world.simulation import Simulation
+from steptwin.simulation.world.snapshot import SimulationSnapshot
 from steptwin.subject import commands as command
 from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
 from steptwin.subject.describe import describe
@@ -54,7 +54,7 @@ CANNOT_DO = Message("subject.cannot-do", "{name!r} is {kind}, which cannot do {c
 class WorldSubject:
     """The world ``world``; ``apply_input`` applies an external input to it at its present moment."""
 
-    def __init__(self, world: Plant, apply_input: Callable[[ExternalInput], None] | None = None) -> None:
+    def __init__(self, world: Simulation, apply_input: Callable[[ExternalInput], None] | None = None) -> None:
         self.world = world
         self.description: Description = describe(world)
         self._apply_input = apply_input or world.apply_input
@@ -264,7 +264,7 @@ class WorldSubject:
         self.go_back(self.snapshots.find(wanted), wanted.name)
         return self.time()
 
-    def go_back(self, snapshot: PlantSnapshot, name: str | None) -> None:
+    def go_back(self, snapshot: SimulationSnapshot, name: str | None) -> None:
         """Restore a snapshot, with its name if it has one, and notify followers."""
         self.world.restore(snapshot)
         self.numbering.moved(self.world.now)

@@ -214,11 +214,11 @@ class LineRig(Rig):
         live = self._live or self.twin_only(what)
 
         def at(_: Nanos) -> T:
-            kernel = live.world.touch(self._machine)
+            scheduler = live.world.touch(self._machine)
             try:
                 return act(live.world)
             finally:
-                kernel.mark(self._machine)  # what acted on the machine itself has changed it behind the kernel's back
+                scheduler.mark(self._machine)  # what acted on the machine itself has changed it behind the scheduler's back
                 live.stale = True
 
         return self._at_present(at)

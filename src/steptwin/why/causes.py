@@ -190,8 +190,8 @@ class Causes:
         circuit = self._world.parts.circuits.get(target)
         if circuit is not None:
             yield from (contact.lane for contact in circuit.contacts if contact.lane)
-        for kernel in (self._world.parts.kernel_of[target.machine],):
-            wire = kernel.wire_to(target)
+        for scheduler in (self._world.parts.scheduler_of[target.machine],):
+            wire = scheduler.wire_to(target)
             if wire is not None:
                 yield self._name(wire.source)
 
@@ -200,7 +200,7 @@ class Causes:
         return str(pin) if pin.machine in self._world.machines else f"{pin.machine}.{pin.pin.lower()}"
 
     def _of_pin(self, pin: PinName, change: Change) -> FoundCause:
-        wire = self._world.parts.kernel_of[pin.machine].wire_to(pin)
+        wire = self._world.parts.scheduler_of[pin.machine].wire_to(pin)
         if wire is not None:
             found = self._before(self._name(wire.source), change, change.time - wire.delay)
             if found is not None and found[0].time == change.time - wire.delay:

@@ -12,8 +12,8 @@ from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.simulation.script import steps as do
-from steptwin.simulation.world.plant import Plant
-from steptwin.simulation.world.plantsnapshot import RecordedInput
+from steptwin.simulation.world.simulation import Simulation
+from steptwin.simulation.world.snapshot import RecordedInput
 from steptwin.why.log import in_parts
 from steptwin.why.states import Interval
 
@@ -22,7 +22,7 @@ MOST_REMEMBERED = 200_000
 
 CourseTurns: TypeAlias = list[tuple[Nanos, float]]
 """The values from the beginning of an interval on, each with its moment."""
-CourseWatch: TypeAlias = Callable[[Plant, str, CourseTurns], do.Steps]
+CourseWatch: TypeAlias = Callable[[Simulation, str, CourseTurns], do.Steps]
 """A script that notes the turns of what has a name."""
 
 
@@ -37,10 +37,10 @@ NOTHING_IS_KNOWN = Message("why.nothing-is-known", "{name}: nothing is known of 
 class Courses:
     """``make`` gives the world at its beginning, ``inputs`` are what came from outside since, more and more."""
 
-    def __init__(self, make: Callable[[], Plant], inputs: Sequence[RecordedInput]) -> None:
+    def __init__(self, make: Callable[[], Simulation], inputs: Sequence[RecordedInput]) -> None:
         self._make = make
         self._inputs = inputs
-        self._second: Plant | None = None
+        self._second: Simulation | None = None
         self._known: dict[tuple[str, Nanos], _Course] = {}
         self._remembered = 0
 
@@ -109,7 +109,7 @@ def _moment(turn: tuple[Nanos, float]) -> Nanos:
     return turn[0]
 
 
-def watch_truth(world: Plant, text: str, turns: CourseTurns) -> do.Steps:
+def watch_truth(world: Simulation, text: str, turns: CourseTurns) -> do.Steps:
     """Notes when a condition becomes true and false."""
     negated = f"not ({text})"
     is_true = world.holds(world.condition(text))
@@ -120,7 +120,7 @@ def watch_truth(world: Plant, text: str, turns: CourseTurns) -> do.Steps:
         turns.append((world.now, float(is_true)))
 
 
-def watch_value(world: Plant, name: str, turns: CourseTurns) -> do.Steps:
+def watch_value(world: Simulation, name: str, turns: CourseTurns) -> do.Steps:
     """Notes when a signal takes another value."""
     value = world.read(name)
     turns.append((world.now, value))

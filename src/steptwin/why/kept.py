@@ -13,8 +13,8 @@ from typing import Protocol
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.world.history import outside_past
-from steptwin.simulation.world.plant import Plant
-from steptwin.simulation.world.plantsnapshot import PlantSnapshot, RecordedInput
+from steptwin.simulation.world.simulation import Simulation
+from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
 from steptwin.why.answer import MOST_LINKS, Answer
 from steptwin.why.question import Asking, Why
 from steptwin.why.search import Asked, LastChanges, PastStates
@@ -143,13 +143,13 @@ def _joined(answer: Answer, before: Answer) -> Answer:
     )
 
 
-def first_span(world: Plant) -> Nanos:
+def first_span(world: Simulation) -> Nanos:
     """How much of the past of a world is looked at first: less where statements take less time."""
     times = [programs.statement_time for programs in world.programs.values() if programs.statement_time]
     return min([FIRST_SPAN_NS, *(FIRST_STATEMENTS * time for time in times)])
 
 
-def _second_world(world: Plant, snapshot: PlantSnapshot) -> Plant:
-    second = Plant(world.blueprint, keep_trace=False, keep_inputs=False, at=snapshot)
+def _second_world(world: Simulation, snapshot: SimulationSnapshot) -> Simulation:
+    second = Simulation(world.blueprint, keep_trace=False, keep_inputs=False, at=snapshot)
     second.trace.stop()
     return second

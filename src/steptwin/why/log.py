@@ -22,8 +22,8 @@ from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.history import SLICE_NS, replay
 from steptwin.simulation.world.inputs import Download, ExternalInput
-from steptwin.simulation.world.plant import Plant
-from steptwin.simulation.world.plantsnapshot import RecordedInput
+from steptwin.simulation.world.simulation import Simulation
+from steptwin.simulation.world.snapshot import RecordedInput
 from steptwin.statements import StatementHook
 from steptwin.why import points
 
@@ -97,13 +97,13 @@ class CauseLog:
     at its beginning, the statements in execution and the plans in force are noted first, as if they had begun now.
     """
 
-    def __init__(self, world: Plant, most: int = MOST_NOTED) -> None:
+    def __init__(self, world: Simulation, most: int = MOST_NOTED) -> None:
         self.world = world
         self.begin = world.now
         self._most = most
         parts = world.parts
-        numbers = {id(kernel): number for number, kernel in enumerate(world.kernels)}
-        self._group_of = {name: numbers[id(kernel)] for name, kernel in parts.kernel_of.items()}
+        numbers = {id(scheduler): number for number, scheduler in enumerate(world.schedulers)}
+        self._group_of = {name: numbers[id(scheduler)] for name, scheduler in parts.scheduler_of.items()}
         self._pins = {name: frozenset(machine.pins()) for name, machine in world.machines.items()}
         self.first_levels = levels_of(world)
         self.records: dict[int, list[TraceRecord]] = defaultdict(list)
@@ -333,13 +333,13 @@ class CauseLog:
         return self.executed[machine].last(until)
 
 
-def in_parts(world: Plant, inputs: Sequence[RecordedInput], end: Nanos) -> Iterator[bool]:
+def in_parts(world: Simulation, inputs: Sequence[RecordedInput], end: Nanos) -> Iterator[bool]:
     """`replay` in parts that are short for the programs of the world, too."""
     times = [programs.statement_time for programs in world.programs.values() if programs.statement_time]
     return replay(world, inputs, end, min(SLICE_NS, STATEMENTS_AT_ONCE * min(times, default=SLICE_NS)))
 
 
-def levels_of(world: Plant) -> dict[str, float]:
+def levels_of(world: Simulation) -> dict[str, float]:
     """The present levels of all that has edges: pins, outputs of elements, contacts."""
     found = {f"{name}.{pin}": level for name, machine in world.machines.items() for pin, level in machine.pins().items()}
     for kind, parts in world.parts.elements.items():
@@ -350,7 +350,7 @@ def levels_of(world: Plant) -> dict[str, float]:
     return found | {contact.lane: float(contact.level) for contact in contacts}
 
 
-def _plans(world: Plant) -> Iterator[TraceRecord]:
+def _plans(world: Simulation) -> Iterator[TraceRecord]:
     """The plans in force."""
     for name, machine in world.machines.items():
         for number, drive in enumerate(machine.axes, start=1):

@@ -11,7 +11,7 @@ from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.points import LivePoint, MemoryCells
 from steptwin.simulation.world.eventpoints import EventPoints, points_of, stays_between_events
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 
 MOST_TURNS = 1_000_000
 """Limit of the changes that are noted, which are kept in memory."""
@@ -27,14 +27,14 @@ class PointTurns:
     """Notes the changes of all such points of ``world`` from now on: after each event of their controller, and after each
     statement of which `executes` is notified."""
 
-    def __init__(self, world: Plant) -> None:
+    def __init__(self, world: Simulation) -> None:
         self._world = world
         self._readers = {owner: _Reader(self, world, owner) for owner in world.machines}
         self._noted = self._looks = 0
         for owner, reader in self._readers.items():
-            kernel = world.parts.kernel_of[owner]
-            kernel.hears_requests = True
-            kernel.follow(reader, (owner,))
+            scheduler = world.parts.scheduler_of[owner]
+            scheduler.hears_requests = True
+            scheduler.follow(reader, (owner,))
 
     def executes(self, owner: str, now: Nanos, *, keeps: bool) -> None:
         """A controller executes a statement next, which may change points without an event if it ``keeps``."""
@@ -48,7 +48,7 @@ class PointTurns:
         self._looks += 1
         if self._noted > MOST_TURNS or self._looks > MOST_LOOKS:
             for owner, reader in self._readers.items():
-                self._world.parts.kernel_of[owner].unfollow(reader)
+                self._world.parts.scheduler_of[owner].unfollow(reader)
             self._readers.clear()
 
     def turns(self, name: str) -> Sequence[PointTurn] | None:
@@ -67,10 +67,10 @@ class PointTurns:
 class _Reader:
     """Reader of the points of one controller. ``points``: the turns of each.
 
-    As `steptwin.simulation.scheduler.followers.KernelFollower`.
+    As `steptwin.simulation.scheduler.followers.SchedulerFollower`.
     """
 
-    def __init__(self, noted: PointTurns, world: Plant, owner: str) -> None:
+    def __init__(self, noted: PointTurns, world: Simulation, owner: str) -> None:
         self._all = noted
         points = dict(points_of(world, owner))
         found = {path: point for path, point in points.items() if point is not None and stays_between_events(point)}
@@ -168,14 +168,14 @@ def note_turn(turns: list[PointTurn], now: Nanos, value: float) -> None:
         turns.append((now, value))
 
 
-def _point(world: Plant, owner: str, path: str) -> LivePoint | None:
+def _point(world: Simulation, owner: str, path: str) -> LivePoint | None:
     """None also for a row of registers, of which one must be chosen."""
     with suppress(Misuse):
         return world.kind(owner).point(world.machine(owner), path)
     return None
 
 
-def _memory(world: Plant, owner: str, path: str) -> MemoryCells | None:
+def _memory(world: Simulation, owner: str, path: str) -> MemoryCells | None:
     found = _point(world, owner, path)
     return None if found is None else found.memory
 

@@ -17,8 +17,8 @@ from steptwin.simulation.logic.condition import Signal, SignalCondition
 from steptwin.simulation.logic.expression import parse_condition
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.world.history import outside_past
-from steptwin.simulation.world.plant import Plant
-from steptwin.simulation.world.plantsnapshot import RecordedInput
+from steptwin.simulation.world.simulation import Simulation
+from steptwin.simulation.world.snapshot import RecordedInput
 from steptwin.why import points
 from steptwin.why.answer import MOST_LINKS, Answer, ChainLink, since_before
 from steptwin.why.causes import IS, IS_SINCE, Cause, Causes, nothing
@@ -116,7 +116,9 @@ class Why:
     noted.
     """
 
-    def __init__(self, make: Callable[[], Plant], inputs: Iterable[RecordedInput], end: Nanos, most: int = MOST_NOTED) -> None:
+    def __init__(
+        self, make: Callable[[], Simulation], inputs: Iterable[RecordedInput], end: Nanos, most: int = MOST_NOTED
+    ) -> None:
         self._make = make
         self._inputs = list(inputs)
         self.end = end

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.simulation.world.history import MOST_STATES, ChangedSince, PastState, StatesByAge, outside_past, replay
-from steptwin.simulation.world.plant import Plant
-from steptwin.simulation.world.plantsnapshot import RecordedInput
+from steptwin.simulation.world.simulation import Simulation
+from steptwin.simulation.world.snapshot import RecordedInput
 from steptwin.why.answer import Answer
 from steptwin.why.kept import PastQuestions, first_span
 from steptwin.why.log import MOST_NOTED
@@ -22,7 +22,7 @@ class RepeatedPast:
     """Answers questions about the past until ``end``. ``make`` gives the world at its beginning, ``inputs`` are what came from
     outside since."""
 
-    def __init__(self, make: Callable[[], Plant], inputs: Sequence[RecordedInput], end: Nanos) -> None:
+    def __init__(self, make: Callable[[], Simulation], inputs: Sequence[RecordedInput], end: Nanos) -> None:
         self._make = make
         self._inputs = list(inputs)
         self._end = end
@@ -42,7 +42,7 @@ class StatesOfRun:
 
     branch = 0
 
-    def __init__(self, world: Plant, inputs: Sequence[RecordedInput], end: Nanos) -> None:
+    def __init__(self, world: Simulation, inputs: Sequence[RecordedInput], end: Nanos) -> None:
         self.world = world
         self.begin = world.now
         self._inputs = inputs

@@ -15,8 +15,8 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.world.history import ACTED, MOVED, PastState
 from steptwin.simulation.world.inputs import Bytes, Download
-from steptwin.simulation.world.plant import Plant
-from steptwin.simulation.world.plantsnapshot import PlantSnapshot, RecordedInput
+from steptwin.simulation.world.simulation import Simulation
+from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
 from steptwin.statements import StatementHook
 from steptwin.why import points
 from steptwin.why.courses import CourseTurns, watch_truth
@@ -51,7 +51,7 @@ class PastStates(Protocol):
     """The past of a world as a search needs it; see `steptwin.simulation.world.history.History`."""
 
     @property
-    def world(self) -> Plant: ...
+    def world(self) -> Simulation: ...
     @property
     def begin(self) -> Nanos: ...
     @property
@@ -67,13 +67,13 @@ FoundTurn: TypeAlias = Generator[None, None, "Nanos | None"]
 class LastChanges:
     """Search in the past in ``history``. ``second_world`` makes one like it, at a snapshot."""
 
-    def __init__(self, history: PastStates, second_world: Callable[[Plant, PlantSnapshot], Plant]) -> None:
+    def __init__(self, history: PastStates, second_world: Callable[[Simulation, SimulationSnapshot], Simulation]) -> None:
         self._history = history
         self._make = second_world
         self._branch = history.branch
         self._known: dict[str, tuple[Nanos, Found]] = {}
         """Results of searches before a moment, by question."""
-        self._world: Plant | None = None
+        self._world: Simulation | None = None
         self._values: dict[tuple[str, Nanos], float] = {}
         """At states, while a search goes on."""
         self._written: dict[tuple[str, str, tuple[str, ...]], bool] = {}
@@ -165,7 +165,7 @@ class LastChanges:
             self._values[key] = world.signal(name).value(world.now)
         return self._values[key]
 
-    def _writes(self, world: Plant, owner: str, path: str, memory: MemoryCells | None) -> bool:
+    def _writes(self, world: Simulation, owner: str, path: str, memory: MemoryCells | None) -> bool:
         """Whether a statement of a controller may write a point that is kept."""
         programs = world.programs.get(owner)
         if programs is None:
@@ -177,7 +177,7 @@ class LastChanges:
         return self._written[key]
 
     @staticmethod
-    def _are_in(world: Plant, owner: str, path: str, memory: MemoryCells | None, written: Collection[Resource]) -> bool:
+    def _are_in(world: Simulation, owner: str, path: str, memory: MemoryCells | None, written: Collection[Resource]) -> bool:
         """Whether a point may have another value after a statement that keeps what it writes."""
         values = [one.name for one in written if one.kind is ResourceKind.VALUE]
         for name in filter(None, map(world.programs[owner].point, values)):
@@ -193,13 +193,17 @@ class LastChanges:
         """Whether all that may move stands at the moment of a state, and nothing begins to move until the next one."""
         world = self._at(state)
         signals = [signal for name in asked.moving if isinstance(signal := world.signal(name), SignalOf)]
-        kernels = {source.kernel for signal in signals for source in signal.bring(world.now)}
+        schedulers = {source.scheduler for signal in signals for source in signal.bring(world.now)}
         moved = {machine for machine, subject in after.changed if subject == MOVED}
-        if len(signals) < len(asked.moving) or not kernels or any(not moved.isdisjoint(kernel.machines) for kernel in kernels):
+        if (
+            len(signals) < len(asked.moving)
+            or not schedulers
+            or any(not moved.isdisjoint(scheduler.machines) for scheduler in schedulers)
+        ):
             return False
         return all(rest_of(signal, world.now) is not None for signal in signals)
 
-    def _at(self, state: PastState) -> Plant:
+    def _at(self, state: PastState) -> Simulation:
         """The second world at a state."""
         world = self._world = self._world or self._make(self._history.world, state.snapshot)
         world.restore(state.snapshot)
@@ -226,7 +230,7 @@ class LastChanges:
 class _Noted:
     """The turns of some signals of ``world`` from now on, until ``stack`` is closed."""
 
-    def __init__(self, world: Plant, asked: Asked, stack: ExitStack, *, is_replaced: bool) -> None:
+    def __init__(self, world: Simulation, asked: Asked, stack: ExitStack, *, is_replaced: bool) -> None:
         levels = levels_of(world) if asked.edges else {}
         self.turns: dict[str, CourseTurns] = {name: [(world.now, levels.get(name, 0.0))] for name in asked.edges}
         if asked.edges:
@@ -246,9 +250,9 @@ class _Noted:
 
 
 class _Follower:
-    """Notes the turns of a signal that has no edges. As `steptwin.simulation.scheduler.followers.KernelFollower`."""
+    """Notes the turns of a signal that has no edges. As `steptwin.simulation.scheduler.followers.SchedulerFollower`."""
 
-    def __init__(self, world: Plant, name: str) -> None:
+    def __init__(self, world: Simulation, name: str) -> None:
         signal = world.signal(name)
         self._world, self._read = world, signal.value
         self._sources = signal.bring(world.now)
@@ -263,10 +267,10 @@ class _Follower:
 
     def follow(self, stack: ExitStack, *, is_replaced: bool) -> None:
         """``is_replaced``: whether programs may get other statements meanwhile."""
-        for kernel, name in self._sources:
-            kernel.follow(self, (name,))
-            stack.callback(kernel.unfollow, self)
-            kernel.hears_requests |= self._is_kept
+        for scheduler, name in self._sources:
+            scheduler.follow(self, (name,))
+            stack.callback(scheduler.unfollow, self)
+            scheduler.hears_requests |= self._is_kept
         programs = self._world.programs.get(self._owner)
         if self._is_kept and programs is not None:
             keeping = {} if is_replaced else dict(_acting(programs))

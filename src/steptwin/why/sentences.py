@@ -13,7 +13,7 @@ from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.control import Halt
 from steptwin.simulation.world.inputs import Bytes, Download, ExternalInput, SetVariable
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 from steptwin.why.log import CauseLog, Executed
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
@@ -77,7 +77,7 @@ def statement(log: CauseLog, executed: Executed) -> MessageText:
 class Frames:
     """The frames of the lines of a world in words."""
 
-    def __init__(self, world: Plant) -> None:
+    def __init__(self, world: Simulation) -> None:
         self._told: list[FrameLine] = []
         self.words: dict[str, LineWords] = {
             spec.name: line_kinds()[spec.kind].words(world.lines[spec.name], "", self._told.append) for spec in world.spec.lines

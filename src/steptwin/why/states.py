@@ -11,7 +11,7 @@ from steptwin.machine import SECOND, Nanos
 from steptwin.points import FARTHEST_NS
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.world.history import PastState, StatesByAge
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 
 MOST_KEPT = 64
 LEAST_DISTANCE_NS: Nanos = SECOND // 2
@@ -35,7 +35,7 @@ class Standing(NamedTuple):
 class StatesOnTheWay:
     """States of ``world``, the first one where it is now."""
 
-    def __init__(self, world: Plant) -> None:
+    def __init__(self, world: Simulation) -> None:
         self._world = world
         self._moving = dict(_moving(world))
         self._begin = world.now
@@ -75,7 +75,7 @@ class StatesOnTheWay:
             end = state.snapshot.now
 
 
-def _moving(world: Plant) -> Iterator[tuple[str, SignalOf]]:
+def _moving(world: Simulation) -> Iterator[tuple[str, SignalOf]]:
     """The quantities that move, and can tell when their course is another one."""
     elements = (name for built in world.parts.elements.values() for name in built)
     names = [f"{name}.{signal}" for name in elements for signal in world.parts.element_signals(name) or ()]

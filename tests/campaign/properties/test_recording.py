@@ -1,4 +1,5 @@
-"""Courses of comparisons beside what is read at each moment: programs that calculate ahead, several kernels, several motions."""
+"""Courses of comparisons beside what is read at each moment: programs that calculate ahead, several schedulers, several
+motions."""
 
 from __future__ import annotations
 
@@ -28,7 +29,7 @@ ENDWHILE
 def moved(text: str, *, joined: bool) -> tuple[Verdict, list[tuple[float, float]]]:
     """The verdict on two axes that move with other ramps, and their places every 0.1 ms."""
     world = World.from_toml(TWO + (JOINED if joined else ""))
-    assert len(world.kernels) == (1 if joined else 2)
+    assert len(world.schedulers) == (1 if joined else 2)
     watch = read_property(text).watch(world)
     for name in ("left", "right"):
         world.mic488[name].axis[1].enable()

@@ -14,7 +14,7 @@ from steptwin.campaign.properties.text import parse_property
 from steptwin.campaign.properties.tree import Atom, nodes
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 
 WORLD = (
     slide()
@@ -256,7 +256,7 @@ def test_what_several_properties_compare_is_followed_once(monkeypatch: pytest.Mo
     made: list[Atom] = []
     begin = ComparisonRecord.__init__
 
-    def noted(self: ComparisonRecord, world: Plant, atom: Atom, *, is_fine: bool) -> None:
+    def noted(self: ComparisonRecord, world: Simulation, atom: Atom, *, is_fine: bool) -> None:
         made.append(atom)
         begin(self, world, atom, is_fine=is_fine)
 
@@ -269,7 +269,7 @@ def test_what_several_properties_compare_is_followed_once(monkeypatch: pytest.Mo
     assert len(made) < comparisons
     for one in several:
         one.close()
-    assert all(kernel.followers is None or not any(kernel.followers.by_name.values()) for kernel in joined.kernels)
+    assert all(scheduler.followers is None or not any(scheduler.followers.by_name.values()) for scheduler in joined.schedulers)
 
 
 def _atoms(text: str) -> list[Atom]:

@@ -21,8 +21,8 @@ POINTS = ("time", "table.USER_REGISTER[4]:real", "table.IN3")
 
 
 def shown(world: World | Past) -> tuple[float, ...]:
-    plant = world.world if isinstance(world, Past) else world
-    return tuple(plant.read(point) for point in POINTS)
+    simulation = world.world if isinstance(world, Past) else world
+    return tuple(simulation.read(point) for point in POINTS)
 
 
 def make(path: Path) -> dict[int, tuple[float, ...]]:

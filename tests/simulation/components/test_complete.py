@@ -19,7 +19,7 @@ from steptwin.files.export.recording import sort_out
 from steptwin.motion.divisions import profile_of
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.mechanics.lanes import AxisViews
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 
 ROOT = Path(__file__).parents[3]
 NAMES = sorted(ELEMENTS)
@@ -80,7 +80,7 @@ def test_it_has_tests_of_its_own(name: str) -> None:
     assert (Path(__file__).parent / TESTS.get(name, f"test_{name}.py")).is_file()
 
 
-Recorded: TypeAlias = "tuple[Plant, AxisViews, set[str], set[str]]"
+Recorded: TypeAlias = "tuple[Simulation, AxisViews, set[str], set[str]]"
 
 
 @pytest.fixture(scope="module")

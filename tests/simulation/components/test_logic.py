@@ -105,7 +105,7 @@ delay = "5 ms"
     there.mic488["a"].write("OUT1", 1)
     there.run(for_=0.01)
     assert (there.read("a.IN3"), there.read("b.IN4")) == (0, 0)
-    # Both are in one kernel, and lanes are under its first machine.
+    # Both are in one scheduler, and lanes are under its first machine.
     assert {record.machine for record in there.trace.edges() if record.subject == "both.out"} == {"a"}
 
 

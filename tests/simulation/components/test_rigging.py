@@ -11,7 +11,7 @@ from steptwin.files.world import World
 from steptwin.simulation.faults import read
 from steptwin.simulation.script.steps import ClearFault
 
-PLANT = """
+WORLD = """
 [world]
 seed = 11
 
@@ -76,7 +76,7 @@ for_ms = 12
 
 
 def test_lost_steps_of_a_described_axis_are_lost_by_its_load() -> None:
-    sound, spoilt = World.from_toml(PLANT), World.from_toml(PLANT + FAULTS)
+    sound, spoilt = World.from_toml(WORLD), World.from_toml(WORLD + FAULTS)
     for world in (sound, spoilt):
         world.run(for_="10 s")
     assert sound.read("x.position") == pytest.approx(100.0)
@@ -134,13 +134,13 @@ def test_the_load_of_an_m1486_is_what_stalls_and_loses_steps() -> None:
 
 
 def test_what_goes_wrong_is_in_the_trace_and_two_runs_share_it() -> None:
-    worlds = [World.from_toml(PLANT + FAULTS) for _ in range(2)]
+    worlds = [World.from_toml(WORLD + FAULTS) for _ in range(2)]
     for world in worlds:
         world.run(for_="10 s")
     first, second = worlds
     assert first.trace.digest() == second.trace.digest()
     assert {record.subject for record in first.trace.faults()} == {"lost-steps", "bounce", "crc", "gap"}
-    other = World.from_toml(PLANT.replace("seed = 11", "seed = 12") + FAULTS)
+    other = World.from_toml(WORLD.replace("seed = 11", "seed = 12") + FAULTS)
     other.run(for_="10 s")
     assert other.trace.digest() != first.trace.digest()
 
@@ -148,10 +148,10 @@ def test_what_goes_wrong_is_in_the_trace_and_two_runs_share_it() -> None:
 @settings(max_examples=10)
 @given(st.floats(0.0, 2.0))
 def test_a_snapshot_at_any_moment_changes_nothing(moment: float) -> None:
-    world = World.from_toml(PLANT + FAULTS)
+    world = World.from_toml(WORLD + FAULTS)
     world.run(for_="3 s")
     digest = world.trace.digest()
-    world = World.from_toml(PLANT + FAULTS)
+    world = World.from_toml(WORLD + FAULTS)
     world.run(for_=f"{moment:.9f} s")
     snapshot = world.snapshot()
     world.run(for_="0.7 s")

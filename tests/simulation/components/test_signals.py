@@ -141,21 +141,21 @@ def test_controllers_have_status_program_and_pins() -> None:
     assert world.read("go.pressed") == 0.0
 
 
-def test_to_bring_a_signal_is_to_bring_the_kernel_of_its_source() -> None:
+def test_to_bring_a_signal_is_to_bring_the_scheduler_of_its_source() -> None:
     world = small()
     signal = find_signal(world.parts, "c.status")
     assert isinstance(signal, SignalOf)
-    assert signal.bring(SECOND) == ((world.parts.kernel_of["c"], "c"),)
-    assert [kernel.now for kernel in world.kernels] == [0, SECOND]
+    assert signal.bring(SECOND) == ((world.parts.scheduler_of["c"], "c"),)
+    assert [scheduler.now for scheduler in world.schedulers] == [0, SECOND]
 
 
-def test_a_condition_makes_no_kernel_attentive_unless_requests_change_its_signal() -> None:
+def test_a_condition_makes_no_scheduler_attentive_unless_requests_change_its_signal() -> None:
     """What a controller counts changes with events; what a master stores does not."""
     for is_kept in (False, True):
-        kernel = small().parts.kernel_of["c"]
+        scheduler = small().parts.scheduler_of["c"]
         options = {"is_kept": True} if is_kept else {}
-        SignalOf((kernel.source("c"),), lambda now: 0.0, **options).watch("c.status")  # type: ignore[arg-type]
-        assert kernel.is_attentive is is_kept
+        SignalOf((scheduler.source("c"),), lambda now: 0.0, **options).watch("c.status")  # type: ignore[arg-type]
+        assert scheduler.is_attentive is is_kept
 
 
 def test_idle_looks_at_what_was_busy_last_and_at_all_when_nothing_is() -> None:
@@ -163,16 +163,16 @@ def test_idle_looks_at_what_was_busy_last_and_at_all_when_nothing_is() -> None:
     idle = find_signal(world.parts, "idle")
     assert isinstance(idle, Idle)
     assert (idle.continuous, list(idle.turns(0)), idle.version()) == (False, [], None)
-    assert idle.bring(world.now) == (world.parts.kernel_of["a"].source("a"),)
+    assert idle.bring(world.now) == (world.parts.scheduler_of["a"].source("a"),)
     assert idle.value(world.now) == 0.0
-    assert [kernel.now for kernel in world.kernels] == [0, 0, 0]
+    assert [scheduler.now for scheduler in world.schedulers] == [0, 0, 0]
     world.run(for_=1.1)
-    assert idle.bring(world.now) == tuple(world.parts.kernel_of[name].source(name) for name in world.machines)
+    assert idle.bring(world.now) == tuple(world.parts.scheduler_of[name].source(name) for name in world.machines)
     assert idle.value(world.now) == 1.0
-    assert [kernel.now for kernel in world.kernels] == [world.now] * 3
+    assert [scheduler.now for scheduler in world.schedulers] == [world.now] * 3
     world.mic488["c"].axis[1].enable()
     world.mic488["c"].axis[1].move_to(100.0)
-    assert idle.bring(world.now) == (world.parts.kernel_of["c"].source("c"),)
+    assert idle.bring(world.now) == (world.parts.scheduler_of["c"].source("c"),)
     assert world.read("idle") == 0.0
 
 

@@ -18,7 +18,7 @@ from steptwin.mic488.status import AxisStatus
 from steptwin.simulation.faults import Faults, FaultyMachine, read, rig
 from steptwin.simulation.kinds.mic488.faults import Mic488Body
 from steptwin.simulation.logic.contacts import PositionSwitch, place
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
 
@@ -154,7 +154,7 @@ def test_master_error_is_shown_as_m_status_3_and_goes_with_the_fault() -> None:
         shown.append(m_status(rig))
         rig.wait(1.0)
     assert shown == [0, 3, 3, 3]
-    rig.kernel.advance(rig.now)
+    rig.scheduler.advance(rig.now)
     rig.faults.remove("other", rig.now)
     assert m_status(rig) == 0
     assert rig.told() == [
@@ -172,9 +172,9 @@ def test_master_error_stays_when_the_controller_is_switched_off_and_on() -> None
 
 
 def test_what_shows_no_master_error_says_so() -> None:
-    kernel, faults = Kernel(), Faults()
-    kernel.add("old", Mic488Device(ControllerConfig(), "1.40"))
-    rig(kernel, "old", faults, Mic488Body(kernel.machines["old"], 1))  # type: ignore[arg-type]
+    scheduler, faults = Scheduler(), Faults()
+    scheduler.add("old", Mic488Device(ControllerConfig(), "1.40"))
+    rig(scheduler, "old", faults, Mic488Body(scheduler.machines["old"], 1))  # type: ignore[arg-type]
     with pytest.raises(Misuse, match=r"fault master-error: 'old' has firmware 1\.40, which has no M_STATUS: 1\.70 has"):
         faults.add(read("master-error"))
 
@@ -195,7 +195,7 @@ def test_an_axis_runs_over_a_limit_switch_that_is_stuck() -> None:
     stops = []
     for faults in ((), ("stuck pin=IN1 value=0",)):
         rig = FaultRig(*faults, config=axis(limit_mode=3, in_kl=1, in_kr=0))
-        place(rig.kernel, PositionSwitch("1", 1, 200, None, PinName("1", "IN1")))
+        place(rig.scheduler, PositionSwitch("1", 1, 200, None, PinName("1", "IN1")))
         rig.ask(ENABLE, ms=0)
         rig.ask(real(VEL_ABS, 100.0), ms=0)
         rig.wait(5.0)
@@ -328,11 +328,11 @@ def test_power_cut_leaves_what_was_not_written_as_it_was(written: int) -> None:
 
 
 def test_what_is_stored_outside_is_what_the_memory_has() -> None:
-    kernel, held, kept = Kernel(), Faults(), list[bytes]()
+    scheduler, held, kept = Scheduler(), Faults(), list[bytes]()
     device = Mic488Device(ControllerConfig())
     device.store = kept.append
-    kernel.add("1", device)
-    rig(kernel, "1", held, Mic488Body(device, 1))
+    scheduler.add("1", device)
+    rig(scheduler, "1", held, Mic488Body(device, 1))
     held.add(read("power-cut written=3 nth=1"))
     device.user[:] = array("H", [0x5555] * len(device.user))
     device.save_memory()
@@ -424,9 +424,9 @@ def test_state_of_physics_taken_out_and_put_back_changes_nothing() -> None:
     rig.pin("IN4", 0)
     rig.wait(0.004)
     told = len(rig.records)
-    kernel, faults, now = rig.kernel.snapshot(), rig.faults.copy_state(), rig.now
+    scheduler, faults, now = rig.scheduler.snapshot(), rig.faults.copy_state(), rig.now
     first = go_on()
-    rig.kernel.restore(kernel)
+    rig.scheduler.restore(scheduler)
     rig.faults.set_state(faults)
     rig.now = now
     del rig.records[told:]
@@ -436,7 +436,7 @@ def test_state_of_physics_taken_out_and_put_back_changes_nothing() -> None:
 def test_a_machine_with_faults_is_switched_off_and_on() -> None:
     """EN and the outputs fall with the power (MIC-27); a pulse that nobody gives any more turns nothing."""
     rig = moving("stall at_s=100")
-    machine = rig.kernel.machines["1"]
+    machine = rig.scheduler.machines["1"]
     rig.wait(1.0)
     assert machine.pins()["M1_EN"] == 1.0
     machine.power_off(rig.now)
@@ -497,9 +497,9 @@ class Heard(Bare):
 
 
 def faulty(fault: str) -> tuple[Heard, FaultyMachine]:
-    kernel, faults, inner = Kernel(), Faults(0), Heard()
-    kernel.add("a", inner)
-    machine = rig(kernel, "a", faults, ToyBody())
+    scheduler, faults, inner = Scheduler(), Faults(0), Heard()
+    scheduler.add("a", inner)
+    machine = rig(scheduler, "a", faults, ToyBody())
     faults.add(read(fault), 0)
     inner.asked.clear()
     return inner, machine
@@ -521,7 +521,7 @@ def test_a_machine_looks_ahead_no_further_than_to_a_fault() -> None:
     assert machine.advance_to_change(2 * SECOND) == SECOND
 
 
-def test_its_kernel_is_told_when_the_supply_of_a_machine_fails() -> None:
+def test_its_scheduler_is_told_when_the_supply_of_a_machine_fails() -> None:
     _, machine = faulty("supply-drop at_s=1 for_s=0.5")
     told: list[bool] = []
     machine.changed = lambda: told.append(True)

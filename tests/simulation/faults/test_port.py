@@ -418,11 +418,11 @@ def test_state_taken_out_and_put_back_changes_nothing() -> None:
     for _ in range(6):
         rig.ask(READ)
     told = len(rig.told())
-    kernel, faults_ = rig.kernel.snapshot(), rig.faults.copy_state()
+    scheduler, faults_ = rig.scheduler.snapshot(), rig.faults.copy_state()
     port, inner = rig.port.copy_state(), rig.inner.copy_state()
     now = rig.now
     first = go_on(rig)
-    rig.kernel.restore(kernel)
+    rig.scheduler.restore(scheduler)
     rig.inner.set_state(inner)
     rig.port.set_state(port)
     rig.faults.set_state(faults_)

@@ -21,7 +21,7 @@ from steptwin.motion import MotionState, Profile, plan_position
 from steptwin.motion.profile import cruise
 from steptwin.simulation.logic.contacts import Button, Circuit, CountedPosition, Switch, Zone
 from steptwin.simulation.scheduler.chance import Chance
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
 
@@ -73,22 +73,22 @@ def test_a_repeated_zone_is_at_every_turn_to_the_nearest_pulse(low: int, width: 
 def test_contacts_of_one_input_are_joined(in_series: bool) -> None:
     """Two buttons, one of them NC: an input has what its contacts give it together, and only its changes are edges."""
     edges: list[TraceRecord] = []
-    kernel = Kernel(record=edges.append)
+    scheduler = Scheduler(record=edges.append)
     device = Mic488Device(controller())
-    kernel.add("m", device)
-    circuit = Circuit(kernel, PinName("m", "IN3"), in_series=in_series)
+    scheduler.add("m", device)
+    circuit = Circuit(scheduler, PinName("m", "IN3"), in_series=in_series)
     buttons = [
         Button(circuit, normally_closed=closed, bounce_ns=0, bounces=0, chance=Chance(0, "b"), lane=f"b{closed:d}")
         for closed in (False, True)
     ]
     for button in buttons:
         button.rest_at(button.normally_closed)
-        kernel.add_part(button)
+        scheduler.add_part(button)
     circuit.close()
     for now, (which, pressed) in enumerate([(0, True), (1, True), (0, False), (1, False), (0, True), (0, False)], start=1):
-        kernel.advance(now)
+        scheduler.advance(now)
         buttons[which].press(pressed, now)
-        kernel.settle()
+        scheduler.settle()
         closed = [buttons[0].pressed, not buttons[1].pressed]
         assert device.pins()["IN3"] == float(all(closed) if in_series else any(closed))
     levels = [record.value for record in edges if record.subject == "IN3"]
@@ -120,18 +120,18 @@ def test_zones_that_cannot_be_are_misuse(arguments: tuple, message: str) -> None
 def test_a_bouncing_switch_comes_to_rest_within_its_time_and_the_same_way_again() -> None:
     def run(seed: int) -> list[tuple[int, float]]:
         edges: list[TraceRecord] = []
-        kernel = Kernel(record=edges.append)
+        scheduler = Scheduler(record=edges.append)
         device = Mic488Device(controller(AxisConfig(acc=1e4, vel=1e4)))
-        kernel.add("m", device)
-        circuit = Circuit(kernel, PinName("m", "IN1"))
+        scheduler.add("m", device)
+        circuit = Circuit(scheduler, PinName("m", "IN1"))
         chance = Chance(seed, "x")
-        kernel.add_part(
+        scheduler.add_part(
             Switch(circuit, CountedPosition(device.axes[0]), Zone(100, None), 0, bounce_ns=MILLISECOND, bounces=3, chance=chance)
         )
         circuit.close()
         device.execute(bytes.fromhex("06 271E 0001"), 0)
         device.execute(bytes.fromhex("10 2764 0002 04 0000 4348"), 0)  # POS_ABS M1 = 200
-        kernel.advance(SECOND)
+        scheduler.advance(SECOND)
         return [(r.time, float(r.value)) for r in edges if r.subject == "IN1"][1:]  # type: ignore[arg-type]
 
     first = run(1)
@@ -144,16 +144,16 @@ def test_a_bouncing_switch_comes_to_rest_within_its_time_and_the_same_way_again(
 
 
 def test_a_normally_closed_button_opens_when_it_is_pressed() -> None:
-    kernel = Kernel()
+    scheduler = Scheduler()
     device = Mic488Device(controller())
-    kernel.add("m", device)
+    scheduler.add("m", device)
     seen: list[PinEdge] = []
-    kernel.observers.append(lambda name, edge: seen.append(edge))
-    circuit = Circuit(kernel, PinName("m", "IN3"))
+    scheduler.observers.append(lambda name, edge: seen.append(edge))
+    circuit = Circuit(scheduler, PinName("m", "IN3"))
     button = Button(circuit, normally_closed=True, bounce_ns=0, bounces=0, chance=Chance(0, "b"))
     button.rest_at(True)
     circuit.close()
-    kernel.add_part(button)
+    scheduler.add_part(button)
     assert (device.pins()["IN3"], button.pressed) == (1.0, False)
     button.press(True, 0)
     assert (device.pins()["IN3"], button.pressed) == (0.0, True)
@@ -162,60 +162,60 @@ def test_a_normally_closed_button_opens_when_it_is_pressed() -> None:
 @pytest.mark.parametrize(("bounces", "levels"), [(0, [1.0]), (1, [1.0, 0.0, 1.0]), (2, [1.0, 0.0, 1.0, 0.0, 1.0])])
 def test_a_contact_bounces_so_often(bounces: int, levels: list[float]) -> None:
     edges: list[TraceRecord] = []
-    kernel = Kernel(record=edges.append)
-    kernel.add("m", Mic488Device(controller()))
-    circuit = Circuit(kernel, PinName("m", "IN3"))
+    scheduler = Scheduler(record=edges.append)
+    scheduler.add("m", Mic488Device(controller()))
+    circuit = Circuit(scheduler, PinName("m", "IN3"))
     button = Button(circuit, normally_closed=False, bounce_ns=MILLISECOND, bounces=bounces, chance=Chance(0, "b"))
-    kernel.add_part(button)
+    scheduler.add_part(button)
     circuit.close()
-    kernel.advance(SECOND)
+    scheduler.advance(SECOND)
     edges.clear()
     button.press(True, SECOND)
-    kernel.settle()
-    kernel.advance(SECOND + MILLISECOND)
+    scheduler.settle()
+    scheduler.advance(SECOND + MILLISECOND)
     assert [record.value for record in edges if record.subject == "IN3"] == levels
 
 
 def test_the_bouncing_of_a_contact_that_changes_nothing_for_its_input_is_awaited_all_the_same() -> None:
     """Beside a closed contact: the input stays 1, and the lane of the contact shows it."""
     edges: list[TraceRecord] = []
-    kernel = Kernel(record=edges.append)
+    scheduler = Scheduler(record=edges.append)
     device = Mic488Device(controller())
-    kernel.add("m", device)
-    circuit = Circuit(kernel, PinName("m", "IN3"))
+    scheduler.add("m", device)
+    circuit = Circuit(scheduler, PinName("m", "IN3"))
     closed, bouncing = (
         Button(circuit, normally_closed=nc, bounce_ns=MILLISECOND, bounces=2, chance=Chance(0, "b"), lane=lane)
         for nc, lane in ((True, "closed"), (False, "bouncing"))
     )
     for button in (closed, bouncing):
-        kernel.add_part(button)
+        scheduler.add_part(button)
     circuit.close()
-    kernel.advance(SECOND)
-    assert kernel.deadline() is None
+    scheduler.advance(SECOND)
+    assert scheduler.deadline() is None
     bouncing.press(True, SECOND)
-    due = kernel.deadline()
+    due = scheduler.deadline()
     assert due is not None
     assert SECOND < due <= SECOND + MILLISECOND
-    kernel.advance(SECOND + MILLISECOND)
+    scheduler.advance(SECOND + MILLISECOND)
     assert [record.value for record in edges if record.subject == "bouncing"] == [1.0, 0.0, 1.0, 0.0, 1.0]
     assert [record.value for record in edges if record.subject == "IN3"] == [1.0]
-    assert (kernel.deadline(), device.pins()["IN3"], bouncing.pressed, closed.pressed) == (None, 1.0, True, False)
+    assert (scheduler.deadline(), device.pins()["IN3"], bouncing.pressed, closed.pressed) == (None, 1.0, True, False)
 
 
 def test_the_level_of_an_input_is_that_of_its_contacts_at_rest_and_of_the_switch_where_it_is() -> None:
     """A switch that is on where it is put: NO gives 1, NC 0; without a change nothing bounces."""
-    kernel = Kernel()
-    kernel.add("m", Mic488Device(controller()))
-    drive = kernel.drive_of("m", 1)
+    scheduler = Scheduler()
+    scheduler.add("m", Mic488Device(controller()))
+    drive = scheduler.drive_of("m", 1)
     for pin, normally_closed, level in (("IN1", False, 1.0), ("IN2", True, 0.0)):
-        circuit = Circuit(kernel, PinName("m", pin))
+        circuit = Circuit(scheduler, PinName("m", pin))
         switch = Switch(
             circuit, CountedPosition(drive), Zone(-5, 5), 0, normally_closed=normally_closed, bounce_ns=MILLISECOND, bounces=2
         )
-        kernel.add_part(switch)
+        scheduler.add_part(switch)
         circuit.close()
-        kernel.settle()
-        assert (kernel.machines["m"].pins()[pin], switch.on, switch.deadline()) == (level, True, None)
+        scheduler.settle()
+        assert (scheduler.machines["m"].pins()[pin], switch.on, switch.deadline()) == (level, True, None)
 
 
 @given(
@@ -276,9 +276,9 @@ def test_a_switch_whose_carriage_does_as_before_asks_it_nothing() -> None:
         def reaches(self, position: int, after: int, direction: int) -> None:
             return None
 
-    kernel, carriage = Kernel(), Counted()
-    kernel.add("m", Mic488Device(controller()))
-    switch = Switch(Circuit(kernel, PinName("m", "IN3")), carriage, Zone(5, 9), 0)
+    scheduler, carriage = Scheduler(), Counted()
+    scheduler.add("m", Mic488Device(controller()))
+    switch = Switch(Circuit(scheduler, PinName("m", "IN3")), carriage, Zone(5, 9), 0)
     switch.update(0)
     asked = carriage.asked
     for now in (1, 2, 3):

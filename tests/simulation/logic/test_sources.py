@@ -14,7 +14,7 @@ from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.device import Mic488Device
 from steptwin.simulation.logic.sources import AnalogSource, ConstantWaveform, SineWaveform, TableWaveform, Waveform
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.toml.reader import WorldError
@@ -74,14 +74,14 @@ def test_a_sine_begins_at_its_mean_and_rises() -> None:
     assert [wave.volts(t) for t in (0.0, 1.0, 2.0, 3.0)] == [5.0, 7.0, 5.0, 3.0]
 
 
-def driven(waveform: Waveform, period_ms: float, until_s: float, begin: int = 0) -> tuple[list[tuple[int, float]], Kernel]:
+def driven(waveform: Waveform, period_ms: float, until_s: float, begin: int = 0) -> tuple[list[tuple[int, float]], Scheduler]:
     """What AIN2 gets: moments in ms and volts."""
     edges: list[TraceRecord] = []
-    kernel = Kernel(begin, record=edges.append)
-    kernel.add("m", Mic488Device(controller()))
-    kernel.add_part(AnalogSource(kernel, PinName("m", "AIN2"), waveform, round(period_ms * MILLISECOND)))
-    kernel.advance(begin + round(until_s * SECOND))
-    return [(r.time // MILLISECOND, float(str(r.value))) for r in edges if r.subject == "AIN2"], kernel
+    scheduler = Scheduler(begin, record=edges.append)
+    scheduler.add("m", Mic488Device(controller()))
+    scheduler.add_part(AnalogSource(scheduler, PinName("m", "AIN2"), waveform, round(period_ms * MILLISECOND)))
+    scheduler.advance(begin + round(until_s * SECOND))
+    return [(r.time // MILLISECOND, float(str(r.value))) for r in edges if r.subject == "AIN2"], scheduler
 
 
 def test_a_source_drives_its_input_once_in_a_period_to_the_millivolt() -> None:
@@ -91,18 +91,18 @@ def test_a_source_drives_its_input_once_in_a_period_to_the_millivolt() -> None:
 
 
 def test_a_source_that_rests_has_no_deadline() -> None:
-    ramp, kernel = driven(TableWaveform(((0.0, 1.0), (1.0, 2.0))), 400, 5.0)
+    ramp, scheduler = driven(TableWaveform(((0.0, 1.0), (1.0, 2.0))), 400, 5.0)
     assert ramp == [(0, 1.0), (400, 1.4000000000000001), (800, 1.8), (1200, 2.0)]
-    assert kernel.deadline() is None
-    constant, kernel = driven(ConstantWaveform(3.0), 100, 0.0)
+    assert scheduler.deadline() is None
+    constant, scheduler = driven(ConstantWaveform(3.0), 100, 0.0)
     assert constant == [(0, 3.0)]
-    assert kernel.deadline() is None
+    assert scheduler.deadline() is None
 
 
-def test_a_source_begins_with_its_kernel() -> None:
-    edges, kernel = driven(SineWaveform(5.0, 1.0, 1.0), 250, 0.5, begin=10 * SECOND)
+def test_a_source_begins_with_its_scheduler() -> None:
+    edges, scheduler = driven(SineWaveform(5.0, 1.0, 1.0), 250, 0.5, begin=10 * SECOND)
     assert edges == [(10_000, 5.0), (10_250, 6.0), (10_500, 5.0)]
-    assert kernel.deadline() == 10 * SECOND + 750 * MILLISECOND
+    assert scheduler.deadline() == 10 * SECOND + 750 * MILLISECOND
 
 
 def test_changes_below_a_millivolt_are_none() -> None:
@@ -120,14 +120,14 @@ def test_changes_below_a_millivolt_are_none() -> None:
     ],
 )
 def test_what_an_input_does_not_take_is_misuse(waveform: Waveform, period: int, message: str) -> None:
-    kernel = Kernel()
-    kernel.add("m", Mic488Device(controller()))
+    scheduler = Scheduler()
+    scheduler.add("m", Mic488Device(controller()))
     with pytest.raises(Misuse, match=message):
-        AnalogSource(kernel, PinName("m", "AIN2"), waveform, period)
+        AnalogSource(scheduler, PinName("m", "AIN2"), waveform, period)
     for bound in (0.0, 10.0):
-        AnalogSource(kernel, PinName("m", "AIN2"), ConstantWaveform(bound), 1)
+        AnalogSource(scheduler, PinName("m", "AIN2"), ConstantWaveform(bound), 1)
     with pytest.raises(Misuse, match="no pin 'AIN9'"):
-        AnalogSource(kernel, PinName("m", "AIN9"), ConstantWaveform(1.0), 1)
+        AnalogSource(scheduler, PinName("m", "AIN9"), ConstantWaveform(1.0), 1)
 
 
 NAMED = """

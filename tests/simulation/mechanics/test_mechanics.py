@@ -21,7 +21,7 @@ from steptwin.simulation.faults import read
 from steptwin.simulation.mechanics.course import Build, LoadPiece, MechanicalState
 from steptwin.simulation.mechanics.mechanics import EncoderBuild, Mechanism
 from steptwin.simulation.mechanics.motor import StepperMotor
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.script import steps as do
 
@@ -233,49 +233,49 @@ def test_a_correction_follows_an_encoder_that_has_slipped() -> None:
     stops=st.booleans(),
 )
 def test_a_mechanism_follows_replaced_plans_as_a_simulation_does(moves: list[tuple[int, Nanos]], play: int, stops: bool) -> None:
-    kernel, motor = Kernel(), Driven()
-    kernel.add("m", motor)
+    scheduler, motor = Scheduler(), Driven()
+    scheduler.add("m", motor)
     build = Build(zero=5, low=-90 if stops else None, high=110 if stops else None, play=play)
-    mechanism = Mechanism(kernel, "m", 1, build)
-    kernel.add_part(mechanism)
+    mechanism = Mechanism(scheduler, "m", 1, build)
+    scheduler.add_part(mechanism)
     state, now = MechanicalState(5, 5), 0
     for target, pause in moves:
         motor.go(target, now)
-        kernel.settle()
+        scheduler.settle()
         way = pulse_by_pulse(build, motor.axis.plan, state, now, now + pause)
         now += pause
-        kernel.advance(now)
+        scheduler.advance(now)
         motor.advance(now)
         state = MechanicalState(*way[-1][1:])
         assert mechanism.at(now)[:2] == state[:2]
 
 
 def test_steps_taken_away_are_lost_until_the_end() -> None:
-    kernel, motor = Kernel(), Driven()
-    kernel.add("m", motor)
-    mechanism = Mechanism(kernel, "m", 1, Build())
-    kernel.add_part(mechanism)
+    scheduler, motor = Scheduler(), Driven()
+    scheduler.add("m", motor)
+    mechanism = Mechanism(scheduler, "m", 1, Build())
+    scheduler.add_part(mechanism)
     motor.go(100, 0)
-    kernel.advance(20 * SECOND)
+    scheduler.advance(20 * SECOND)
     mechanism.lose(7, 20 * SECOND)
     assert (mechanism.place(20 * SECOND), mechanism.lost(20 * SECOND)) == (93, 7)
     mechanism.block(True, 20 * SECOND)
     motor.go(150, 20 * SECOND)
-    kernel.advance(40 * SECOND)
+    scheduler.advance(40 * SECOND)
     assert (mechanism.place(40 * SECOND), mechanism.lost(40 * SECOND)) == (93, 57)
     mechanism.block(False, 40 * SECOND)
     motor.go(100, 40 * SECOND)
-    kernel.advance(60 * SECOND)
+    scheduler.advance(60 * SECOND)
     assert mechanism.place(60 * SECOND) == pytest.approx(43)
 
 
-def rigged(build: Build, **options: object) -> tuple[Kernel, Driven, Mechanism, list[TraceRecord]]:
+def rigged(build: Build, **options: object) -> tuple[Scheduler, Driven, Mechanism, list[TraceRecord]]:
     told: list[TraceRecord] = []
-    kernel, drive = Kernel(record=told.append), Driven()
-    kernel.add("m", drive)
-    mechanism = Mechanism(kernel, "m", 1, build, "x")
-    kernel.add_part(mechanism)
-    return kernel, drive, mechanism, told
+    scheduler, drive = Scheduler(record=told.append), Driven()
+    scheduler.add("m", drive)
+    mechanism = Mechanism(scheduler, "m", 1, build, "x")
+    scheduler.add_part(mechanism)
+    return scheduler, drive, mechanism, told
 
 
 @pytest.mark.parametrize(("zero", "is_within"), [(-11, False), (-10, True), (20, True), (21, False)])
@@ -289,46 +289,50 @@ def test_an_axis_begins_within_its_stops(zero: int, is_within: bool) -> None:
 
 
 def test_what_is_ideal_has_no_deadline_and_no_stops_either() -> None:
-    kernel, drive, mechanism, told = rigged(Build(sign=-1, zero=7))
+    scheduler, drive, mechanism, told = rigged(Build(sign=-1, zero=7))
     drive.go(100, 0)
-    kernel.advance(20 * SECOND)
-    assert (mechanism.at(kernel.now), mechanism.lost(kernel.now), mechanism.deadline()) == (MechanicalState(-93, -93), 0, None)
+    scheduler.advance(20 * SECOND)
+    assert (mechanism.at(scheduler.now), mechanism.lost(scheduler.now), mechanism.deadline()) == (
+        MechanicalState(-93, -93),
+        0,
+        None,
+    )
     assert [record.kind for record in told] == ["plan"]
 
 
 @pytest.mark.parametrize("taken", [7, -7, 400, -400])
 def test_pulses_are_taken_away_as_far_as_stops_permit(taken: int) -> None:
     """Stops at -30 and 120 and 5 pulses of play: the rotor goes from -35 to 120. The load is at the rotor or up to 5 above."""
-    kernel, drive, mechanism, _ = rigged(Build(low=-30, high=120, play=5))
+    scheduler, drive, mechanism, _ = rigged(Build(low=-30, high=120, play=5))
     drive.go(100, 0)
-    kernel.advance(20 * SECOND)
-    assert mechanism.at(kernel.now) == MechanicalState(100, 100)
-    mechanism.lose(taken, kernel.now)
+    scheduler.advance(20 * SECOND)
+    assert mechanism.at(scheduler.now) == MechanicalState(100, 100)
+    mechanism.lose(taken, scheduler.now)
     rotor = min(max(100 - taken, -35), 120)
     load = min(max(100, rotor), rotor + 5)
-    assert mechanism.at(kernel.now)[:2] == (rotor, load)
-    assert mechanism.lost(kernel.now) == 100 - rotor
-    assert kernel.stale, "what stands on the load looks again"
-    drive.go(60, kernel.now)
-    kernel.advance(40 * SECOND)
-    assert mechanism.at(kernel.now).rotor == min(max(rotor - 40, -35), 120)
+    assert mechanism.at(scheduler.now)[:2] == (rotor, load)
+    assert mechanism.lost(scheduler.now) == 100 - rotor
+    assert scheduler.stale, "what stands on the load looks again"
+    drive.go(60, scheduler.now)
+    scheduler.advance(40 * SECOND)
+    assert mechanism.at(scheduler.now).rotor == min(max(rotor - 40, -35), 120)
 
 
 def test_an_ideal_axis_that_lost_pulses_keeps_the_loss_through_a_snapshot_and_a_counter_from_0() -> None:
-    kernel, drive, mechanism, _ = rigged(Build())
+    scheduler, drive, mechanism, _ = rigged(Build())
     drive.go(100, 0)
-    kernel.advance(20 * SECOND)
-    mechanism.lose(7, kernel.now)
-    kernel.settle()
+    scheduler.advance(20 * SECOND)
+    mechanism.lose(7, scheduler.now)
+    scheduler.settle()
     state = mechanism.copy_state()
-    mechanism.lose(3, kernel.now)
+    mechanism.lose(3, scheduler.now)
     mechanism.set_state(state)
-    assert mechanism.lost(kernel.now) == 7
-    drive.go(50, kernel.now)
-    kernel.settle()
+    assert mechanism.lost(scheduler.now) == 7
+    drive.go(50, scheduler.now)
+    scheduler.settle()
     later = mechanism.copy_state()
-    kernel.advance(40 * SECOND)
-    assert (mechanism.place(kernel.now), mechanism.lost(kernel.now)) == (43, 7)
+    scheduler.advance(40 * SECOND)
+    assert (mechanism.place(scheduler.now), mechanism.lost(scheduler.now)) == (43, 7)
     mechanism.set_state(later)
     assert mechanism.place(40 * SECOND) == 43
     # A drive that is switched off counts from 0 again: the load stays where it is.
@@ -338,11 +342,11 @@ def test_an_ideal_axis_that_lost_pulses_keeps_the_loss_through_a_snapshot_and_a_
 
 def test_the_trace_is_told_where_the_load_is_only_when_it_does_not_go_with_its_drive() -> None:
     """Stop at 55: 45 of 100 pulses are lost there. On the way back the load is 45 behind."""
-    kernel, drive, _, told = rigged(Build(high=55))
+    scheduler, drive, _, told = rigged(Build(high=55))
     drive.go(100, 0)
-    kernel.advance(10 * SECOND)
+    scheduler.advance(10 * SECOND)
     drive.go(70, 10 * SECOND)
-    kernel.advance(20 * SECOND)
+    scheduler.advance(20 * SECOND)
     loads = [record for record in told if record.kind == "load"]
     assert [(record.machine, record.subject) for record in loads] == [("m", "1")] * len(loads)
     met = plan_position(MotionState(0, 0, 0.0, 0.0), 100, 500.0, 500.0, 200.0)
@@ -356,19 +360,19 @@ def test_the_trace_is_told_where_the_load_is_only_when_it_does_not_go_with_its_d
 def test_a_motor_without_torque_is_told_when_it_loses_the_field_and_when_it_is_caught() -> None:
     """Nothing is left above 100 pulses/s: lost 0.2 s after the start with 500 pulses/s², caught at rest. Full steps of 16."""
     build = Build(period_p=64, motor=StepperMotor(((0.0, 1.0), (100.0, 1.0)), 0.0, 0.0, 0.0, None))
-    kernel, drive, mechanism, told = rigged(build)
+    scheduler, drive, mechanism, told = rigged(build)
     assert mechanism.deadline() is None
     drive.go(200, 0)
-    kernel.settle()
+    scheduler.settle()
     assert mechanism.deadline() == pytest.approx(0.2 * SECOND, abs=1000)
-    assert kernel.deadline() == mechanism.deadline()
-    kernel.advance(SECOND // 2)
+    assert scheduler.deadline() == mechanism.deadline()
+    scheduler.advance(SECOND // 2)
     end = drive.axis.plan.end
     assert mechanism.deadline() == end
-    assert (mechanism.at(kernel.now).stalled, mechanism.at(kernel.now).rotor) == (True, 10)
-    kernel.advance(5 * SECOND)
+    assert (mechanism.at(scheduler.now).stalled, mechanism.at(scheduler.now).rotor) == (True, 10)
+    scheduler.advance(5 * SECOND)
     assert mechanism.deadline() is None
-    behind = 200 - mechanism.place(kernel.now)
+    behind = 200 - mechanism.place(scheduler.now)
     assert behind == 192, "the multiple of 64 nearest to 190"
     events = [(record.time, record.subject, record.value) for record in told if record.kind == "event"]
     assert [event[1:] for event in events] == [
@@ -376,24 +380,24 @@ def test_a_motor_without_torque_is_told_when_it_loses_the_field_and_when_it_is_c
         ("stall", "x is caught, 192 pulses behind"),
     ]
     assert [event[0] for event in events] == pytest.approx([0.2 * SECOND, end], abs=1000)
-    assert mechanism.lost(kernel.now) == 192
+    assert mechanism.lost(scheduler.now) == 192
 
 
 @pytest.mark.parametrize(("sign", "side"), [(1, "upper"), (-1, "lower")])
 def test_an_axis_that_pushes_against_a_hard_stop_is_reported_until_it_no_longer_does(sign: int, side: str) -> None:
     """It stands at the stop and does not push; 60 pulses further, each of them is lost: a multiple of the period."""
     build = Build(low=-40, high=40, period_p=4)
-    kernel, drive, mechanism, told = rigged(build)
+    scheduler, drive, mechanism, told = rigged(build)
 
     def reported() -> list[tuple[Nanos, str]]:
         return [(record.time, str(record.value)) for record in told if record.subject == "hard-stop"]
 
     drive.go(sign * 40, 0)
-    kernel.advance(2 * SECOND)
+    scheduler.advance(2 * SECOND)
     assert (reported(), mechanism.deadline()) == ([], None)
-    drive.go(sign * 100, kernel.now)
-    begin = kernel.now
-    kernel.advance(10 * SECOND)
+    drive.go(sign * 100, scheduler.now)
+    begin = scheduler.now
+    scheduler.advance(10 * SECOND)
     end = drive.axis.plan.end
     assert end is not None
     (first, begins), (last, ends) = reported()
@@ -401,9 +405,9 @@ def test_an_axis_that_pushes_against_a_hard_stop_is_reported_until_it_no_longer_
     assert ends == f"x no longer pushes against its {side} hard stop, {sign * 60} pulses behind"
     assert first == pytest.approx(begin + (2 / 500) ** 0.5 * SECOND, abs=1), "the first pulse of the way, at 250 t²"
     assert last == end
-    drive.go(sign * 70, kernel.now)
-    kernel.advance(20 * SECOND)
-    assert (len(reported()), mechanism.place(kernel.now)) == (2, sign * 10)
+    drive.go(sign * 70, scheduler.now)
+    scheduler.advance(20 * SECOND)
+    assert (len(reported()), mechanism.place(scheduler.now)) == (2, sign * 10)
     facts = [dict(record.facts) for record in told if record.subject == "hard-stop"]
     assert facts == [
         {"axis": 1, "element": "x", "stop": side, "pushes": True, "lost": sign},
@@ -413,69 +417,69 @@ def test_an_axis_that_pushes_against_a_hard_stop_is_reported_until_it_no_longer_
 
 def test_an_axis_that_turns_round_at_a_hard_stop_pushes_until_its_field_comes_back_to_it() -> None:
     """The field is 3 pulses beyond the stop, less than half a period of 8: nothing is lost."""
-    kernel, drive, mechanism, told = rigged(Build(high=40, period_p=8))
+    scheduler, drive, mechanism, told = rigged(Build(high=40, period_p=8))
     drive.go(43, 0)
-    kernel.advance(SECOND)
-    drive.go(0, kernel.now)
-    kernel.advance(5 * SECOND)
+    scheduler.advance(SECOND)
+    drive.go(0, scheduler.now)
+    scheduler.advance(5 * SECOND)
     texts = [str(record.value) for record in told if record.subject == "hard-stop"]
     assert texts[0] == "x pushes against its upper hard stop"
     assert texts[-1] == "x no longer pushes against its upper hard stop, 0 pulses behind"
-    assert mechanism.place(kernel.now) == 0
+    assert mechanism.place(scheduler.now) == 0
 
 
 def test_a_blocked_rotor_of_a_motor_is_let_go_to_the_nearest_period() -> None:
     build = Build(period_p=64, motor=StepperMotor(((0.0, 1.0), (1000.0, 1.0)), 0.0, 0.0, 0.0, None))
-    kernel, drive, mechanism, _ = rigged(build)
+    scheduler, drive, mechanism, _ = rigged(build)
     mechanism.block(True, 0)
     drive.go(200, 0)
-    kernel.advance(5 * SECOND)
-    assert (mechanism.place(kernel.now), mechanism.lost(kernel.now)) == (0, 200)
+    scheduler.advance(5 * SECOND)
+    assert (mechanism.place(scheduler.now), mechanism.lost(scheduler.now)) == (0, 200)
     version = mechanism.version()
-    mechanism.block(False, kernel.now)
+    mechanism.block(False, scheduler.now)
     assert mechanism.version() != version
-    kernel.advance(6 * SECOND)
-    assert mechanism.at(kernel.now) == MechanicalState(8, 8, behind=192)
+    scheduler.advance(6 * SECOND)
+    assert mechanism.at(scheduler.now) == MechanicalState(8, 8, behind=192)
 
 
 def test_an_encoder_elsewhere_is_told_every_10_ms_while_the_axis_moves() -> None:
     """The encoder of another controller: it is looked at while it turns, and at rest not at all."""
     told: list[TraceRecord] = []
-    kernel, drive = Kernel(record=told.append), Driven()
+    scheduler, drive = Scheduler(record=told.append), Driven()
     other = Mic488Device(controller())
-    kernel.add("m", drive)
-    kernel.add("other", other)
-    mechanism = Mechanism(kernel, "m", 1, Build())
-    kernel.add_part(mechanism)
+    scheduler.add("m", drive)
+    scheduler.add("other", other)
+    mechanism = Mechanism(scheduler, "m", 1, Build())
+    scheduler.add_part(mechanism)
     mechanism.fit(EncoderBuild("other", other, 2, counts=-3, pulses=2), 0)
     assert mechanism.deadline() is None
     drive.go(100, 0)
-    kernel.settle()
+    scheduler.settle()
     assert mechanism.deadline() == 10 * MILLISECOND
-    kernel.advance(10 * MILLISECOND)
+    scheduler.advance(10 * MILLISECOND)
     assert mechanism.deadline() == 20 * MILLISECOND
-    kernel.advance(20 * SECOND)
+    scheduler.advance(20 * SECOND)
     assert mechanism.deadline() is None
     assert other.axes[1].encoder_counts(20 * SECOND) == -150
     assert other.axes[0].encoder_counts(20 * SECOND) == 0
     mechanism.slip(5, 20 * SECOND)
-    assert (other.axes[1].encoder_counts(20 * SECOND), kernel.stale) == (-145, True)
+    assert (other.axes[1].encoder_counts(20 * SECOND), scheduler.stale) == (-145, True)
 
 
 @pytest.mark.parametrize(("on_load", "counts"), [(False, [0, 100, 60]), (True, [0, 100, 65])])
 def test_an_encoder_sits_on_the_rotor_or_on_the_load(on_load: bool, counts: list[int]) -> None:
     """One count a pulse, 5 pulses of play."""
-    kernel, drive = Kernel(), Driven()
+    scheduler, drive = Scheduler(), Driven()
     other = Mic488Device(controller())
-    kernel.add("m", drive)
-    kernel.add("other", other)
-    mechanism = Mechanism(kernel, "m", 1, Build(sign=-1, zero=500, play=5))
-    kernel.add_part(mechanism)
+    scheduler.add("m", drive)
+    scheduler.add("other", other)
+    mechanism = Mechanism(scheduler, "m", 1, Build(sign=-1, zero=500, play=5))
+    scheduler.add_part(mechanism)
     mechanism.fit(EncoderBuild("other", other, 1, on_load, 1), 0)
     found = [other.axes[0].encoder_counts(0)]
     for target, now in ((-100, 0), (-60, 20 * SECOND)):
         drive.go(target, now)
-        kernel.advance(now + 20 * SECOND)
-        found.append(-other.axes[0].encoder_counts(kernel.now))
-    assert mechanism.at(kernel.now)[:2] == (560, 565)
+        scheduler.advance(now + 20 * SECOND)
+        found.append(-other.axes[0].encoder_counts(scheduler.now))
+    assert mechanism.at(scheduler.now)[:2] == (560, 565)
     assert found == counts

@@ -1,4 +1,4 @@
-"""Who follows the signals of a kernel: told of what concerns it, once for each event, and before it if it wants that."""
+"""Who follows the signals of a scheduler: told of what concerns it, once for each event, and before it if it wants that."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import pytest
 from toy import Bare
 
 from steptwin.machine import Nanos, PinEdge
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.wires import PinName, Wire
 
 
@@ -63,64 +63,64 @@ class Told:
 
 @pytest.mark.parametrize("attentive", [False, True])
 def test_of_a_machine_alone(attentive: bool) -> None:
-    kernel, plain, leaving, other = Kernel(), Told(), Told(), Told()
-    kernel.add("m", Clock(10, 20, 20, 30))
-    kernel.is_attentive = attentive
-    kernel.settle()
-    kernel.follow(plain, ["m"])
-    kernel.follow(leaving, ["m", "x"], leaves=True)
-    kernel.follow(other, ["x"])
-    kernel.advance(25)
+    scheduler, plain, leaving, other = Scheduler(), Told(), Told(), Told()
+    scheduler.add("m", Clock(10, 20, 20, 30))
+    scheduler.is_attentive = attentive
+    scheduler.settle()
+    scheduler.follow(plain, ["m"])
+    scheduler.follow(leaving, ["m", "x"], leaves=True)
+    scheduler.follow(other, ["x"])
+    scheduler.advance(25)
     assert (plain.take(), other.take()) == (([10, 20], []), ([], []))
     assert leaving.take() == ([10, 20], [10, 20, 25])
-    kernel.advance(25)
+    scheduler.advance(25)
     assert leaving.take() == ([], [])
-    kernel.machines["m"].set_pin("A", 1.0, 25)
-    kernel.settle()
+    scheduler.machines["m"].set_pin("A", 1.0, 25)
+    scheduler.settle()
     assert (plain.take(), leaving.take()) == (([25], []), ([25], []))
-    kernel.unfollow(plain)
-    kernel.unfollow(other)
-    kernel.advance(40)
+    scheduler.unfollow(plain)
+    scheduler.unfollow(other)
+    scheduler.advance(40)
     assert (plain.take(), leaving.take()) == (([], []), ([30], [30, 40]))
-    kernel.unfollow(leaving)
-    kernel.advance(50)
+    scheduler.unfollow(leaving)
+    scheduler.advance(50)
     assert leaving.take() == ([], [])
 
 
 def test_of_machines_that_are_joined() -> None:
-    kernel, one, two, both = Kernel(), Told(), Told(), Told()
-    kernel.add("a", Clock(10, 30))
-    kernel.add("b", Clock(20))
-    kernel.add("c", Clock(60, 70))
-    kernel.connect(Wire(PinName("a", "B"), PinName("b", "A")))
-    kernel.settle()
-    kernel.follow(one, ["a"])
-    kernel.follow(two, ["b"], leaves=True)
-    kernel.follow(both, ["a", "b"])
-    kernel.advance(50)
+    scheduler, one, two, both = Scheduler(), Told(), Told(), Told()
+    scheduler.add("a", Clock(10, 30))
+    scheduler.add("b", Clock(20))
+    scheduler.add("c", Clock(60, 70))
+    scheduler.connect(Wire(PinName("a", "B"), PinName("b", "A")))
+    scheduler.settle()
+    scheduler.follow(one, ["a"])
+    scheduler.follow(two, ["b"], leaves=True)
+    scheduler.follow(both, ["a", "b"])
+    scheduler.advance(50)
     assert one.take() == ([10, 30], [])
     assert two.take() == ([10, 20, 30], [10, 20, 30, 50])  # the wire changes its input
     assert both.take() == ([10, 20, 30], [])
-    kernel.unfollow(two)
-    kernel.machines["b"].set_pin("A", 0.0, 50)
-    kernel.settle()
+    scheduler.unfollow(two)
+    scheduler.machines["b"].set_pin("A", 0.0, 50)
+    scheduler.settle()
     assert (one.take(), two.take(), both.take()) == (([], []), ([], []), ([50], []))
-    kernel.advance(80)
+    scheduler.advance(80)
     assert both.take() == ([], [])
 
 
 def test_who_is_gone_is_not_told_what_is_new_already() -> None:
-    kernel, one, other = Kernel(), Told(), Told()
-    kernel.add("m", Clock())
-    kernel.settle()
-    kernel.follow(one, ["m"])
-    kernel.follow(other, ["m"])
-    assert kernel.followers is not None
-    kernel.followers.news = {one: None, other: None}
-    kernel.unfollow(one)
-    kernel.followers.tell(5)
+    scheduler, one, other = Scheduler(), Told(), Told()
+    scheduler.add("m", Clock())
+    scheduler.settle()
+    scheduler.follow(one, ["m"])
+    scheduler.follow(other, ["m"])
+    assert scheduler.followers is not None
+    scheduler.followers.news = {one: None, other: None}
+    scheduler.unfollow(one)
+    scheduler.followers.tell(5)
     assert (one.take(), other.take()) == (([], []), ([5], []))
-    assert kernel.followers.news == {}
+    assert scheduler.followers.news == {}
 
 
 @pytest.mark.parametrize("attentive", [False, True])
@@ -137,21 +137,21 @@ def test_two_that_are_due_together_do_not_run_ahead_of_each_other(attentive: boo
             super().set_pin(pin, value, now)
             seen.append((now, value))
 
-    kernel = Kernel()
-    kernel.add("a", Clock(10, 20))
-    kernel.add("b", Ahead(10))
-    kernel.is_attentive = attentive
-    kernel.connect(Wire(PinName("a", "B"), PinName("b", "A")))
-    kernel.settle()
-    kernel.advance(30)
+    scheduler = Scheduler()
+    scheduler.add("a", Clock(10, 20))
+    scheduler.add("b", Ahead(10))
+    scheduler.is_attentive = attentive
+    scheduler.connect(Wire(PinName("a", "B"), PinName("b", "A")))
+    scheduler.settle()
+    scheduler.advance(30)
     assert seen == [(0, 0.0), (10, 1.0), (20, 0.0)]
 
 
 def test_who_wants_to_be_told_before_each_event_is_told_once_of_a_moment() -> None:
-    kernel, leaving = Kernel(), Told()
-    kernel.add("m", Clock())
-    kernel.follow(leaving, ["m"], leaves=True)
-    kernel.advance(5)
+    scheduler, leaving = Scheduler(), Told()
+    scheduler.add("m", Clock())
+    scheduler.follow(leaving, ["m"], leaves=True)
+    scheduler.advance(5)
     assert leaving.take() == ([0], [5])
-    kernel.advance(5)
+    scheduler.advance(5)
     assert leaving.take() == ([], [])

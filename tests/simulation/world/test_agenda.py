@@ -12,7 +12,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 from tests.support.toy.machine import Bare
 
 from steptwin.errors import Misuse
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.world.agenda import Agenda, Watchers
 
 
@@ -92,13 +92,13 @@ def test_outdated_entries_are_cleared_away(moments: list[tuple[int, int]]) -> No
     assert agenda.take_timed(1000) is None
 
 
-def joined(*names: str) -> Kernel:
-    """A kernel with a machine of each name."""
-    kernel = Kernel()
+def joined(*names: str) -> Scheduler:
+    """A scheduler with a machine of each name."""
+    scheduler = Scheduler()
     for name in names:
-        kernel.add(name, Bare())
-    kernel.settle()
-    return kernel
+        scheduler.add(name, Bare())
+    scheduler.settle()
+    return scheduler
 
 
 def test_scripts_are_evaluated_when_what_they_depend_on_has_changed() -> None:

@@ -15,7 +15,7 @@ from steptwin.simulation.script.steps import Set, Write
 from steptwin.simulation.world import history as module
 from steptwin.simulation.world.history import History, Past, PastState
 from steptwin.simulation.world.inputs import Bytes, size_of
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 
 TEXT = """
 [[mic488]]
@@ -38,16 +38,16 @@ def make() -> World:
     return world
 
 
-def shown(world: Plant) -> tuple[object, ...]:
+def shown(world: Simulation) -> tuple[object, ...]:
     found = world.snapshot(with_inputs=False)
-    return world.now, world.machine("m").pins(), world.read("m.M1.position"), world.read("m.M1.velocity"), repr(found.kernels)
+    return world.now, world.machine("m").pins(), world.read("m.M1.position"), world.read("m.M1.velocity"), repr(found.schedulers)
 
 
 def states(history: History) -> list[PastState]:
     return [*history._states.back_from(history.world.now)][::-1]
 
 
-def go(past: Past, moment: Nanos) -> Plant:
+def go(past: Past, moment: Nanos) -> Simulation:
     for _ in past.go(moment):
         pass
     return past.world
@@ -288,7 +288,7 @@ def test_nothing_watches_the_trace_after_the_end() -> None:
     assert world.trace.watchers != watchers
     history.close()
     assert world.trace.watchers == watchers
-    followers = world.parts.kernel_of["m"].followers
+    followers = world.parts.scheduler_of["m"].followers
     assert followers is None or not followers.by_name["m"]
 
 

@@ -13,10 +13,10 @@ from steptwin.errors import Misuse, Runaway
 from steptwin.files.world import World
 from steptwin.machine import SECOND
 from steptwin.simulation.logic.condition import SignalCondition
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.steps import Steps
-from steptwin.simulation.world import plant
+from steptwin.simulation.world import simulation
 
 
 def test_events_act_once_again_and_again_or_when_a_condition_comes_true() -> None:
@@ -217,7 +217,7 @@ def test_scripts_that_watch_are_looked_at_for_what_they_watch_alone(
 
     counting(SignalCondition, "holds")
     counting(SignalCondition, "__init__")
-    counting(Kernel, "advance")
+    counting(Scheduler, "advance")
     found = []
     for controllers in (5, 20):
         world = World.from_toml(
@@ -387,7 +387,7 @@ def test_a_script_is_not_looked_at_that_another_one_has_called_off_at_the_same_m
 
 def test_conditions_that_are_true_at_once_for_ever_are_a_runaway(monkeypatch: pytest.MonkeyPatch) -> None:
     """After each of them others have their turn."""
-    monkeypatch.setattr(plant, "MOST_STEPS_PER_INSTANT", 20)
+    monkeypatch.setattr(simulation, "MOST_STEPS_PER_INSTANT", 20)
 
     def often(times: int) -> Steps:
         yield do.Wait(SECOND)

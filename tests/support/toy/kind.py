@@ -28,7 +28,7 @@ from steptwin.simulation.kinds.machineview import MachineView
 from steptwin.simulation.kinds.registry import KINDS, register
 from steptwin.simulation.mechanics.lanes import AxisLane, plain_view
 from steptwin.simulation.mechanics.scale import FULL_STEPS, DriveScale, GivenScale
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.control import Halt, Move, StopAxes
@@ -47,8 +47,8 @@ class ToySpec(ControllerSpec):
 
 
 class ToyView(MachineView):
-    def __init__(self, plant: RunningWorld, name: str, toy: Toy) -> None:
-        super().__init__(plant, name)
+    def __init__(self, simulation: RunningWorld, name: str, toy: Toy) -> None:
+        super().__init__(simulation, name)
         self._toy = toy
 
     @property
@@ -137,10 +137,12 @@ class ToyLines(LineKind[Toy, ToyLine]):
     meaning = "toys"
     links: Mapping[str, LinkKind] = {"pty": LinkKind("raw", "pty", "toys"), "tcp": LinkKind("raw", "tcp", "toys")}
 
-    def make(self, spec: LineSpec, members: Sequence[Member[Toy]], kernel: Kernel, record: RecordSink, faults: Faults) -> ToyLine:
+    def make(
+        self, spec: LineSpec, members: Sequence[Member[Toy]], scheduler: Scheduler, record: RecordSink, faults: Faults
+    ) -> ToyLine:
         if len(members) != 1:
             raise Misuse("a toy is alone on its line")
-        return ToyLine(kernel, spec.name, members[0].machine, faults, record)
+        return ToyLine(scheduler, spec.name, members[0].machine, faults, record)
 
     def words(self, line: ToyLine, prefix: str, sink: Callable[[FrameLine], None]) -> ToyWords:
         return ToyWords(line, prefix, sink)

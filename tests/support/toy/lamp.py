@@ -14,7 +14,7 @@ from steptwin.simulation.components.site import Site
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT, Terminal, flag, name_value, pin_name, time_value
@@ -32,12 +32,12 @@ class LampSpec(NamedSpec):
 class Lamp(Stateful):
     """Lit when its output has been on for ``warms``, unless it has burnt out. Its edges are recorded under its name."""
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_spec", "kernel", "source")
+    FIXED: ClassVar[tuple[str, ...]] = ("_spec", "scheduler", "source")
     __slots__ = (*FIXED, "_due", "_is_on", "burnt", "lit")
 
-    def __init__(self, spec: LampSpec, kernel: Kernel, source: PinName) -> None:
+    def __init__(self, spec: LampSpec, scheduler: Scheduler, source: PinName) -> None:
         self._spec = spec
-        self.kernel = kernel
+        self.scheduler = scheduler
         self.source = source
         self._is_on = False
         self._due: Nanos | None = None
@@ -45,7 +45,7 @@ class Lamp(Stateful):
         self.lit = False
 
     def update(self, now: Nanos) -> None:
-        level = self.kernel.machines[self.source.machine].pin(self.source.pin)
+        level = self.scheduler.machines[self.source.machine].pin(self.source.pin)
         is_on = bool(level) is not self._spec.inverted
         if is_on is not self._is_on:
             self._is_on = is_on
@@ -61,7 +61,7 @@ class Lamp(Stateful):
     def _show(self, lit: bool) -> None:
         if lit is not self.lit:
             self.lit = lit
-            self.kernel.report(self.source.machine, "edge", self._spec.name, float(lit))
+            self.scheduler.report(self.source.machine, "edge", self._spec.name, float(lit))
 
     def deadline(self) -> Nanos | None:
         return self._due
@@ -72,18 +72,18 @@ def _refers(spec: LampSpec, described: ElementSpecs) -> Iterator[Reference]:
 
 
 def _build(spec: LampSpec, site: Site) -> Lamp:
-    lamp = Lamp(spec, site.kernel(spec.source[0]), site.terminal(spec.source, OUTPUT))
-    lamp.kernel.add_part(lamp, name=spec.name)
+    lamp = Lamp(spec, site.scheduler(spec.source[0]), site.terminal(spec.source, OUTPUT))
+    lamp.scheduler.add_part(lamp, name=spec.name)
     return lamp
 
 
 def _signals(lamp: Lamp) -> Mapping[str, SignalOf]:
-    return {"lit": SignalOf((lamp.kernel.source(lamp.name),), lambda now: float(lamp.lit))}
+    return {"lit": SignalOf((lamp.scheduler.source(lamp.name),), lambda now: float(lamp.lit))}
 
 
 def _burn(active: ActiveFault, lamp: Lamp, begins: bool, now: Nanos) -> str:
     lamp.burnt = begins
-    lamp.kernel.mark()
+    lamp.scheduler.mark()
     return "it is burnt out" if begins else "it has been replaced"
 
 

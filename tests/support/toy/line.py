@@ -9,7 +9,7 @@ from steptwin.machine import Nanos
 from steptwin.simulation.faults import Faults
 from steptwin.simulation.faults import LineProtocol as FaultLine
 from steptwin.simulation.kinds.lines import Line, LineEndPoint
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import RecordSink
 from steptwin.state import Stateful
 from steptwin.wire.slave import FrameDirection
@@ -57,9 +57,9 @@ class ToyLine(Line):
     is_timed = False
 
     def __init__(
-        self, kernel: Kernel, name: str, toy: Toy, faults: Faults | None = None, record: RecordSink | None = None
+        self, scheduler: Scheduler, name: str, toy: Toy, faults: Faults | None = None, record: RecordSink | None = None
     ) -> None:
-        super().__init__(kernel, name, record, Faults() if faults is None else faults)
+        super().__init__(scheduler, name, record, Faults() if faults is None else faults)
         self._toy = toy
 
     @property

@@ -10,7 +10,7 @@ from steptwin.campaign.properties.text import parse_property
 from steptwin.errors import Misuse
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.components.collision import COLLISION
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 
 _NAMED = re.compile(r"\s*([A-Za-z]+(?:-[A-Za-z]+)+)\s*(?:=\s*)?(.*)\Z", re.DOTALL)
 _TIME = re.compile(r"(?:within\s+)?(\d+(?:\.\d+)?\s*(?:ns|us|ms|s|min|h))\b\s*(.*)\Z", re.DOTALL)
@@ -26,10 +26,10 @@ class ReadyProperty:
     name: str
     needs: str
     meaning: str
-    write: Callable[[str, Plant | None], str]
+    write: Callable[[str, Simulation | None], str]
 
 
-def _no_collision(rest: str, world: Plant | None) -> str:
+def _no_collision(rest: str, world: Simulation | None) -> str:
     _nothing("no-collision", rest)
     if world is None:
         return "never any.count > 0"
@@ -39,7 +39,7 @@ def _no_collision(rest: str, world: Plant | None) -> str:
     return _all(f"never {name}.count > 0" for name in names)
 
 
-def _no_lost_step(rest: str, world: Plant | None) -> str:
+def _no_lost_step(rest: str, world: Simulation | None) -> str:
     later = _LATER.match(rest)
     noticed, time = (later[1] or "", later[2]) if later else (rest, USUAL_TIME)
     if world is None:
@@ -52,17 +52,17 @@ def _no_lost_step(rest: str, world: Plant | None) -> str:
     )
 
 
-def _moving_of(world: Plant, machine: str, axis: str) -> str:
+def _moving_of(world: Simulation, machine: str, axis: str) -> str:
     paths = _paths(world, machine)
     return f"{machine}.{axis}.moving" if f"{axis}.moving" in paths else f"{machine}.moving"
 
 
-def _never_moves(rest: str, world: Plant | None) -> str:
+def _never_moves(rest: str, world: Simulation | None) -> str:
     condition = _given("never-moves-while", rest, "a condition, such as guard.open")
     return f"never (({condition}) and ({_any_moving(world)}))"
 
 
-def _stops(rest: str, world: Plant | None) -> str:
+def _stops(rest: str, world: Simulation | None) -> str:
     found = _TIME.match(rest)
     condition = "" if found is None else found[2].strip()
     if found is None or not condition.startswith("after "):
@@ -70,7 +70,7 @@ def _stops(rest: str, world: Plant | None) -> str:
     return f"after ({condition.removeprefix('after ')}) at {found[1]} not ({_any_moving(world)})"
 
 
-def _returns(rest: str, world: Plant | None) -> str:
+def _returns(rest: str, world: Simulation | None) -> str:
     later = _LATER.match(rest)
     condition = _given(
         "returns-to-safe", later[1] or "" if later else rest, "the condition that is safe, such as table.OUT1 == 0"
@@ -78,7 +78,7 @@ def _returns(rest: str, world: Plant | None) -> str:
     return f"eventually {f'within {later[2]} ' if later else ''}(always ({condition}))"
 
 
-def _any_moving(world: Plant | None) -> str:
+def _any_moving(world: Simulation | None) -> str:
     if world is None:
         return "any.moving"
     return " or ".join(
@@ -86,7 +86,7 @@ def _any_moving(world: Plant | None) -> str:
     )
 
 
-def _paths(world: Plant, machine: str) -> list[str]:
+def _paths(world: Simulation, machine: str) -> list[str]:
     return [point.path for point in world.kind(machine).datasheet(world.machines[machine]).points]
 
 
@@ -142,7 +142,7 @@ def check_ready(text: str) -> bool:
     return named is not None
 
 
-def written_out(text: str, world: Plant) -> str:
+def written_out(text: str, world: Simulation) -> str:
     """The text of a property for a world. Raises `Misuse` as `check_ready`, and for what the world does not have."""
     named = _named(text)
     return text if named is None else named[0].write(named[1], world)

@@ -1,7 +1,7 @@
 """The course of one comparison in a running world, exact at every event, turn and crossing.
 
 While signals go on as they did, nothing is computed: a way is looked at as a whole once another one follows. Signals of one
-kernel are followed by that kernel (`steptwin.simulation.scheduler.followers`).
+scheduler are followed by that scheduler (`steptwin.simulation.scheduler.followers`).
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from steptwin.simulation.logic.quantities import (
     unit_of_all,
 )
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.scheduler.kernel import Kernel, Source
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.scheduler.scheduler import Scheduler, Source
+from steptwin.simulation.world.simulation import Simulation
 
 _SIGNS = {"<": -1.0, "<=": -1.0, ">": 1.0, ">=": 1.0, "==": 0.0, "!=": 0.0}
 """Whether more of the left side is nearer to the truth, or less; 0: neither."""
@@ -48,11 +48,11 @@ PROBES = (0.0625, *SHARES, 0.9375)
 class ComparisonRecord:
     """``is_fine``: between its turns its shape counts, too, because it meets others or a window.
 
-    It is notified of events by `leave` and `look`, as a `KernelFollower`: by its ``kernel``, or, where that is None because its
-    signals have several, by who observes the world.
+    It is notified of events by `leave` and `look`, as a `SchedulerFollower`: by its ``scheduler``, or, where that is None because
+    its signals have several, by who observes the world.
     """
 
-    def __init__(self, world: Plant, atom: Atom, *, is_fine: bool) -> None:
+    def __init__(self, world: Simulation, atom: Atom, *, is_fine: bool) -> None:
         """Raises `Misuse` for unknown signals, and for a number in a unit that its signals do not have."""
         self._signals = {name: world.watched(name) for name in dict.fromkeys(atom.comparison.names())}
         self.node = atom.comparison.in_unit("", lambda name: self._signals[name].unit)
@@ -74,7 +74,7 @@ class ComparisonRecord:
         self._is_monotonic = len(self._moving) == 1 and _is_alone(self.node.left, self.node.right, *self._moving)
         """Whether it goes one way between turns, so that its extremes are there."""
         self._is_fine = is_fine or not self._is_monotonic
-        self.kernel, self.names = self._followed()
+        self.scheduler, self.names = self._followed()
         self._closed: Shape = []
         self._known: object = None
         """Version of the sources of the present way."""
@@ -92,33 +92,33 @@ class ComparisonRecord:
         self._turns: Iterator[Nanos] = iter(())
         self._turn: Nanos | None = None
 
-    def _followed(self) -> tuple[Kernel | None, tuple[str, ...]]:
-        """The only kernel on which it depends, and the names there."""
+    def _followed(self) -> tuple[Scheduler | None, tuple[str, ...]]:
+        """The only scheduler on which it depends, and the names there."""
         sources: set[Source] = set()
         for signal in self._signals.values():
             if isinstance(signal, Idle):
                 return None, ()
             sources.update(signal.sources)
-        kernels = {source.kernel for source in sources}
-        return (kernels.pop(), tuple(sorted(source.name for source in sources))) if len(kernels) == 1 else (None, ())
+        schedulers = {source.scheduler for source in sources}
+        return (schedulers.pop(), tuple(sorted(source.name for source in sources))) if len(schedulers) == 1 else (None, ())
 
-    def follow(self, world: Plant) -> None:
-        """From now on its kernel notifies it."""
-        kernel = self.kernel
-        if kernel is None:
+    def follow(self, world: Simulation) -> None:
+        """From now on its scheduler notifies it."""
+        scheduler = self.scheduler
+        if scheduler is None:
             return
-        if kernel.now < world.now:
-            kernel.advance(world.now)
+        if scheduler.now < world.now:
+            scheduler.advance(world.now)
         if not all(_is_event(world, name, signal) for name, signal in self._signals.items()):
-            kernel.is_attentive = True
-        kernel.follow(self, self.names, leaves=not self._stays)
+            scheduler.is_attentive = True
+        scheduler.follow(self, self.names, leaves=not self._stays)
 
     def unfollow(self) -> None:
-        if self.kernel is not None and self.kernel.followers is not None:
-            self.kernel.followers.remove(self)
+        if self.scheduler is not None and self.scheduler.followers is not None:
+            self.scheduler.followers.remove(self)
 
     def bring(self, now: Nanos) -> tuple[Source, ...]:
-        """Advance its kernels to ``now`` and return what it depends on."""
+        """Advance its schedulers to ``now`` and return what it depends on."""
         return tuple(dict.fromkeys(source for signal in self._signals.values() for source in signal.bring(now)))
 
     # ------------------------------------------------------------------ values
@@ -357,14 +357,14 @@ def _is_alone(left: Quantity, right: Quantity, name: str) -> bool:
     return any(side == SignalName(name) and name not in other.names() for side, other in sides)
 
 
-def _is_event(world: Plant, name: str, signal: SignalOf | Idle) -> bool:
+def _is_event(world: Simulation, name: str, signal: SignalOf | Idle) -> bool:
     """Whether its changes are seen from outside of programs, so that a program may calculate ahead of it."""
     owner, _, rest = name.partition(".")
     machine = world.machines.get(owner)
     return signal.freeze is not None or (not signal.continuous and (machine is None or rest.upper() in machine.pins()))
 
 
-def _scale(world: Plant, left: Quantity, right: Quantity) -> float:
+def _scale(world: Simulation, left: Quantity, right: Quantity) -> float:
     """The range of the signals in a comparison, otherwise the greatest number in it, otherwise 1."""
     spans = [span for name in (*left.names(), *right.names()) if (span := _span(world, name)) is not None]
     if spans:
@@ -372,7 +372,7 @@ def _scale(world: Plant, left: Quantity, right: Quantity) -> float:
     return max((*_numbers(left), *_numbers(right)), default=0.0) or 1.0
 
 
-def _span(world: Plant, name: str) -> float | None:
+def _span(world: Simulation, name: str) -> float | None:
     owner, _, rest = name.partition(".")
     axis = world.axes.get(owner) if rest == "position" else None
     if axis is not None and axis.spec.travel is not None:

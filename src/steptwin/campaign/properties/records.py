@@ -10,8 +10,8 @@ from steptwin.campaign.properties.slopes import Shape, negative
 from steptwin.campaign.properties.tree import OPPOSITE, Atom
 from steptwin.machine import Nanos
 from steptwin.simulation.logic.expression import Comparison
-from steptwin.simulation.scheduler.kernel import Source
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.scheduler.scheduler import Source
+from steptwin.simulation.world.simulation import Simulation
 
 
 class SharedRecord:
@@ -40,11 +40,11 @@ class ComparisonRecords:
     _begins = True
     sources: tuple[Source, ...] = ()
 
-    def __init__(self, world: Plant) -> None:
+    def __init__(self, world: Simulation) -> None:
         self._world = world
         self._known: dict[tuple[Comparison, bool], ComparisonRecord] = {}
         self._spread: list[ComparisonRecord] = []
-        """Those that no kernel follows alone."""
+        """Those that no scheduler follows alone."""
         self._users = 0
 
     def use(self, atoms: Iterable[Atom], fine: frozenset[Atom]) -> dict[Atom, SharedRecord]:
@@ -66,7 +66,7 @@ class ComparisonRecords:
     def begin(self) -> None:
         """Follow the world from its present moment on."""
         for record in self._known.values():
-            if record.kernel is None:
+            if record.scheduler is None:
                 self._spread.append(record)
             record.follow(self._world)
         if self._known:
@@ -91,11 +91,11 @@ class ComparisonRecords:
             record.leave(moment)
 
     def look(self, now: Nanos) -> tuple[Source, ...]:
-        """All look where the watch begins; later only those that no kernel follows."""
+        """All look where the watch begins; later only those that no scheduler follows."""
         found: dict[Source, None] = {}
         for record in self._known.values() if self._begins else self._spread:
             sources = record.bring(now)
-            if record.kernel is None:
+            if record.scheduler is None:
                 found.update(dict.fromkeys(sources))
             record.look(now)
         self._begins = False

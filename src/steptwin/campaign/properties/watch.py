@@ -17,7 +17,7 @@ from steptwin.campaign.properties.tree import Atom, CycleTime, Delayed, Holding,
 from steptwin.campaign.properties.words import formula_text, found_text
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +36,7 @@ class Property:
     text: str
     name: str
 
-    def watch(self, world: Plant, earlier: WatchState | None = None) -> PropertyWatch:
+    def watch(self, world: Simulation, earlier: WatchState | None = None) -> PropertyWatch:
         """Watch a world from its present moment on, or as if from the begin of ``earlier``, which another world with the same
         past has seen. Raises `Misuse` for what this world does not have."""
         return watch_together([self], world, [earlier])[0]
@@ -50,7 +50,7 @@ def read_property(text: str, name: str = "") -> Property:
 
 
 def watch_together(
-    properties: Sequence[Property], world: Plant, earlier: Sequence[WatchState | None] | None = None
+    properties: Sequence[Property], world: Simulation, earlier: Sequence[WatchState | None] | None = None
 ) -> list[PropertyWatch]:
     """As `Property.watch` of each; what several of them compare is followed once."""
     records = ComparisonRecords(world)
@@ -63,7 +63,7 @@ def watch_together(
 class PropertyWatch:
     """A property on a world whose comparisons are followed by ``records``. It ends with `close`."""
 
-    def __init__(self, which: Property, world: Plant, earlier: WatchState | None, records: ComparisonRecords) -> None:
+    def __init__(self, which: Property, world: Simulation, earlier: WatchState | None, records: ComparisonRecords) -> None:
         self.which = which
         self._world = world
         self._records = records
@@ -95,7 +95,7 @@ class PropertyWatch:
         world = self._at_present()
         return {atom: shortest(recording.course(world.now)) for atom, recording in self._recordings.items()}
 
-    def _at_present(self) -> Plant:
+    def _at_present(self) -> Simulation:
         """The world, all of which has come to its present moment."""
         self._world.advance(self._world.now)
         self._records.bring(self._world.now)

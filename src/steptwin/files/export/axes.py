@@ -11,10 +11,10 @@ from steptwin.simulation.mechanics.lanes import AxisLane, AxisViews, Mechanics, 
 
 if TYPE_CHECKING:
     from steptwin.simulation.components.axis import BuiltAxis
-    from steptwin.simulation.world.plant import Plant
+    from steptwin.simulation.world.simulation import Simulation
 
 
-def axis_views(world: Plant) -> AxisViews:
+def axis_views(world: Simulation) -> AxisViews:
     """The views of all axes of the controllers in a world, with the mechanics that they move."""
     views: dict[tuple[str, str], AxisLane] = {}
     for name, machine in world.machines.items():

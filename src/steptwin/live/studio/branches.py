@@ -20,7 +20,7 @@ from steptwin.live.world import LiveWorld
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.messages import NONE, Message
 from steptwin.simulation.scheduler.trace import Mark
-from steptwin.simulation.world.plantsnapshot import PlantSnapshot
+from steptwin.simulation.world.snapshot import SimulationSnapshot
 
 MOST_BRANCHES = 4
 MODULE = "steptwin.live.studio.branch"
@@ -34,7 +34,7 @@ class BranchStart:
     ready_file: Path
     name: str
     source: str
-    snapshot: PlantSnapshot
+    snapshot: SimulationSnapshot
 
 
 class _OpenBranch(NamedTuple):
@@ -93,7 +93,7 @@ class WorldBranches:
         self._open[number] = branch
         return branch.plain(number)
 
-    def _begin(self, own: StudioOptions, number: int, snapshot: PlantSnapshot) -> _OpenBranch:
+    def _begin(self, own: StudioOptions, number: int, snapshot: SimulationSnapshot) -> _OpenBranch:
         """Blocks until its page is there. Its trace and its inputs begin anew: nothing of the past is recorded there."""
         spec, ready = self._live.world.spec, self._processes.folder / f"{number}.ready.json"
         name = f"{spec.name}, branch {number} from {snapshot.now // MILLISECOND / 1000:.3f} s"

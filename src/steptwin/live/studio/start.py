@@ -44,9 +44,9 @@ from steptwin.live.studio.drawing import WorldArrangement
 from steptwin.live.studio.openpage import OpenedPage, has_desktop
 from steptwin.live.studio.options import StudioOptions
 from steptwin.live.studio.owntokens import new_tokens, own_tokens
-from steptwin.live.studio.plant import WorldPlant
 from steptwin.live.studio.recorded import recorded
 from steptwin.live.studio.recordings import WorldRecordings
+from steptwin.live.studio.services import LiveServices
 from steptwin.live.studio.work import LineWork
 from steptwin.live.twins import find_device
 from steptwin.live.withoutworld import serve_without_world
@@ -232,7 +232,7 @@ class _Page:
             lookback=lookback,
             branches=branches,
             recordings=recordings,
-            plant=None if beside is None else WorldPlant(running.gateways),
+            services=None if beside is None else LiveServices(running.gateways),
             campaigns=campaigns,
             arrangement=_arrangement(live, None if beside is None else beside.world),
             traffic=live.traffic,

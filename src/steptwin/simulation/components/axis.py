@@ -22,7 +22,7 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.course import Build, Course
 from steptwin.simulation.mechanics.mechanics import EncoderBuild, Mechanism, RotorMark
 from steptwin.simulation.mechanics.scale import GivenScale, Scale, exact_fraction, scale_of
-from steptwin.simulation.scheduler.kernel import Kernel, Source
+from steptwin.simulation.scheduler.scheduler import Scheduler, Source
 from steptwin.simulation.toml.names import Unknown, WrongTerminal
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table, table_in, tables_in
@@ -102,13 +102,13 @@ class BuiltAxis:
     """An axis with its mechanics."""
 
     spec: AxisSpec
-    kernel: Kernel
+    scheduler: Scheduler
     mechanism: Mechanism
     scale: Scale
 
     @property
     def source(self) -> Source:
-        return self.kernel.source(self.spec.name)
+        return self.scheduler.source(self.spec.name)
 
     def units(self, pulses: int) -> float:
         scale = self.scale.pulses_per_unit
@@ -129,11 +129,11 @@ def _refers(spec: AxisSpec, described: ElementSpecs) -> Iterator[Reference]:
 
 def _build(spec: AxisSpec, site: Site) -> BuiltAxis:
     machine = spec.drive[0]
-    kernel = site.kernel(machine)
+    scheduler = site.scheduler(machine)
     number, scale, build = site.memo.once(spec.path, lambda: _checked(spec, site))
-    mechanism = Mechanism(kernel, machine, number, build, spec.name)
-    kernel.add_part(mechanism, (machine,), spec.name)
-    fitted = BuiltAxis(spec, kernel, mechanism, scale)
+    mechanism = Mechanism(scheduler, machine, number, build, spec.name)
+    scheduler.add_part(mechanism, (machine,), spec.name)
+    fitted = BuiltAxis(spec, scheduler, mechanism, scale)
     for n, switch in enumerate(spec.switches, start=1):
         site.text.unless_wrong(switch.path, partial(_put_switch, fitted, switch, lane_of(spec.name, n), site))
     return fitted
@@ -173,7 +173,7 @@ def _put_switch(axis: BuiltAxis, spec: SwitchSpec, lane: str, site: Site) -> Non
         period = usual if spec.period is None else axis.scale.pulses(spec.period)
         return zone_of(spec, axis.scale.nearest, period)
 
-    put_switch(axis.kernel, axis.mechanism, axis.spec.drive[0], site.memo.once(spec.path, zone), spec, lane, site)
+    put_switch(axis.scheduler, axis.mechanism, axis.spec.drive[0], site.memo.once(spec.path, zone), spec, lane, site)
 
 
 def _connect(spec: AxisSpec, fitted: BuiltAxis, site: Site) -> None:
@@ -191,7 +191,7 @@ def _fit_encoder(axis: BuiltAxis, spec: EncoderSpec | None, axes: Mapping[str, B
         if spec is not None:
             raise Misuse(f"encoder: {name} is {kind.title}, which reads none")
         return
-    now = axis.kernel.now
+    now = axis.scheduler.now
     reader = encoders.reader(machine)
     if spec is None:
         if not mechanism.build.ideal:
@@ -210,9 +210,9 @@ def _fit_encoder(axis: BuiltAxis, spec: EncoderSpec | None, axes: Mapping[str, B
     if spec.index:
         low = axis.scale.nearest(spec.offset)
         target = (name, encoders.index_input(mechanism.number))
-        circuit = site.circuit(axis.kernel, target, (*spec.path, "index"), None)
+        circuit = site.circuit(axis.scheduler, target, (*spec.path, "index"), None)
         zone = Zone(low, low + spec.index_width - 1, 0, axis.scale.pulses_per_rev)
-        axis.kernel.add_part(Switch(circuit, RotorMark(turned.mechanism), zone, now), (turned.mechanism.machine,))
+        axis.scheduler.add_part(Switch(circuit, RotorMark(turned.mechanism), zone, now), (turned.mechanism.machine,))
 
 
 def _counts(spec: EncoderSpec, turned: BuiltAxis, encoders: EncoderInputs[Any], machine: Any, number: int) -> Fraction | None:

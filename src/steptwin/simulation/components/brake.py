@@ -17,7 +17,7 @@ from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.faults.table import number
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.mechanics.mechanics import Mechanism
-from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.scheduler.scheduler import Board
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, time_value
 from steptwin.simulation.toml.values import number as number_value
@@ -67,8 +67,8 @@ class Brake(BoardPart):
         """Fault: it does not let go."""
         self.share = 1.0
         """Share of its torque that it has; less while it is worn."""
-        if not board.kernel.is_blank:
-            mechanism.brake(spec.torque, board.kernel.now)
+        if not board.scheduler.is_blank:
+            mechanism.brake(spec.torque, board.scheduler.now)
 
     def acts_on(self, mechanism: Mechanism) -> bool:
         return self._mechanism is mechanism

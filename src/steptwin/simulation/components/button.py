@@ -10,7 +10,7 @@ from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, 
 from steptwin.simulation.components.site import Site
 from steptwin.simulation.logic.contacts import Button
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import name_value
 
@@ -24,9 +24,9 @@ def _refers(spec: ButtonSpec, described: ElementSpecs) -> Iterator[Reference]:
     yield Reference(spec.target[0], spec.target[0], (*spec.path, "to"))
 
 
-def _build(spec: ButtonSpec, site: Site) -> tuple[Button, Kernel]:
-    kernel = site.kernel(spec.target[0])
-    circuit = site.circuit(kernel, spec.target, spec.path, spec.join)
+def _build(spec: ButtonSpec, site: Site) -> tuple[Button, Scheduler]:
+    scheduler = site.scheduler(spec.target[0])
+    circuit = site.circuit(scheduler, spec.target, spec.path, spec.join)
     button = Button(
         circuit,
         normally_closed=spec.contact == "NC",
@@ -36,16 +36,16 @@ def _build(spec: ButtonSpec, site: Site) -> tuple[Button, Kernel]:
         lane=spec.name,
     )
     button.rest_at(spec.contact == "NC")
-    kernel.add_part(button, (circuit.target.machine,), spec.name, circuit.target.machine)
-    return button, kernel
+    scheduler.add_part(button, (circuit.target.machine,), spec.name, circuit.target.machine)
+    return button, scheduler
 
 
-def _signals(built: tuple[Button, Kernel]) -> Mapping[str, SignalOf]:
-    button, kernel = built
-    return {"pressed": SignalOf((kernel.source(button.lane),), lambda now: float(button.pressed))}
+def _signals(built: tuple[Button, Scheduler]) -> Mapping[str, SignalOf]:
+    button, scheduler = built
+    return {"pressed": SignalOf((scheduler.source(button.lane),), lambda now: float(button.pressed))}
 
 
-BUTTON: Element[ButtonSpec, tuple[Button, Kernel]] = Element(
+BUTTON: Element[ButtonSpec, tuple[Button, Scheduler]] = Element(
     spec=ButtonSpec,
     refers=_refers,
     build=_build,

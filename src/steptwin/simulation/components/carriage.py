@@ -49,7 +49,7 @@ class Carriage(Stateful):
         self.spec = spec
         self.axis = axis
         self._spring = Spring(spec.frequency, spec.damping)
-        now = axis.kernel.now
+        now = axis.scheduler.now
         self._response = self._respond(now, float(axis.mechanism.place(now)), 0.0)
         self._version: object = axis.mechanism.version()
 
@@ -69,14 +69,14 @@ class Carriage(Stateful):
         """Let the belt have a share of its frequency."""
         self._spring = Spring(self.spec.frequency * share, self.spec.damping)
         self._renew(now)
-        self.axis.kernel.report(self.axis.mechanism.machine, "edge", f"{self.spec.name}.{SPRING_SHARE}", share)
+        self.axis.scheduler.report(self.axis.mechanism.machine, "edge", f"{self.spec.name}.{SPRING_SHARE}", share)
 
-    # ------------------------------------------------------------------ part of a kernel
+    # ------------------------------------------------------------------ part of a scheduler
 
     def update(self, now: Nanos) -> None:
         if self.axis.mechanism.version() != self._version:
             self._renew(now)
-            self.axis.kernel.mark(self.spec.name)
+            self.axis.scheduler.mark(self.spec.name)
 
     def deadline(self) -> Nanos | None:
         """None: its motion is computed in advance."""
@@ -155,7 +155,7 @@ def _refers(spec: CarriageSpec, described: ElementSpecs) -> Iterator[Reference]:
 def _build(spec: CarriageSpec, site: Site) -> Carriage:
     carriage = Carriage(spec, find_axis(spec.axis, site))
     mechanism = carriage.axis.mechanism
-    carriage.axis.kernel.add_part(carriage, (mechanism.machine, spec.axis), spec.name)
+    carriage.axis.scheduler.add_part(carriage, (mechanism.machine, spec.axis), spec.name)
     for n, switch in enumerate(spec.switches, start=1):
         site.text.unless_wrong(switch.path, partial(_put_switch, carriage, switch, lane_of(spec.name, n), site))
     return carriage
@@ -165,7 +165,7 @@ def _put_switch(carriage: Carriage, spec: SwitchSpec, lane: str, site: Site) -> 
     scale = carriage.axis.scale
     usual = scale.turn if carriage.axis.spec.kind == "rotary" else None
     period = usual if spec.period is None else scale.pulses(spec.period)
-    put_switch(carriage.axis.kernel, carriage, carriage.spec.name, zone_of(spec, scale.nearest, period), spec, lane, site)
+    put_switch(carriage.axis.scheduler, carriage, carriage.spec.name, zone_of(spec, scale.nearest, period), spec, lane, site)
 
 
 def _signals(carriage: Carriage) -> Mapping[str, SignalOf]:
@@ -173,7 +173,7 @@ def _signals(carriage: Carriage) -> Mapping[str, SignalOf]:
         name, axis = carriage.spec.name, carriage.spec.axis
         raise Misuse(f"{name}.deflection swings while its axis moves: write {name}.position - {axis}.position")
 
-    source, unit = (carriage.axis.kernel.source(carriage.spec.name),), carriage.axis.scale.unit
+    source, unit = (carriage.axis.scheduler.source(carriage.spec.name),), carriage.axis.scale.unit
     return {
         "position": SignalOf(source, carriage.position, carriage.turns, carriage.version, unit),
         "deflection": SignalOf(source, carriage.deflection, unit=unit, check=refuse),

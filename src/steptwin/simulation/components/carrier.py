@@ -14,7 +14,7 @@ from steptwin.simulation.components.logic import BoardPart, BoardSpec, Joint
 from steptwin.simulation.components.site import Site
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.belt import Workpiece, next_change
-from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.scheduler.scheduler import Board
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, number
 

@@ -27,7 +27,7 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.belt import BeltDrive, ConstantDrive, Load, Workpiece, next_change
 from steptwin.simulation.mechanics.drawing import BELT, Drawing, SensorZone
 from steptwin.simulation.mechanics.scale import exact_fraction
-from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.scheduler.scheduler import Board
 from steptwin.simulation.toml.names import Unknown
 
 FEEDER_STANDS = "feeder_stands"
@@ -106,7 +106,7 @@ class Conveyor(BoardPart):
         self._own = own
         self._moved_by = moved_by
         self._turns = turns
-        self._then = drive.place(board.kernel.now)
+        self._then = drive.place(board.scheduler.now)
         """The place of the belt when it was looked at last: since then it has moved one way while anything stands."""
         self.following: Conveyor | None = None
         self.load = Load()
@@ -164,14 +164,14 @@ class Conveyor(BoardPart):
             self._hold(now)
             self._deliver(now)
             self._seen = self._state()
-            self.board.kernel.mark(self.board.name)
+            self.board.scheduler.mark(self.board.name)
             self._due = self._next(now)
 
     def _feed(self, now: Nanos) -> None:
         """Put a workpiece at the beginning, where there is room for it."""
         if self.feeder_stands or self.load.covering(0, self.drive.place(now)) is not None:
             self.missed += 1
-            self.board.kernel.mark(self.board.name)
+            self.board.scheduler.mark(self.board.name)
             return
         self.fed += 1
         spec = self.spec
@@ -183,7 +183,7 @@ class Conveyor(BoardPart):
         self._then = self.drive.place(now)
         self.load.put(piece._replace(origin=self.drive.place(now) - self.places(front), held=None))
         self.report(IS_ON(piece=piece.name, belt=self.spec.name), piece.name, "on")
-        self.board.kernel.mark(self.board.name)
+        self.board.scheduler.mark(self.board.name)
 
     def take_over(self, piece: Workpiece, other: Conveyor, front: float, now: Nanos) -> None:
         """Put a workpiece that was on another belt on this one."""
@@ -198,7 +198,7 @@ class Conveyor(BoardPart):
     def take(self, piece: Workpiece) -> None:
         """Take a workpiece off the belt."""
         self.load.take(piece)
-        self.board.kernel.mark(self.board.name)
+        self.board.scheduler.mark(self.board.name)
 
     def front(self, number: int, now: Nanos) -> float:
         """How far the front of a workpiece is from the beginning, mm. 0 is the workpiece that was put there first; NaN if
@@ -212,9 +212,9 @@ class Conveyor(BoardPart):
 
     def report(self, text: str, name: str, what: str) -> None:
         """Something has happened to a workpiece."""
-        kernel = self.board.kernel
+        scheduler = self.board.scheduler
         facts = ("workpiece", name), ("element", self.spec.name), ("what", what)
-        kernel.report(kernel.owner(self.board.name), "event", "workpiece", text, *facts)
+        scheduler.report(scheduler.owner(self.board.name), "event", "workpiece", text, *facts)
 
     def _hold(self, now: Nanos) -> None:
         """Let workpieces stand where they cannot go on, and let those go on that can."""
@@ -326,15 +326,15 @@ FEEDER_WORKS_AGAIN = Message("simulation.feeder-works-again", "the feeder of {na
 
 def _stop_feeder(active: ActiveFault, conveyor: Conveyor, begins: bool, now: Nanos) -> str:
     conveyor.feeder_stands = begins
-    kernel, name = conveyor.board.kernel, conveyor.spec.name
-    kernel.report(kernel.owner(name), "edge", f"{name}.{FEEDER_STANDS}", float(begins))
+    scheduler, name = conveyor.board.scheduler, conveyor.spec.name
+    scheduler.report(scheduler.owner(name), "edge", f"{name}.{FEEDER_STANDS}", float(begins))
     return (FEEDER_FAILS if begins else FEEDER_WORKS_AGAIN)(name=name)
 
 
 def _make(spec: ConveyorSpec, site: Site) -> Conveyor:
     board = site.board(spec.name)
     if spec.axis is None:
-        own = ConstantDrive(exact_fraction(spec.speed), board.kernel.now)
+        own = ConstantDrive(exact_fraction(spec.speed), board.scheduler.now)
         conveyor = Conveyor(board, spec, own, Fraction(PICOMETRES), own)
     else:
         axis = find_axis(spec.axis, site)
@@ -376,10 +376,10 @@ def _put_sensors(spec: ConveyorSpec, conveyor: Conveyor, site: Site) -> None:
 
 
 def _put_sensor(conveyor: Conveyor, spec: SensorSpec, lane: str, site: Site) -> None:
-    kernel = conveyor.board.kernel
-    circuit = site.circuit(kernel, spec.target, (*spec.path, "to"), spec.join)
+    scheduler = conveyor.board.scheduler
+    circuit = site.circuit(scheduler, spec.target, (*spec.path, "to"), spec.join)
     sensor = Sensor(circuit, conveyor, spec, site.bounce_of(circuit), lane)
-    kernel.add_part(sensor, (conveyor.board.name,), drives=circuit.target.machine)
+    scheduler.add_part(sensor, (conveyor.board.name,), drives=circuit.target.machine)
 
 
 def _place_names(spec: ConveyorSpec) -> tuple[str, ...]:

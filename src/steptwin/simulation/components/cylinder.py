@@ -21,7 +21,7 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.drawing import ROD, Drawing
 from steptwin.simulation.mechanics.scale import exact_fraction
 from steptwin.simulation.mechanics.travel import Travel
-from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.scheduler.scheduler import Board
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table, tables_in
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, number, positive_time, time_value, word
@@ -82,7 +82,7 @@ class Cylinder(BoardPart):
         """When the spool of the valve moves."""
         self.has_air = True
         self.is_jammed = False
-        self.travel = Travel(spec.extend_time, spec.retract_time, is_forth=starts_out, now=board.kernel.now)
+        self.travel = Travel(spec.extend_time, spec.retract_time, is_forth=starts_out, now=board.scheduler.now)
 
     def update(self, now: Nanos) -> None:
         self._switch(now)  # before the coils change: an input at a moment comes after what is due then
@@ -94,7 +94,7 @@ class Cylinder(BoardPart):
         force = self._force()
         if force != self.travel.direction:
             self.travel.send(force, now)
-            self.board.kernel.mark(self.board.name)
+            self.board.scheduler.mark(self.board.name)
         place = self.travel.place(now)
         self.board.put(EXTENDED, float(place == self.travel.full))
         self.board.put(RETRACTED, float(place == 0))
@@ -122,7 +122,7 @@ class Cylinder(BoardPart):
         return self._spool
 
     def deadline(self) -> Nanos | None:
-        moments = (*self.travel.turns(self.board.kernel.now), *(() if self._due is None else (self._due,)))
+        moments = (*self.travel.turns(self.board.scheduler.now), *(() if self._due is None else (self._due,)))
         return min(moments, default=None)
 
     @property
@@ -179,7 +179,7 @@ def _put_switches(spec: CylinderSpec, cylinder: Cylinder, site: Site) -> None:
 
 def _put_switch(cylinder: Cylinder, spec: SwitchSpec, lane: str, site: Site) -> None:
     zone = zone_of(spec, cylinder.places, None if spec.period is None else cylinder.places(spec.period))
-    put_switch(cylinder.board.kernel, cylinder.travel, cylinder.board.name, zone, spec, lane, site)
+    put_switch(cylinder.board.scheduler, cylinder.travel, cylinder.board.name, zone, spec, lane, site)
 
 
 def _signals(cylinder: Cylinder) -> Mapping[str, SignalOf]:

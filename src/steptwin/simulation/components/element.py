@@ -29,7 +29,7 @@ class Element(ElementTable[S, B]):
     refers: Callable[[S, ElementSpecs], Iterable[Reference]]
     """All machines, lines and elements with terminals that it names. Names that do not exist are reported at the path."""
     build: Callable[[S, Site], B]
-    """Adds it to its kernel. Raises `Misuse` if it does not fit."""
+    """Adds it to its scheduler. Raises `Misuse` if it does not fit."""
     connect: Callable[[S, B, Site], None] | None = None
     """Called after all elements of this kind were built, because they may refer to each other."""
     terminals: Callable[[S], Terminals] | None = None

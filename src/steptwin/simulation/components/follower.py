@@ -73,10 +73,10 @@ class Follower(Stateful):
         self._share = Fraction(1)
         """Fault: of its lift that a worn cam gives it."""
 
-    # ------------------------------------------------------------------ part of a kernel
+    # ------------------------------------------------------------------ part of a scheduler
 
     def update(self, now: Nanos) -> None:
-        """It has no state of its own: the kernel looks again at what depends on it."""
+        """It has no state of its own: the scheduler looks again at what depends on it."""
 
     def deadline(self) -> Nanos | None:
         """None: its motion is that of its axis."""
@@ -145,7 +145,7 @@ class Follower(Stateful):
 
     def _report(self, what: str, level: float) -> None:
         axis = self.shaft.axis
-        axis.kernel.report(axis.mechanism.machine, "edge", f"{self.spec.name}.{what}", level)
+        axis.scheduler.report(axis.mechanism.machine, "edge", f"{self.spec.name}.{what}", level)
 
     @property
     def moved(self) -> tuple[str, MovedLane]:
@@ -199,8 +199,8 @@ def _build(spec: FollowerSpec, site: Site) -> Follower:
     if shaft is None:
         raise Unknown(spec.shaft, f"no shaft is called {spec.shaft!r}")
     follower = Follower(spec, shaft, site.memo.once(spec.path, lambda: _cam(spec, shaft)))
-    kernel = shaft.axis.kernel
-    kernel.add_part(follower, (shaft.axis.mechanism.machine, shaft.axis.spec.name, spec.shaft, spec.name), spec.name)
+    scheduler = shaft.axis.scheduler
+    scheduler.add_part(follower, (shaft.axis.mechanism.machine, shaft.axis.spec.name, spec.shaft, spec.name), spec.name)
     for n, switch in enumerate(spec.switches, start=1):
         site.text.unless_wrong(switch.path, partial(_put_switch, follower, switch, lane_of(spec.name, n), site))
     return follower
@@ -223,12 +223,12 @@ def _put_switch(follower: Follower, spec: SwitchSpec, lane: str, site: Site) -> 
 
     zone = site.memo.once(spec.path, lambda: zone_of(spec, places))
     mechanism = follower.shaft.axis.mechanism
-    kernel = follower.shaft.axis.kernel
-    put_switch(kernel, follower, (mechanism.machine, follower.spec.shaft, follower.spec.name), zone, spec, lane, site)
+    scheduler = follower.shaft.axis.scheduler
+    put_switch(scheduler, follower, (mechanism.machine, follower.spec.shaft, follower.spec.name), zone, spec, lane, site)
 
 
 def _signals(follower: Follower) -> Mapping[str, SignalOf]:
-    source, spec = (follower.shaft.axis.kernel.source(follower.spec.name),), follower.spec
+    source, spec = (follower.shaft.axis.scheduler.source(follower.spec.name),), follower.spec
     bounds = 0.0, spec.highest
     return {"position": SignalOf(source, follower.position, follower.turns, follower.version, spec.unit, bounds)}
 

@@ -24,7 +24,7 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.drawing import Drawing, rail
 from steptwin.simulation.mechanics.lanes import MovedLane
 from steptwin.simulation.mechanics.scale import Loading, burden_of
-from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.scheduler.scheduler import Board
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, word
@@ -98,7 +98,7 @@ class Gantry(Touch):
         return SKEWED
 
     def touching(self) -> str:
-        skew = self.signals[SKEW].value(self.board.kernel.now)
+        skew = self.signals[SKEW].value(self.board.scheduler.now)
         return ENDS_ARE_SKEWED(name=self.board.name, skew=skew, unit=self.unit)
 
     def update(self, now: Nanos) -> None:
@@ -117,7 +117,7 @@ class Gantry(Touch):
         super().update(now)
 
     def deadline(self) -> Nanos | None:
-        now = self.board.kernel.now
+        now = self.board.scheduler.now
         dues = (super().deadline(), *(end.mechanism.next_stall(now) for end in self.ends))
         return min((due for due in dues if due is not None), default=None)
 

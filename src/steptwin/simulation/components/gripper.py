@@ -18,7 +18,7 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.drawing import ROD, Drawing
 from steptwin.simulation.mechanics.scale import exact_fraction
 from steptwin.simulation.mechanics.travel import Travel
-from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.scheduler.scheduler import Board
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, number, positive_time
@@ -63,7 +63,7 @@ class Gripper(Carrier):
     def __init__(self, board: Board, spec: GripperSpec, site: Site) -> None:
         super().__init__(board, spec, site)
         self._spec = spec
-        self.travel = Travel(spec.close_time, spec.open_time, is_forth=False, now=board.kernel.now)
+        self.travel = Travel(spec.close_time, spec.open_time, is_forth=False, now=board.scheduler.now)
         share = 1 - exact_fraction(spec.width) / exact_fraction(spec.stroke)
         self._at = floor(share * self.travel.full)
         """The place of the jaws at a workpiece."""
@@ -86,14 +86,14 @@ class Gripper(Carrier):
         direction = 0 if self.is_held else 1 if closes else -1
         if direction != self.travel.direction:
             self.travel.send(direction, now)
-            self.board.kernel.mark(self.board.name)
+            self.board.scheduler.mark(self.board.name)
         place = self.travel.place(now)
         self.board.put(OPENED, float(place == 0))
         self.board.put(CLOSED, float(place == self.travel.full))
         self.board.put(HELD, float(self.is_held))
 
     def deadline(self) -> Nanos | None:
-        now = self.board.kernel.now
+        now = self.board.scheduler.now
         touches = self.travel.reaches(self._at, now, 1)
         moments = (*self.travel.turns(now), *(() if touches is None else (touches,)))
         return min(moments, default=None)

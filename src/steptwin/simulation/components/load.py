@@ -30,7 +30,7 @@ from steptwin.simulation.logic.curve import Stepped
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.motor import Burden
 from steptwin.simulation.mechanics.scale import Loading, burden_of
-from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.scheduler.scheduler import Board
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import NameOf, points, text_value

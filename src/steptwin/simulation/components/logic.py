@@ -20,7 +20,7 @@ from steptwin.simulation.faults.table import Parameter, ParameterForm, whole
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.drawing import Drawing
-from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.scheduler.scheduler import Board
 from steptwin.simulation.scheduler.wires import PinName, Wire
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.tomlplaces import Path
@@ -53,12 +53,12 @@ class BoardSpec(NamedSpec, ABC):
         """Outputs that its keys join to its inputs."""
 
     def others(self, described: ElementSpecs) -> Iterable[tuple[str, str]]:
-        """Keys that name other elements, and the names of these or of what they are in one kernel with."""
+        """Keys that name other elements, and the names of these or of what they are in one scheduler with."""
         return ()
 
 
 class BoardPart(Stateful, ABC):
-    """The part of a kernel that gives the outputs of a board their levels."""
+    """The part of a scheduler that gives the outputs of a board their levels."""
 
     __slots__ = ("board",)
 
@@ -77,10 +77,10 @@ class BoardPart(Stateful, ABC):
 
     @abstractmethod
     def update(self, now: Nanos) -> None:
-        """As `KernelPart.update`."""
+        """As `ScheduledPart.update`."""
 
     def deadline(self) -> Nanos | None:
-        """As `KernelPart.deadline`; none for an element whose outputs follow its inputs alone."""
+        """As `ScheduledPart.deadline`; none for an element whose outputs follow its inputs alone."""
         return None
 
 
@@ -179,7 +179,7 @@ def with_terminals(
 
     def build(found: S, site: Site) -> P:
         part = make(found, site)
-        part.board.kernel.add_part(part, part.watches, found.name)
+        part.board.scheduler.add_part(part, part.watches, found.name)
         for wire, path in site.memo.once((*found.path, "wires"), lambda: tuple(_wires(found))):
             site.join(wire, path)
         fit(found, part, site)

@@ -14,7 +14,7 @@ from steptwin.simulation.kinds.lines import Line
 from steptwin.simulation.kinds.links import LineSpec
 from steptwin.simulation.logic.contacts import Circuit
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import RecordSink
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.toml.tomlplaces import Path
@@ -29,9 +29,9 @@ class WorldParts:
     """The elements of the description."""
     faults: Faults
     record: RecordSink
-    kernels: list[Kernel] = field(default_factory=list)
-    kernel_of: dict[str, Kernel] = field(default_factory=dict)
-    """Kernels of machines, lines and elements with terminals."""
+    schedulers: list[Scheduler] = field(default_factory=list)
+    scheduler_of: dict[str, Scheduler] = field(default_factory=dict)
+    """Schedulers of machines, lines and elements with terminals."""
     machines: dict[str, MotionController] = field(default_factory=dict)
     kind_of: dict[str, AnyKind] = field(default_factory=dict)
     """Kinds of machines."""

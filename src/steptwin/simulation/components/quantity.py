@@ -10,7 +10,7 @@ from steptwin.simulation.components.site import Site
 from steptwin.simulation.logic.condition import SignalCondition
 from steptwin.simulation.logic.expression import parse_condition
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.scheduler.scheduler import Board
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.tomlplaces import Path
 
@@ -47,9 +47,9 @@ def owner_of(signal: str) -> str:
 
 
 def signal_of(key: str, board: Board, site: Site, name: str) -> SignalOf | Idle:
-    """A signal of what is in one kernel with a board. Raises `Misuse`."""
+    """A signal of what is in one scheduler with a board. Raises `Misuse`."""
     found = find_signal(site.parts, name)
-    if isinstance(found, Idle) or any(source.kernel is not board.kernel for source in found.sources):
+    if isinstance(found, Idle) or any(source.scheduler is not board.scheduler for source in found.sources):
         raise Misuse(f"{key}: {name!r} is no quantity of a machine or an element")
     found.watch(name)
     return found

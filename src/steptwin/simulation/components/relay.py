@@ -11,7 +11,7 @@ from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Jo
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.kinds.kind import Terminals
-from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.scheduler.scheduler import Board
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, time_value
 

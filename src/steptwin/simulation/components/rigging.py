@@ -29,7 +29,7 @@ class Rigging:
         self._plan.faults.check(fault)
 
     def put(self, fault: Fault, now: Nanos) -> None:
-        """Set a fault; kernels are at ``now``. Raises as `check`."""
+        """Set a fault; schedulers are at ``now``. Raises as `check`."""
         self.check(fault)
         self._plan.faults.add(fault, now)
 
@@ -50,15 +50,15 @@ class Rigging:
     def rig(self, name: str) -> FaultyMachine:
         """Prepare a machine for faults; if an axis has mechanics, its faults act on these instead of on the encoder."""
         plan = self._plan
-        machine, kernel = plan.machines[name], plan.kernel_of[name]
-        rigged = kernel.machines[name]
+        machine, scheduler = plan.machines[name], plan.scheduler_of[name]
+        rigged = scheduler.machines[name]
         if isinstance(rigged, FaultyMachine):
             return rigged
         mechanisms = {axis.mechanism.number: axis.mechanism for axis in plan.built(AXIS).values() if axis.spec.drive[0] == name}
         on = plan.line_of.get(name)
         service = LineUnit() if on is None else LineUnit(on[1], on[0].name)
         body = plan.kind_of[name].body(machine, service, mechanisms)
-        return rig(kernel, name, plan.faults, body)
+        return rig(scheduler, name, plan.faults, body)
 
 
 def _wires(plan: WorldParts) -> Iterator[RequestRoute]:

@@ -80,10 +80,10 @@ class GearedShaft(Stateful):
         self._behind = 0
         """Pulses of the axis that slipping has cost it; negative: it is ahead."""
 
-    # ------------------------------------------------------------------ part of a kernel
+    # ------------------------------------------------------------------ part of a scheduler
 
     def update(self, now: Nanos) -> None:
-        """Its motion is that of its axis: the kernel looks again at what depends on it."""
+        """Its motion is that of its axis: the scheduler looks again at what depends on it."""
 
     def deadline(self) -> Nanos | None:
         """None: its motion is that of its axis."""
@@ -104,14 +104,14 @@ class GearedShaft(Stateful):
 
     def slip(self, slips: bool, now: Nanos) -> None:
         """Let the coupling slip, or grip again where the shaft is then."""
-        kernel, mechanism = self.axis.kernel, self.axis.mechanism
-        kernel.report(mechanism.machine, "edge", f"{self.spec.name}.{SLIPS}", float(slips))
+        scheduler, mechanism = self.axis.scheduler, self.axis.mechanism
+        scheduler.report(mechanism.machine, "edge", f"{self.spec.name}.{SLIPS}", float(slips))
         if slips:
             self._held = self.place(now)
         elif self._held is not None:
             self._behind = mechanism.place(now) - self._held
             self._held = None
-        kernel.mark(self.spec.name)
+        scheduler.mark(self.spec.name)
 
     @property
     def moved(self) -> tuple[str, MovedLane]:
@@ -159,7 +159,7 @@ def _refers(spec: ShaftSpec, described: ElementSpecs) -> Iterator[Reference]:
 def _build(spec: ShaftSpec, site: Site) -> GearedShaft:
     shaft = GearedShaft(spec, find_axis(spec.axis, site))
     mechanism = shaft.axis.mechanism
-    shaft.axis.kernel.add_part(shaft, (mechanism.machine, spec.axis, spec.name), spec.name)
+    shaft.axis.scheduler.add_part(shaft, (mechanism.machine, spec.axis, spec.name), spec.name)
     for n, cam in enumerate(spec.cams, start=1):
         site.text.unless_wrong(cam.path, partial(_put_cam, shaft, cam, lane_of(spec.name, n), site))
     return shaft
@@ -167,12 +167,12 @@ def _build(spec: ShaftSpec, site: Site) -> GearedShaft:
 
 def _put_cam(shaft: GearedShaft, cam: CamSpec, lane: str, site: Site) -> None:
     moved_by = shaft.axis.mechanism.machine, shaft.spec.name
-    put_switch(shaft.axis.kernel, shaft, moved_by, shaft.zone(cam), cam, lane, site)
+    put_switch(shaft.axis.scheduler, shaft, moved_by, shaft.zone(cam), cam, lane, site)
 
 
 def _signals(shaft: GearedShaft) -> Mapping[str, SignalOf]:
     turning = partial(turns_of_axis, shaft.axis)
-    source = (shaft.axis.kernel.source(shaft.spec.name),)
+    source = (shaft.axis.scheduler.source(shaft.spec.name),)
     return {"angle": SignalOf(source, shaft.angle, turning, shaft.version, "degree")}
 
 

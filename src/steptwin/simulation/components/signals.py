@@ -15,7 +15,7 @@ from steptwin.simulation.components.parts import WorldParts
 from steptwin.simulation.kinds.kind import AnyKind
 from steptwin.simulation.kinds.lines import Line
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.scheduler.kernel import Source
+from steptwin.simulation.scheduler.scheduler import Source
 from steptwin.simulation.toml.names import Unknown, UnknownSignal
 
 T = TypeVar("T")
@@ -39,7 +39,7 @@ class Idle:
             **{name: partial(plan.kind_of[name].is_idle, machine) for name, machine in plan.machines.items()},
             **{name: partial(_is_quiet, line) for name, line in plan.lines.items()},
         }
-        self._things = [(plan.kernel_of[name].source(name), is_at_rest) for name, is_at_rest in at_rest.items()]
+        self._things = [(plan.scheduler_of[name].source(name), is_at_rest) for name, is_at_rest in at_rest.items()]
         self._sources = tuple(source for source, _ in self._things)
         self._busy: int | None = None
         """Index of the machine or line that was busy last."""
@@ -48,7 +48,7 @@ class Idle:
         """As `SignalOf.bring`: a busy machine or line, or all if none is busy."""
         for n in (*(() if self._busy is None else (self._busy,)), *range(len(self._things))):
             source, is_at_rest = self._things[n]
-            source.kernel.advance(now)
+            source.scheduler.advance(now)
             if not is_at_rest(now):
                 self._busy = n
                 return (source,)
@@ -90,7 +90,7 @@ def find_signal(plan: WorldParts, name: str) -> SignalOf | Idle:
         return _chosen(of_element, rest, name)
     line = plan.lines.get(owner)
     if line is not None:
-        return _chosen({"idle": _quiet(line, plan.kernel_of[owner].source(owner))}, rest, name)
+        return _chosen({"idle": _quiet(line, plan.scheduler_of[owner].source(owner))}, rest, name)
     machine = plan.machines.get(owner)
     if machine is None:
         later = plan.unbuilt(owner)
@@ -100,7 +100,7 @@ def find_signal(plan: WorldParts, name: str) -> SignalOf | Idle:
         near = NearMiss()
         text = NOTHING_IS_CALLED(name=name, owner=owner, hint=near.hint(owner, known), names=known)
         raise Unknown(owner, text, near.of(owner, known))
-    return _of_machine(plan.kind_of[owner], machine, plan.kernel_of[owner].source(owner), rest, name)
+    return _of_machine(plan.kind_of[owner], machine, plan.scheduler_of[owner].source(owner), rest, name)
 
 
 def _seconds(now: Nanos) -> float:

@@ -1,4 +1,4 @@
-"""The context in which elements are built: machines and kernels by name, inputs and their drivers, shared contacts."""
+"""The context in which elements are built: machines and schedulers by name, inputs and their drivers, shared contacts."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from steptwin.simulation.components.parts import WorldParts
 from steptwin.simulation.kinds.kind import AnyKind
 from steptwin.simulation.logic.contacts import Circuit
 from steptwin.simulation.scheduler.chance import Chance
-from steptwin.simulation.scheduler.kernel import Board, Kernel
+from steptwin.simulation.scheduler.scheduler import Board, Scheduler
 from steptwin.simulation.scheduler.wires import PinName, Wire
 from steptwin.simulation.toml.names import Unknown
 from steptwin.simulation.toml.reader import TomlText
@@ -29,12 +29,12 @@ class Site:
         self._joins: dict[PinName, str | None] = {}
         """``join`` of each input with contacts."""
 
-    # ------------------------------------------------------------------ machines and kernels
+    # ------------------------------------------------------------------ machines and schedulers
 
     def machine(self, name: str) -> MotionController:
         """The machine called ``name``, which is not a line."""
         found = self.parts.machines.get(name)
-        if found is None and name not in self.parts.kernel_of:
+        if found is None and name not in self.parts.scheduler_of:
             raise Unknown(name, f"nothing is called {name!r}")
         if found is None:
             what = "an element" if name in self.parts.terminals else "a line"
@@ -46,9 +46,9 @@ class Site:
         self.machine(name)
         return self.parts.kind_of[name]
 
-    def kernel(self, name: str) -> Kernel:
-        """The kernel of a machine, a line or an element with terminals."""
-        found = self.parts.kernel_of.get(name)
+    def scheduler(self, name: str) -> Scheduler:
+        """The scheduler of a machine, a line or an element with terminals."""
+        found = self.parts.scheduler_of.get(name)
         if found is None:
             raise Unknown(name, f"nothing is called {name!r}")
         return found
@@ -57,17 +57,17 @@ class Site:
 
     def board(self, name: str) -> Board:
         """The terminals of the element ``name``."""
-        return self.kernel(name).boards[name]
+        return self.scheduler(name).boards[name]
 
     def join(self, wire: Wire, path: Path) -> None:
         """Join an output to an input that nothing else drives. ``path``: the table of the wire, or the key of its source."""
-        kernel = self.kernel(wire.source.machine)
+        scheduler = self.scheduler(wire.source.machine)
         if self.memo.is_checked:
             self.parts.driven[wire.target] = path
         else:
             self.terminal(wire.source, OUTPUT)
             self.input(wire.target, path)
-        kernel.connect(wire)
+        scheduler.connect(wire)
 
     def terminal(self, name: Terminal, kind: str) -> PinName:
         """A terminal of a machine or an element; ``kind`` is one of those of `steptwin.simulation.toml.values`."""
@@ -92,12 +92,12 @@ class Site:
         self.parts.driven[target] = path
         return target
 
-    def circuit(self, kernel: Kernel, name: Terminal, path: Path, join: str | None) -> Circuit:
+    def circuit(self, scheduler: Scheduler, name: Terminal, path: Path, join: str | None) -> Circuit:
         """The circuit of a contact: an input of its own, or one shared with contacts that have the same ``join``."""
         target = PinName(*name)
         there = self.parts.circuits.get(target)
         if there is None:
-            circuit = Circuit(kernel, self.input(name, path), in_series=join == "series")
+            circuit = Circuit(scheduler, self.input(name, path), in_series=join == "series")
             self.parts.circuits[target], self._joins[target] = circuit, join
             return circuit
         if join is None or join != self._joins[target]:

@@ -83,10 +83,10 @@ def _refers(spec: SourceSpec, described: ElementSpecs) -> Iterator[Reference]:
 
 
 def _build(spec: SourceSpec, site: Site) -> AnalogSource:
-    kernel = site.kernel(spec.target[0])
+    scheduler = site.scheduler(spec.target[0])
     target = site.input(spec.target, spec.path, ANALOG_INPUT)
-    source = AnalogSource(kernel, target, WAVEFORMS[spec.kind](spec), spec.period, spec.name)
-    kernel.add_part(source, (), spec.name or None)
+    source = AnalogSource(scheduler, target, WAVEFORMS[spec.kind](spec), spec.period, spec.name)
+    scheduler.add_part(source, (), spec.name or None)
     return source
 
 

@@ -19,7 +19,7 @@ from steptwin.simulation.faults.machine import FaultyMachine
 from steptwin.simulation.faults.table import number as parameter
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.scheduler.scheduler import Board
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, flag, name_value, number, permitting, time_value
@@ -129,7 +129,7 @@ class Supply(BoardPart):
         super().__init__(board)
         self._spec = spec
         self._fed = fed
-        self._ramp = Ramp(board.kernel.now, 0.0, 0.0, 0.0)
+        self._ramp = Ramp(board.scheduler.now, 0.0, 0.0, 0.0)
         self._is_wanted = False
         self._is_on = False
         self._switch_due: Nanos | None = None
@@ -137,7 +137,7 @@ class Supply(BoardPart):
         self.sag: float | None = None
         """Fault: the voltage that it has at most."""
         for machine in fed:
-            machine.supply(False, board.kernel.now)
+            machine.supply(False, board.scheduler.now)
 
     def volts(self, now: Nanos) -> float:
         return self._ramp.at(now)
@@ -186,14 +186,14 @@ class Supply(BoardPart):
     def _feed(self, now: Nanos) -> None:
         for machine in self._fed:
             machine.supply(self.is_good, now)
-        kernel, name = self.board.kernel, self.board.name
+        scheduler, name = self.board.scheduler, self.board.name
         fed = self._spec.feeds
         text = (SUPPLY_IS_ON if self.is_good else SUPPLY_IS_OFF)(supply=name, fed=list(fed))
         facts = ("element", name), ("on", self.is_good), ("fed", ", ".join(fed))
-        kernel.report(kernel.owner(name), "event", "supply", text, *facts)
+        scheduler.report(scheduler.owner(name), "event", "supply", text, *facts)
 
     def deadline(self) -> Nanos | None:
-        now = self.board.kernel.now
+        now = self.board.scheduler.now
         dues = (self._switch_due, self._ramp.crosses(self._spec.threshold, now), next(self.turns(now), None))
         return min((due for due in dues if due is not None), default=None)
 

@@ -9,7 +9,7 @@ from steptwin.simulation.components.contact import ContactSpec
 from steptwin.simulation.components.site import Site
 from steptwin.simulation.logic.contacts import MovingPart, Switch, Zone
 from steptwin.simulation.mechanics.drawing import SensorZone
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import number
@@ -53,22 +53,28 @@ def lane_of(axis: str, number: int) -> str:
 
 
 def put_switch(
-    kernel: Kernel, carriage: MovingPart, moved_by: str | tuple[str, ...], zone: Zone, spec: ContactSpec, lane: str, site: Site
+    scheduler: Scheduler,
+    carriage: MovingPart,
+    moved_by: str | tuple[str, ...],
+    zone: Zone,
+    spec: ContactSpec,
+    lane: str,
+    site: Site,
 ) -> None:
     """Put a switch where a carriage, which the machines or elements ``moved_by`` move, runs over it."""
-    circuit = site.circuit(kernel, spec.target, (*spec.path, "to"), spec.join)
+    circuit = site.circuit(scheduler, spec.target, (*spec.path, "to"), spec.join)
     part = Switch(
         circuit,
         carriage,
         zone,
-        kernel.now,
+        scheduler.now,
         normally_closed=spec.contact == "NC",
         bounce_ns=spec.bounce,
         bounces=spec.bounces,
         chance=site.bounce_of(circuit),
         lane=lane,
     )
-    kernel.add_part(part, (moved_by,) if isinstance(moved_by, str) else moved_by, drives=circuit.target.machine)
+    scheduler.add_part(part, (moved_by,) if isinstance(moved_by, str) else moved_by, drives=circuit.target.machine)
 
 
 def zone_of(spec: SwitchSpec, places: Callable[[float], int], period: Fraction | int | None = None) -> Zone:

@@ -9,7 +9,7 @@ from typing import ClassVar
 from steptwin.machine import Nanos
 from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.simulation.kinds.kind import Terminals
-from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.scheduler.scheduler import Board
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, positive_time, word
 

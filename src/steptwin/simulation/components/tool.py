@@ -87,10 +87,10 @@ class Tool(Stateful):
             name: Coordinate(axes, shares, self._pulled) for name, shares in zip(COORDINATES, (spec.x, spec.y), strict=True)
         }
 
-    # ------------------------------------------------------------------ part of a kernel
+    # ------------------------------------------------------------------ part of a scheduler
 
     def update(self, now: Nanos) -> None:
-        """Its motion is that of its axes: the kernel looks again at what depends on it."""
+        """Its motion is that of its axes: the scheduler looks again at what depends on it."""
 
     def deadline(self) -> Nanos | None:
         """None: its motion is that of its axes."""
@@ -104,9 +104,9 @@ class Tool(Stateful):
             self._pulled[n] = Pulled(pulled_to(axis, its, now))
         elif its.held is not None:
             self._pulled[n] = Pulled(None, pulled_to(axis, Pulled(), now) - its.held)
-        kernel = axis.kernel
-        kernel.report(self.axes[0].mechanism.machine, "edge", f"{self.spec.name}.{belt}.{SLIPS}", float(slips))
-        kernel.mark(self.spec.name)
+        scheduler = axis.scheduler
+        scheduler.report(self.axes[0].mechanism.machine, "edge", f"{self.spec.name}.{belt}.{SLIPS}", float(slips))
+        scheduler.mark(self.spec.name)
         return self._pulled[n].behind
 
     def copy_state(self) -> Plain:
@@ -169,7 +169,7 @@ def _build(spec: ToolSpec, site: Site) -> Tool:
     if one.scale.unit != other.scale.unit:
         raise Misuse(f"{spec.axis!r} is in {one.scale.unit} and {spec.other!r} in {other.scale.unit}: a tool has one unit")
     tool = Tool(spec, (one, other))
-    one.kernel.add_part(tool, (*_machines(tool), spec.axis, spec.other, spec.name), spec.name)
+    one.scheduler.add_part(tool, (*_machines(tool), spec.axis, spec.other, spec.name), spec.name)
     for name, n, switch in spec.switches:
         lane = f"{spec.name}.{name}_switch{n}"
         site.text.unless_wrong(switch.path, partial(_put_switch, tool, name, switch, lane, site))
@@ -185,11 +185,11 @@ def _put_switch(tool: Tool, name: str, spec: SwitchSpec, lane: str, site: Site) 
         return round(exact_fraction(units) * PLACES)
 
     zone = zone_of(spec, places, None if spec.period is None else places(spec.period))
-    put_switch(tool.axes[0].kernel, tool.coordinates[name], (*_machines(tool), tool.spec.name), zone, spec, lane, site)
+    put_switch(tool.axes[0].scheduler, tool.coordinates[name], (*_machines(tool), tool.spec.name), zone, spec, lane, site)
 
 
 def _signals(tool: Tool) -> Mapping[str, SignalOf]:
-    source = (tool.axes[0].kernel.source(tool.spec.name),)
+    source = (tool.axes[0].scheduler.source(tool.spec.name),)
     return {name: SignalOf(source, its.value, its.turns, its.version, tool.unit) for name, its in tool.coordinates.items()}
 
 

@@ -10,7 +10,7 @@ from steptwin.messages import Message
 from steptwin.simulation.components.logic import BoardPart
 from steptwin.simulation.logic.condition import SignalCondition
 from steptwin.simulation.mechanics.mechanics import Mechanism
-from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.scheduler.scheduler import Board
 from steptwin.state import Plain
 
 RESET, HIT = "RESET", "HIT"
@@ -88,9 +88,9 @@ class Touch(BoardPart):
             mechanism.block(blocked, now, by=self.board.name)
 
     def _report(self, text: str, *, touches: bool) -> None:
-        kernel = self.board.kernel
+        scheduler = self.board.scheduler
         facts = ("element", self.board.name), ("touches", touches), ("jams", self._jams)
-        kernel.report(kernel.owner(self.board.name), "event", "collision", text, *facts)
+        scheduler.report(scheduler.owner(self.board.name), "event", "collision", text, *facts)
 
     def deadline(self) -> Nanos | None:
         return self._due

@@ -17,7 +17,7 @@ from steptwin.simulation.logic.condition import Signal
 from steptwin.simulation.logic.curve import Stepped
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.logic.sources import HIGHEST_V, LOWEST_V
-from steptwin.simulation.scheduler.kernel import Kernel, Source
+from steptwin.simulation.scheduler.scheduler import Scheduler, Source
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
@@ -46,11 +46,11 @@ class TransducerSpec(NamedSpec):
 class Transducer(Stateful):
     """Drives an analog input. It is due whenever its signal comes to a value at which the voltage is another one."""
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_kernel", "_spec")
+    FIXED: ClassVar[tuple[str, ...]] = ("_scheduler", "_spec")
     __slots__ = (*FIXED, "_level", "is_broken", "offset")
 
-    def __init__(self, kernel: Kernel, spec: TransducerSpec, signal: Signal) -> None:
-        self._kernel = kernel
+    def __init__(self, scheduler: Scheduler, spec: TransducerSpec, signal: Signal) -> None:
+        self._scheduler = scheduler
         self._spec = spec
         self._level = Stepped(signal, spec.points, spec.resolution)
         self.is_broken = False
@@ -64,7 +64,7 @@ class Transducer(Stateful):
 
     @property
     def source(self) -> Source:
-        return self._kernel.source(self.name)
+        return self._scheduler.source(self.name)
 
     def volts(self, now: Nanos) -> float:
         """The voltage that it gives."""
@@ -74,7 +74,7 @@ class Transducer(Stateful):
 
     def update(self, now: Nanos) -> None:
         self._level.update(now)
-        self._kernel.drive(PinName(*self._spec.target), self.volts(now))
+        self._scheduler.drive(PinName(*self._spec.target), self.volts(now))
 
     def deadline(self) -> Nanos | None:
         return self._level.due
@@ -86,14 +86,14 @@ def _refers(spec: TransducerSpec, described: ElementSpecs) -> Iterator[Reference
 
 
 def _build(spec: TransducerSpec, site: Site) -> Transducer:
-    kernel = site.kernel(spec.target[0])
+    scheduler = site.scheduler(spec.target[0])
     site.input(spec.target, (*spec.path, "to"), ANALOG_INPUT)
     found = find_signal(site.parts, spec.of)
     found.watch(spec.of)
-    if all(source.kernel is not kernel for source in found.bring(kernel.now)):
+    if all(source.scheduler is not scheduler for source in found.bring(scheduler.now)):
         raise Misuse(f"of = {spec.of!r} is no quantity of what {spec.target[0]!r} is joined to")
-    transducer = Transducer(kernel, spec, found)
-    kernel.add_part(transducer, name=spec.name)
+    transducer = Transducer(scheduler, spec, found)
+    scheduler.add_part(transducer, name=spec.name)
     return transducer
 
 

@@ -16,7 +16,7 @@ from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.scheduler.kernel import Board
+from steptwin.simulation.scheduler.scheduler import Board
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, number, positive_time
@@ -63,7 +63,7 @@ class Vacuum(Carrier):
         self.spec = spec
         self.leaks = False
         self._is_held = False
-        self._begin: Nanos = board.kernel.now
+        self._begin: Nanos = board.scheduler.now
         self._first = 0.0
         """Pressure at `_begin`, kPa below that of the air."""
         self._goal = 0.0
@@ -114,7 +114,7 @@ class Vacuum(Carrier):
         self.board.put(HELD, float(self._is_held))
 
     def deadline(self) -> Nanos | None:
-        passing = self.passing(self.board.kernel.now) if self.board.is_on(EJECTOR) else None
+        passing = self.passing(self.board.scheduler.now) if self.board.is_on(EJECTOR) else None
         moments = (moment for moment in (self._due, passing) if moment is not None)
         return min(moments, default=None)
 

@@ -1,4 +1,4 @@
-"""Builds machines and kernels from a description: one kernel for all that is connected by wires, lines and mechanics."""
+"""Builds machines and schedulers from a description: one scheduler for all that is connected by wires, lines and mechanics."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from steptwin.simulation.faults.element import FaultyElement
 from steptwin.simulation.kinds.kind import ControllerSpec, Member, Terminals
 from steptwin.simulation.kinds.links import LineSpec
 from steptwin.simulation.kinds.registry import line_kinds
-from steptwin.simulation.scheduler.kernel import Board, Kernel
+from steptwin.simulation.scheduler.scheduler import Board, Scheduler
 from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
 from steptwin.simulation.toml.table import TableSpec
 
@@ -31,7 +31,7 @@ Keep = Callable[[str, bytes, Nanos], None]
 def build(blueprint: Blueprint, record: RecordSink, keep: Keep | None = None, *, is_blank: bool = False) -> WorldParts:
     """The machines of a description at time 0. Raises `WorldError` where its parts do not fit together.
 
-    ``keep`` is called whenever a controller has a new non-volatile memory. ``is_blank``: as for `Kernel`.
+    ``keep`` is called whenever a controller has a new non-volatile memory. ``is_blank``: as for `Scheduler`.
     """
     return _Builder(blueprint, record, keep, is_blank=is_blank).parts
 
@@ -46,7 +46,7 @@ class _Builder:
         self.parts.faults.sinks.append(record)
         self.site = Site(spec.text, spec.seed, blueprint.memo, self.parts)
         self._make_machines()
-        self._make_kernels()
+        self._make_schedulers()
         self._make_lines()
         self._make_elements()
 
@@ -67,24 +67,24 @@ class _Builder:
         if keep is not None:
             spec.kind.keep_memory(machine, memory, lambda data: keep(spec.name, data, machine.now))
 
-    # ------------------------------------------------------------------ kernels
+    # ------------------------------------------------------------------ schedulers
 
-    def _make_kernels(self) -> None:
-        """Machines connected by a line, a wire or mechanics share a kernel; kernels are ordered by their first machine."""
+    def _make_schedulers(self) -> None:
+        """Machines connected by a line, a wire or mechanics share a scheduler; schedulers are ordered by their first machine."""
         memo = self.blueprint.memo
         boards = memo.once(("boards",), lambda: {spec.name: (spec, terminals) for spec, terminals in self._boards()})
         if self.blueprint.joined is None:
             self.blueprint.joined = joined_names(self.spec, self.parts.machines)
         for names in self.blueprint.joined:
-            kernel = Kernel(record=self.parts.record, is_checked=memo.is_checked, is_blank=self._is_blank)
-            self.parts.kernels.append(kernel)
+            scheduler = Scheduler(record=self.parts.record, is_checked=memo.is_checked, is_blank=self._is_blank)
+            self.parts.schedulers.append(scheduler)
             for name in names:
-                self.parts.kernel_of[name] = kernel
+                self.parts.scheduler_of[name] = scheduler
                 if name in self.parts.machines:
-                    kernel.add(name, self.parts.machines[name])
+                    scheduler.add(name, self.parts.machines[name])
                 elif name in boards:
                     spec, terminals = boards[name]
-                    self._add_board(spec, terminals, kernel)
+                    self._add_board(spec, terminals, scheduler)
 
     def _boards(self) -> Iterator[tuple[NamedSpec, Terminals]]:
         for element in ELEMENTS.values():
@@ -92,11 +92,11 @@ class _Builder:
                 for spec in element.named(self.spec.elements[element.name]):
                     yield spec, element.terminals(spec)
 
-    def _add_board(self, spec: NamedSpec, terminals: Terminals, kernel: Kernel) -> None:
-        if not kernel.machines and not self.spec.text.findings:
+    def _add_board(self, spec: NamedSpec, terminals: Terminals, scheduler: Scheduler) -> None:
+        if not scheduler.machines and not self.spec.text.findings:
             self.spec.text.wrong(spec.path, "D009", f"nothing joins {spec.name!r} to a controller")
         self.parts.terminals[spec.name] = terminals
-        kernel.add_board(Board(kernel, spec.name, (*terminals.digital_inputs, *terminals.analog_inputs), terminals.outputs))
+        scheduler.add_board(Board(scheduler, spec.name, (*terminals.digital_inputs, *terminals.analog_inputs), terminals.outputs))
 
     # ------------------------------------------------------------------ lines
 
@@ -119,9 +119,9 @@ class _Builder:
             return
         if not members:
             raise Misuse("nothing is on this line")
-        kernel = self.site.kernel(spec.name)
-        line = kind.make(spec, members, kernel, parts.record, parts.faults)
-        kernel.add_part(line, (spec.name, *(member.spec.name for member in members)), spec.name)
+        scheduler = self.site.scheduler(spec.name)
+        line = kind.make(spec, members, scheduler, parts.record, parts.faults)
+        scheduler.add_part(line, (spec.name, *(member.spec.name for member in members)), spec.name)
         parts.lines[spec.name] = line
         for member in members:
             parts.line_of[member.spec.name] = line, member.address
@@ -143,9 +143,9 @@ class _Builder:
             self._build_elements(element, [spec])
         if not self.spec.text.findings:
             self.site.close_circuits()
-            for number, kernel in enumerate(self.parts.kernels):
-                if order := self.blueprint.memo.once(("order", number), kernel.order):
-                    kernel.arrange(order)
+            for number, scheduler in enumerate(self.parts.schedulers):
+                if order := self.blueprint.memo.once(("order", number), scheduler.order):
+                    scheduler.arrange(order)
 
     def _waits(self, element: AnyElement, spec: TableSpec) -> bool:
         """Whether it is over a signal of an element that is not built yet."""
@@ -170,16 +170,16 @@ class _Builder:
             if element.signals is not None:
                 self.parts.signals_of[named.name] = partial(element.signals, found)
             if element.faults:
-                kernel = self._kernel_of(element, named)
-                failing = FaultyElement(kernel, named.name, self.parts.faults, element.faults, found)
+                scheduler = self._scheduler_of(element, named)
+                failing = FaultyElement(scheduler, named.name, self.parts.faults, element.faults, found)
                 self.parts.faults.elements[named.name] = failing
-                kernel.add_part(failing, ())
+                scheduler.add_part(failing, ())
         return found
 
-    def _kernel_of(self, element: AnyElement, spec: NamedSpec) -> Kernel:
-        """The kernel that an element is in: its own, or that of the first thing it refers to."""
+    def _scheduler_of(self, element: AnyElement, spec: NamedSpec) -> Scheduler:
+        """The scheduler that an element is in: its own, or that of the first thing it refers to."""
         name = next(iter(element.refers(spec, self.spec.elements))).one if element.terminals is None else spec.name
-        return self.site.kernel(name)
+        return self.site.scheduler(name)
 
 
 def _record_event(record: RecordSink, machine: str, event: MachineEvent) -> None:

@@ -1,4 +1,4 @@
-"""Which machines, lines and elements with terminals of a description share a kernel: those that anything connects."""
+"""Which machines, lines and elements with terminals of a description share a scheduler: those that anything connects."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from steptwin.simulation.toml.values import NameOf
 
 
 def joined_names(spec: WorldSpec, machines: Iterable[str]) -> list[list[str]]:
-    """The names in each kernel. Kernels, and names in them, are in order: machines, lines, elements.
+    """The names in each scheduler. Schedulers, and names in them, are in order: machines, lines, elements.
 
     Names that do not exist are reported in the text of the description.
     """
@@ -64,7 +64,7 @@ def _element_named_by(path: Path) -> str | None:
 
 
 def _placed(spec: WorldSpec) -> Mapping[str, str]:
-    """For each element without terminals of its own the first thing that it refers to, in whose kernel it is."""
+    """For each element without terminals of its own the first thing that it refers to, in whose scheduler it is."""
     return {
         one.name: next(iter(element.refers(one, spec.elements))).one
         for element in ELEMENTS.values()

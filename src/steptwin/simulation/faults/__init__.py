@@ -1,7 +1,7 @@
 """Faults, seeded and targeted: bytes, frames, protocol, physics.
 
 `parse` and `read` make a `Fault` of a table or a line of text; `Faults` is the set of those that are set. A `FaultyPort` stands
-between a link and a port, `rig` lets a machine in its kernel have faults. `steptwin fault --kinds` shows `KINDS`.
+between a link and a port, `rig` lets a machine in its scheduler have faults. `steptwin fault --kinds` shows `KINDS`.
 """
 
 from steptwin.simulation.faults.active import ActiveFault, Faults

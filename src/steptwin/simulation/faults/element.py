@@ -10,7 +10,7 @@ from steptwin.machine import Nanos
 from steptwin.messages import NONE, Message
 from steptwin.simulation.faults.active import ActiveFault, Faults, HeldLevel
 from steptwin.simulation.faults.table import Fault, FaultKind
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.state import Stateful
 
 FAULT_OF_ANOTHER_ELEMENT = Message(
@@ -19,14 +19,14 @@ FAULT_OF_ANOTHER_ELEMENT = Message(
 
 
 class FaultyElement(Stateful):
-    """A part of the kernel beside an element, which applies the effects of its faults to the built object."""
+    """A part of the scheduler beside an element, which applies the effects of its faults to the built object."""
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_faults", "_kernel", "_kinds", "_part", "name")
+    FIXED: ClassVar[tuple[str, ...]] = ("_faults", "_scheduler", "_kinds", "_part", "name")
     __slots__ = (*FIXED, "_lasting")
 
-    def __init__(self, kernel: Kernel, name: str, faults: Faults, kinds: Iterable[FaultKind], part: Any) -> None:
+    def __init__(self, scheduler: Scheduler, name: str, faults: Faults, kinds: Iterable[FaultKind], part: Any) -> None:
         self.name = name
-        self._kernel = kernel
+        self._scheduler = scheduler
         self._faults = faults
         self._kinds = tuple(kinds)
         self._part = part
@@ -43,13 +43,13 @@ class FaultyElement(Stateful):
 
     def begin(self, active: ActiveFault) -> None:
         """A fault has been set."""
-        self._kernel.mark()
+        self._scheduler.mark()
 
     def end(self, active: ActiveFault, now: Nanos) -> None:
         """A fault has been removed."""
         if active.name in self._lasting:
             self._turn(active, now, begins=False)
-        self._kernel.mark()
+        self._scheduler.mark()
 
     def held(self) -> Iterator[tuple[str, HeldLevel]]:
         """The terminals that faults hold, in small letters."""
@@ -70,10 +70,10 @@ class FaultyElement(Stateful):
         if begins:
             active.struck += 1
         text = active.fault.kind.effect.act(active, self._part, begins, now)
-        self._kernel.mark()  # the part may have been updated already at this moment
+        self._scheduler.mark()  # the part may have been updated already at this moment
         self._faults.report(active, self.name, now, text)
 
     def deadline(self) -> Nanos | None:
-        now = self._kernel.now
+        now = self._scheduler.now
         moments = (moment for active in self._faults.of_element(self.name) for moment in (active.begin, active.end))
         return min((moment for moment in moments if moment is not None and moment > now), default=None)

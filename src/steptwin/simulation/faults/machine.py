@@ -12,7 +12,7 @@ from steptwin.motioncontroller import Drive, MotionController
 from steptwin.simulation.faults.active import ActiveFault, Faults, HeldLevel
 from steptwin.simulation.faults.answers import NEVER_SENT
 from steptwin.simulation.faults.table import Fault, FaultKind, Occasion
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.state import Plain, Stateful
@@ -83,7 +83,7 @@ REFUSED_REQUEST = Message("simulation.refused-request", "{what}: {bytes}")
 
 
 class FaultyMachine(Stateful):
-    """Wraps a machine in its kernel and applies faults to its inputs, shafts, supply and memory.
+    """Wraps a machine in its scheduler and applies faults to its inputs, shafts, supply and memory.
 
     Inputs are set through it, so that a stuck switch remains stuck.
     """
@@ -403,15 +403,15 @@ class FaultyMachine(Stateful):
         return True
 
 
-def rig(kernel: Kernel, name: str, faults: Faults, body: Body) -> FaultyMachine:
-    """Apply faults of physics and protocol to the machine ``name`` of a kernel."""
+def rig(scheduler: Scheduler, name: str, faults: Faults, body: Body) -> FaultyMachine:
+    """Apply faults of physics and protocol to the machine ``name`` of a scheduler."""
 
     def on_edge(pin: str, now: Nanos, level: float) -> None:
-        kernel.mark_recorded(PinName(name, pin), now, level)
+        scheduler.mark_recorded(PinName(name, pin), now, level)
 
-    machine = kernel.machines[name]
+    machine = scheduler.machines[name]
     if isinstance(machine, FaultyMachine):
         return machine
     failing = faults.machines[name] = FaultyMachine(machine, name, faults, body, on_edge)
-    kernel.replace(name, failing)
+    scheduler.replace(name, failing)
     return failing

@@ -20,7 +20,7 @@ from steptwin.optionalmethods import OptionalMethods
 from steptwin.simulation.kinds.links import LINK_KEYS, LineSpec
 from steptwin.simulation.mechanics.mechanics import EncoderReader
 from steptwin.simulation.mechanics.scale import DriveScale, GivenScale
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script.control import (
     ControllerCommand,
@@ -136,8 +136,8 @@ class RunningWorld(Protocol):
         """The kind of a machine."""
         ...
 
-    def touch(self, name: str, /) -> Kernel:
-        """The kernel of a machine or line, advanced to the present."""
+    def touch(self, name: str, /) -> Scheduler:
+        """The scheduler of a machine or line, advanced to the present."""
         ...
 
     def apply_input(self, what: Step, /) -> None:
@@ -496,8 +496,8 @@ class ControllerKind(OptionalMethods, ABC, Generic[S, M, V]):
         """Its programs while they are executed; None for a kind without any."""
         return None
 
-    def watch_program(self, machine: M, kernel: Kernel, name: str, /) -> ProgramReport | None:
-        """Watch the programs of the machine, which has that name in its kernel; None without any."""
+    def watch_program(self, machine: M, scheduler: Scheduler, name: str, /) -> ProgramReport | None:
+        """Watch the programs of the machine, which has that name in its scheduler; None without any."""
         return None
 
     def download(self, machine: M, to: Destination, source: SourceText, /) -> Downloading:
@@ -571,7 +571,9 @@ class LineKind(ABC, Generic[M, L]):
     """Other keys of ``[[line]]`` that not all kinds have."""
 
     @abstractmethod
-    def make(self, spec: LineSpec, members: Sequence[Member[M]], kernel: Kernel, record: RecordSink, faults: Faults, /) -> L:
+    def make(
+        self, spec: LineSpec, members: Sequence[Member[M]], scheduler: Scheduler, record: RecordSink, faults: Faults, /
+    ) -> L:
         """The line with its members, at least one. Raises `Misuse` if they do not fit together."""
 
     @abstractmethod

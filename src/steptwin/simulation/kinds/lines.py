@@ -17,7 +17,7 @@ from steptwin.messages import Message
 from steptwin.simulation.faults import Faults, FaultyPort, FaultySendingPort
 from steptwin.simulation.faults import LineProtocol as FaultLine
 from steptwin.simulation.kinds.master import Master
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
 from steptwin.state import Plain, Stateful
 from steptwin.wire.slave import FrameDirection, FrameObserver, SlaveDevice, SlavePort
@@ -127,9 +127,9 @@ OTHER_KIND_OF_CONNECTION = Message(
 
 
 class Line(Stateful, ABC):
-    """Base class of lines; a part of its kernel."""
+    """Base class of lines; a part of its scheduler."""
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_before", "_busy", "_faults", "_followers", "_kernel", "_record", "name", "places")
+    FIXED: ClassVar[tuple[str, ...]] = ("_before", "_busy", "_faults", "_followers", "_scheduler", "_record", "name", "places")
     __slots__ = (*FIXED,)
 
     kinds: ClassVar[tuple[str, ...]]
@@ -138,8 +138,8 @@ class Line(Stateful, ABC):
     is_shared: ClassVar[bool] = False
     """Whether every program on it receives all that is sent, requested or not."""
 
-    def __init__(self, kernel: Kernel, name: str, record: RecordSink | None, faults: Faults) -> None:
-        self._kernel = kernel
+    def __init__(self, scheduler: Scheduler, name: str, record: RecordSink | None, faults: Faults) -> None:
+        self._scheduler = scheduler
         self._record = record
         self._faults = faults
         self.name = name
@@ -202,7 +202,7 @@ class Line(Stateful, ABC):
             faulty: FaultyPort = FaultySendingPort(
                 port, place, self._faults, self.fault_kinds[kind], line_name=self.name, is_read=place != SCRIPTS
             )
-            port.on_output = partial(self._kernel.mark, self.name)
+            port.on_output = partial(self._scheduler.mark, self.name)
             is_busy = True
         else:
             faulty = FaultyPort(
@@ -254,14 +254,14 @@ class Line(Stateful, ABC):
         place.unframed = unframed
 
     def exchange(self, place: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
-        """Take bytes of the program at ``place``, connected as ``found``; the kernel is at ``now``. Returns the immediate answer;
-        later answers go to `LineEndPoint.received`."""
+        """Take bytes of the program at ``place``, connected as ``found``; the scheduler is at ``now``. Returns the immediate
+        answer; later answers go to `LineEndPoint.received`."""
         answer = found.port.exchange(data, now)
         if place in self._busy or found.port.deadline() is not None:
             self._busy[place] = found
-            self._kernel.mark(self.name)
-        if self._kernel.is_attentive or self._kernel.hears_requests:
-            self._kernel.mark()
+            self._scheduler.mark(self.name)
+        if self._scheduler.is_attentive or self._scheduler.hears_requests:
+            self._scheduler.mark()
         if self._followers:
             self._count_unframed(place, found, now)
         return answer
@@ -279,12 +279,12 @@ class Line(Stateful, ABC):
             self._record = record
 
     def receive(self, place: str, data: bytes, now: Nanos) -> None:
-        """Take bytes of the program at ``place``; all answers go to `LineEndPoint.received`. The kernel is at ``now``."""
+        """Take bytes of the program at ``place``; all answers go to `LineEndPoint.received`. The scheduler is at ``now``."""
         found = self.connect(place)
         answer = self.exchange(place, found, data, now)
         if answer:
             self._came(place, found, [(now, answer)])
-        self._kernel.mark(self.name)
+        self._scheduler.mark(self.name)
 
     def _came(self, place: str, found: LineEndPoint, pieces: list[tuple[Nanos, bytes]]) -> None:
         found.received.extend(pieces)

@@ -16,7 +16,7 @@ from steptwin.machine import Nanos
 from steptwin.motion.divisions import profile_of
 from steptwin.motioncontroller import Drive
 from steptwin.simulation.scheduler.chance import Chance
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.state import Plain, Stateful
 
@@ -124,11 +124,11 @@ class Zone:
 class Circuit:
     """The contacts of an input: in series it is 1 while all are closed, else while any is."""
 
-    __slots__ = ("_kernel", "contacts", "in_series", "target")
+    __slots__ = ("_scheduler", "contacts", "in_series", "target")
 
-    def __init__(self, kernel: Kernel, target: PinName, *, in_series: bool = False) -> None:
-        kernel.check(target)
-        self._kernel = kernel
+    def __init__(self, scheduler: Scheduler, target: PinName, *, in_series: bool = False) -> None:
+        scheduler.check(target)
+        self._scheduler = scheduler
         self.target = target
         self.in_series = in_series
         self.contacts: list[Contact] = []
@@ -136,25 +136,25 @@ class Circuit:
     @property
     def machine(self) -> str:
         """The subject of the records of its contacts."""
-        return self._kernel.owner(self.target.machine)
+        return self._scheduler.owner(self.target.machine)
 
     @property
     def is_blank(self) -> bool:
         """Whether the state of its contacts is restored later."""
-        return self._kernel.is_blank
+        return self._scheduler.is_blank
 
     def close(self) -> None:
         """Set the input to the present state of its contacts."""
         levels = [contact.level for contact in self.contacts]
-        self._kernel.drive(self.target, float(all(levels) if self.in_series else any(levels)))
+        self._scheduler.drive(self.target, float(all(levels) if self.in_series else any(levels)))
 
     def mark(self) -> None:
         """One of the contacts bounces from now on."""
-        self._kernel.mark(self.target.machine)
+        self._scheduler.mark(self.target.machine)
 
     def report(self, lane: str, level: float) -> None:
         """The level of one contact, apart from the others of the input."""
-        self._kernel.report(self.machine, "edge", lane, level)
+        self._scheduler.report(self.machine, "edge", lane, level)
 
 
 class Contact(Stateful):
@@ -316,16 +316,16 @@ class PositionSwitch:
             raise Misuse(f"switch on {self.target}: {error}") from None
 
 
-def place(kernel: Kernel, switch: PositionSwitch) -> None:
+def place(scheduler: Scheduler, switch: PositionSwitch) -> None:
     """Add a switch and drive its input to the present state."""
-    kernel.check(switch.target)
+    scheduler.check(switch.target)
     try:
-        drive = kernel.drive_of(switch.machine, switch.axis)
+        drive = scheduler.drive_of(switch.machine, switch.axis)
     except Misuse as error:
         raise Misuse(f"switch on {switch.target}: {error}") from None
     zone = Zone(switch.low, switch.high)
-    circuit = Circuit(kernel, switch.target)
-    kernel.add_part(
-        Switch(circuit, CountedPosition(drive), zone, kernel.now, normally_closed=switch.normally_closed), (switch.machine,)
+    circuit = Circuit(scheduler, switch.target)
+    scheduler.add_part(
+        Switch(circuit, CountedPosition(drive), zone, scheduler.now, normally_closed=switch.normally_closed), (switch.machine,)
     )
     circuit.close()

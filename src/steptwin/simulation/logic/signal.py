@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.messages import Message
-from steptwin.simulation.scheduler.kernel import Source
+from steptwin.simulation.scheduler.scheduler import Source
 
 IT_CAN_ONLY_BE_WRITTEN = Message("simulation.it-can-only-be-written", "it can only be written")
 CAN_ONLY_BE_WRITTEN = Message("simulation.can-only-be-written", "{name} can only be written")
@@ -16,7 +16,7 @@ CAN_ONLY_BE_WRITTEN = Message("simulation.can-only-be-written", "{name} can only
 
 @dataclass(frozen=True, slots=True)
 class SignalOf:
-    """A signal, and the machines, lines and elements that compute it: their kernels must be advanced before it is read."""
+    """A signal, and the machines, lines and elements that compute it: their schedulers must be advanced before it is read."""
 
     sources: tuple[Source, ...]
     read: Callable[[Nanos], float] | None
@@ -27,7 +27,7 @@ class SignalOf:
     bounds: tuple[float, float] | None = None
     """The lowest and highest value, where that is known."""
     is_kept: bool = False
-    """Whether a request may change it without an event of its kernel."""
+    """Whether a request may change it without an event of its scheduler."""
     freeze: Callable[[Nanos], Callable[[Nanos], float]] | None = None
     """Gives the course at a moment as a function that stays as it is, also when the signal goes another way; None: it cannot."""
     check: Callable[[], None] = lambda: None
@@ -45,7 +45,7 @@ class SignalOf:
         """Advance what the value depends on to ``now`` and return it. Until one of these changes, the value is constant or
         follows its course."""
         for source in self.sources:
-            source.kernel.advance(now)
+            source.scheduler.advance(now)
         return self.sources
 
     def value(self, now: Nanos) -> float:
@@ -61,7 +61,7 @@ class SignalOf:
         self.check()
         if self.is_kept:
             for source in self.sources:
-                source.kernel.is_attentive = True
+                source.scheduler.is_attentive = True
 
     def turns(self, now: Nanos) -> Iterator[Nanos]:
         return iter(() if self.turning is None else self.turning(now))

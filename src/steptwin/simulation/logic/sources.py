@@ -9,7 +9,7 @@ from typing import ClassVar, Protocol
 from steptwin.errors import Misuse
 from steptwin.machine import SECOND, Nanos
 from steptwin.motion.trig import sine
-from steptwin.simulation.scheduler.kernel import Kernel, Source
+from steptwin.simulation.scheduler.scheduler import Scheduler, Source
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.state import Stateful
 
@@ -103,18 +103,18 @@ class SineWaveform:
 class AnalogSource(Stateful):
     """Drives an analog input with the voltage of a waveform, updated every ``period``."""
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_kernel", "_waveform", "name", "period", "target")
+    FIXED: ClassVar[tuple[str, ...]] = ("_scheduler", "_waveform", "name", "period", "target")
     __slots__ = (*FIXED, "_due", "_plain", "is_broken", "offset")
 
-    def __init__(self, kernel: Kernel, target: PinName, waveform: Waveform, period: Nanos, name: str = "") -> None:
-        kernel.check(target)
+    def __init__(self, scheduler: Scheduler, target: PinName, waveform: Waveform, period: Nanos, name: str = "") -> None:
+        scheduler.check(target)
         if period < 1:
             raise Misuse(f"source of {target}: a period of {period} ns is not positive")
         lowest, highest = waveform.bounds
         if not LOWEST_V <= lowest <= highest <= HIGHEST_V:
             volts = f"{lowest:g}" if lowest == highest else f"{lowest:g} to {highest:g}"
             raise Misuse(f"source of {target}: {volts} V: an analog input takes {LOWEST_V:g} to {HIGHEST_V:g} V")
-        self._kernel = kernel
+        self._scheduler = scheduler
         self._waveform = waveform
         self.name = name
         self.target = target
@@ -125,11 +125,11 @@ class AnalogSource(Stateful):
         self._plain = 0.0
         """Volts of the waveform when it was renewed last."""
         self.period = period
-        self._due: Nanos | None = kernel.now
+        self._due: Nanos | None = scheduler.now
 
     @property
     def source(self) -> Source:
-        return self._kernel.source(self.name)
+        return self._scheduler.source(self.name)
 
     def volts(self, now: Nanos) -> float:
         """The voltage that it gives."""
@@ -143,7 +143,7 @@ class AnalogSource(Stateful):
             t_s = now / SECOND
             self._plain = self._waveform.volts(t_s)
             self._due = None if self._waveform.rests(t_s) else now + self.period
-        self._kernel.drive(self.target, self.volts(now))
+        self._scheduler.drive(self.target, self.volts(now))
 
     def deadline(self) -> Nanos | None:
         return self._due

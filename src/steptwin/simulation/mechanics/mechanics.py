@@ -20,7 +20,7 @@ from steptwin.motioncontroller import Drive
 from steptwin.simulation.mechanics.course import Build, Course, LoadPiece, MechanicalState
 from steptwin.simulation.mechanics.loose import Looseness
 from steptwin.simulation.mechanics.motor import NO_BURDEN, Burden
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.state import Plain, Stateful
 
 _OUTDATED = -1
@@ -59,7 +59,7 @@ class EncoderReader(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class EncoderBuild:
-    """An encoder that the controller ``device``, called ``machine`` in the kernel, reads for its axis ``axis`` (from 1).
+    """An encoder that the controller ``device``, called ``machine`` in the scheduler, reads for its axis ``axis`` (from 1).
 
     ``counts`` (negative: backwards) per ``pulses`` of the drive that turns it; None: as the controller is configured.
     """
@@ -85,9 +85,10 @@ STANDS = Message("simulation.stands-behind", "{axis} stands, {pulses} pulses beh
 
 
 class Mechanism(Stateful):
-    """The mechanics of axis ``number`` (from 1) of a machine in ``kernel``: a part of the kernel, and a carriage for switches."""
+    """The mechanics of axis ``number`` (from 1) of a machine in ``scheduler``: a part of the scheduler, and a carriage for
+    switches."""
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_encoders", "_kernel", "_name", "_revision", "build", "machine", "number")
+    FIXED: ClassVar[tuple[str, ...]] = ("_encoders", "_scheduler", "_name", "_revision", "build", "machine", "number")
     __slots__ = (
         *FIXED,
         "_blockers",
@@ -111,8 +112,8 @@ class Mechanism(Stateful):
         "_stop_due",
     )
 
-    def __init__(self, kernel: Kernel, machine: str, number: int, build: Build, name: str = "axis") -> None:
-        self._kernel = kernel
+    def __init__(self, scheduler: Scheduler, machine: str, number: int, build: Build, name: str = "axis") -> None:
+        self._scheduler = scheduler
         self._name = name
         self.machine = machine
         self.number = number
@@ -139,41 +140,41 @@ class Mechanism(Stateful):
         """All of them together."""
         self._changed: tuple[int, Burden] | None = None
         """Where the rotor was when they changed, and what it carried until then."""
-        self._loose = None if build.motor is None or not build.is_loose else Looseness(build, build.motor, kernel.now)
+        self._loose = None if build.motor is None or not build.is_loose else Looseness(build, build.motor, scheduler.now)
         """None for a rotor that always goes with its field, or stands."""
         self._falls = False
         self._rest_due: Nanos | None = None
         """When a free rotor that moves comes to rest."""
         self._changes = 0
-        self._reported: tuple[LoadPiece, ...] | None = (LoadPiece(kernel.now, True, 0),)
+        self._reported: tuple[LoadPiece, ...] | None = (LoadPiece(scheduler.now, True, 0),)
         """The position of the load as reported last; None while it moves freely."""
         self._reported_course: Course | None = None
         """The course that was reported."""
         self._simple = build.ideal
         """Whether the load always was, and always will be, at the commanded position."""
-        drive = kernel.drive_of(machine, number)
-        here = 0 if kernel.is_blank else build.sign * drive.plan.count(kernel.now) + build.zero
-        if kernel.is_blank:
+        drive = scheduler.drive_of(machine, number)
+        here = 0 if scheduler.is_blank else build.sign * drive.plan.count(scheduler.now) + build.zero
+        if scheduler.is_blank:
             pass  # it is restored, where another one has been
         elif (build.low is not None and here < build.low) or (build.high is not None and here > build.high):
             raise Misuse(f"{machine} axis {number} stands at {here} imp, outside its hard stops {build.low} to {build.high} imp")
         self._revision = drive.revision
-        self._course = Course(build, drive.plan, kernel.now, MechanicalState(here, here))
-        if self._loose is not None and not kernel.is_blank:
-            self._renew(drive, kernel.now)
+        self._course = Course(build, drive.plan, scheduler.now, MechanicalState(here, here))
+        if self._loose is not None and not scheduler.is_blank:
+            self._renew(drive, scheduler.now)
 
     @property
     def _drive(self) -> Drive:
-        return self._kernel.machines[self.machine].axes[self.number - 1]
+        return self._scheduler.machines[self.machine].axes[self.number - 1]
 
     # ------------------------------------------------------------------ position
 
     def course(self, now: Nanos) -> Course:
-        """The course at ``now``, which is the kernel's moment or later. What is looked at in advance changes nothing: a course is
-        renewed at the kernel's moment."""
+        """The course at ``now``, which is the scheduler's moment or later. What is looked at in advance changes nothing: a course
+        is renewed at the scheduler's moment."""
         drive = self._drive
-        if drive.revision != self._revision or (self._loose is not None and self._loose.is_switched(drive, self._kernel.now)):
-            self._renew(drive, self._kernel.now)
+        if drive.revision != self._revision or (self._loose is not None and self._loose.is_switched(drive, self._scheduler.now)):
+            self._renew(drive, self._scheduler.now)
         return self._course
 
     def at(self, now: Nanos) -> MechanicalState:
@@ -185,7 +186,7 @@ class Mechanism(Stateful):
         return course.field(now) - course.at(now).rotor
 
     def version(self) -> object:
-        return self._kernel.machines[self.machine].axes[self.number - 1].revision, self._changes
+        return self._scheduler.machines[self.machine].axes[self.number - 1].revision, self._changes
 
     def place(self, now: Nanos) -> int:
         return self.course(now).load_at(now)
@@ -200,7 +201,7 @@ class Mechanism(Stateful):
             drive = self._drive
             if drive.revision != self._revision or (self._loose is not None and self._loose.is_switched(drive, now)):
                 self._renew(drive, now)
-                self._kernel.mark(self.machine)  # switches on it look ahead
+                self._scheduler.mark(self.machine)  # switches on it look ahead
             elif self._due is not None and self._due <= now:
                 self._turn_encoders(now)
             if self._stall_due is not None and self._stall_due <= now:
@@ -222,12 +223,12 @@ class Mechanism(Stateful):
             self._reported = None
             state = course.at(now)
             moved = Profile(free.start, free.base + (state.load - state.rotor) * self.build.sign, free.segments, free.final_p)
-            self._kernel.report(self.machine, "free", str(self.number), moved)
+            self._scheduler.report(self.machine, "free", str(self.number), moved)
             return
         pieces = _from(course.load_pieces(), now)
         if self._reported is None or pieces != _from(self._reported, now):
             self._reported = pieces
-            self._kernel.report(self.machine, "load", str(self.number), pieces)
+            self._scheduler.report(self.machine, "load", str(self.number), pieces)
 
     def deadline(self) -> Nanos | None:
         """Courses are computed in advance: what is due is to be reported, or concerns followers and the current of the axis."""
@@ -249,7 +250,7 @@ class Mechanism(Stateful):
                 ("stalled", stalled),
                 ("lost", 0 if stalled else self.lost(now)),
             )
-            self._kernel.report(self.machine, "event", "stall", text, *facts)
+            self._scheduler.report(self.machine, "event", "stall", text, *facts)
         self._stall_due = self._course.next_stall(now)
 
     def _watch_stops(self, now: Nanos) -> None:
@@ -263,7 +264,7 @@ class Mechanism(Stateful):
             else:
                 text = (LEAVES_UPPER if side == "upper" else LEAVES_LOWER)(axis=self._name, pulses=lost)
             facts = ("axis", self.number), ("element", self._name), ("stop", side), ("pushes", pushes), ("lost", lost)
-            self._kernel.report(self.machine, "event", "hard-stop", text, *facts)
+            self._scheduler.report(self.machine, "event", "hard-stop", text, *facts)
             self._stop = stop
         self._stop_due = self._course.next_stop(now)
 
@@ -323,7 +324,7 @@ class Mechanism(Stateful):
             lost = self.lost(now)
             text = self._loose.why(axis=self._name) if falls else STANDS(axis=self._name, pulses=lost)
             facts = ("axis", self.number), ("element", self._name), ("falls", falls), ("lost", lost)
-            self._kernel.report(self.machine, "event", "fall", text, *facts)
+            self._scheduler.report(self.machine, "event", "fall", text, *facts)
         self._rest_due = free.end if free is not None and falls else None
 
     def brake(self, torque: float, now: Nanos) -> None:
@@ -333,7 +334,7 @@ class Mechanism(Stateful):
         state = self.at(now)
         self._brake = torque
         self._renew(self._drive, now, state)
-        self._kernel.mark(self.machine)
+        self._scheduler.mark(self.machine)
 
     def burden(self, by: str, more: Burden, now: Nanos) -> None:
         """Let the element ``by`` load the rotor with ``more``, in place of what it did before."""
@@ -347,7 +348,7 @@ class Mechanism(Stateful):
         state = course.at(now)
         rests = self._loose is not None and self._settles(self._loose, course, before, now)
         self._renew(self._drive, now, state, rests=rests)
-        self._kernel.mark(self.machine)
+        self._scheduler.mark(self.machine)
 
     def _settles(self, loose: Looseness, course: Course, before: Burden, now: Nanos) -> bool:
         """Whether a free rotor stands whose load changes from ``before`` where it changed the other way the last time."""
@@ -413,7 +414,7 @@ class Mechanism(Stateful):
         self._blockers = (*others, by) if blocked else ()
         stalled = state.stalled or (not blocked and self.build.motor is not None)
         self._renew(self._drive, now, state._replace(stalled=stalled))
-        self._kernel.mark(self.machine)
+        self._scheduler.mark(self.machine)
 
     def lose(self, pulses: int, now: Nanos) -> None:
         """Move the rotor ``pulses`` behind the field (negative: ahead), within the hard stops."""
@@ -426,13 +427,13 @@ class Mechanism(Stateful):
         self._simple = False
         behind = self.course(now).field(now) - rotor
         self._renew(self._drive, now, MechanicalState(rotor, min(max(load, rotor), rotor + build.play), stalled, behind))
-        self._kernel.mark(self.machine)
+        self._scheduler.mark(self.machine)
 
     def slip(self, counts: int, now: Nanos) -> None:
         """Let the encoders slip by ``counts`` on their shaft."""
         for encoder in self._encoders:
             encoder.device.turn_encoder(encoder.axis, counts, now)
-        self._kernel.mark(self.machine)
+        self._scheduler.mark(self.machine)
 
     # Revisions of a drive are not restored, so the state only holds whether the course belongs to the drive's present plan.
 

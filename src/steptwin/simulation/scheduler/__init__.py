@@ -1,1 +1,1 @@
-"""Kernels in virtual time, wires, parts and records of what happens. Sees `toml`."""
+"""Schedulers in virtual time, wires, parts and records of what happens. Sees `toml`."""

@@ -1,4 +1,4 @@
-"""Followers of the signals of one kernel, which are notified of each of its events."""
+"""Followers of the signals of one scheduler, which are notified of each of its events."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Protocol
 from steptwin.machine import Nanos
 
 
-class KernelFollower(Protocol):
-    """It reads signals of one kernel only, and changes nothing."""
+class SchedulerFollower(Protocol):
+    """It reads signals of one scheduler only, and changes nothing."""
 
     def leave(self, moment: Nanos) -> None:
         """Before anything happens at ``moment``: what moves is still on the way that it had before."""
@@ -20,27 +20,27 @@ class KernelFollower(Protocol):
         ...
 
 
-class KernelFollowers:
-    """Followers of one kernel."""
+class SchedulerFollowers:
+    """Followers of one scheduler."""
 
     __slots__ = ("by_name", "leaving", "news")
 
     def __init__(self) -> None:
-        self.by_name: dict[str, dict[KernelFollower, None]] = {}
+        self.by_name: dict[str, dict[SchedulerFollower, None]] = {}
         """By the machines, lines and elements on which they depend."""
-        self.leaving: list[KernelFollower] = []
+        self.leaving: list[SchedulerFollower] = []
         """Those that are notified before each event."""
-        self.news: dict[KernelFollower, None] = {}
+        self.news: dict[SchedulerFollower, None] = {}
         """Those that will be notified."""
 
-    def add(self, follower: KernelFollower, names: Iterable[str], *, leaves: bool) -> None:
+    def add(self, follower: SchedulerFollower, names: Iterable[str], *, leaves: bool) -> None:
         """Tell it of events at machines, lines and elements with these names; ``leaves``: and before each event."""
         for name in names:
             self.by_name.setdefault(name, {})[follower] = None
         if leaves:
             self.leaving.append(follower)
 
-    def remove(self, follower: KernelFollower) -> None:
+    def remove(self, follower: SchedulerFollower) -> None:
         for there in (*self.by_name.values(), self.news):
             there.pop(follower, None)
         if follower in self.leaving:

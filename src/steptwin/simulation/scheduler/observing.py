@@ -1,7 +1,7 @@
 """Observers of a running world: they see its signals at every moment at which these change, and change nothing.
 
-A `KernelFollower` is notified by one kernel, event by event, however far that runs at once. A `WorldObserver` is for what
-depends on several kernels: the world brings them to each moment together.
+A `SchedulerFollower` is notified by one scheduler, event by event, however far that runs at once. A `WorldObserver` is for what
+depends on several schedulers: the world brings them to each moment together.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from steptwin.machine import Nanos
-from steptwin.simulation.scheduler.kernel import Source
+from steptwin.simulation.scheduler.scheduler import Source
 
 
 class WorldObserver(Protocol):

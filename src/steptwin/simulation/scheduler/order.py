@@ -1,4 +1,4 @@
-"""The order in which the parts of a kernel are updated at one moment: what drives an input comes before what reads it, so that
+"""The order in which the parts of a scheduler are updated at one moment: what drives an input comes before what reads it, so that
 logic without delay has no glitches that depend on the order of a description."""
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Record of a world, exact and compact: profiles instead of pulses, edges instead of samples.
 
-Each machine's records come in the order in which they happened to it. Machines that share a kernel are advanced together, so
+Each machine's records come in the order in which they happened to it. Machines that share a scheduler are advanced together, so
 their records are merged by (time, order in which they happened): a cause stands before its effect of the same nanosecond.
-Machines of several kernels are advanced apart from each other; theirs are merged by (time, order of the kernels).
+Machines of several schedulers are advanced apart from each other; theirs are merged by (time, order of the schedulers).
 
 Values by kind: ``plan`` the new `Profile` of an axis (subject ``"1"``…), in pulses, or the `StepTrain` of one that does not give
 a pulse for every unit of position; ``load`` where the load of an axis is until the next such record: tuples (moment, whether it
@@ -92,8 +92,8 @@ class Trace:
         return list(self._streams)
 
     def read_together(self, machines: Iterable[Sequence[str]]) -> None:
-        """Read the records of these machines, which share a kernel, in the order in which they came; those of each kernel one
-        after the other, and before those of machines that are not named."""
+        """Read the records of these machines, which share a scheduler, in the order in which they came; those of each scheduler
+        one after the other, and before those of machines that are not named."""
         self._together = tuple(machines)
 
     def add(self, record: TraceRecord) -> None:
@@ -122,7 +122,7 @@ class Trace:
         return sum(stream.count for stream in self._streams.values())
 
     def __iter__(self) -> Iterator[TraceRecord]:
-        """All kept records by time; those of one moment by the order of kernels, within one as they happened."""
+        """All kept records by time; those of one moment by the order of schedulers, within one as they happened."""
         apart = dict(self._streams)
         groups: list[Iterable[TraceRecord]] = []
         for names in self._together:

@@ -1,4 +1,4 @@
-"""Work lists of a kernel by number: what has to be looked at, and what is due when, without a scan of everything."""
+"""Work lists of a scheduler by number: what has to be looked at, and what is due when, without a scan of everything."""
 
 from __future__ import annotations
 

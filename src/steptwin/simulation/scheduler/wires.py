@@ -1,4 +1,4 @@
-"""Wires between the pins of a kernel, and the levels on their way along those with a delay."""
+"""Wires between the pins of a scheduler, and the levels on their way along those with a delay."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from steptwin.simulation.kinds.kind import ControllerKind
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.kinds.master import ANSWER_NS
 from steptwin.simulation.kinds.programtexts import Destination
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
@@ -48,21 +48,21 @@ def _record(model: Model, machine: str, what: str, value: object) -> None:
 
 
 @contextmanager
-def _now(model: Model, name: str) -> Generator[Kernel]:
-    """The kernel of a machine or line, advanced to the present; it settles after the action."""
-    kernel = model.touch(name)
-    yield kernel
-    kernel.mark(name)
-    kernel.settle()
+def _now(model: Model, name: str) -> Generator[Scheduler]:
+    """The scheduler of a machine or line, advanced to the present; it settles after the action."""
+    scheduler = model.touch(name)
+    yield scheduler
+    scheduler.mark(name)
+    scheduler.settle()
 
 
 def _set(model: Model, scripts: Scripts, step: do.Set) -> None:
     for name, pin, value in step.levels:
         known = model.input_pin(name, pin, value)
-        kernel = model.touch(name)  # as `_now`, but with hundreds of levels at a moment
-        kernel.set_input(PinName(name, known), value)
-        kernel.mark(name)
-        kernel.settle()
+        scheduler = model.touch(name)  # as `_now`, but with hundreds of levels at a moment
+        scheduler.set_input(PinName(name, known), value)
+        scheduler.mark(name)
+        scheduler.settle()
 
 
 def _press(model: Model, scripts: Scripts, step: do.Press) -> None:
@@ -103,7 +103,7 @@ def _move_button(model: Model, scripts: Scripts, name: str, *, pressed: bool) ->
 def _write(model: Model, scripts: Scripts, step: do.Write) -> None:
     parts, now = model.parts, model.now
     for name, values in model.by_machine(step):
-        kernel = model.touch(name)  # as `_now` does: every write of every script comes here
+        scheduler = model.touch(name)  # as `_now` does: every write of every script comes here
         machine, on = parts.machines[name], parts.line_of.get(name)
         for pdu in model.requests(name, values):
             if on is not None:
@@ -112,8 +112,8 @@ def _write(model: Model, scripts: Scripts, step: do.Write) -> None:
             else:
                 _record(model, name, "request", pdu)
                 model.registers(name).execute(machine, pdu, now)
-        kernel.mark(name if on is None else on[0].name)
-        kernel.settle()
+        scheduler.mark(name if on is None else on[0].name)
+        scheduler.settle()
 
 
 def _halt(model: Model, scripts: Scripts, given: Halt) -> None:

@@ -1,8 +1,8 @@
 """Scheduling of waiting scripts: at fixed moments, and when a machine, a line or an element changes on which their condition
 depends.
 
-A script with a condition is evaluated only at its due moment or when one of these may have changed; watched kernels are advanced
-event by event. The cost of a world therefore grows with the number of its events, not with the number of its scripts.
+A script with a condition is evaluated only at its due moment or when one of these may have changed; watched schedulers are
+advanced event by event. The cost of a world therefore grows with the number of its events, not with the number of its scripts.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from itertools import count
 from typing import Generic, TypeAlias, TypeVar
 
 from steptwin.machine import Nanos
-from steptwin.simulation.scheduler.kernel import Kernel, Source
 from steptwin.simulation.scheduler.observing import WorldObserver
+from steptwin.simulation.scheduler.scheduler import Scheduler, Source
 from steptwin.simulation.scheduler.turns import Dues
 from steptwin.simulation.world.running import Script
 
@@ -106,23 +106,23 @@ class Agenda(Generic[W]):
 
 
 class Watchers:
-    """Which scripts depend on which machines, lines and elements, when their kernels are due, and what has changed since the last
-    `take`."""
+    """Which scripts depend on which machines, lines and elements, when their schedulers are due, and what has changed since the
+    last `take`."""
 
-    __slots__ = ("_again", "_changed", "_dues", "_kernels", "_numbers", "_scripts", "_watch")
+    __slots__ = ("_again", "_changed", "_dues", "_numbers", "_schedulers", "_scripts", "_watch")
 
     def __init__(self) -> None:
-        self._watch: Callable[[Kernel], None] | None = None
-        """Called with every changed kernel, including those on which no script depends."""
-        self._scripts: dict[Kernel, dict[str, dict[int, Waiter]]] = {}
-        """By kernel, name of the source, and number."""
-        self._changed: dict[Kernel, None] = {}
+        self._watch: Callable[[Scheduler], None] | None = None
+        """Called with every changed scheduler, including those on which no script depends."""
+        self._scripts: dict[Scheduler, dict[str, dict[int, Waiter]]] = {}
+        """By scheduler, name of the source, and number."""
+        self._changed: dict[Scheduler, None] = {}
         self._again: dict[int, Waiter] = {}
-        self._kernels: list[Kernel] = []
+        self._schedulers: list[Scheduler] = []
         """All that were watched ever, by number."""
-        self._numbers: dict[Kernel, int] = {}
+        self._numbers: dict[Scheduler, int] = {}
         self._dues = Dues()
-        """Deadlines of kernels on which a script depends."""
+        """Deadlines of schedulers on which a script depends."""
 
     def set(self, script: Waiter, sources: tuple[Source, ...]) -> None:
         """Replace what a script depends on."""
@@ -131,53 +131,53 @@ class Watchers:
         for source in script.sources:
             self._leave(source, script)
         script.sources = sources
-        for kernel, name in sources:
-            if kernel not in self._scripts:
-                self._begin(kernel)
-            self._scripts[kernel].setdefault(name, {})[script.number] = script
+        for scheduler, name in sources:
+            if scheduler not in self._scripts:
+                self._begin(scheduler)
+            self._scripts[scheduler].setdefault(name, {})[script.number] = script
 
     def _leave(self, source: Source, script: Waiter) -> None:
-        kernel, name = source
-        named = self._scripts[kernel]
+        scheduler, name = source
+        named = self._scripts[scheduler]
         scripts = named[name]
         del scripts[script.number]
         if scripts:
             return
         del named[name]
         if not named:
-            del self._scripts[kernel]
-            self._dues.put(self._numbers[kernel], None)
-            kernel.on_change = self._watch
+            del self._scripts[scheduler]
+            self._dues.put(self._numbers[scheduler], None)
+            scheduler.on_change = self._watch
 
-    def _begin(self, kernel: Kernel) -> None:
-        if kernel not in self._numbers:
-            self._numbers[kernel] = len(self._kernels)
-            self._kernels.append(kernel)
-        self._scripts[kernel] = {}
-        self._dues.put(self._numbers[kernel], kernel.deadline())
-        kernel.on_change = self.change
+    def _begin(self, scheduler: Scheduler) -> None:
+        if scheduler not in self._numbers:
+            self._numbers[scheduler] = len(self._schedulers)
+            self._schedulers.append(scheduler)
+        self._scripts[scheduler] = {}
+        self._dues.put(self._numbers[scheduler], scheduler.deadline())
+        scheduler.on_change = self.change
 
     def due(self) -> Nanos | None:
-        """When a kernel on which a script depends is due, as far as `take` has nothing to give."""
+        """When a scheduler on which a script depends is due, as far as `take` has nothing to give."""
         return self._dues.first()
 
     def advance(self, now: Nanos) -> None:
-        """Advance the kernels that are due by ``now``."""
+        """Advance the schedulers that are due by ``now``."""
         for number in self._dues.take(now):
-            self._kernels[number].advance(now)
+            self._schedulers[number].advance(now)
 
-    def change(self, kernel: Kernel) -> None:
-        """Register a change of ``kernel``: the scripts that depend on what has changed there have to be evaluated."""
-        self._changed[kernel] = None
+    def change(self, scheduler: Scheduler) -> None:
+        """Register a change of ``scheduler``: the scripts that depend on what has changed there have to be evaluated."""
+        self._changed[scheduler] = None
         if self._watch is not None:
-            self._watch(kernel)
+            self._watch(scheduler)
 
-    def watch_all(self, kernels: Iterable[Kernel], watch: Callable[[Kernel], None]) -> None:
-        """Call ``watch`` with every one of these kernels that has changed."""
+    def watch_all(self, schedulers: Iterable[Scheduler], watch: Callable[[Scheduler], None]) -> None:
+        """Call ``watch`` with every one of these schedulers that has changed."""
         self._watch = watch
-        for kernel in kernels:
-            if kernel not in self._scripts:
-                kernel.on_change = watch
+        for scheduler in schedulers:
+            if scheduler not in self._scripts:
+                scheduler.on_change = watch
 
     def again(self, script: Waiter) -> None:
         """Evaluate a script again with the next `take`."""
@@ -193,10 +193,10 @@ class Watchers:
             return []
         found, self._again = self._again, {}
         while self._changed:
-            kernel, _ = self._changed.popitem()
-            named = self._scripts.get(kernel)
+            scheduler, _ = self._changed.popitem()
+            named = self._scripts.get(scheduler)
             if named is not None:
-                self._dues.put(self._numbers[kernel], kernel.deadline())  # signals settle
-                for name in kernel.take_changed():
+                self._dues.put(self._numbers[scheduler], scheduler.deadline())  # signals settle
+                for name in scheduler.take_changed():
                     found.update(named.get(name, ()))
         return [found[n] for n in sorted(found)]

@@ -12,7 +12,7 @@ from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.description import describe
 from steptwin.simulation.describe.pieces import is_piece
 from steptwin.simulation.toml.reader import TomlText, WorldError
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 
 LONGEST_MESSAGE = 500
 """Limit of a message, in characters: the errors in a program that a description names are many, and shown in the program too."""
@@ -47,7 +47,7 @@ def diagnose(name: str, text: str, read: Callable[[str], bytes]) -> Diagnosis:
             except Misuse as error:
                 spec.text.wrong(key, "D009", str(error))
         blueprint = Blueprint(spec, files)
-        Plant(blueprint, keep_trace=False, keep_inputs=False)
+        Simulation(blueprint, keep_trace=False, keep_inputs=False)
         found: Sequence[Diagnostic] = in_order(spec.text.findings)
     except WorldError as error:
         found = error.findings

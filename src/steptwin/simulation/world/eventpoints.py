@@ -9,10 +9,10 @@ from contextlib import suppress
 from steptwin.errors import Misuse
 from steptwin.machine import Nanos
 from steptwin.points import LivePoint
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 
 
-def points_of(world: Plant, owner: str) -> Iterator[tuple[str, LivePoint | None]]:
+def points_of(world: Simulation, owner: str) -> Iterator[tuple[str, LivePoint | None]]:
     """Those of a data sheet that are no pins, by path; None for a row of registers, of which one must be chosen."""
     machine, kind = world.machine(owner), world.kind(owner)
     pins = machine.pins()
@@ -32,7 +32,7 @@ class EventPoints:
     """``points`` of a controller. Those whose mark (`steptwin.simulation.kinds.kind.ControllerKind.marks`) is what it was are
     not read."""
 
-    def __init__(self, world: Plant, owner: str, points: Mapping[str, LivePoint]) -> None:
+    def __init__(self, world: Simulation, owner: str, points: Mapping[str, LivePoint]) -> None:
         machine, kind = world.machine(owner), world.kind(owner)
         groups: defaultdict[int, dict[str, Callable[[Nanos], float]]] = defaultdict(dict)
         for path, point in points.items():

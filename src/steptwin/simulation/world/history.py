@@ -19,8 +19,8 @@ from steptwin.messages import Message
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.world.eventpoints import EventPoints, points_of, stays_between_events
 from steptwin.simulation.world.inputs import ExternalInput, size_of
-from steptwin.simulation.world.plant import Plant
-from steptwin.simulation.world.plantsnapshot import PlantSnapshot, RecordedInput
+from steptwin.simulation.world.simulation import Simulation
+from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
 
 MOST_STATES = 256
 MOST_CONTROLLER_STATES = 4096
@@ -33,7 +33,7 @@ SLICE_NS: Nanos = SECOND // 4
 """Interval of virtual time after which a replay can be interrupted, ns."""
 
 
-def replay(world: Plant, inputs: Iterable[RecordedInput], end: Nanos, slice_ns: Nanos | None = None) -> Iterator[bool]:
+def replay(world: Simulation, inputs: Iterable[RecordedInput], end: Nanos, slice_ns: Nanos | None = None) -> Iterator[bool]:
     """Advance a world to ``end``, ns, and apply the inputs until then; stops of scripts do not end it.
 
     Yields after each input (True) and after each slice of time (False), so that the caller can interrupt it. Raises `Misuse` for
@@ -54,7 +54,7 @@ def replay(world: Plant, inputs: Iterable[RecordedInput], end: Nanos, slice_ns: 
     world.settle_all()
 
 
-def _bring(world: Plant, moment: Nanos, slice_ns: Nanos | None) -> Iterator[None]:
+def _bring(world: Simulation, moment: Nanos, slice_ns: Nanos | None) -> Iterator[None]:
     while world.now < moment:
         world.go_on()
         world.advance(moment if slice_ns is None else min(moment, world.now + slice_ns))
@@ -80,7 +80,7 @@ ACTED: Changed = ("", "")
 
 
 class PastState(NamedTuple):
-    snapshot: PlantSnapshot
+    snapshot: SimulationSnapshot
     inputs: int
     """Number of inputs before it."""
     changed: frozenset[Changed] = frozenset()
@@ -159,7 +159,7 @@ class StatesByAge:
 class ChangedSince:
     """Notes what changes in ``world``, from one state to the next."""
 
-    def __init__(self, world: Plant) -> None:
+    def __init__(self, world: Simulation) -> None:
         self._world = world
         self._names: set[Changed] = set()
         world.trace.watchers.append(self._take)
@@ -196,16 +196,16 @@ class ChangedSince:
 
 class _ChangedPoints:
     """Those of one controller that have the same value between events, and are not only kept (`LivePoint.is_kept`). As
-    `steptwin.simulation.scheduler.followers.KernelFollower`."""
+    `steptwin.simulation.scheduler.followers.SchedulerFollower`."""
 
-    def __init__(self, world: Plant, owner: str, note: Callable[[Changed], None]) -> None:
+    def __init__(self, world: Simulation, owner: str, note: Callable[[Changed], None]) -> None:
         self._world, self._owner, self._note = world, owner, note
         found = {path: point for path, point in points_of(world, owner) if point is not None and not point.is_kept}
         self._points = EventPoints(world, owner, {path: point for path, point in found.items() if stays_between_events(point)})
-        world.parts.kernel_of[owner].follow(self, (owner,))
+        world.parts.scheduler_of[owner].follow(self, (owner,))
 
     def close(self) -> None:
-        self._world.parts.kernel_of[self._owner].unfollow(self)
+        self._world.parts.scheduler_of[self._owner].unfollow(self)
 
     def read(self) -> None:
         """The present values, whatever they were before."""
@@ -228,7 +228,7 @@ class History:
     Each snapshot has all records of a trace that is kept: for a long run, drop them before (`Trace.let_go`).
     """
 
-    def __init__(self, world: Plant) -> None:
+    def __init__(self, world: Simulation) -> None:
         self.world = world
         self.branch = 0
         """Counts how often the world has gone back; each time, the past after that moment is replaced."""
@@ -322,7 +322,7 @@ class Past:
     def __init__(self, history: History) -> None:
         self._history = history
         world = history.world
-        self.world = Plant(world.blueprint, keep_trace=world.trace.is_kept, keep_inputs=False)
+        self.world = Simulation(world.blueprint, keep_trace=world.trace.is_kept, keep_inputs=False)
         if not world.trace.is_recorded:
             self.world.stop_recording()
         self._branch: int | None = None

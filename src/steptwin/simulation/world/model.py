@@ -1,6 +1,6 @@
 """The model of a world at the present moment: its parts by name, its signals and conditions, and what is reported of it.
 
-Steps, checks and texts of programs need no more of a world. `steptwin.simulation.world.plant.Plant` runs it.
+Steps, checks and texts of programs need no more of a world. `steptwin.simulation.world.simulation.Simulation` runs it.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from steptwin.simulation.kinds.programs import Programs
 from steptwin.simulation.logic.condition import SignalCondition
 from steptwin.simulation.logic.contacts import Button
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.toml.names import Unknown
@@ -51,7 +51,7 @@ A_LINE = Message("simulation.line", "line")
 
 
 class Model:
-    """The kernels, machines, lines and elements of a description. A kernel is advanced to the present before it is read or
+    """The schedulers, machines, lines and elements of a description. A scheduler is advanced to the present before it is read or
     changed."""
 
     def __init__(self, blueprint: Blueprint, *, keep_trace: bool, keep_memory: Keep | None, is_blank: bool) -> None:
@@ -70,8 +70,9 @@ class Model:
         """Expectations that did not hold."""
         self.overdue = Reports()
         """Conditions that scripts of the description waited for until their time-out."""
-        self.settled_first: Sequence[Kernel] = ()
-        """Kernels that are advanced before the others where the order is free, so that what observes them can read the others."""
+        self.settled_first: Sequence[Scheduler] = ()
+        """Schedulers that are advanced before the others where the order is free, so that what observes them can read the
+        others."""
         self._encoded: dict[object, tuple[bytes, ...]] = {}
         self._signals: dict[str, SignalOf | Idle] = {}
         self._conditions: dict[str, SignalCondition] = {}
@@ -95,16 +96,16 @@ class Model:
         return self.parts.built(AXIS)
 
     @property
-    def kernels(self) -> list[Kernel]:
-        return self.parts.kernels
+    def schedulers(self) -> list[Scheduler]:
+        return self.parts.schedulers
 
-    def touch(self, name: str) -> Kernel:
-        """The kernel of a machine or line, advanced to the present. Raises `Misuse` with the existing names."""
-        kernel = self.parts.kernel_of.get(name)
-        if kernel is None:
-            raise self.unknown(A_MACHINE_OR_LINE(), name, self.parts.kernel_of)
-        kernel.advance(self.now)
-        return kernel
+    def touch(self, name: str) -> Scheduler:
+        """The scheduler of a machine or line, advanced to the present. Raises `Misuse` with the existing names."""
+        scheduler = self.parts.scheduler_of.get(name)
+        if scheduler is None:
+            raise self.unknown(A_MACHINE_OR_LINE(), name, self.parts.scheduler_of)
+        scheduler.advance(self.now)
+        return scheduler
 
     @staticmethod
     def unknown(what: str, name: str, known: Iterable[str]) -> Unknown:
@@ -149,9 +150,9 @@ class Model:
         return {name: programs for name, programs in found.items() if programs is not None}
 
     def settle_all(self) -> None:
-        """Advance every kernel to the present."""
-        for kernel in (*self.settled_first, *self.kernels):
-            kernel.advance(self.now)
+        """Advance every scheduler to the present."""
+        for scheduler in (*self.settled_first, *self.schedulers):
+            scheduler.advance(self.now)
 
     # ------------------------------------------------------------------ by name
 
@@ -223,8 +224,8 @@ class Model:
             raise kind.lacks(name, "program whose text is known")
         return self.programs[name]
 
-    def button(self, name: str) -> tuple[Button, Kernel]:
-        """The button called ``name`` and its kernel. Raises `Misuse` with the existing buttons."""
+    def button(self, name: str) -> tuple[Button, Scheduler]:
+        """The button called ``name`` and its scheduler. Raises `Misuse` with the existing buttons."""
         found = self.parts.built(BUTTON).get(name)
         if found is None:
             raise self.unknown(A_BUTTON(), name, self.parts.built(BUTTON))

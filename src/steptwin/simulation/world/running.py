@@ -125,7 +125,7 @@ class Script:
         self.entry = 0
         """The number of its valid entry in an agenda."""
         self.sources: tuple[Any, ...] = ()
-        """The machines, lines and elements on which its wait depends (`steptwin.simulation.scheduler.kernel.Source`)."""
+        """The machines, lines and elements on which its wait depends (`steptwin.simulation.scheduler.scheduler.Source`)."""
         self.ended = False
 
     def send(self, value: Any) -> do.Step | None:

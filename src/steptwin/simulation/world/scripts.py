@@ -11,8 +11,8 @@ from steptwin.errors import Refusal, Runaway
 from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.kinds.master import Master
-from steptwin.simulation.scheduler.kernel import Kernel
 from steptwin.simulation.scheduler.observing import WorldObserver
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.agenda import Agenda, Watchers
@@ -60,9 +60,9 @@ class Scripts:
         self._scheduled: dict[str, Script] = {}
         """Scheduled steps that can be cancelled, by name."""
 
-    def watch_kernels(self, kernels: Iterable[Kernel], watch: Callable[[Kernel], None]) -> None:
-        """Call ``watch`` from now on with every kernel that has changed."""
-        self._watchers.watch_all(kernels, watch)
+    def watch_schedulers(self, schedulers: Iterable[Scheduler], watch: Callable[[Scheduler], None]) -> None:
+        """Call ``watch`` from now on with every scheduler that has changed."""
+        self._watchers.watch_all(schedulers, watch)
 
     def __iter__(self) -> Iterator[Script]:
         """The scripts that have not ended, in order of their start."""
@@ -148,12 +148,12 @@ class Scripts:
     # ------------------------------------------------------------------ scheduling
 
     def first(self) -> tuple[Nanos | None, Nanos | None, Nanos | None]:
-        """The earliest due moments: of kernels that scripts wait for, of scripts of the description, of external scripts."""
+        """The earliest due moments: of schedulers that scripts wait for, of scripts of the description, of external scripts."""
         self._renew()
         return self._watchers.due(), self._described.first(), self._external.first()
 
-    def advance_kernels(self) -> None:
-        """Advance the kernels that are due now; scripts that wait for what happens there become due."""
+    def advance_schedulers(self) -> None:
+        """Advance the schedulers that are due now; scripts that wait for what happens there become due."""
         self._watchers.advance(self._model.now)
 
     def _renew(self) -> None:
@@ -356,7 +356,7 @@ class Scripts:
         return ScriptsState(self._begun, tuple(script.state() for script in self._scripts.values()))
 
     def restore(self, state: ScriptsState, scheduled: Collection[str]) -> None:
-        """Restore a state; the kernels must have been restored before."""
+        """Restore a state; the schedulers must have been restored before."""
         for script in list(self._scripts.values()):
             self.end(script)
         self._begun = state.begun

@@ -9,7 +9,7 @@ from steptwin.diagnostics import visible
 from steptwin.machine import Nanos
 from steptwin.simulation.faults.active import HeldLevel
 from steptwin.simulation.kinds.programs import Place, Resource, ResourceKind
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.wiring import Connection, connections
 
 
@@ -20,51 +20,51 @@ class Waiting(NamedTuple):
     what: str
 
 
-def waiting(plant: Plant) -> Iterator[Waiting]:
+def waiting(simulation: Simulation) -> Iterator[Waiting]:
     """The programs that wait for something other than time, then the scripts, but for events, which wait for the next time."""
-    drivers, held = _drivers(plant), _held(plant)
-    for name, programs in plant.programs.items():
-        stack = programs.stack(plant.now)
+    drivers, held = _drivers(simulation), _held(simulation)
+    for name, programs in simulation.programs.items():
+        stack = programs.stack(simulation.now)
         if not stack:
             continue
         use = programs.use(stack[0].place)
         if use.waits and use.reads:
-            states = ", ".join(state for resource in use.reads for state in _states(plant, name, resource, drivers, held))
-            where = _statement(plant, name, stack[0].place)
+            states = ", ".join(state for resource in use.reads for state in _states(simulation, name, resource, drivers, held))
+            where = _statement(simulation, name, stack[0].place)
             yield Waiting(name, f"{where}: {states}" if states else where)
-    events = {script.name for script in plant.spec.scripts if script.when is not None or script.every is not None}
-    for script in plant.scripts:
+    events = {script.name for script in simulation.spec.scripts if script.when is not None or script.every is not None}
+    for script in simulation.scripts:
         if script.waiting is not None and script.name not in events:
             asked = ", ".join(f"the answer on {pending.line}" for pending in script.waiting.asked)
             if what := script.waiting.condition or asked:
                 yield Waiting(script.name, what)
 
 
-def _statement(plant: Plant, machine: str, place: Place) -> str:
-    programs = plant.programs[machine]
+def _statement(simulation: Simulation, machine: str, place: Place) -> str:
+    programs = simulation.programs[machine]
     found, source = programs.statements(place.text)[place.number], programs.texts[place.text]
     return f"{source.name}:{found.line} {visible(source.text[found.start : found.end].strip())}"
 
 
 def _states(
-    plant: Plant, machine: str, resource: Resource, drivers: dict[str, list[Connection]], held: dict[str, HeldLevel]
+    simulation: Simulation, machine: str, resource: Resource, drivers: dict[str, list[Connection]], held: dict[str, HeldLevel]
 ) -> Iterator[str]:
     """The present level of a pin that a statement reads, and what drives it; where the axes are that it waits for."""
     if resource.kind is ResourceKind.AXIS:
-        for axis in plant.kind(machine).state(plant.machine(machine), plant.now).axes:
+        for axis in simulation.kind(machine).state(simulation.machine(machine), simulation.now).axes:
             if axis.moving and resource.name in ("", str(axis.number)):
                 place = "" if axis.position is None else f" at {axis.position:g} {axis.unit}"
                 yield f"{machine}.{axis.name} moves{place}"
     elif resource.kind is ResourceKind.PIN and resource.name:
-        yield from _level(plant, machine, resource.name, drivers, held)
+        yield from _level(simulation, machine, resource.name, drivers, held)
 
 
 def _level(
-    plant: Plant, machine: str, name: str, drivers: dict[str, list[Connection]], held: dict[str, HeldLevel]
+    simulation: Simulation, machine: str, name: str, drivers: dict[str, list[Connection]], held: dict[str, HeldLevel]
 ) -> Iterator[str]:
     pin = f"{machine}.{name}"
-    level = plant.read(pin)
-    terminals = plant.kind(machine).terminals
+    level = simulation.read(pin)
+    terminals = simulation.kind(machine).terminals
     if pin in held:
         yield f"{pin} is {held[pin].words()}"
     elif name not in (*terminals.digital_inputs, *terminals.analog_inputs):
@@ -75,20 +75,20 @@ def _level(
         yield f"{pin} is {level:g}, driven by {by}"
 
 
-def _held(plant: Plant) -> dict[str, HeldLevel]:
-    faults = plant.parts.faults
+def _held(simulation: Simulation) -> dict[str, HeldLevel]:
+    faults = simulation.parts.faults
     return {signal: held for owner in (*faults.machines, *faults.elements) for signal, held in faults.held(owner).items()}
 
 
-def _drivers(plant: Plant) -> dict[str, list[Connection]]:
+def _drivers(simulation: Simulation) -> dict[str, list[Connection]]:
     found: dict[str, list[Connection]] = {}
-    for one in connections(plant.parts):
+    for one in connections(simulation.parts):
         found.setdefault(str(one.target), []).append(one)
     return found
 
 
-def unchanged_inputs(plant: Plant, since: Nanos) -> list[str]:
+def unchanged_inputs(simulation: Simulation, since: Nanos) -> list[str]:
     """The inputs of controllers that something drives and that have had one level since a moment, as far as the trace is kept."""
-    changed = {(record.machine, record.subject) for record in plant.trace.edges() if record.time > since}
-    driven = dict.fromkeys(one.target for one in connections(plant.parts) if one.target.machine in plant.machines)
+    changed = {(record.machine, record.subject) for record in simulation.trace.edges() if record.time > since}
+    driven = dict.fromkeys(one.target for one in connections(simulation.parts) if one.target.machine in simulation.machines)
     return [str(pin) for pin in driven if (pin.machine, pin.pin) not in changed]

@@ -10,7 +10,7 @@ from typing import Any, Generic, TypeVar
 
 from steptwin.simulation.components.axis import BuiltAxis
 from steptwin.simulation.world.inputs import Bytes
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 
 View = TypeVar("View")
 
@@ -18,14 +18,14 @@ View = TypeVar("View")
 class Views(Mapping[str, View], Generic[View]):
     """Views by name. An unknown name raises `Misuse` with the existing ones."""
 
-    def __init__(self, plant: Plant, what: str, views: Mapping[str, View]) -> None:
-        self._plant = plant
+    def __init__(self, simulation: Simulation, what: str, views: Mapping[str, View]) -> None:
+        self._simulation = simulation
         self._what = what
         self._views = views
 
     def __getitem__(self, name: str) -> View:
         if name not in self._views:
-            raise self._plant.unknown(self._what, name, self._views)
+            raise self._simulation.unknown(self._what, name, self._views)
         return self._views[name]
 
     def get(self, name: str, default: Any = None) -> Any:
@@ -44,14 +44,14 @@ class Views(Mapping[str, View], Generic[View]):
 class MechanicsView:
     """The mechanics of an axis: its true position, in its units."""
 
-    def __init__(self, plant: Plant, fitted: BuiltAxis) -> None:
-        self._plant = plant
+    def __init__(self, simulation: Simulation, fitted: BuiltAxis) -> None:
+        self._simulation = simulation
         self._fitted = fitted
 
     @property
     def _now(self) -> int:
-        self._plant.touch(self._fitted.spec.drive[0])
-        return self._plant.now
+        self._simulation.touch(self._fitted.spec.drive[0])
+        return self._simulation.now
 
     @property
     def unit(self) -> str:
@@ -81,17 +81,17 @@ class MechanicsView:
 class LineView:
     """A line, for Python programs that send and receive on it."""
 
-    def __init__(self, plant: Plant, name: str) -> None:
-        self._plant = plant
+    def __init__(self, simulation: Simulation, name: str) -> None:
+        self._simulation = simulation
         self.name = name
 
     def send(self, data: bytes, place: str = "python") -> None:
         """Put bytes on the line at the present moment."""
-        line = self._plant.lines[self.name]
-        self._plant.apply_input(Bytes(self.name, place, line.kinds[0], data))
+        line = self._simulation.lines[self.name]
+        self._simulation.apply_input(Bytes(self.name, place, line.kinds[0], data))
 
     def received(self, place: str = "python") -> bytes:
         """Remove and return the bytes received for ``place``."""
-        self._plant.touch(self.name)
-        line = self._plant.lines[self.name]
-        return b"".join(data for _, data in line.connect(place).take(self._plant.now))
+        self._simulation.touch(self.name)
+        line = self._simulation.lines[self.name]
+        return b"".join(data for _, data in line.connect(place).take(self._simulation.now))

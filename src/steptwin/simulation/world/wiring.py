@@ -27,7 +27,7 @@ class Connection:
 
 def connections(parts: WorldParts) -> Iterator[Connection]:
     """The connections in the order in which the description has them."""
-    wires = {wire.target: wire for kernel in parts.kernels for wire in kernel.wires}
+    wires = {wire.target: wire for scheduler in parts.schedulers for wire in scheduler.wires}
     for target, path in parts.driven.items():
         circuit, wire = parts.circuits.get(target), wires.get(target)
         if wire is not None:

@@ -11,7 +11,7 @@ from steptwin.machine import Nanos, Port
 from steptwin.simulation.faults import Faults
 from steptwin.simulation.faults import LineProtocol as FaultLine
 from steptwin.simulation.kinds.lines import SCRIPTS, Line, LineEndPoint, LineTraffic
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import RecordSink
 from steptwin.state import Plain
 from steptwin.wire.slave import FrameDirection
@@ -27,8 +27,10 @@ class ChipLine(Line):
     fault_kinds: ClassVar[Mapping[str, FaultLine]] = {"raw": FaultLine.CHARACTERS}
     is_shared = True
 
-    def __init__(self, kernel: Kernel, name: str, record: RecordSink | None, faults: Faults, chips: list[M1486Chip]) -> None:
-        super().__init__(kernel, name, record, faults)
+    def __init__(
+        self, scheduler: Scheduler, name: str, record: RecordSink | None, faults: Faults, chips: list[M1486Chip]
+    ) -> None:
+        super().__init__(scheduler, name, record, faults)
         self.chain = SerialChain(chips)
         self._commands = 0
         """Number of lines that programs have sent."""

@@ -14,7 +14,7 @@ from steptwin.simulation.kinds.lines import LineWrite
 from steptwin.simulation.kinds.links import LineSpec
 from steptwin.simulation.kinds.m1486.line import ChipLine
 from steptwin.simulation.kinds.m1486.words import ChipLineWords
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import RecordSink
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
@@ -31,12 +31,12 @@ class CharacterLines(LineKind[M1486Chip, ChipLine]):
     }
 
     def make(
-        self, spec: LineSpec, members: Sequence[Member[M1486Chip]], kernel: Kernel, record: RecordSink, faults: Faults
+        self, spec: LineSpec, members: Sequence[Member[M1486Chip]], scheduler: Scheduler, record: RecordSink, faults: Faults
     ) -> ChipLine:
         """As `LineKind.make`. Raises `Misuse` for addresses that are taken, and for strict timing."""
         if spec.timing == "strict":
             raise Misuse("timing = 'strict' is for lines of kind modbus: an M1486 has no time-out between characters")
-        return ChipLine(kernel, spec.name, record, faults, [member.machine for member in members])
+        return ChipLine(scheduler, spec.name, record, faults, [member.machine for member in members])
 
     def words(self, line: ChipLine, prefix: str, sink: Callable[[FrameLine], None]) -> ChipLineWords:
         return ChipLineWords(line, prefix, sink)

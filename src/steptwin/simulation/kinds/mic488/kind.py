@@ -56,7 +56,7 @@ from steptwin.simulation.kinds.mic488.writes import encode_write
 from steptwin.simulation.kinds.programtexts import Destination, Downloading, ProgramText
 from steptwin.simulation.mechanics.lanes import AxisLane, plain_view
 from steptwin.simulation.mechanics.scale import FULL_STEPS, DriveScale, GivenScale, exact_fraction
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.control import ControlProgram, Enable, Halt, Home, Jog, Move, Seek, StopAxes
 from steptwin.wbc.interpreter import STATEMENT_TIME
@@ -296,8 +296,8 @@ class Mic488Kind(ControllerKind[Mic488Spec, Mic488Device, Mic488View]):
     def programs(self, spec: Mic488Spec, device: Mic488Device, context: TextContext) -> WbcPrograms:
         return WbcPrograms(device)
 
-    def watch_program(self, device: Mic488Device, kernel: Kernel, name: str) -> ProgramWatch | None:
-        return ProgramWatch(device, kernel, name) if device.program.banks.programs else None
+    def watch_program(self, device: Mic488Device, scheduler: Scheduler, name: str) -> ProgramWatch | None:
+        return ProgramWatch(device, scheduler, name) if device.program.banks.programs else None
 
     def download(self, device: Mic488Device, to: Destination, source: SourceText) -> Downloading:
         """The bank is filled at once, without the line, for how the vendor's program does it is not documented. Its program must

@@ -14,7 +14,7 @@ from steptwin.simulation.faults import Faults
 from steptwin.simulation.faults import LineProtocol as FaultLine
 from steptwin.simulation.kinds.lines import SCRIPTS, Line, LineEndPoint
 from steptwin.simulation.kinds.master import Master
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import RecordSink
 from steptwin.wire.gateway import ModbusGateway, ScriptPort, TcpGatewayPort
 from steptwin.wire.line import SerialLine
@@ -39,7 +39,7 @@ class ModbusBus(Line):
 
     def __init__(
         self,
-        kernel: Kernel,
+        scheduler: Scheduler,
         name: str,
         record: RecordSink | None,
         faults: Faults,
@@ -49,7 +49,7 @@ class ModbusBus(Line):
         baud: int = 38400,
         gap: Nanos | None = None,
     ) -> None:
-        super().__init__(kernel, name, record, faults)
+        super().__init__(scheduler, name, record, faults)
         self.devices = devices
         self._served: Mapping[int, SlaveDevice] = devices
         self._on_write: Callable[[str, Nanos, int, bytes, bytes], None] | None = None

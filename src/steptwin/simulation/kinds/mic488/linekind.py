@@ -16,7 +16,7 @@ from steptwin.simulation.kinds.lines import LineWrite
 from steptwin.simulation.kinds.links import LineSpec
 from steptwin.simulation.kinds.mic488.line import ModbusBus, timing_of
 from steptwin.simulation.kinds.mic488.words import ModbusWords
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import RecordSink
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.pdu import REFUSED
@@ -36,7 +36,7 @@ class ModbusLines(LineKind[Mic488Device, ModbusBus]):
     keys = frozenset({"gap"})
 
     def make(
-        self, spec: LineSpec, members: Sequence[Member[Mic488Device]], kernel: Kernel, record: RecordSink, faults: Faults
+        self, spec: LineSpec, members: Sequence[Member[Mic488Device]], scheduler: Scheduler, record: RecordSink, faults: Faults
     ) -> ModbusBus:
         """As `LineKind.make`. Raises `Misuse` for units that are taken, and rates that no MIC488 has."""
         devices: dict[int, Mic488Device] = {}
@@ -50,7 +50,7 @@ class ModbusLines(LineKind[Mic488Device, ModbusBus]):
             raise Misuse(f"baud = {spec.baud}: a MIC488 has {', '.join(map(str, BAUDS))} bit/s")
         baud = spec.baud or next(iter(devices.values())).config.ports[0].baud
         timing = None if spec.timing == "off" else timing_of(baud, strict=spec.timing == "strict")
-        return ModbusBus(kernel, spec.name, record, faults, devices=devices, timing=timing, baud=baud, gap=spec.gap)
+        return ModbusBus(scheduler, spec.name, record, faults, devices=devices, timing=timing, baud=baud, gap=spec.gap)
 
     def words(self, line: ModbusBus, prefix: str, sink: Callable[[FrameLine], None]) -> ModbusWords:
         return ModbusWords(line, prefix, sink)

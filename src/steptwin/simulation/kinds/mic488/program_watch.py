@@ -18,7 +18,7 @@ from steptwin.mic488.registers import AXIS_STATUS_TEXTS
 from steptwin.mic488.status import AxisStatus
 from steptwin.simulation.kinds.mic488.statement_use import use_of
 from steptwin.simulation.kinds.programs import ResourceKind
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.state import Plain
 from steptwin.wbc import steps as s
 from steptwin.wbc.controller import RegisterReader
@@ -52,14 +52,14 @@ class ProgramEvent(NamedTuple):
 
 
 class ProgramWatch:
-    """Observes the programs in the banks of a controller, as a part of its kernel. ``happened`` is in order of time.
+    """Observes the programs in the banks of a controller, as a part of its scheduler. ``happened`` is in order of time.
 
     It does not change the run: a hook before each statement notes what the statement may change, and that is compared before the
     next one, or when signals settle at the same moment.
     """
 
-    def __init__(self, device: Mic488Device, kernel: Kernel, name: str) -> None:
-        """``name``: the name of the controller in the kernel."""
+    def __init__(self, device: Mic488Device, scheduler: Scheduler, name: str) -> None:
+        """``name``: the name of the controller in the scheduler."""
         self.device = device
         self._name = name
         self.happened: list[ProgramEvent] = []
@@ -72,8 +72,8 @@ class ProgramWatch:
         self._following: set[int] = set()
         """Axes of which it was told that they follow their encoders."""
         device.program.interpreter.hook(self._begins)
-        kernel.add_part(self, (name,))
-        kernel.observers.append(self._edge)
+        scheduler.add_part(self, (name,))
+        scheduler.observers.append(self._edge)
 
     # ------------------------------------------------------------------ what the program does
 
@@ -154,7 +154,7 @@ class ProgramWatch:
             self._tell(edge.time, "output", f"{edge.pin} {'on' if edge.value else 'off'}", self._caused(edge.time))
 
     def deadline(self) -> Nanos | None:
-        """None: the part of the kernel only watches the axes."""
+        """None: the part of the scheduler only watches the axes."""
         return None
 
     def update(self, now: Nanos) -> None:

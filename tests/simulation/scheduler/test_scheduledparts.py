@@ -1,4 +1,4 @@
-"""Parts of a kernel: nothing that is kept by their numbers gets lost when they are numbered anew."""
+"""Parts of a scheduler: nothing that is kept by their numbers gets lost when they are numbered anew."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import pytest
 
 from steptwin.files.world import World
 from steptwin.machine import MILLISECOND, SECOND, Nanos
-from steptwin.simulation.scheduler.kernel import Kernel
-from steptwin.simulation.scheduler.kernelparts import KernelParts
+from steptwin.simulation.scheduler.scheduledparts import ScheduledParts
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.state import Plain
 
 MACHINE = '[[mic488]]\nname = "b"\n[[axis]]\nname = "x"\ndrive = "b.M1"\n'
@@ -49,7 +49,7 @@ class Clock:
 
 def test_parts_keep_what_they_watch_when_they_are_numbered_anew() -> None:
     """Part 0 watches b, part 1 computes b from a, part 2 watches everything."""
-    parts, clocks = KernelParts(), [Clock(1), Clock(2), Clock(3)]
+    parts, clocks = ScheduledParts(), [Clock(1), Clock(2), Clock(3)]
     numbers = [
         parts.add(clocks[0], ["b"], None, None),
         parts.add(clocks[1], ["a", "a"], "b", None),
@@ -66,13 +66,13 @@ def test_parts_keep_what_they_watch_when_they_are_numbered_anew() -> None:
 
 @pytest.mark.parametrize("is_settled", [False, True])
 def test_each_part_has_its_own_deadlines_when_they_are_numbered_anew(is_settled: bool) -> None:
-    kernel, clocks = Kernel(), [Clock(period * MILLISECOND) for period in (2, 3, 5)]
+    scheduler, clocks = Scheduler(), [Clock(period * MILLISECOND) for period in (2, 3, 5)]
     for clock in clocks:
-        kernel.add_part(clock, ())
+        scheduler.add_part(clock, ())
     if is_settled:
-        assert kernel.deadline() == 2 * MILLISECOND
-    kernel.arrange([2, 0, 1])
-    kernel.advance(10 * MILLISECOND)
+        assert scheduler.deadline() == 2 * MILLISECOND
+    scheduler.arrange([2, 0, 1])
+    scheduler.advance(10 * MILLISECOND)
     assert [clock.events for clock in clocks] == [[*range(one.period, 10 * MILLISECOND + 1, one.period)] for one in clocks]
 
 

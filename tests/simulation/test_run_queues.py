@@ -8,7 +8,7 @@ import pytest
 
 from steptwin.files.world import World
 from steptwin.machine import SECOND, Nanos
-from steptwin.simulation.scheduler.kernel import Kernel
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.state import Plain
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
@@ -67,19 +67,19 @@ steps = [
 """
 
 
-def missed(kernel: Kernel) -> list[object]:
+def missed(scheduler: Scheduler) -> list[object]:
     """What an update of every part and a look at every machine still finds."""
-    kernel.deadline()
+    scheduler.deadline()
     found: list[object] = []
-    for part in kernel.parts:
+    for part in scheduler.parts:
         before = repr(part.copy_state())
-        part.update(kernel.now)
-        if kernel.stale or repr(part.copy_state()) != before:
+        part.update(scheduler.now)
+        if scheduler.stale or repr(part.copy_state()) != before:
             found.append(part)
-    dues = [one.deadline() for one in (*kernel.machines.values(), *kernel.parts)]
-    if kernel.deadline() != min((due for due in dues if due is not None), default=None):
+    dues = [one.deadline() for one in (*scheduler.machines.values(), *scheduler.parts)]
+    if scheduler.deadline() != min((due for due in dues if due is not None), default=None):
         found.append(dues)
-    return [*found, *(edge for machine in kernel.machines.values() for edge in machine.take_edges())]
+    return [*found, *(edge for machine in scheduler.machines.values() for edge in machine.take_edges())]
 
 
 @pytest.mark.parametrize("name", ["pick_and_place/pick_and_place.toml", "feeder.toml", "handwheel.toml", "lift.toml", ""])
@@ -90,8 +90,8 @@ def test_nothing_that_has_changed_is_missed(name: str) -> None:
             if world.stopped is not None:
                 break
             world.run(for_=0.0137)
-            kernels = [kernel for kernel in world.kernels if not kernel.wires.delayed]
-            assert [missed(kernel) for kernel in kernels] == [[]] * len(kernels), world.now
+            schedulers = [scheduler for scheduler in world.schedulers if not scheduler.wires.delayed]
+            assert [missed(scheduler) for scheduler in schedulers] == [[]] * len(schedulers), world.now
 
 
 class Clock:
@@ -118,28 +118,28 @@ class Clock:
 
 def test_a_part_is_updated_for_what_it_watches_and_when_it_is_due() -> None:
     """One that watches everything is updated with every event."""
-    kernel = Kernel()
+    scheduler = Scheduler()
     usual, other, curious = Clock(SECOND), Clock(10 * SECOND), Clock(100 * SECOND)
-    kernel.add_part(usual, ("a", "b"))
-    kernel.add_part(other, ())
-    kernel.add_part(curious)
-    kernel.advance(0)
+    scheduler.add_part(usual, ("a", "b"))
+    scheduler.add_part(other, ())
+    scheduler.add_part(curious)
+    scheduler.advance(0)
 
     assert (usual.updates, other.updates, curious.updates) == (1, 1, 1)
     for changed in ("a", "b", "c"):
-        kernel.mark(changed)
-        kernel.advance(0)
+        scheduler.mark(changed)
+        scheduler.advance(0)
     assert (usual.updates, other.updates, curious.updates) == (3, 1, 4)
-    kernel.advance(20 * SECOND)
+    scheduler.advance(20 * SECOND)
     assert (usual.updates, other.updates, curious.updates) == (23, 3, 24)
-    kernel.mark()
-    kernel.advance(20 * SECOND)
+    scheduler.mark()
+    scheduler.advance(20 * SECOND)
     assert (usual.updates, other.updates, curious.updates) == (24, 4, 25)
 
 
 def test_a_part_that_comes_later_is_told_as_a_change() -> None:
-    told: list[Kernel] = []
-    kernel = Kernel()
-    kernel.on_change = told.append
-    kernel.add_part(Clock(SECOND))
-    assert told == [kernel]
+    told: list[Scheduler] = []
+    scheduler = Scheduler()
+    scheduler.on_change = told.append
+    scheduler.add_part(Clock(SECOND))
+    assert told == [scheduler]

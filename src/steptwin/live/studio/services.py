@@ -13,7 +13,7 @@ from steptwin.gateways.contract import OpenGateway
 from steptwin.machine import SECOND
 from steptwin.messages import Message
 from steptwin.simulation.describe.servicetables import HISTORY
-from steptwin.studio.plantrequests import MOST_POINTS, MOST_WRITES
+from steptwin.studio.servicerequests import MOST_POINTS, MOST_WRITES
 
 if TYPE_CHECKING:
     from steptwin.history.reading import HistoryDatabase, KeptEvent, KeptRun, PointSeries
@@ -29,8 +29,8 @@ COUNT_OF_POINTS = Message("live.count-of-points", "points: {count} are given: pe
 NO_HISTORY = Message("live.no-history", "nothing is kept here: the description of the world has no table [{table}]")
 
 
-class WorldPlant:
-    """See `steptwin.studio.plantrequests.PlantRecords`. ``opened``: the gateways that are open, which grow after the start."""
+class LiveServices:
+    """See `steptwin.studio.servicerequests.WorldServices`. ``opened``: the gateways that are open, which grow after the start."""
 
     def __init__(self, opened: Sequence[OpenGateway]) -> None:
         self._opened = opened

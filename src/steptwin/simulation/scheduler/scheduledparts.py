@@ -1,16 +1,16 @@
-"""The parts of a kernel, and everything that is kept by their numbers."""
+"""The parts of a scheduler, and everything that is kept by their numbers."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from steptwin.simulation.scheduler.kernelpart import KernelPart
 from steptwin.simulation.scheduler.order import successors, update_order
+from steptwin.simulation.scheduler.scheduledpart import ScheduledPart
 from steptwin.simulation.scheduler.turns import Dues, Turns
 from steptwin.simulation.scheduler.wires import Wire
 
 
-class KernelParts:
+class ScheduledParts:
     """Parts with numbers in the order in which they are updated: what each watches, computes and drives, and when it has a turn.
 
     All that is kept by number is here, and `arranged` makes it anew, so that nothing of one numbering gets into another.
@@ -19,7 +19,7 @@ class KernelParts:
     __slots__ = ("_drives", "_watched", "all", "by_name", "computes", "dues", "looked_at", "parts", "turns")
 
     def __init__(self) -> None:
-        self.parts: list[KernelPart] = []
+        self.parts: list[ScheduledPart] = []
         self.by_name: dict[str, list[int]] = {}
         """The parts that watch a machine, a line or an element, by its name."""
         self._watched: list[tuple[str, ...] | None] = []
@@ -36,7 +36,7 @@ class KernelParts:
         self.looked_at: set[int] = set()
         """Those whose deadlines may have changed since the signals last settled."""
 
-    def add(self, part: KernelPart, watches: Iterable[str] | None, computes: str | None, drives: str | None) -> int:
+    def add(self, part: ScheduledPart, watches: Iterable[str] | None, computes: str | None, drives: str | None) -> int:
         """The number of another part, the last one. ``watches``: None is everything."""
         number = len(self.parts)
         self.parts.append(part)
@@ -57,9 +57,9 @@ class KernelParts:
         found = update_order(successors(self.computes, self.by_name, self._drives, wires), self.all)
         return () if found == sorted(found) else found
 
-    def arranged(self, order: Sequence[int]) -> KernelParts:
+    def arranged(self, order: Sequence[int]) -> ScheduledParts:
         """The same parts, added in another order; none has a turn yet. ``order``: their present numbers."""
-        found = KernelParts()
+        found = ScheduledParts()
         for old in order:
             found.add(self.parts[old], self._watched[old], self.computes[old], self._drives.get(old))
         return found

@@ -14,7 +14,7 @@ from steptwin.studio.requesttype import request
 from steptwin.subject.shapes import FLAG, NUMBER, TEXT, WHOLE, list_of, members, or_null
 
 
-class PlantRecords(Protocol):
+class WorldServices(Protocol):
     """History of one world. Awaits only `steptwin.later.Later`."""
 
     def gateways(self) -> Sequence[Mapping[str, object]]:
@@ -185,4 +185,4 @@ class ReadHistoryWrites:
     to_s: _End = None
 
 
-PlantRequest: TypeAlias = ReadGateways | ReadHistory | ReadHistoryValues | CompareHistory | ReadHistoryWrites
+ServiceRequest: TypeAlias = ReadGateways | ReadHistory | ReadHistoryValues | CompareHistory | ReadHistoryWrites

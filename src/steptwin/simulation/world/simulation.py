@@ -1,8 +1,8 @@
-"""A running world: its kernels, each advanced on demand, and its scripts.
+"""A running world: its schedulers, each advanced on demand, and its scripts.
 
-Machines without a connection are in separate kernels. A kernel is advanced to the present before it is read or changed; the
-kernels that a condition depends on are advanced event by event. The result therefore does not depend on the order in which
-kernels are advanced.
+Machines without a connection are in separate schedulers. A scheduler is advanced to the present before it is read or changed; the
+schedulers that a condition depends on are advanced event by event. The result therefore does not depend on the order in which
+schedulers are advanced.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ from steptwin.simulation.describe.blueprint import Blueprint, FileContents
 from steptwin.simulation.describe.build import Keep
 from steptwin.simulation.describe.overrides import Overrides
 from steptwin.simulation.describe.spec import ScriptSpec
-from steptwin.simulation.scheduler.kernel import Kernel
 from steptwin.simulation.scheduler.observing import WorldObserver
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.actions import act
 from steptwin.simulation.world.inputs import ExternalInput
 from steptwin.simulation.world.model import Model
-from steptwin.simulation.world.plantsnapshot import PlantSnapshot, RecordedInput
 from steptwin.simulation.world.references import check_faults, check_scripts, check_step
 from steptwin.simulation.world.reports import Reports
 from steptwin.simulation.world.running import Script
 from steptwin.simulation.world.scripts import MOST_STEPS_PER_INSTANT, Scripts
+from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
 
 SNAPSHOT_OF_ANOTHER_WORLD = Message("simulation.snapshot-of-another-world", "the snapshot is of another world")
 SCRIPTS_LOOP = Message("simulation.scripts-loop", "scripts loop without end at {now} ns")
 
 
-class Plant(Model):
+class Simulation(Model):
     """A world, independent of files and clocks."""
 
     def __init__(
@@ -43,7 +43,7 @@ class Plant(Model):
         keep_trace: bool = True,
         keep_inputs: bool = True,
         keep_memory: Keep | None = None,
-        at: PlantSnapshot | None = None,
+        at: SimulationSnapshot | None = None,
     ) -> None:
         """The world of a description at time 0, or ``at`` a snapshot of one with the same description."""
         super().__init__(blueprint, keep_trace=keep_trace, keep_memory=keep_memory, is_blank=at is not None)
@@ -138,7 +138,7 @@ class Plant(Model):
         return _first(_first(*self._scripts.first()), self._scripts.first_observed(), None)
 
     def advance(self, now: Nanos) -> None:
-        """Advance the scripts, and the kernels they depend on, to ``now``, or to the moment at which a script stops the run.
+        """Advance the scripts, and the schedulers they depend on, to ``now``, or to the moment at which a script stops the run.
 
         All events of that moment are processed, so that the result depends on the duration of a run only.
         """
@@ -146,8 +146,8 @@ class Plant(Model):
             raise TimeReversal(self.now, now)
         rounds, at = 0, -1
         while True:
-            kernels, own, guests = self._scripts.first()
-            due = _first(kernels, own, guests)
+            schedulers, own, guests = self._scripts.first()
+            due = _first(schedulers, own, guests)
             observed = self._scripts.first_observed()
             if observed is not None and (due is None or observed < due):
                 due = observed
@@ -159,8 +159,8 @@ class Plant(Model):
             rounds, at = (rounds + 1, at) if self.now == at else (0, self.now)
             if rounds > MOST_STEPS_PER_INSTANT:
                 raise Runaway(SCRIPTS_LOOP(now=self.now))
-            if kernels is not None and kernels <= self.now:
-                self._scripts.advance_kernels()
+            if schedulers is not None and schedulers <= self.now:
+                self._scripts.advance_schedulers()
             elif own is not None and own <= self.now:
                 self._scripts.run_described()
             elif guests is not None and guests <= self.now:
@@ -174,9 +174,9 @@ class Plant(Model):
                 self._scripts.leave(now)
             self.now = now
 
-    def watch_kernels(self, watch: Callable[[Kernel], None]) -> None:
-        """Call ``watch`` from now on with every kernel that has changed, as `Kernel.on_change`."""
-        self._scripts.watch_kernels(self.kernels, watch)
+    def watch_schedulers(self, watch: Callable[[Scheduler], None]) -> None:
+        """Call ``watch`` from now on with every scheduler that has changed, as `Scheduler.on_change`."""
+        self._scripts.watch_schedulers(self.schedulers, watch)
 
     def stop_recording(self) -> None:
         """Record nothing from now on: no trace, digest or session. Watchers of the trace are called, but not with frames."""
@@ -205,13 +205,13 @@ class Plant(Model):
 
     # ------------------------------------------------------------------ snapshots
 
-    def snapshot(self, *, with_inputs: bool = True) -> PlantSnapshot:
+    def snapshot(self, *, with_inputs: bool = True) -> SimulationSnapshot:
         """Everything at the present moment, ``with_inputs`` also what came from outside before, where it is kept."""
         self.settle_all()
-        return PlantSnapshot(
+        return SimulationSnapshot(
             self._description(),
             self.now,
-            tuple(kernel.snapshot() for kernel in self.kernels),
+            tuple(scheduler.snapshot() for scheduler in self.schedulers),
             tuple((active.fault, active.name, active.since) for active in self.parts.faults.active),
             tuple(self.parts.faults.machines),
             self.parts.faults.copy_state(),
@@ -228,7 +228,7 @@ class Plant(Model):
     def _description(self) -> tuple[str, int, Overrides, FileContents]:
         return self.spec.text.source.text, self.spec.seed, self.spec.overrides, self.files
 
-    def restore(self, snapshot: PlantSnapshot) -> None:
+    def restore(self, snapshot: SimulationSnapshot) -> None:
         """Continue from a snapshot of this world, or of one with the same description.
 
 
@@ -240,8 +240,8 @@ class Plant(Model):
         self.stopped = None
         self.trace.rewind(snapshot.trace)
         self.rigging.put_back(snapshot.faults, snapshot.rigged, snapshot.faults_state)
-        for kernel, state in zip(self.kernels, snapshot.kernels, strict=True):
-            kernel.restore(state)
+        for scheduler, state in zip(self.schedulers, snapshot.schedulers, strict=True):
+            scheduler.restore(state)
         self.inputs, self.is_settled = list(snapshot.inputs), snapshot.is_settled
         self.failures, self.overdue = Reports(snapshot.failures), Reports(snapshot.overdue)
         self.downloaded.clear()

@@ -1,4 +1,4 @@
-"""Parts that a kernel runs between its machines, and the state of a kernel as plain values."""
+"""Parts that a scheduler runs between its machines, and the state of a scheduler as plain values."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from steptwin.simulation.scheduler.wires import DelayedLevel, PinName
 from steptwin.state import Plain
 
 
-class KernelPart(Protocol):
+class ScheduledPart(Protocol):
     """A part between machines: mechanics, a switch, a source, a line. Its state is plain (`steptwin.state.Stateful`)."""
 
     def deadline(self) -> Nanos | None:
@@ -19,15 +19,15 @@ class KernelPart(Protocol):
 
     def update(self, now: Nanos) -> None:
         """Process events due by ``now`` and changes of what it watches, repeatedly until nothing changes. Levels go to
-        `Kernel.drive`."""
+        `Scheduler.drive`."""
         ...
 
     def copy_state(self) -> Plain: ...
     def set_state(self, plain: Plain) -> None: ...
 
 
-class KernelState(NamedTuple):
-    """State of a kernel, its machines and its parts."""
+class SchedulerState(NamedTuple):
+    """State of a scheduler, its machines and its parts."""
 
     now: Nanos
     machines: tuple[Any, ...]

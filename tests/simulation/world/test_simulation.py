@@ -17,19 +17,19 @@ from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.steps import Steps
 from steptwin.simulation.world import model
 from steptwin.simulation.world.inputs import Bytes, Leave, See
-from steptwin.simulation.world.plant import Plant
+from steptwin.simulation.world.simulation import Simulation
 from steptwin.wire.crc import with_crc
 from steptwin.wire.slave import FrameDirection
 
 
 def test_machines_that_share_nothing_are_advanced_when_somebody_looks() -> None:
     world = small()
-    assert [list(kernel.machines) for kernel in world.kernels] == [["a", "b"], ["c"]]
+    assert [list(scheduler.machines) for scheduler in world.schedulers] == [["a", "b"], ["c"]]
     world.at(3.0, do.Set((("a", "IN5", 1.0),)))
     world.advance(5 * SECOND)
-    assert [kernel.now for kernel in world.kernels] == [3 * SECOND, 0]
+    assert [scheduler.now for scheduler in world.schedulers] == [3 * SECOND, 0]
     assert world.mic488["c"].status == 0
-    assert [kernel.now for kernel in world.kernels] == [3 * SECOND, 5 * SECOND]
+    assert [scheduler.now for scheduler in world.schedulers] == [3 * SECOND, 5 * SECOND]
 
 
 def test_an_edge_of_an_input_is_told_once() -> None:
@@ -330,11 +330,11 @@ def test_a_world_that_has_stopped_goes_on_where_a_snapshot_was_taken() -> None:
     assert world.now == SECOND // 2
 
 
-def test_whoever_watches_kernels_sees_those_that_scripts_wait_for_as_well() -> None:
+def test_whoever_watches_schedulers_sees_those_that_scripts_wait_for_as_well() -> None:
     world = small('[[script]]\nname = "s"\nsteps = [{ until = "a.IN5" }, { until = "a.IN6" }]\n')
     world.run(for_=0.1)
     seen: list[str] = []
-    world.watch_kernels(lambda kernel: seen.append(next(iter(kernel.machines))))
+    world.watch_schedulers(lambda scheduler: seen.append(next(iter(scheduler.machines))))
     for machine, pin in (("a", "IN7"), ("c", "IN7"), ("a", "IN5"), ("a", "IN6"), ("a", "IN8")):
         seen.clear()
         world.apply_input(do.Set(((machine, pin, 1.0),)))
@@ -490,7 +490,7 @@ def test_what_a_program_does_not_fetch_is_kept_up_to_a_limit(count: int) -> None
 
 def test_a_plant_keeps_what_happens_and_what_comes_in_unless_told_otherwise() -> None:
     world = small()
-    usual, light = Plant(world.blueprint), Plant(world.blueprint, keep_trace=False, keep_inputs=False)
+    usual, light = Simulation(world.blueprint), Simulation(world.blueprint, keep_trace=False, keep_inputs=False)
     for keeps, found in ((True, usual), (False, light)):
         assert (found.trace.is_kept, found.keeps_inputs) == (keeps, keeps)
         found.apply_input(do.Set((("a", "IN5", 1.0),)))

@@ -10,7 +10,7 @@ from steptwin.machine import Nanos
 from steptwin.simulation.describe.blueprint import FileContents
 from steptwin.simulation.describe.overrides import Overrides
 from steptwin.simulation.faults import Fault
-from steptwin.simulation.scheduler.kernelpart import KernelState
+from steptwin.simulation.scheduler.scheduledpart import SchedulerState
 from steptwin.simulation.scheduler.trace import Mark
 from steptwin.simulation.world.inputs import ExternalInput
 from steptwin.simulation.world.reports import ReportsState
@@ -26,12 +26,12 @@ class RecordedInput(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class PlantSnapshot:
+class SimulationSnapshot:
     """The complete state of a world at a moment."""
 
     description: tuple[str, int, Overrides, FileContents]
     now: Nanos
-    kernels: tuple[KernelState, ...]
+    schedulers: tuple[SchedulerState, ...]
     faults: tuple[tuple[Fault, str, Nanos], ...]
     """The faults that were set, with their names and moments."""
     rigged: tuple[str, ...]

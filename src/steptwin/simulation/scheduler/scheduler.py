@@ -1,7 +1,7 @@
-"""The event-driven kernel: machines, the wires between their pins, and the parts (mechanics, switches, lines) between them.
+"""The event-driven scheduler: machines, the wires between their pins, and the parts (mechanics, switches, lines) between them.
 
-A kernel is itself a machine in virtual time. Machines without a common wire are put into separate kernels, so that each one is
-advanced only when an event concerns it.
+A scheduler is itself a machine in virtual time. Machines without a common wire are put into separate schedulers, so that each one
+is advanced only when an event concerns it.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from steptwin.errors import Misuse, Runaway, TimeReversal
 from steptwin.machine import Fact, Nanos, PinEdge
 from steptwin.messages import NONE, Message
 from steptwin.motioncontroller import Drive, MotionController
-from steptwin.simulation.scheduler.followers import KernelFollower, KernelFollowers
-from steptwin.simulation.scheduler.kernelpart import KernelPart, KernelState
-from steptwin.simulation.scheduler.kernelparts import KernelParts
+from steptwin.simulation.scheduler.followers import SchedulerFollower, SchedulerFollowers
 from steptwin.simulation.scheduler.recordedplans import RecordedPlans
+from steptwin.simulation.scheduler.scheduledpart import ScheduledPart, SchedulerState
+from steptwin.simulation.scheduler.scheduledparts import ScheduledParts
 from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
 from steptwin.simulation.scheduler.turns import Dues, Turns
 from steptwin.simulation.scheduler.wires import PinName, Wire, Wires
@@ -28,9 +28,9 @@ MAX_ROUNDS_PER_INSTANT = 1000
 
 
 class Source(NamedTuple):
-    """A machine, a line or an element of a kernel, on which a value depends."""
+    """A machine, a line or an element of a scheduler, on which a value depends."""
 
-    kernel: Kernel
+    scheduler: Scheduler
     name: str
 
 
@@ -38,14 +38,14 @@ class Board(Stateful):
     """Terminals of the element ``name``: levels that wires, contacts and other elements join as they join pins of controllers.
     All levels are 0 until something drives them.
 
-    Its element reads inputs in `KernelPart.update`, never earlier, so that a loop of elements is found by the kernel.
+    Its element reads inputs in `ScheduledPart.update`, never earlier, so that a loop of elements is found by the scheduler.
     """
 
-    FIXED: ClassVar[tuple[str, ...]] = ("inputs", "kernel", "name", "outputs")
+    FIXED: ClassVar[tuple[str, ...]] = ("inputs", "scheduler", "name", "outputs")
     __slots__ = (*FIXED, "_held", "_recorded", "_wanted", "levels")
 
-    def __init__(self, kernel: Kernel, name: str, inputs: Iterable[str], outputs: Iterable[str]) -> None:
-        self.kernel = kernel
+    def __init__(self, scheduler: Scheduler, name: str, inputs: Iterable[str], outputs: Iterable[str]) -> None:
+        self.scheduler = scheduler
         self.name = name
         self.inputs, self.outputs = tuple(inputs), tuple(outputs)
         self.levels: dict[str, float] = dict.fromkeys((*self.inputs, *self.outputs), 0.0)
@@ -59,7 +59,7 @@ class Board(Stateful):
     @property
     def source(self) -> Source:
         """Source of its levels and of the signals of its element."""
-        return self.kernel.source(self.name)
+        return self.scheduler.source(self.name)
 
     def set_pin(self, pin: str, level: float, now: Nanos) -> None:
         """Drive an input. The element sees it when signals settle."""
@@ -92,7 +92,7 @@ class Board(Stateful):
         self.levels[output] = level
         if output not in self._recorded:
             self._recorded = (*self._recorded, output)
-        self.kernel.put(self.name, output, level)
+        self.scheduler.put(self.name, output, level)
 
 
 MACHINE_IS_THERE = Message("simulation.machine-is-there", "there is a machine {name!r} already")
@@ -107,13 +107,13 @@ SIGNALS_DO_NOT_SETTLE = Message(
 )
 
 
-class Kernel:
+class Scheduler:
     """Runs machines together. Ties in time are broken by the order in which machines and parts were added.
 
     An event costs what it changes: only machines and parts that are due, or that something they watch has changed (`mark`), are
     looked at.
 
-    Before a machine is changed directly (by a request or a pin), the kernel must be advanced to that moment, so that delayed
+    Before a machine is changed directly (by a request or a pin), the scheduler must be advanced to that moment, so that delayed
     levels arrive in order; the effects propagate with the next `advance`, `deadline` or `settle`.
 
     ``record`` gets the first level of each driven input, every edge of an output and of an input, and every new plan of an axis.
@@ -122,13 +122,13 @@ class Kernel:
     def __init__(
         self, now: Nanos = 0, record: RecordSink | None = None, *, is_checked: bool = False, is_blank: bool = False
     ) -> None:
-        """``is_checked``: its wires join what exists, because they do so in another kernel of the same description. ``is_blank``:
-        `restore` comes next, with all levels; until then it drives and records nothing."""
+        """``is_checked``: its wires join what exists, because they do so in another scheduler of the same description.
+        ``is_blank``: `restore` comes next, with all levels; until then it drives and records nothing."""
         self.now = now
         self.machines: dict[str, MotionController] = {}
         self.boards: dict[str, Board] = {}
         """Terminals of elements."""
-        self._parts = KernelParts()
+        self._parts = ScheduledParts()
         self.observers: list[Callable[[str, PinEdge], None]] = []
         """Called with machine name and edge, in order, for every output edge."""
         self.stale = False
@@ -138,9 +138,9 @@ class Kernel:
         counts as one."""
         self.hears_requests = False
         """Whether every request counts as an event, because what one may change is noted."""
-        self.on_change: Callable[[Kernel], None] | None = None
-        """Called with the kernel after each of its events and after each change from outside."""
-        self.followers: KernelFollowers | None = None
+        self.on_change: Callable[[Scheduler], None] | None = None
+        """Called with the scheduler after each of its events and after each change from outside."""
+        self.followers: SchedulerFollowers | None = None
         """Followers that are notified of each event; None: there have been none yet."""
         self._changed: set[str] = set()
         """The machines, lines and elements that were looked at since the last `take_changed`."""
@@ -168,17 +168,17 @@ class Kernel:
         """Those whose deadlines may have changed since the signals last settled."""
         self._due: Nanos | None = None
         self._alone: tuple[str, RecordedPlans] | None = None
-        """The only machine of a kernel without parts and wires, for which nothing has to be scheduled."""
+        """The only machine of a scheduler without parts and wires, for which nothing has to be scheduled."""
 
     # ------------------------------------------------------------------ what is in it
 
     @property
-    def parts(self) -> Sequence[KernelPart]:
+    def parts(self) -> Sequence[ScheduledPart]:
         """In the order in which they are updated."""
         return self._parts.parts
 
     def add(self, name: str, machine: MotionController) -> None:
-        """Add a machine and set its ``changed`` hook. Raises `TimeReversal` if its time is after the kernel's."""
+        """Add a machine and set its ``changed`` hook. Raises `TimeReversal` if its time is after the scheduler's."""
         if name in self.machines:
             raise Misuse(MACHINE_IS_THERE(name=name))
         if not self.is_blank:
@@ -213,7 +213,7 @@ class Kernel:
         self.boards[board.name] = board
 
     def add_part(
-        self, part: KernelPart, watches: Iterable[str] | None = None, name: str | None = None, drives: str | None = None
+        self, part: ScheduledPart, watches: Iterable[str] | None = None, name: str | None = None, drives: str | None = None
     ) -> None:
         """Add a part; it is first updated when the signals settle next, then whenever it is due or something that it watches has
         changed.
@@ -287,13 +287,13 @@ class Kernel:
             raise Misuse(NO_AXIS_OF(axis=axis, machine=machine, count=len(axes)))
         return axes[axis - 1]
 
-    def follow(self, follower: KernelFollower, names: Iterable[str], *, leaves: bool = False) -> None:
-        """Tell it of events from now on, as `KernelFollowers.add`."""
+    def follow(self, follower: SchedulerFollower, names: Iterable[str], *, leaves: bool = False) -> None:
+        """Tell it of events from now on, as `SchedulerFollowers.add`."""
         if self.followers is None:
-            self.followers = KernelFollowers()
+            self.followers = SchedulerFollowers()
         self.followers.add(follower, names, leaves=leaves)
 
-    def unfollow(self, follower: KernelFollower) -> None:
+    def unfollow(self, follower: SchedulerFollower) -> None:
         """Tell it no more."""
         if self.followers is not None:
             self.followers.remove(follower)
@@ -306,7 +306,7 @@ class Kernel:
     def mark(self, name: str | None = None) -> None:
         """Register a change of a machine, a line or an element, or of anything: the signals have to settle."""
         if self._alone is not None or self.is_blank:
-            pass  # it is looked at whenever the kernel settles, all of it after `restore`
+            pass  # it is looked at whenever the scheduler settles, all of it after `restore`
         elif name is None:
             for number in range(len(self._names)):
                 self._machine_turns.add(number)
@@ -541,11 +541,11 @@ class Kernel:
 
     # ------------------------------------------------------------------ snapshots
 
-    def snapshot(self) -> KernelState:
-        """State of everything at the kernel's moment."""
+    def snapshot(self) -> SchedulerState:
+        """State of everything at the scheduler's moment."""
         if self.stale:
             self.settle()
-        return KernelState(
+        return SchedulerState(
             self.now,
             tuple(machine.snapshot() for machine in self.machines.values()),
             tuple(part.copy_state() for part in self.parts),
@@ -553,8 +553,8 @@ class Kernel:
             tuple(self.wires.delayed),
         )
 
-    def restore(self, state: KernelState) -> None:
-        """Restore the state of a kernel with the same machines and parts."""
+    def restore(self, state: SchedulerState) -> None:
+        """Restore the state of a scheduler with the same machines and parts."""
         self.now, self.is_blank = state.now, False
         for machine, its_state in zip(self.machines.values(), state.machines, strict=True):
             machine.restore(its_state)

@@ -17,7 +17,7 @@ from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.motion import MotionState, Profile, at_rest, plan_position, plan_velocity
 from steptwin.simulation.logic.contacts import PositionSwitch, place
-from steptwin.simulation.scheduler.kernel import MAX_ROUNDS_PER_INSTANT, Kernel
+from steptwin.simulation.scheduler.scheduler import MAX_ROUNDS_PER_INSTANT, Scheduler
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName, Wire
 
@@ -85,89 +85,89 @@ def wire(source: str, target: str, *, inverted: bool = False) -> Wire:
     return Wire(PinName(one, output), PinName(other, input_), inverted)
 
 
-def two_controllers() -> tuple[Kernel, Mic488Device, Mic488Device]:
-    kernel = Kernel()
+def two_controllers() -> tuple[Scheduler, Mic488Device, Mic488Device]:
+    scheduler = Scheduler()
     one, other = Mic488Device(ControllerConfig()), Mic488Device(controller(AxisConfig(limit_mode=2, in_kr=0)))
-    kernel.add("one", one)
-    kernel.add("other", other)
-    return kernel, one, other
+    scheduler.add("one", one)
+    scheduler.add("other", other)
+    return scheduler, one, other
 
 
 # ---------------------------------------------------------------------- wires
 
 
 def test_an_output_drives_an_input_at_the_same_moment() -> None:
-    kernel, one, other = two_controllers()
-    kernel.connect(wire("one.OUT3", "other.IN1"))
+    scheduler, one, other = two_controllers()
+    scheduler.connect(wire("one.OUT3", "other.IN1"))
     other.execute(ENABLE_M1, 0)
     other.execute(RUN_M1, 0)
-    kernel.advance(SECOND)
+    scheduler.advance(SECOND)
     one.execute(bytes.fromhex("05 1772 FF00"), SECOND)
-    kernel.advance(SECOND)
+    scheduler.advance(SECOND)
     assert other.pins()["IN1"] == 1.0
     assert other.axes[0].status == 10  # its limit switch, before the filter
     assert other.axes[0].coordinate_p(SECOND) == 500
-    kernel.advance(SECOND + 10 * MILLISECOND)
+    scheduler.advance(SECOND + 10 * MILLISECOND)
     assert other.inputs.filtered[0] is True
 
 
 def test_a_wire_carries_the_level_there_is_when_it_is_connected() -> None:
-    kernel, one, other = two_controllers()
+    scheduler, one, other = two_controllers()
     one.execute(bytes.fromhex("05 1770 FF00"), 0)
-    kernel.connect(wire("one.OUT1", "other.IN5"))
-    kernel.connect(wire("one.OUT2", "other.IN6", inverted=True))
+    scheduler.connect(wire("one.OUT1", "other.IN5"))
+    scheduler.connect(wire("one.OUT2", "other.IN6", inverted=True))
     assert (other.pins()["IN5"], other.pins()["IN6"]) == (1.0, 1.0)
     one.execute(bytes.fromhex("05 1771 FF00"), 0)
-    kernel.settle()
+    scheduler.settle()
     assert other.pins()["IN6"] == 0.0
 
 
 def test_an_output_may_drive_several_inputs_and_its_own_machine() -> None:
-    kernel, one, other = two_controllers()
+    scheduler, one, other = two_controllers()
     for target in ("other.IN1", "other.IN2", "one.IN7"):
-        kernel.connect(wire("one.M1_EN", target))
+        scheduler.connect(wire("one.M1_EN", target))
     one.execute(ENABLE_M1, 0)
-    kernel.advance(0)
+    scheduler.advance(0)
     assert (other.pins()["IN1"], other.pins()["IN2"], one.pins()["IN7"]) == (1.0, 1.0, 1.0)
 
 
 def test_edges_travel_along_a_chain_with_the_delays_of_its_machines() -> None:
-    kernel = Kernel()
+    scheduler = Scheduler()
     relays = [Relay(3 * MILLISECOND), Relay(), Relay(4 * MILLISECOND)]
     seen: list[tuple[str, PinEdge]] = []
     for number, relay in enumerate(relays):
-        kernel.add(f"r{number}", relay)
-    kernel.connect(wire("r0.B", "r1.A"))
-    kernel.connect(wire("r1.B", "r2.A"))
-    kernel.advance(10 * MILLISECOND)
-    kernel.observers.append(lambda name, edge: seen.append((name, edge)))
+        scheduler.add(f"r{number}", relay)
+    scheduler.connect(wire("r0.B", "r1.A"))
+    scheduler.connect(wire("r1.B", "r2.A"))
+    scheduler.advance(10 * MILLISECOND)
+    scheduler.observers.append(lambda name, edge: seen.append((name, edge)))
     relays[0].set_pin("A", 1.0, 10 * MILLISECOND)
-    assert kernel.deadline() == 13 * MILLISECOND
-    kernel.advance(SECOND)
+    assert scheduler.deadline() == 13 * MILLISECOND
+    scheduler.advance(SECOND)
     assert seen == [
         ("r0", PinEdge(13 * MILLISECOND, "B", 0.0)),
         ("r1", PinEdge(13 * MILLISECOND, "B", 1.0)),
         ("r2", PinEdge(17 * MILLISECOND, "B", 0.0)),
     ]
-    assert kernel.deadline() is None
+    assert scheduler.deadline() is None
 
 
 def test_a_loop_of_wires_that_never_settles_is_a_runaway() -> None:
-    kernel = Kernel()
-    kernel.add("r", Relay())
-    kernel.advance(5)
-    kernel.connect(wire("r.B", "r.A"))
+    scheduler = Scheduler()
+    scheduler.add("r", Relay())
+    scheduler.advance(5)
+    scheduler.connect(wire("r.B", "r.A"))
     with pytest.raises(Runaway, match=f"did not settle after {MAX_ROUNDS_PER_INSTANT} rounds at 5 ns: a loop of wires"):
-        kernel.advance(6)
+        scheduler.advance(6)
 
 
 def test_a_loop_with_a_delay_oscillates() -> None:
-    kernel = Kernel()
-    kernel.add("r", Relay(MILLISECOND))
+    scheduler = Scheduler()
+    scheduler.add("r", Relay(MILLISECOND))
     seen: list[Nanos] = []
-    kernel.observers.append(lambda name, edge: seen.append(edge.time))
-    kernel.connect(wire("r.B", "r.A"))
-    kernel.advance(5 * MILLISECOND)
+    scheduler.observers.append(lambda name, edge: seen.append(edge.time))
+    scheduler.connect(wire("r.B", "r.A"))
+    scheduler.advance(5 * MILLISECOND)
     assert seen == [n * MILLISECOND for n in range(1, 6)]
 
 
@@ -175,76 +175,76 @@ def test_a_loop_with_a_delay_oscillates() -> None:
 
 
 def test_time_cannot_go_back() -> None:
-    kernel = Kernel(100)
+    scheduler = Scheduler(100)
     with pytest.raises(TimeReversal) as caught:
-        kernel.advance(99)
+        scheduler.advance(99)
     assert caught.value.args == TimeReversal(100, 99).args
 
 
-def test_a_machine_joins_at_the_time_of_the_kernel() -> None:
-    kernel = Kernel(SECOND)
+def test_a_machine_joins_at_the_time_of_the_scheduler() -> None:
+    scheduler = Scheduler(SECOND)
     late, early = Mic488Device(ControllerConfig()), Mic488Device(ControllerConfig())
-    kernel.add("late", late)
+    scheduler.add("late", late)
     assert late.now == SECOND
     early.advance(2 * SECOND)
     with pytest.raises(TimeReversal):
-        kernel.add("early", early)
-    assert list(kernel.machines) == ["late"]
+        scheduler.add("early", early)
+    assert list(scheduler.machines) == ["late"]
 
 
 def test_the_deadline_is_the_earliest_of_all() -> None:
-    kernel = Kernel()
+    scheduler = Scheduler()
     relays = [Relay(5), Relay(3), Relay(9)]
     for number, relay in enumerate(relays):
-        kernel.add(str(number), relay)
-    assert kernel.deadline() is None
+        scheduler.add(str(number), relay)
+    assert scheduler.deadline() is None
     for relay in relays:
         relay.set_pin("A", 1.0, 0)
-    assert kernel.stale
+    assert scheduler.stale
     dues = []
-    while (due := kernel.deadline()) is not None:
-        assert not kernel.stale
+    while (due := scheduler.deadline()) is not None:
+        assert not scheduler.stale
         dues.append(due)
-        kernel.advance(due)
+        scheduler.advance(due)
     assert dues == [3, 5, 9]
 
 
 def test_a_machine_takes_the_place_of_another_with_what_it_has_to_do() -> None:
-    kernel = Kernel()
-    kernel.add("a", Relay())
-    kernel.add("b", Relay())
-    assert kernel.deadline() is None
+    scheduler = Scheduler()
+    scheduler.add("a", Relay())
+    scheduler.add("b", Relay())
+    assert scheduler.deadline() is None
     relay = Relay(5)
     relay.set_pin("A", 1.0, 0)
-    kernel.replace("a", relay)
-    assert kernel.deadline() == 5
-    kernel.advance(5)
+    scheduler.replace("a", relay)
+    assert scheduler.deadline() == 5
+    scheduler.advance(5)
     relay.set_pin("A", 0.0, 5)
-    assert kernel.deadline() == 10
+    assert scheduler.deadline() == 10
 
 
 def test_ties_are_broken_by_the_order_of_joining() -> None:
-    kernel = Kernel()
+    scheduler = Scheduler()
     seen: list[str] = []
-    kernel.observers.append(lambda name, edge: seen.append(name))
+    scheduler.observers.append(lambda name, edge: seen.append(name))
     relays = {name: Relay(7) for name in ("b", "c", "a")}
     for name, relay in relays.items():
-        kernel.add(name, relay)
+        scheduler.add(name, relay)
     for name in ("a", "b", "c"):
         relays[name].set_pin("A", 1.0, 0)
-    kernel.advance(7)
+    scheduler.advance(7)
     assert seen == ["b", "c", "a"]
 
 
 # ---------------------------------------------------------------------- switches
 
 
-def on_axis(low: int | None, high: int | None, *, normally_closed: bool = False) -> tuple[Kernel, Relay]:
-    kernel = Kernel()
+def on_axis(low: int | None, high: int | None, *, normally_closed: bool = False) -> tuple[Scheduler, Relay]:
+    scheduler = Scheduler()
     relay = Relay()
-    kernel.add("r", relay)
-    place(kernel, PositionSwitch("r", 1, low, high, PinName("r", "A"), normally_closed))
-    return kernel, relay
+    scheduler.add("r", relay)
+    place(scheduler, PositionSwitch("r", 1, low, high, PinName("r", "A"), normally_closed))
+    return scheduler, relay
 
 
 @pytest.mark.parametrize(
@@ -259,14 +259,14 @@ def test_a_switch_has_its_state_at_once(low: int | None, high: int | None, on: b
 
 def test_a_switch_is_crossed_at_the_moment_of_the_pulse_in_both_directions() -> None:
     """1000 p/s² to 1000 p/s and back: pulse 100 comes √0.2 s after the start."""
-    kernel, relay = on_axis(100, 200)
+    scheduler, relay = on_axis(100, 200)
     seen: list[PinEdge] = []
-    kernel.observers.append(lambda name, edge: seen.append(edge))
+    scheduler.observers.append(lambda name, edge: seen.append(edge))
     relay.follow(plan_position(MotionState(0, 0, 0.0, 0.0), 1000, 1000.0, 1000.0, 1000.0))
-    kernel.advance(3 * SECOND)
+    scheduler.advance(3 * SECOND)
     back = plan_position(MotionState(3 * SECOND, 1000, 0.0, 0.0), 150, 1000.0, 1000.0, 1000.0)
     relay.follow(back)
-    kernel.advance(10 * SECOND)
+    scheduler.advance(10 * SECOND)
     first = plan_position(MotionState(0, 0, 0.0, 0.0), 1000, 1000.0, 1000.0, 1000.0)
     on, off, again = first.pulse_time(100, 0), first.pulse_time(201, 0), back.pulse_time(200, 0)
     assert on == pytest.approx(0.2**0.5 * SECOND, abs=1)
@@ -274,23 +274,23 @@ def test_a_switch_is_crossed_at_the_moment_of_the_pulse_in_both_directions() -> 
 
 
 def test_a_switch_follows_a_profile_that_is_replaced_before_it_gets_there() -> None:
-    kernel, relay = on_axis(500, None)
+    scheduler, relay = on_axis(500, None)
     relay.follow(plan_velocity(MotionState(0, 0, 0.0, 0.0), 1000.0, 1000.0, 1000.0))
-    assert kernel.deadline() == SECOND
-    kernel.advance(SECOND - 1)
+    assert scheduler.deadline() == SECOND
+    scheduler.advance(SECOND - 1)
     relay.follow(at_rest(SECOND - 1, 499))
-    assert kernel.deadline() is None
-    kernel.advance(5 * SECOND)
+    assert scheduler.deadline() is None
+    scheduler.advance(5 * SECOND)
     assert relay.levels["A"] == 0.0
 
 
 def test_a_turn_on_the_edge_of_a_switch_is_seen() -> None:
-    kernel, relay = on_axis(100, None)
+    scheduler, relay = on_axis(100, None)
     relay.follow(plan_position(MotionState(0, 0, 0.0, 0.0), 100, 1000.0, 1000.0, 1000.0))
-    kernel.advance(SECOND)
+    scheduler.advance(SECOND)
     assert relay.levels["A"] == 1.0
     relay.follow(plan_position(MotionState(SECOND, 100, 0.0, 0.0), 99, 1000.0, 1000.0, 1000.0))
-    kernel.advance(2 * SECOND)
+    scheduler.advance(2 * SECOND)
     assert relay.levels["A"] == 0.0
 
 
@@ -345,11 +345,11 @@ def test_switches_show_where_the_axis_is_at_any_moment(
     ],
 )
 def test_wires_between_what_is_not_there_are_misuse(source: str, target: str, message: str) -> None:
-    kernel, one, other = two_controllers()
+    scheduler, one, other = two_controllers()
     with pytest.raises(Misuse, match=message):
-        kernel.connect(wire(source, target))
+        scheduler.connect(wire(source, target))
     one.execute(bytes.fromhex("05 1770 FF00"), 0)
-    kernel.advance(SECOND)
+    scheduler.advance(SECOND)
     assert other.pins()["IN1"] == 0.0
 
 
@@ -364,10 +364,10 @@ def test_wires_between_what_is_not_there_are_misuse(source: str, target: str, me
     ],
 )
 def test_switches_where_nothing_is_are_misuse(machine: str, axis: int, pin: str, message: str) -> None:
-    kernel, _, _ = two_controllers()
+    scheduler, _, _ = two_controllers()
     with pytest.raises(Misuse, match=message):
-        place(kernel, PositionSwitch(machine, axis, None, 10, PinName("one", pin)))
-    kernel.advance(SECOND)
+        place(scheduler, PositionSwitch(machine, axis, None, 10, PinName("one", pin)))
+    scheduler.advance(SECOND)
 
 
 def test_a_switch_turned_inside_out_is_misuse() -> None:
@@ -376,48 +376,48 @@ def test_a_switch_turned_inside_out_is_misuse() -> None:
 
 
 def test_names_are_given_once() -> None:
-    kernel, one, _ = two_controllers()
+    scheduler, one, _ = two_controllers()
     with pytest.raises(Misuse, match="there is a machine 'one' already"):
-        kernel.add("one", one)
+        scheduler.add("one", one)
 
 
-def test_a_kernel_in_which_nothing_has_changed_is_settled() -> None:
-    kernel = Kernel()
-    assert not kernel.stale
-    assert kernel.deadline() is None
+def test_a_scheduler_in_which_nothing_has_changed_is_settled() -> None:
+    scheduler = Scheduler()
+    assert not scheduler.stale
+    assert scheduler.deadline() is None
     with pytest.raises(Misuse, match="no machine 'x': there are none"):
-        kernel.replace("x", Relay())
-    kernel.add("a", Relay())
+        scheduler.replace("x", Relay())
+    scheduler.add("a", Relay())
     with pytest.raises(Misuse, match="no machine 'x': there are a"):
-        kernel.replace("x", Relay())
+        scheduler.replace("x", Relay())
     with pytest.raises(Misuse, match=r"wire to a\.A: a delay of -1 ns is negative"):
         Wire(PinName("a", "B"), PinName("a", "A"), delay=-1)
 
 
-def test_each_event_is_told_with_its_kernel() -> None:
+def test_each_event_is_told_with_its_scheduler() -> None:
     """Of a machine alone, of joined ones, and changes from outside."""
-    told: list[tuple[Kernel, Nanos]] = []
-    alone, joined = Kernel(), Kernel()
+    told: list[tuple[Scheduler, Nanos]] = []
+    alone, joined = Scheduler(), Scheduler()
     alone.add("a", Relay(10))
     for name in ("a", "b"):
         joined.add(name, Relay(10))
     joined.connect(wire("a.B", "b.A"))
-    for kernel in (alone, joined):
-        kernel.settle()
-        kernel.on_change = lambda one: told.append((one, one.now))
-        kernel.machines["a"].set_pin("A", 1.0, kernel.now)
-        assert told == [(kernel, kernel.now)]
+    for scheduler in (alone, joined):
+        scheduler.settle()
+        scheduler.on_change = lambda one: told.append((one, one.now))
+        scheduler.machines["a"].set_pin("A", 1.0, scheduler.now)
+        assert told == [(scheduler, scheduler.now)]
         told.clear()
-        kernel.settle()
-        assert told == [(kernel, 0)]
+        scheduler.settle()
+        assert told == [(scheduler, 0)]
         told.clear()
-        kernel.advance(15)
-        assert (kernel, 10) in told
+        scheduler.advance(15)
+        assert (scheduler, 10) in told
         told.clear()
-        kernel.advance(16)
+        scheduler.advance(16)
         assert told == []
-        kernel.advance(40)
-        assert bool(told) is (kernel is joined)
+        scheduler.advance(40)
+        assert bool(told) is (scheduler is joined)
         told.clear()
 
 
@@ -432,55 +432,55 @@ def test_a_machine_that_says_nothing_of_its_edges_is_looked_at() -> None:
             super().advance(now)
             self.changed = hook
 
-    kernel = Kernel()
-    kernel.add("loud", Relay(10))
-    kernel.add("a", Silent(10))
-    kernel.add("b", Relay(5))
-    kernel.connect(wire("a.B", "b.A"))
-    kernel.settle()
+    scheduler = Scheduler()
+    scheduler.add("loud", Relay(10))
+    scheduler.add("a", Silent(10))
+    scheduler.add("b", Relay(5))
+    scheduler.connect(wire("a.B", "b.A"))
+    scheduler.settle()
     for name in ("loud", "a"):
-        kernel.machines[name].set_pin("A", 1.0, 0)
-    kernel.advance(30)
-    assert [kernel.machines[name].pin("B") for name in ("a", "b")] == [0.0, 1.0]
+        scheduler.machines[name].set_pin("A", 1.0, 0)
+    scheduler.advance(30)
+    assert [scheduler.machines[name].pin("B") for name in ("a", "b")] == [0.0, 1.0]
 
 
 def test_an_input_that_its_machine_changes_is_recorded_once_and_so_is_what_drives_it_then() -> None:
     found: list[TraceRecord] = []
-    kernel, relay, target = Kernel(record=found.append), Relay(), PinName("a", "A")
-    kernel.add("a", relay)
-    kernel.drive(target, 1.0)
-    kernel.advance(5)
+    scheduler, relay, target = Scheduler(record=found.append), Relay(), PinName("a", "A")
+    scheduler.add("a", relay)
+    scheduler.drive(target, 1.0)
+    scheduler.advance(5)
     relay.levels["A"] = 0.0
     relay.edges.append(PinEdge(5, "A", 0.0))
     relay.changed()
-    kernel.advance(7)
+    scheduler.advance(7)
     for level in (0.0, 1.0):
-        kernel.drive(target, level)
-        kernel.advance(7)
+        scheduler.drive(target, level)
+        scheduler.advance(7)
     assert [(record.time, record.value) for record in found if record.subject == "A"] == [(0, 1.0), (5, 0.0), (7, 1.0)]
 
 
 def test_a_snapshot_has_what_a_change_leads_to() -> None:
-    kernel = Kernel()
+    scheduler = Scheduler()
     for name in ("a", "b"):
-        kernel.add(name, Relay())
-    kernel.connect(wire("a.B", "b.A"))
-    kernel.settle()
-    kernel.machines["a"].set_pin("A", 1.0, 0)
-    assert kernel.snapshot().levels == {PinName("b", "A"): 0.0}
+        scheduler.add(name, Relay())
+    scheduler.connect(wire("a.B", "b.A"))
+    scheduler.settle()
+    scheduler.machines["a"].set_pin("A", 1.0, 0)
+    assert scheduler.snapshot().levels == {PinName("b", "A"): 0.0}
 
 
 def test_who_looks_at_each_event_is_told_of_each() -> None:
     """Of a machine alone, whose changes without an event matter; it does not tell of its own."""
     told: list[Nanos] = []
-    kernel, relay = Kernel(), Relay(10)
-    kernel.add("a", relay)
-    kernel.is_attentive = True
+    scheduler, relay = Scheduler(), Relay(10)
+    scheduler.add("a", relay)
+    scheduler.is_attentive = True
     for moment, level in ((0, 1.0), (5, 0.0)):
-        kernel.advance(moment)
+        scheduler.advance(moment)
         relay.set_pin("A", level, moment)
-    kernel.settle()
+    scheduler.settle()
     relay.changed = lambda: None
-    kernel.on_change = lambda one: told.append(one.now)
-    kernel.advance(40)
+    scheduler.on_change = lambda one: told.append(one.now)
+    scheduler.advance(40)
     assert [*dict.fromkeys(told)] == [10, 15]

@@ -55,9 +55,9 @@ def test_what_happens_meanwhile_is_told_at_its_moment() -> None:
     """The pulse and the move end while the program calculates, which goes on to switch OUT1 on 2 ms later."""
     program = "M1 = ON\nPREL M1 5\nPULSE(OUT3, 0.004)\nMAIN:\n" + "n = n + 1\n" * 20 + "OUT1 = ON\nOUT1 = OFF\nJUMP MAIN\n"
     world = made(ALONE, program)
-    (kernel,) = world.kernels
+    (scheduler,) = world.schedulers
     told: dict[str, list[Nanos]] = {}
-    kernel.observers.append(lambda name, edge: told.setdefault(edge.pin, []).append(kernel.now - edge.time))
+    scheduler.observers.append(lambda name, edge: told.setdefault(edge.pin, []).append(scheduler.now - edge.time))
     world.run_to(END)
     assert set(told) >= {"OUT1", "OUT3", "M1_EN"}
     assert {late for lates in told.values() for late in lates} == {0}
