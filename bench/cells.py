@@ -1,5 +1,5 @@
 """The cost of a world by its size: 1, 10, 100 and 1000 machines, each with a program, a waiting script and a conveyor; 60 virtual
-seconds. Separate machines share nothing; joined ones are wired in a chain, so that one scheduler runs them all.
+seconds. Separate machines share nothing; connected ones are wired in a chain, so that one scheduler runs them all.
 
 ``SIZES`` (such as ``1,10``) and ``SECONDS`` in the environment make it smaller.
 """
@@ -56,10 +56,10 @@ JUMP AGAIN
 """
 
 
-def cost(machines: int, seconds: int, *, joined: bool) -> tuple[float, int]:
+def cost(machines: int, seconds: int, *, connected: bool) -> tuple[float, int]:
     """Processor time of a run, s, and the number of records."""
     text = "".join(CELL.format(n=n, speed=200 + n % 100 * 0.37) for n in range(machines))
-    if joined:
+    if connected:
         text += "".join(WIRE.format(n=n, next=n + 1) for n in range(machines - 1))
     world = World.from_toml(text, {"cell.prg": PROGRAM}, keep_trace=False)
     begin = time.process_time()
@@ -70,11 +70,11 @@ def cost(machines: int, seconds: int, *, joined: bool) -> tuple[float, int]:
 def main() -> None:
     sizes = [int(size) for size in os.environ.get("SIZES", "1,10,100,1000").split(",")]
     seconds = int(os.environ.get("SECONDS", "60"))
-    for joined in (False, True):
+    for connected in (False, True):
         for machines in sizes:
-            spent, records = cost(machines, seconds, joined=joined)
+            spent, records = cost(machines, seconds, connected=connected)
             print(
-                f"{machines} {'joined' if joined else 'separate'} machines, {seconds} virtual seconds: {spent:.2f} s, "
+                f"{machines} {'connected' if connected else 'separate'} machines, {seconds} virtual seconds: {spent:.2f} s, "
                 f"{records} records, {spent / records * 1e6:.0f} us each"
             )
 

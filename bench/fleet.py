@@ -7,10 +7,10 @@ import gc
 import socket
 import sys
 
-from steptwin.live.cell import Cell
 from steptwin.live.clients import Clients
 from steptwin.live.clock import Clock
 from steptwin.live.descriptors import descriptors
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.tcp_epoll import EpollConnection
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
@@ -38,7 +38,7 @@ async def main(port: int) -> None:
         scheduler.add("1", device)
         for request in (ENABLE_ALL, *RUN):
             device.execute(request, scheduler.now)
-        EpollConnection(client, Address(*peer), Cell(scheduler, clock), TcpSlavePort({1: device}), clients)
+        EpollConnection(client, Address(*peer), RealTimeDriver(scheduler, clock), TcpSlavePort({1: device}), clients)
 
     descriptors().await_input(listener.fileno(), accept)
     gc.freeze()

@@ -33,7 +33,7 @@ from soak import time_limit
 from virtual_loop import VirtualLoop, run_virtually
 
 import steptwin.services  # noqa: F401  descriptions are checked for their tables, too
-from steptwin.live.cell import Cell
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.simulation.scheduler.scheduler import Scheduler
@@ -288,15 +288,15 @@ def run() -> Callable[[Coroutine[Any, Any, T]], T]:
 
 
 @pytest.fixture
-def make_cell() -> Callable[[], tuple[Cell, Mic488Device]]:
-    """``make_cell()``, in a running virtual loop: a cell with one MIC488 as it comes from the shop."""
+def make_realtime() -> Callable[[], tuple[RealTimeDriver, Mic488Device]]:
+    """``make_realtime()``, in a running virtual loop: a real-time driver with one MIC488 as it comes from the shop."""
 
-    def make() -> tuple[Cell, Mic488Device]:
+    def make() -> tuple[RealTimeDriver, Mic488Device]:
         loop = asyncio.get_running_loop()
         assert isinstance(loop, VirtualLoop)
         device = Mic488Device(ControllerConfig())
         scheduler = Scheduler()
         scheduler.add("1", device)
-        return Cell(scheduler, loop.clock()), device
+        return RealTimeDriver(scheduler, loop.clock()), device
 
     return make

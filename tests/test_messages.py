@@ -51,7 +51,7 @@ DONE = (
     *(f"simulation/faults/{name}.py" for name in ("active", "element", "fault", "kinds_physics", "machine", "places", "table")),
     *(
         f"simulation/kinds/{name}.py"
-        for name in ("kind", "lines", "master", "*/control", "*/heldjog", "*/kind", "*/memory", "m1486/programs")
+        for name in ("kind", "lines", "master", "*/control", "*/deadmanjog", "*/kind", "*/memory", "m1486/programs")
     ),
 )
 """Where what a page asks for can be refused."""

@@ -44,7 +44,7 @@ def test_sensors_actuators_logic_and_power_of_the_press() -> None:
     assert {one.place for one in found if one.mode == "stuck-input level=1"} == {
         *("safety.coil", "left_hand.in1", "right_hand.in1")  # what wires drive is stuck at the output
     }
-    assert not [one for one in found if "IN5" in one.text]  # nothing is joined to it
+    assert not [one for one in found if "IN5" in one.text]  # nothing is connected to it
     assert not [one for one in found if one.fault.kind.name == "stall"]  # no axis
     assert not [one for one in found if one.place == "danger.hit"]  # leads nowhere
 

@@ -263,7 +263,7 @@ STOP_PROGRAM = command.ControlProgram("table", "stop")
     ],
     ids=str,
 )
-def test_a_stop_ends_held_jogs_of_its_axes_only(stop: Any, is_ended: bool) -> None:
+def test_a_stop_ends_dead_man_jogs_of_its_axes_only(stop: Any, is_ended: bool) -> None:
     async def story() -> None:
         rig = BridgeRig()
         await rig.open()

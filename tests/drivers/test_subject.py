@@ -344,12 +344,12 @@ def test_after_a_loss_another_controller_is_there() -> None:
         finish(part.reconnect())
 
 
-def test_held_jogs_are_those_of_the_drivers(rig: Rig) -> None:
+def test_dead_man_jogs_are_those_of_the_drivers(rig: Rig) -> None:
     mic, chip = Mic488Part(rig.mic._driver), M1486Part(rig.chip._driver)
     rig.mic.enable(1)
     rows = (
-        (mic.held_jog(command.Jog("table", 1, -3.0)), "table.M1.velocity", -3.0),
-        (chip.held_jog(command.Jog("drum", 1, -300.0)), "drum.velocity", -300.0 * 64),
+        (mic.dead_man_jog(command.Jog("table", 1, -3.0)), "table.M1.velocity", -3.0),
+        (chip.dead_man_jog(command.Jog("drum", 1, -300.0)), "drum.velocity", -300.0 * 64),
     )
     for held, point, velocity in rows:
         finish(held.__aenter__())
@@ -360,7 +360,7 @@ def test_held_jogs_are_those_of_the_drivers(rig: Rig) -> None:
         finish(held.__aexit__(None, None, None))
         assert held.end is not None
     with pytest.raises(Misuse, match="axis = 2: an M1486 has axis 1 only"):
-        chip.held_jog(command.Jog("drum", 2, 50.0))
+        chip.dead_man_jog(command.Jog("drum", 2, 50.0))
 
 
 def test_settings_are_kept_as_json(rig: Rig) -> None:
@@ -490,7 +490,7 @@ def test_a_stop_between_the_values_of_a_write_refuses_the_rest(table: DeviceSubj
 
     async def write(item: Any, value: Any, **options: Any) -> None:
         await inner(item, value, **options)
-        unit.notes.stops[1] += 1  # another client stops M1 meanwhile
+        unit.shared.stops[1] += 1  # another client stops M1 meanwhile
 
     unit.write = write  # type: ignore[method-assign]
     with pytest.raises(Overtaken, match="a stop was requested meanwhile"):

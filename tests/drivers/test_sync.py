@@ -77,7 +77,7 @@ def test_a_line_of_chips_has_its_rate_and_tells_its_characters(kind: type[Thread
     """Ten bits a character."""
     log: list[str] = []
     line = kind(NOWHERE, baud=1200, log=log.append)
-    talk: Any = line.notes[TALK]
+    talk: Any = line.shared[TALK]
     assert talk.wire_ns(12) == pytest.approx(SECOND / 10, abs=20)
     talk.stray(b"\x13u", 0)
     assert [text.split(maxsplit=2)[2] for text in log] == ["← 13 75                     13H u"]
@@ -88,10 +88,10 @@ def test_a_modbus_line_has_its_pace_and_tells_its_frames(kind: type[ThreadModbus
     log: list[str] = []
     line = kind(RTU, baud=9600, frames_per_second=20.0, log=log.append)
     assert line._engine._interval_ns == 50 * MILLISECOND
-    assert (line.notes["tcp"], kind(NOWHERE, frames_per_second=None)._engine._interval_ns) == (False, 0)
+    assert (line.shared["tcp"], kind(NOWHERE, frames_per_second=None)._engine._interval_ns) == (False, 0)
     with pytest.raises(Misuse, match=r"^0 frames per second: must be above 0$"):
         kind(NOWHERE, frames_per_second=0.0)
-    frames: Any = line.notes["frames"]
+    frames: Any = line.shared["frames"]
     frames.unframed(0, b"\x01\x02")
     assert len(log) == 1
 

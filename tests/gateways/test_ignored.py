@@ -126,7 +126,7 @@ def test_a_raw_motion_that_a_device_ignores_is_answered_by_it_and_logged_as_igno
         await rig.open()
         for is_on in (False, True):
             await rig.subject.do(command.Enable("table", 1, on=is_on))
-            expected = rig.device.execute(bytes.fromhex(motion), rig.cell.enter()).hex()
+            expected = rig.device.execute(bytes.fromhex(motion), rig.realtime.enter()).hex()
             assert await raw(rig, motion) == (expected, ["done" if is_on else "ignored: not enabled"])
             request = Request(PLACE, 1, bytes.fromhex(motion), SECOND)
             assert (await ME.do(rig.subject, request)).value == {"pdu": expected}

@@ -147,7 +147,7 @@ def test_what_runs_past_the_last_address_is_answered_as_by_the_device(run: Any, 
         asked = bytes.fromhex(request_)
         found = (
             await gateway.ask(GatewayClient("master", Role.ENGINEER), part, asked),
-            rig.device.execute(asked, rig.cell.enter()),
+            rig.device.execute(asked, rig.realtime.enter()),
         )
         await rig.close()
         return found[0].hex(), found[1].hex()

@@ -9,8 +9,8 @@ import pytest
 
 from steptwin.errors import LineFailure, Misuse, SteptwinError
 from steptwin.live.bridge import open_device
-from steptwin.live.cell import Cell
 from steptwin.live.devicefile import DeviceSpec
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.server import Server
 
 TABLE = DeviceSpec(name="table", address="/dev/ttyUSB0")
@@ -42,10 +42,10 @@ def test_an_address_that_is_wrong_is_not_waited_for(run: Any) -> None:
         run(open_device(cast("Any", Connections(Misuse("not an address"))), TABLE, lambda text: None))
 
 
-def test_a_server_ends_while_it_waits(run: Any, make_cell: Any) -> None:
+def test_a_server_ends_while_it_waits(run: Any, make_realtime: Any) -> None:
     async def story() -> list[object]:
-        cell: Cell = make_cell()[0]
-        server = Server(cell, lambda text: None)
+        realtime: RealTimeDriver = make_realtime()[0]
+        server = Server(realtime, lambda text: None)
         found: list[object] = [await server.unless_ended(open_device(cast("Any", Connections()), TABLE, server.notice))]
         asyncio.get_running_loop().call_later(1.0, server.end)
         away = cast("Any", Connections(*[LineFailure("no answer")] * 9))

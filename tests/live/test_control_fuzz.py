@@ -14,10 +14,10 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from steptwin.files.world import World
-from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.control import ControlEndpoint
 from steptwin.live.pace import Pace
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_control import WorldControl
 from steptwin.subject.commands import COMMANDS
@@ -27,8 +27,8 @@ EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 
 def world() -> WorldControl:
     live = LiveWorld(World.load(EXAMPLES / "feeder.toml"))
-    cell = Cell(live, Clock())
-    return WorldControl(cell, live, Pace(live, cell, lambda _: None, has_clients=True), list)
+    realtime = RealTimeDriver(live, Clock())
+    return WorldControl(realtime, live, Pace(live, realtime, lambda _: None, has_clients=True), list)
 
 
 WORDS = [

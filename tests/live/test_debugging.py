@@ -12,9 +12,9 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.files.session import session_of
 from steptwin.files.world import World
 from steptwin.live import debugging as module
-from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.pace import Pace
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import MILLISECOND, SECOND
@@ -62,9 +62,9 @@ class Rig:
             self.world.stop_recording()
         self.notices: list[str] = []
         self.live = LiveWorld(self.world, self.notices.append)
-        self.cell = Cell(self.live, Clock(wall_ns=lambda: round(loop.time() * SECOND)))
-        self.pace = Pace(self.live, self.cell, lambda _: None, has_clients=True)
-        self.control = WorldControl(self.cell, self.live, self.pace, lambda: ["here"])
+        self.realtime = RealTimeDriver(self.live, Clock(wall_ns=lambda: round(loop.time() * SECOND)))
+        self.pace = Pace(self.live, self.realtime, lambda _: None, has_clients=True)
+        self.control = WorldControl(self.realtime, self.live, self.pace, lambda: ["here"])
         self.following = self.control.follow(filter_of(["stopped", "log"]), 1000)
         self.pace.begin(1.0)
 
@@ -98,7 +98,7 @@ def scene(run: Run, play: Callable[[Rig], Awaitable[None]]) -> None:
         rig.following.close()
         assert rig.live.run_control is None
         rig.pace.close()
-        rig.cell.close()
+        rig.realtime.close()
         session = session_of(rig.world)
         assert session.replay().trace.digest() == session.digest
 
@@ -245,9 +245,9 @@ def test_a_client_that_was_connected_before_the_debugger_is_seen(run: Run) -> No
         port = PlacePort(rig.live, "bus", "tcp-1", "tcp")
 
         def ask(pdu: str) -> bytes:
-            rig.cell.enter()
+            rig.realtime.enter()
             answer = port.exchange(bytes.fromhex(f"00 01 00 00 00 06 01 {pdu}"), rig.live.now)
-            rig.cell.leave()
+            rig.realtime.leave()
             return answer
 
         for _ in range(3):
@@ -269,7 +269,7 @@ def test_a_client_that_was_connected_before_the_debugger_is_seen(run: Run) -> No
         await asyncio.sleep(0.2)
         rig.following.close()
         rig.pace.close()
-        rig.cell.close()
+        rig.realtime.close()
 
     run(play())
 
@@ -375,7 +375,7 @@ def test_another_speed_does_not_pass_over_a_breakpoint(run: Run) -> None:
         rig.line(line=3)
         await rig.stop()
         rig.do("resume")
-        rig.cell.close()  # as in an event loop that is late
+        rig.realtime.close()  # as in an event loop that is late
         await asyncio.sleep(0.3)
         assert rig.do("resume", speed=2.0)["paused"]
         assert await rig.stop() == ("breakpoint", 3)
@@ -409,7 +409,7 @@ def test_a_world_without_programs_does_not_keep_its_past(run: Run) -> None:
         assert rig.live.history is None
         assert not rig.world.input_watchers
         rig.pace.close()
-        rig.cell.close()
+        rig.realtime.close()
 
     run(play())
 

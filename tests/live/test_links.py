@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from steptwin.live.cell import Cell
 from steptwin.live.links import Feed
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.machine import MILLISECOND, Nanos
 from steptwin.mic488.device import Mic488Device
 from steptwin.wire.line import SerialLine
@@ -18,7 +18,7 @@ from steptwin.wire.slave import RtuSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 
 Run = Callable[..., Any]
-Make = Callable[[], tuple[Cell, Mic488Device]]
+Make = Callable[[], tuple[RealTimeDriver, Mic488Device]]
 
 REQUEST = bytes.fromhex("010213880008FD62")
 ANSWER = bytes.fromhex("01020100A188")
@@ -30,24 +30,24 @@ FIRST_ANSWER_NS = 8 * CHARACTER_NS + TURNAROUND_NS + 6 * CHARACTER_NS
 class Wire:
     """Takes down what is written and when."""
 
-    def __init__(self, cell: Cell) -> None:
-        self.cell = cell
+    def __init__(self, realtime: RealTimeDriver) -> None:
+        self.realtime = realtime
         self.written: list[tuple[Nanos, bytes]] = []
 
     def write(self, data: bytes) -> None:
-        self.written.append((self.cell.clock.now(), data))
+        self.written.append((self.realtime.clock.now(), data))
 
 
-def feed(make_cell: Make, *, timed: bool) -> tuple[Feed, Wire]:
-    cell, device = make_cell()
-    wire = Wire(cell)
+def feed(make_realtime: Make, *, timed: bool) -> tuple[Feed, Wire]:
+    realtime, device = make_realtime()
+    wire = Wire(realtime)
     port = TimedRtuSlavePort(TimedUnits({1: device}, LineTiming(SerialLine(38400)))) if timed else RtuSlavePort({1: device})
-    return Feed(cell, port, wire), wire
+    return Feed(realtime, port, wire), wire
 
 
-def test_without_line_timing_the_answer_is_there_at_once(run: Run, make_cell: Make) -> None:
+def test_without_line_timing_the_answer_is_there_at_once(run: Run, make_realtime: Make) -> None:
     async def scene() -> list[tuple[Nanos, bytes]]:
-        link, wire = feed(make_cell, timed=False)
+        link, wire = feed(make_realtime, timed=False)
         link.take(REQUEST[:3])
         link.take(REQUEST[3:])
         link.close()
@@ -56,9 +56,9 @@ def test_without_line_timing_the_answer_is_there_at_once(run: Run, make_cell: Ma
     assert run(scene()) == [(0, ANSWER)]
 
 
-def test_real_line_timing_takes_the_time_of_the_characters(run: Run, make_cell: Make) -> None:
+def test_real_line_timing_takes_the_time_of_the_characters(run: Run, make_realtime: Make) -> None:
     async def scene() -> list[tuple[Nanos, bytes]]:
-        link, wire = feed(make_cell, timed=True)
+        link, wire = feed(make_realtime, timed=True)
         link.take(REQUEST)
         await asyncio.sleep(1.0)
         link.close()
@@ -69,9 +69,9 @@ def test_real_line_timing_takes_the_time_of_the_characters(run: Run, make_cell: 
     assert when == pytest.approx(FIRST_ANSWER_NS, abs=1000)
 
 
-def test_mic_32_real_line_timing_gives_a_hundred_answers_a_second(run: Run, make_cell: Make) -> None:
+def test_mic_32_real_line_timing_gives_a_hundred_answers_a_second(run: Run, make_realtime: Make) -> None:
     async def scene() -> list[Nanos]:
-        link, wire = feed(make_cell, timed=True)
+        link, wire = feed(make_realtime, timed=True)
         for answers in range(1, 41):
             link.take(REQUEST)
             while len(wire.written) < answers:  # noqa: ASYNC110 - as a master that polls its port
@@ -84,9 +84,9 @@ def test_mic_32_real_line_timing_gives_a_hundred_answers_a_second(run: Run, make
     assert gaps == [pytest.approx(10 * MILLISECOND, abs=2000)] * 39
 
 
-def test_mic_32_what_arrives_while_a_request_is_served_is_lost(run: Run, make_cell: Make) -> None:
+def test_mic_32_what_arrives_while_a_request_is_served_is_lost(run: Run, make_realtime: Make) -> None:
     async def scene() -> int:
-        link, wire = feed(make_cell, timed=True)
+        link, wire = feed(make_realtime, timed=True)
         link.take(REQUEST * 40)
         await asyncio.sleep(10.0)
         link.close()
@@ -96,11 +96,11 @@ def test_mic_32_what_arrives_while_a_request_is_served_is_lost(run: Run, make_ce
     assert run(scene()) == 9
 
 
-def test_a_frame_is_given_up_for_a_request_after_the_gap_without_a_further_byte(run: Run, make_cell: Make) -> None:
+def test_a_frame_is_given_up_for_a_request_after_the_gap_without_a_further_byte(run: Run, make_realtime: Make) -> None:
     """The request might be data of what looks like a longer one; only time tells."""
 
     async def scene() -> list[tuple[Nanos, bytes]]:
-        link, wire = feed(make_cell, timed=False)
+        link, wire = feed(make_realtime, timed=False)
         link.take(bytes.fromhex("0110 0000 0010 20".replace(" ", "")) + REQUEST)
         await asyncio.sleep(0.1)
         link.take(REQUEST)
@@ -111,9 +111,9 @@ def test_a_frame_is_given_up_for_a_request_after_the_gap_without_a_further_byte(
     assert run(scene()) == [(120 * MILLISECOND, ANSWER)]
 
 
-def test_a_closed_feed_answers_no_more(run: Run, make_cell: Make) -> None:
+def test_a_closed_feed_answers_no_more(run: Run, make_realtime: Make) -> None:
     async def scene() -> list[tuple[Nanos, bytes]]:
-        link, wire = feed(make_cell, timed=True)
+        link, wire = feed(make_realtime, timed=True)
         link.take(REQUEST)
         link.close()
         await asyncio.sleep(1.0)

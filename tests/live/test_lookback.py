@@ -34,7 +34,7 @@ class Back(Rig):
 
     def __init__(self, world: World) -> None:
         super().__init__(world)
-        self.lookback = Lookback(self.live, self.cell, self.pace)
+        self.lookback = Lookback(self.live, self.realtime, self.pace)
 
     def shown(self) -> tuple[Any, ...]:
         subject = self.control
@@ -59,7 +59,7 @@ def test_every_moment_is_as_it_was_seen_while_the_world_goes_on(run: Run) -> Non
         seen: dict[Nanos, tuple[Any, ...]] = {}
         for step in range(12):
             await asyncio.sleep(0.7)
-            rig.cell.enter()
+            rig.realtime.enter()
             bus.exchange(read, rig.world.now)
             rig.do("set", levels={"table.IN9": step % 2})
             if step == 3:
@@ -68,11 +68,11 @@ def test_every_moment_is_as_it_was_seen_while_the_world_goes_on(run: Run) -> Non
         look = rig.lookback.open()
         for moment in sorted(seen, key=lambda one: one % 1_300_000_007):
             assert await at(look, moment) == seen[moment]
-        rig.cell.enter()
+        rig.realtime.enter()
         now = rig.world.now
         assert now >= max(seen)
         await asyncio.sleep(1)
-        rig.cell.enter()
+        rig.realtime.enter()
         assert rig.world.now == now + SECOND
         look.close()
         await rig.end()
@@ -88,7 +88,7 @@ def test_another_moment_that_is_wanted_meanwhile_wins(run: Run, monkeypatch: pyt
     async def scene() -> None:
         rig = Back(feeder())
         await asyncio.sleep(9.5)
-        rig.cell.enter()
+        rig.realtime.enter()
         look = rig.lookback.open()
         first = look.go(9 * SECOND + SECOND // 2)
         second = look.go(4 * SECOND + SECOND // 2)
@@ -109,7 +109,7 @@ def test_what_is_not_kept_is_refused_and_looks_are_bounded(run: Run) -> None:
     async def scene() -> None:
         rig = Back(feeder())
         await asyncio.sleep(2)
-        rig.cell.enter()
+        rig.realtime.enter()
         looks = [rig.lookback.open() for _ in range(module.MOST_LOOKS)]
         with pytest.raises(Refusal, match="8 viewers look back already"):
             rig.lookback.open()
@@ -133,12 +133,12 @@ def test_the_world_goes_back_to_what_is_looked_at_and_its_session_replays(run: R
         rig.do("set", levels={"table.IN9": 1})
         rig.do("press", button="start")
         await asyncio.sleep(1.2)
-        rig.cell.enter()
+        rig.realtime.enter()
         seen, moment = rig.shown(), rig.world.now
         await asyncio.sleep(0.1)
         rig.do("set", levels={"table.IN9": 0})
         await asyncio.sleep(2)
-        rig.cell.enter()
+        rig.realtime.enter()
         look = rig.lookback.open()
         await result_of(look.go(moment))
         look.go_back()
@@ -149,7 +149,7 @@ def test_the_world_goes_back_to_what_is_looked_at_and_its_session_replays(run: R
         bus.exchange(read, rig.world.now)
         rig.do("resume")
         await asyncio.sleep(1)
-        rig.cell.enter()
+        rig.realtime.enter()
         assert rig.world.now == moment + SECOND
         later = rig.lookback.open()
         assert await at(later, moment) == seen

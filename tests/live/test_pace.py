@@ -19,11 +19,11 @@ from steptwin.files.session import load, session_of
 from steptwin.files.world import World
 from steptwin.files.worldoptions import WorldRunOptions
 from steptwin.live import pace as pacing
-from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.links import Feed
 from steptwin.live.options import LiveOptions, UpOptions
 from steptwin.live.pace import Pace
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.running import LiveWorld, PlacePort, up
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import MILLISECOND, SECOND, Nanos
@@ -60,12 +60,12 @@ class Rig:
         loop = asyncio.get_running_loop()
         self.live = LiveWorld(world)
         self.world = world
-        self.cell = Cell(self.live, Clock(wall_ns=lambda: round(loop.time() * SECOND), begin=world.now))
+        self.realtime = RealTimeDriver(self.live, Clock(wall_ns=lambda: round(loop.time() * SECOND), begin=world.now))
         self.lags: list[Nanos] = []
-        self.cell.on_lag = self.lags.append
+        self.realtime.on_lag = self.lags.append
         self.told: list[str] = []
-        self.pace = Pace(self.live, self.cell, self.told.append, has_clients=has_clients)
-        self.control = WorldControl(self.cell, self.live, self.pace, list)
+        self.pace = Pace(self.live, self.realtime, self.told.append, has_clients=has_clients)
+        self.control = WorldControl(self.realtime, self.live, self.pace, list)
         self.pace.begin(speed)
 
     def do(self, what: str, **request: object) -> Any:
@@ -76,8 +76,8 @@ class Rig:
         return {name: int(value) if name.endswith("_ns") else value for name, value in answer.items()}
 
     def close(self) -> World:
-        self.cell.enter()
-        self.cell.close()
+        self.realtime.enter()
+        self.realtime.close()
         self.pace.close()
         return self.world
 
@@ -127,8 +127,8 @@ def test_whatever_is_done_to_the_pace_a_session_replays(run: Run, deeds: list[tu
             elif what == "until":
                 rig.do("step", until=how, for_ns=3 * SECOND)
             elif what == "client":
-                ports[how].exchange({"bus": READ_POSITION, "chips": b"x3\rf640\rr\r"}[how], rig.cell.enter())
-                rig.cell.leave()
+                ports[how].exchange({"bus": READ_POSITION, "chips": b"x3\rf640\rr\r"}[how], rig.realtime.enter())
+                rig.realtime.leave()
             elif what == "set":
                 rig.do("set", levels={how: number % 2})
             elif what in ("press", "release"):
@@ -285,7 +285,7 @@ def test_a_standing_world_answers_what_takes_no_time(run: Run, timing: str, kind
         rig = Rig(world, 0.0)
         assert "to_ns" not in rig.do("step", for_ns=20 * SECOND)
         client = Client()
-        feed = Feed(rig.cell, PlacePort(rig.live, "bus", f"{kind}-1", kind), client)
+        feed = Feed(rig.realtime, PlacePort(rig.live, "bus", f"{kind}-1", kind), client)
         feed.take(request)
         await asyncio.sleep(100)
         assert client.heard == (b"" if timing == "real" else answer)
@@ -354,7 +354,7 @@ def test_what_cannot_be_done_is_told_and_changes_nothing(run: Run, what: str, re
         rig = Rig(feeder())
         with pytest.raises(Misuse, match=message):
             rig.do(what, **request_)
-        assert (rig.pace.speed, rig.cell.clock.speed) == (1.0, 1.0)
+        assert (rig.pace.speed, rig.realtime.clock.speed) == (1.0, 1.0)
         await asyncio.sleep(1)
         rig.do("resume")
         assert rig.close().now == SECOND
@@ -371,7 +371,7 @@ def test_a_session_goes_on_live_without_those_who_were_there(run: Run, tmp_path:
     async def scene() -> None:
         rig = Rig(World.from_toml(description), 0.0)
         rig.do("step", for_ns=2 * SECOND)
-        PlacePort(rig.live, "bus", "tcp-1", "tcp").exchange(b"\0", rig.cell.enter())
+        PlacePort(rig.live, "bus", "tcp-1", "tcp").exchange(b"\0", rig.realtime.enter())
         rig.do("save", file=str(tmp_path / "s.json"))
         rig.close()
 
@@ -429,7 +429,7 @@ def test_going_back_leaves_programs_connected_and_the_session_whole(run: Run) ->
         heard = b"".join(data for _, data in chips.to_send(rig.world.now))
         rig.do("resume")
         await asyncio.sleep(4)
-        rig.cell.enter()
+        rig.realtime.enter()
         late = PlacePort(rig.live, "chips", "tcp-2", "raw")
         assert bus.exchange(read, rig.world.now) != before
         assert rig.do("restore", name="here")["time_ns"] == 4 * SECOND == rig.world.now

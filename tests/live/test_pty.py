@@ -15,9 +15,9 @@ import pytest
 
 from steptwin.errors import LineFailure, Misuse
 from steptwin.live import pty as module
-from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.pty import PtyLink
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.simulation.scheduler.scheduler import Scheduler
@@ -58,7 +58,7 @@ def make_link(path: Path, *, timed: bool = False) -> PtyLink:
     devices = {1: Mic488Device(ControllerConfig())}
     scheduler.add("1", devices[1])
     units = TimedUnits(devices, LineTiming(SerialLine(38400)))
-    return PtyLink(Cell(scheduler, Clock()), path, lambda: TimedRtuSlavePort(units) if timed else RtuSlavePort(devices))
+    return PtyLink(RealTimeDriver(scheduler, Clock()), path, lambda: TimedRtuSlavePort(units) if timed else RtuSlavePort(devices))
 
 
 class Program:

@@ -16,11 +16,11 @@ from steptwin.files.export.tracefile import TraceFile
 from steptwin.files.session import load, session_of
 from steptwin.files.world import World
 from steptwin.files.worldoptions import WorldRunOptions
-from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.links import Feed
 from steptwin.live.options import LiveOptions, UpOptions
 from steptwin.live.pace import Pace
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.running import LiveWorld, PlacePort, up
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import MILLISECOND, SECOND, Nanos
@@ -52,9 +52,9 @@ class Client:
         self.heard += data
 
 
-def started(wall: Wall, speed: float = 1.0) -> tuple[World, LiveWorld, Cell]:
+def started(wall: Wall, speed: float = 1.0) -> tuple[World, LiveWorld, RealTimeDriver]:
     live = LiveWorld(World.load(EXAMPLES / "feeder.toml"))
-    return live.world, live, Cell(live, Clock(speed, wall))
+    return live.world, live, RealTimeDriver(live, Clock(speed, wall))
 
 
 @settings(max_examples=12, deadline=None)
@@ -65,16 +65,16 @@ def started(wall: Wall, speed: float = 1.0) -> tuple[World, LiveWorld, Cell]:
 def test_live_and_virtual_give_the_same_trace(looks: list[tuple[int, str]], speed: float) -> None:
     async def run() -> World:
         wall = Wall()
-        world, live, cell = started(wall, speed)
+        world, live, realtime = started(wall, speed)
         bus, chips = PlacePort(live, "bus", "tcp-1", "rtu"), PlacePort(live, "chips", "raw-1", "raw")
-        hand = WorldControl(cell, live, Pace(live, cell, lambda _: None, has_clients=True), list)
-        cell.clock.run(speed)
+        hand = WorldControl(realtime, live, Pace(live, realtime, lambda _: None, has_clients=True), list)
+        realtime.clock.run(speed)
         for pause, what in looks:
             # Less than what counts as held up: nothing here runs the loop between.
             for _ in range(pause // 100 + 1):
                 wall.now += 100 * MILLISECOND
-                now = cell.enter()
-                cell.leave()
+                now = realtime.enter()
+                realtime.leave()
             if what == "bus":
                 bus.exchange(READ_POSITION, now)
             elif what == "chips":
@@ -83,7 +83,7 @@ def test_live_and_virtual_give_the_same_trace(looks: list[tuple[int, str]], spee
                 hand.do(do.Press("start"))
             elif what == "pin":
                 hand.do(do.Set((("table", "IN8", pause % 2),)))
-        cell.close()
+        realtime.close()
         return world
 
     world = asyncio.run(run())
@@ -96,19 +96,19 @@ def test_live_and_virtual_give_the_same_trace(looks: list[tuple[int, str]], spee
 def test_answers_come_to_the_client_when_the_line_has_carried_them() -> None:
     async def run() -> None:
         wall = Wall()
-        world, live, cell = started(wall)
+        world, live, realtime = started(wall)
         client, port = Client(), PlacePort(live, "bus", "rtu-1", "rtu")
-        feed = Feed(cell, port, client)
+        feed = Feed(realtime, port, client)
         wall.now = 20 * SECOND
-        cell.enter()
+        realtime.enter()
         feed.take(READ_POSITION)
         assert client.heard == b""
         wall.now += 10 * MILLISECOND
-        cell.enter()
+        realtime.enter()
         await asyncio.sleep(0)
         assert client.heard == with_crc(bytes.fromhex("01 03 04 00 00 43 16"))
         feed.close()
-        cell.close()
+        realtime.close()
         assert [type(given.what).__name__ for given in world.inputs] == ["Bytes", "Leave"]
 
     asyncio.run(run())
@@ -221,10 +221,10 @@ def test_a_world_wakes_up_by_itself() -> None:
         live = LiveWorld(World.load(EXAMPLES / "lift.toml"))
         noted = asyncio.Event()
         live.world.trace.watchers.append(lambda record: noted.set() if record.subject == "note" else None)
-        cell = Cell(live, Clock(1000.0))
-        Pace(live, cell, lambda _: None, has_clients=False).begin(1000.0)
+        realtime = RealTimeDriver(live, Clock(1000.0))
+        Pace(live, realtime, lambda _: None, has_clients=False).begin(1000.0)
         await asyncio.wait_for(noted.wait(), 60)
         assert live.world.now > 0
-        cell.close()
+        realtime.close()
 
     asyncio.run(run())

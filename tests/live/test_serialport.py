@@ -13,8 +13,8 @@ import pytest
 
 from steptwin.errors import LineFailure
 from steptwin.live import serialport
-from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.serialport import SerialLink
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
@@ -22,7 +22,7 @@ from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.wire.slave import RtuSlavePort
 
 Run = Callable[..., Any]
-Make = Callable[[], tuple[Cell, Mic488Device]]
+Make = Callable[[], tuple[RealTimeDriver, Mic488Device]]
 
 REQUEST = bytes.fromhex("010213880008FD62")
 ANSWER = bytes.fromhex("01020100A188")
@@ -62,7 +62,7 @@ def on_line(device: Path, play: Callable[[SerialLink, list[str]], Awaitable[Any]
         scheduler = Scheduler()
         scheduler.add("1", mic)
         notices: list[str] = []
-        link = SerialLink(Cell(scheduler, Clock()), str(device), 19200, lambda: RtuSlavePort({1: mic}), notices.append)
+        link = SerialLink(RealTimeDriver(scheduler, Clock()), str(device), 19200, lambda: RtuSlavePort({1: mic}), notices.append)
         try:
             await link.open()
             return await play(link, notices)
@@ -127,7 +127,7 @@ def test_closing_while_it_is_looked_for(tmp_path: Path) -> None:
     assert on_line(adapter.device, play) <= before_it_is_cancelled
 
 
-def test_while_the_device_takes_nothing_nothing_is_read_and_what_is_said_unasked_is_lost(run: Run, make_cell: Make) -> None:
+def test_while_the_device_takes_nothing_nothing_is_read_and_what_is_said_unasked_is_lost(run: Run, make_realtime: Make) -> None:
     class Transport:
         def __init__(self) -> None:
             self.reading = True
@@ -139,9 +139,9 @@ def test_while_the_device_takes_nothing_nothing_is_read_and_what_is_said_unasked
             self.reading = True
 
     async def scene() -> list[tuple[bool, bool]]:
-        cell, mic = make_cell()
+        realtime, mic = make_realtime()
         transport: Any = Transport()
-        line = serialport._SerialProtocol(cell, RtuSlavePort({1: mic}), print)
+        line = serialport._SerialProtocol(realtime, RtuSlavePort({1: mic}), print)
         line.connection_made(transport)
         seen = []
         for change in (line.pause_writing, line.resume_writing):

@@ -13,7 +13,7 @@ import pytest
 
 from steptwin.errors import LineFailure, Misuse, Runaway
 from steptwin.files.world import World
-from steptwin.live.cell import Cell
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.server import Server, clear_ready_file
 from steptwin.live.transports import TRANSPORTS
 from steptwin.mic488.config import ControllerConfig
@@ -22,13 +22,13 @@ from steptwin.subject.world import WorldSubject
 from steptwin.wire.slave import TcpSlavePort
 
 Run = Callable[..., Any]
-Make = Callable[[], tuple[Cell, Mic488Device]]
+Make = Callable[[], tuple[RealTimeDriver, Mic488Device]]
 
 
-def serving(run: Run, make_cell: Make, play: Callable[[Server, list[str]], Awaitable[Any]]) -> Any:
+def serving(run: Run, make_realtime: Make, play: Callable[[Server, list[str]], Awaitable[Any]]) -> Any:
     async def scene() -> Any:
         told: list[str] = []
-        server = Server(make_cell()[0], told.append)
+        server = Server(make_realtime()[0], told.append)
         try:
             return await play(server, told)
         finally:
@@ -44,7 +44,7 @@ def port() -> TcpSlavePort:
 # ---------------------------------------------------------------------- ready file
 
 
-def test_the_ready_file_names_every_end_point_and_is_gone_at_the_end(run: Run, make_cell: Make, tmp_path: Path) -> None:
+def test_the_ready_file_names_every_end_point_and_is_gone_at_the_end(run: Run, make_realtime: Make, tmp_path: Path) -> None:
     path = tmp_path / "new" / "ready.json"
 
     async def play(server: Server, told: list[str]) -> Any:
@@ -55,7 +55,7 @@ def test_the_ready_file_names_every_end_point_and_is_gone_at_the_end(run: Run, m
         server.write_ready_file(path)
         return json.loads(path.read_text())
 
-    ready = serving(run, make_cell, play)
+    ready = serving(run, make_realtime, play)
     pty, tcp = ready.pop("end_points")
     controllers = [{"name": "table"}]
     assert ready == {"name": "twin", "pid": os.getpid(), "file": str(tmp_path / "machine.toml"), "controllers": controllers}
@@ -65,23 +65,23 @@ def test_the_ready_file_names_every_end_point_and_is_gone_at_the_end(run: Run, m
     assert list(tmp_path.rglob("*")) == [tmp_path / "new"]
 
 
-def test_the_ready_file_of_another_server_is_left_to_it(run: Run, make_cell: Make, tmp_path: Path) -> None:
+def test_the_ready_file_of_another_server_is_left_to_it(run: Run, make_realtime: Make, tmp_path: Path) -> None:
     path = tmp_path / "ready.json"
 
     async def play(server: Server, told: list[str]) -> None:
         server.write_ready_file(path)
         path.write_text("two")
 
-    serving(run, make_cell, play)
+    serving(run, make_realtime, play)
     assert path.read_text() == "two"
 
 
-def test_a_ready_file_that_cannot_be_written(run: Run, make_cell: Make, tmp_path: Path) -> None:
+def test_a_ready_file_that_cannot_be_written(run: Run, make_realtime: Make, tmp_path: Path) -> None:
     async def play(server: Server, told: list[str]) -> None:
         with pytest.raises(LineFailure, match=f"cannot write the ready file {tmp_path}: "):
             server.write_ready_file(tmp_path)
 
-    serving(run, make_cell, play)
+    serving(run, make_realtime, play)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -124,7 +124,7 @@ def test_a_directory_is_no_ready_file(tmp_path: Path) -> None:
 # ---------------------------------------------------------------------- ending
 
 
-def test_everything_is_closed_though_one_link_fails_to(run: Run, make_cell: Make, tmp_path: Path) -> None:
+def test_everything_is_closed_though_one_link_fails_to(run: Run, make_realtime: Make, tmp_path: Path) -> None:
     class Stubborn:
         async def close(self) -> None:
             raise LineFailure("will not close")
@@ -135,11 +135,11 @@ def test_everything_is_closed_though_one_link_fails_to(run: Run, make_cell: Make
         server.write_ready_file(tmp_path / "ready.json")
 
     with pytest.raises(LineFailure, match="will not close"):
-        serving(run, make_cell, play)
+        serving(run, make_realtime, play)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_machines_that_cannot_go_on_end_the_server(run: Run, make_cell: Make) -> None:
+def test_machines_that_cannot_go_on_end_the_server(run: Run, make_realtime: Make) -> None:
     async def play(server: Server, told: list[str]) -> None:
         def loop_of_wires() -> None:
             raise Runaway("signals did not settle")
@@ -148,10 +148,10 @@ def test_machines_that_cannot_go_on_end_the_server(run: Run, make_cell: Make) ->
         with pytest.raises(LineFailure, match="signals did not settle"):
             await server.until_ended()
 
-    serving(run, make_cell, play)
+    serving(run, make_realtime, play)
 
 
-def test_a_mistake_of_ours_is_one_line_and_the_server_goes_on(run: Run, make_cell: Make) -> None:
+def test_a_mistake_of_ours_is_one_line_and_the_server_goes_on(run: Run, make_realtime: Make) -> None:
     async def play(server: Server, told: list[str]) -> list[str]:
         def mistake() -> None:
             _ = {}["gone"]
@@ -162,13 +162,13 @@ def test_a_mistake_of_ours_is_one_line_and_the_server_goes_on(run: Run, make_cel
         await asyncio.sleep(0.1)
         return told
 
-    accept, odd, mistake = serving(run, make_cell, play)
+    accept, odd, mistake = serving(run, make_realtime, play)
     assert (accept, odd) == ("accept: too many open files", "something odd")
     assert mistake.startswith("internal error, please report it: KeyError: 'gone' (")
     assert "test_server.py:" in mistake
 
 
-def test_the_same_notice_comes_once_a_second(run: Run, make_cell: Make) -> None:
+def test_the_same_notice_comes_once_a_second(run: Run, make_realtime: Make) -> None:
     async def play(server: Server, told: list[str]) -> list[str]:
         for _ in range(100):
             server.notice("again")
@@ -176,15 +176,17 @@ def test_the_same_notice_comes_once_a_second(run: Run, make_cell: Make) -> None:
             await asyncio.sleep(0.03)
         return told
 
-    assert serving(run, make_cell, play) == ["again", "and again"] * 3
+    assert serving(run, make_realtime, play) == ["again", "and again"] * 3
 
 
-def test_a_lag_is_told(run: Run, make_cell: Make) -> None:
+def test_a_lag_is_told(run: Run, make_realtime: Make) -> None:
     async def play(server: Server, told: list[str]) -> list[str]:
         loop: Any = asyncio.get_running_loop()
-        server.cell._arm(1_000_000)
+        server.realtime._arm(1_000_000)
         loop.hold_up(61.25)
-        server.cell.enter()
+        server.realtime.enter()
         return told
 
-    assert serving(run, make_cell, play) == ["this process did not run for 61.2 s; the time of the twin stood still meanwhile"]
+    assert serving(run, make_realtime, play) == [
+        "this process did not run for 61.2 s; the time of the twin stood still meanwhile"
+    ]

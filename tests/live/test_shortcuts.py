@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from steptwin.files.session import session_of
 from steptwin.files.world import World
 from steptwin.live.batches import batches
-from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.links import Feed
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.machine import MILLISECOND
 from steptwin.simulation.kinds.mic488.line import ModbusBus
@@ -144,13 +144,13 @@ def played(given_batches: list[Batch], *, shortcuts: bool, records: bool) -> See
         if not records:
             world.stop_recording()
         live, wall = LiveWorld(world), [0]
-        cell = Cell(live, Clock(wall_ns=lambda: wall[0]))
+        realtime = RealTimeDriver(live, Clock(wall_ns=lambda: wall[0]))
         if shortcuts:
-            live.share_reads(cell)
+            live.share_reads(realtime)
         ports = [PlacePort(live, "bus", f"{kind}-{number}", kind) for number, kind in enumerate(KINDS)]
         clients = [Client() for _ in KINDS]
-        feeds = [Feed(cell, port, client) for port, client in zip(ports, clients, strict=True)]
-        cell.start()
+        feeds = [Feed(realtime, port, client) for port, client in zip(ports, clients, strict=True)]
+        realtime.start()
         world.trace.watchers.append(
             lambda one: found.edges.append((one.time, one.machine, one.subject, one.value)) if one.kind == "edge" else None
         )
@@ -174,8 +174,8 @@ def played(given_batches: list[Batch], *, shortcuts: bool, records: bool) -> See
                     found.framed.append((*sent[:2], FrameDirection.IN, data))
             batches().current = 0
         wall[0] += 50 * MILLISECOND
-        cell.enter()
-        cell.close()
+        realtime.enter()
+        realtime.close()
         world.settle_all()
         if records:
             assert session_of(world).replay().trace.digest() == world.trace.digest()

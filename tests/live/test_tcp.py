@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 
 from steptwin.errors import LineFailure
-from steptwin.live.cell import Cell
 from steptwin.live.clients import RETRY_S, Clients
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.tcp import LISTENER, Listener, TcpLink
 from steptwin.live.tcp_asyncio import AsyncioListener
 from steptwin.live.tcp_epoll import EpollListener
@@ -25,7 +25,7 @@ from steptwin.simulation.toml.addresses import Address
 from steptwin.wire.slave import RtuSlavePort, TcpSlavePort
 
 Run = Callable[..., Any]
-Make = Callable[[], tuple[Cell, Mic488Device]]
+Make = Callable[[], tuple[RealTimeDriver, Mic488Device]]
 
 # Read user register 0, and 125 of them.
 READ_ONE = bytes.fromhex("000100000006010300000001")
@@ -53,12 +53,12 @@ class Scene:
 
     kind: type[Listener] = LISTENER
 
-    def __init__(self, make_cell: Make, most: int = 100) -> None:
-        self.cell, self.device = make_cell()
+    def __init__(self, make_realtime: Make, most: int = 100) -> None:
+        self.realtime, self.device = make_realtime()
         self.notices: list[str] = []
         self.clients = Clients(most, self.notices.append)
         self.executed = 0
-        self.link = TcpLink(self.cell, Address("127.0.0.1", 0), lambda: TcpSlavePort({1: self}), self.clients, self.kind)
+        self.link = TcpLink(self.realtime, Address("127.0.0.1", 0), lambda: TcpSlavePort({1: self}), self.clients, self.kind)
         self._writers: list[asyncio.StreamWriter] = []
 
     async def __aenter__(self) -> Scene:
@@ -67,7 +67,7 @@ class Scene:
 
     async def __aexit__(self, *exc: object) -> None:
         await self.link.close()
-        self.cell.close()
+        self.realtime.close()
         for writer in self._writers:
             writer.close()
 
@@ -94,33 +94,33 @@ async def ask(client: Client) -> bytes:
     return await client[0].readexactly(len(ONE))
 
 
-def in_scene(run: Run, make_cell: Make, play: Callable[[Scene], Awaitable[Any]], most: int = 100) -> Any:
+def in_scene(run: Run, make_realtime: Make, play: Callable[[Scene], Awaitable[Any]], most: int = 100) -> Any:
     async def scene() -> Any:
-        async with Scene(make_cell, most) as made:
+        async with Scene(make_realtime, most) as made:
             return await play(made)
 
     return run(scene())
 
 
-def test_many_clients_are_answered(run: Run, make_cell: Make) -> None:
+def test_many_clients_are_answered(run: Run, make_realtime: Make) -> None:
     async def play(scene: Scene) -> list[bytes]:
         clients = [await scene.client() for _ in range(50)]
         return [await ask(client) for client in clients * 3]
 
-    assert in_scene(run, make_cell, play) == [ONE] * 150
+    assert in_scene(run, make_realtime, play) == [ONE] * 150
 
 
-def test_more_than_one_request_at_once(run: Run, make_cell: Make) -> None:
+def test_more_than_one_request_at_once(run: Run, make_realtime: Make) -> None:
     async def play(scene: Scene) -> bytes:
         reader, writer = await scene.client()
         writer.write(READ_ONE * 3 + READ_ONE[:5])
         writer.write(READ_ONE[5:])
         return await reader.readexactly(4 * len(ONE))
 
-    assert in_scene(run, make_cell, play) == ONE * 4
+    assert in_scene(run, make_realtime, play) == ONE * 4
 
 
-def test_a_client_that_vanishes_within_a_frame_harms_nobody(run: Run, make_cell: Make) -> None:
+def test_a_client_that_vanishes_within_a_frame_harms_nobody(run: Run, make_realtime: Make) -> None:
     async def play(scene: Scene) -> tuple[bytes, int]:
         other = await scene.client()
         _, writer = await scene.client()
@@ -131,10 +131,10 @@ def test_a_client_that_vanishes_within_a_frame_harms_nobody(run: Run, make_cell:
         answer = await ask(other)
         return answer, await scene.fallen_to(1)
 
-    assert in_scene(run, make_cell, play) == (ONE, 1)
+    assert in_scene(run, make_realtime, play) == (ONE, 1)
 
 
-def test_a_wrong_header_ends_the_connection_and_is_told(run: Run, make_cell: Make) -> None:
+def test_a_wrong_header_ends_the_connection_and_is_told(run: Run, make_realtime: Make) -> None:
     async def play(scene: Scene) -> tuple[bytes, list[str], bytes]:
         other = await scene.client()
         reader, writer = await scene.client()
@@ -143,13 +143,13 @@ def test_a_wrong_header_ends_the_connection_and_is_told(run: Run, make_cell: Mak
         assert await reader.read() == b""
         return answered, scene.notices, await ask(other)
 
-    answered, (notice,), other = in_scene(run, make_cell, play)
+    answered, (notice,), other = in_scene(run, make_realtime, play)
     assert answered == ONE
     assert re.fullmatch(r"client 127\.0\.0\.1:\d+: MBAP protocol 7 is not 0; its connection is closed", notice)
     assert other == ONE
 
 
-def test_clients_beyond_the_limit_are_turned_away_and_places_become_free(run: Run, make_cell: Make) -> None:
+def test_clients_beyond_the_limit_are_turned_away_and_places_become_free(run: Run, make_realtime: Make) -> None:
     async def play(scene: Scene) -> tuple[list[bytes], list[str]]:
         first = [await scene.client() for _ in range(2)]
         answers = [await ask(client) for client in first]
@@ -159,7 +159,7 @@ def test_clients_beyond_the_limit_are_turned_away_and_places_become_free(run: Ru
         await scene.fallen_to(1)
         return [*answers, await ask(await scene.client()), await ask(first[1])], scene.notices
 
-    assert in_scene(run, make_cell, play, most=2) == ([ONE] * 4, ["more than 2 clients at once are turned away"])
+    assert in_scene(run, make_realtime, play, most=2) == ([ONE] * 4, ["more than 2 clients at once are turned away"])
 
 
 def deafen(scene: Scene) -> socket.socket:
@@ -179,7 +179,7 @@ def pour(client: socket.socket, requests: bytes) -> None:
             client.send(requests)
 
 
-def test_a_client_that_never_reads_costs_bounded_memory_and_hinders_nobody(run: Run, make_cell: Make) -> None:
+def test_a_client_that_never_reads_costs_bounded_memory_and_hinders_nobody(run: Run, make_realtime: Make) -> None:
     async def play(scene: Scene) -> tuple[list[bytes], int]:
         other = await scene.client()
         deaf = deafen(scene)
@@ -191,12 +191,12 @@ def test_a_client_that_never_reads_costs_bounded_memory_and_hinders_nobody(run: 
         deaf.close()
         return answers, waiting
 
-    answers, waiting = in_scene(run, make_cell, play)
+    answers, waiting = in_scene(run, make_realtime, play)
     assert answers == [ONE] * 300
     assert 0 < waiting < 200_000
 
 
-def test_while_answers_wait_nothing_is_executed_and_all_are_sent_then(run: Run, make_cell: Make) -> None:
+def test_while_answers_wait_nothing_is_executed_and_all_are_sent_then(run: Run, make_realtime: Make) -> None:
     async def play(scene: Scene) -> tuple[int, int, int]:
         deaf = deafen(scene)
         sent = 0
@@ -217,10 +217,10 @@ def test_while_answers_wait_nothing_is_executed_and_all_are_sent_then(run: Run, 
         deaf.close()
         return still - executed, received - expected, scene.executed - sent // len(READ_MANY)
 
-    assert in_scene(run, make_cell, play) == (0, 0, 0)
+    assert in_scene(run, make_realtime, play) == (0, 0, 0)
 
 
-def test_what_was_answered_before_a_wrong_header_is_sent_though_it_has_to_wait(run: Run, make_cell: Make) -> None:
+def test_what_was_answered_before_a_wrong_header_is_sent_though_it_has_to_wait(run: Run, make_realtime: Make) -> None:
     async def play(scene: Scene) -> tuple[int, int, list[str]]:
         deaf = deafen(scene)
         while not any(connection.waiting for connection in scene.clients.present):
@@ -239,12 +239,12 @@ def test_what_was_answered_before_a_wrong_header_is_sent_though_it_has_to_wait(r
         deaf.close()
         return received // (9 + 250), scene.executed, scene.notices
 
-    answers, executed, notices = in_scene(run, make_cell, play)
+    answers, executed, notices = in_scene(run, make_realtime, play)
     assert answers == executed
     assert len(notices) == 1
 
 
-def test_a_connection_that_is_to_end_ends_when_its_last_answers_have_found_room(run: Run, make_cell: Make) -> None:
+def test_a_connection_that_is_to_end_ends_when_its_last_answers_have_found_room(run: Run, make_realtime: Make) -> None:
     """Requests and noise come together, and their answers find no room."""
 
     async def play(scene: Scene) -> tuple[int, int, int]:
@@ -266,23 +266,23 @@ def test_a_connection_that_is_to_end_ends_when_its_last_answers_have_found_room(
         deaf.close()
         return waiting, received, await scene.fallen_to(0)
 
-    waiting, received, left = in_scene(run, make_cell, play)
+    waiting, received, left = in_scene(run, make_realtime, play)
     assert waiting > 0
     assert (received, left) == (150 * (9 + 250), 0)
 
 
-def test_after_a_wrong_header_the_rest_of_a_flood_is_not_executed(run: Run, make_cell: Make) -> None:
+def test_after_a_wrong_header_the_rest_of_a_flood_is_not_executed(run: Run, make_realtime: Make) -> None:
     async def play(scene: Scene) -> tuple[int, int]:
         _, writer = await scene.client()
         writer.write(READ_ONE + b"\xff" * 12 + READ_ONE * 1000)
         await asyncio.sleep(0.1)
         return scene.executed, await scene.fallen_to(0)
 
-    assert in_scene(run, make_cell, play) == (1, 0)
+    assert in_scene(run, make_realtime, play) == (1, 0)
 
 
 @pytest.mark.parametrize("kind", ["epoll"], indirect=True)
-def test_a_system_without_room_for_clients_is_asked_again(run: Run, make_cell: Make) -> None:
+def test_a_system_without_room_for_clients_is_asked_again(run: Run, make_realtime: Make) -> None:
     async def play(scene: Scene) -> tuple[list[str], bytes, str]:
         """asyncio waits and asks again by itself."""
         assert isinstance(scene.link._listener, EpollListener)
@@ -294,7 +294,7 @@ def test_a_system_without_room_for_clients_is_asked_again(run: Run, make_cell: M
         full.full = False
         return scene.notices, await ask(client), str(scene.address)
 
-    notices, answer, address = in_scene(run, make_cell, play)
+    notices, answer, address = in_scene(run, make_realtime, play)
     assert notices == [f"no client is accepted on {address} for {RETRY_S:g} s: too many open files"]
     assert answer == ONE
 
@@ -318,7 +318,7 @@ class Full:
         self._listener.close()
 
 
-def test_a_flood_is_served_in_slices_between_the_requests_of_others(run: Run, make_cell: Make) -> None:
+def test_a_flood_is_served_in_slices_between_the_requests_of_others(run: Run, make_realtime: Make) -> None:
     """65 536 bytes at once are some 5000 requests; another client's single one is answered among the first of them."""
 
     async def play(scene: Scene) -> list[str]:
@@ -340,12 +340,12 @@ def test_a_flood_is_served_in_slices_between_the_requests_of_others(run: Run, ma
         await asyncio.gather(flooding(), asking())
         return order
 
-    order = in_scene(run, make_cell, play)
+    order = in_scene(run, make_realtime, play)
     assert len(order) == 5001
     assert order.index("other") < 2000
 
 
-def test_a_client_that_resets_after_a_wrong_header_is_told_by_its_address(run: Run, make_cell: Make) -> None:
+def test_a_client_that_resets_after_a_wrong_header_is_told_by_its_address(run: Run, make_realtime: Make) -> None:
     async def play(scene: Scene) -> tuple[list[str], str]:
         with socket.create_connection(scene.address) as client:
             await scene.fallen_to(1)
@@ -355,23 +355,23 @@ def test_a_client_that_resets_after_a_wrong_header_is_told_by_its_address(run: R
         await scene.fallen_to(0)
         return scene.notices, str(address)
 
-    notices, address = in_scene(run, make_cell, play)
+    notices, address = in_scene(run, make_realtime, play)
     assert notices == [f"client {address}: MBAP protocol 21536 is not 0; its connection is closed"]
 
 
-def test_what_is_no_name_of_a_host(run: Run, make_cell: Make) -> None:
+def test_what_is_no_name_of_a_host(run: Run, make_realtime: Make) -> None:
     async def scene() -> None:
-        cell, _ = make_cell()
+        realtime, _ = make_realtime()
         with pytest.raises(LineFailure, match=r"cannot listen on a\.\.b:0: no name of a host"):
-            await TcpLink(cell, Address("a..b", 0), lambda: TcpSlavePort({}), Clients()).open()
+            await TcpLink(realtime, Address("a..b", 0), lambda: TcpSlavePort({}), Clients()).open()
 
     run(scene())
 
 
-def test_closing_the_link_ends_its_connections_and_no_others(run: Run, make_cell: Make) -> None:
+def test_closing_the_link_ends_its_connections_and_no_others(run: Run, make_realtime: Make) -> None:
     async def scene() -> tuple[bytes, bytes]:
-        async with Scene(make_cell) as one:
-            line = TcpLink(one.cell, Address("127.0.0.1", 0), lambda: RtuSlavePort({1: one.device}), one.clients, one.kind)
+        async with Scene(make_realtime) as one:
+            line = TcpLink(one.realtime, Address("127.0.0.1", 0), lambda: RtuSlavePort({1: one.device}), one.clients, one.kind)
             rtu_reader, rtu_writer = await asyncio.open_connection(*await line.open())
             client = await one.client()
             await ask(client)
@@ -386,10 +386,10 @@ def test_closing_the_link_ends_its_connections_and_no_others(run: Run, make_cell
     assert run(scene()) == (b"", ONE)
 
 
-def test_a_port_that_is_taken(run: Run, make_cell: Make) -> None:
+def test_a_port_that_is_taken(run: Run, make_realtime: Make) -> None:
     async def scene() -> None:
-        async with Scene(make_cell) as one:
-            second = TcpLink(one.cell, one.address, lambda: TcpSlavePort({1: one.device}), one.clients)
+        async with Scene(make_realtime) as one:
+            second = TcpLink(one.realtime, one.address, lambda: TcpSlavePort({1: one.device}), one.clients)
             with pytest.raises(
                 LineFailure,
                 match=rf"cannot listen on 127\.0\.0\.1:{one.address.port}: address already in use; port 0 takes a free one$",

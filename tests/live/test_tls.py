@@ -72,7 +72,7 @@ def audited() -> list[tuple[Any, ...]]:
 
 
 @pytest.fixture
-def served(run: Any, make_cell: Any, folder: Path, audited: list[tuple[Any, ...]]) -> Callable[..., Any]:
+def served(run: Any, make_realtime: Any, folder: Path, audited: list[tuple[Any, ...]]) -> Callable[..., Any]:
     """``served(play)``: the value of ``await play(port, device)`` beside a twin whose line is encrypted, and its notices."""
 
     def serve(play: Callable[[int, Mic488Device], Any], files: TlsFiles | None = None, most: int = 10) -> tuple[Any, list[str]]:
@@ -80,14 +80,14 @@ def served(run: Any, make_cell: Any, folder: Path, audited: list[tuple[Any, ...]
         audited.clear()
 
         async def scene() -> Any:
-            cell, device = make_cell()
+            realtime, device = make_realtime()
             clients = Clients(most, notices.append)
             opened = await TRANSPORTS["tls_tcp"].open(
                 LinkArguments(
                     where="127.0.0.1:0",
                     make_port=lambda: TcpSlavePort({1: device}),
                     line=TwinLine(),
-                    cell=cell,
+                    realtime=realtime,
                     clients=clients,
                     tls=files or files_in(folder),
                     audit=lambda who, do, fields, outcome: audited.append((str(who), who.role, do, dict(fields), outcome)),
@@ -98,7 +98,7 @@ def served(run: Any, make_cell: Any, folder: Path, audited: list[tuple[Any, ...]
                 return await play(int(str(opened.details["port"])), device)
             finally:
                 await opened.link.close()
-                cell.close()
+                realtime.close()
                 assert not clients.present
 
         return run(scene()), notices

@@ -12,8 +12,8 @@ import pytest
 
 from steptwin.errors import LineFailure, Misuse
 from steptwin.live import ptys
-from steptwin.live.cell import Cell
 from steptwin.live.clients import Clients
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.rfc2217 import TwinLine
 from steptwin.live.transports import TRANSPORTS, LinkArguments, OpenLink
 from steptwin.mic488.device import Mic488Device
@@ -22,7 +22,7 @@ from steptwin.simulation.kinds.registry import line_kinds
 from steptwin.wire.slave import RtuSlavePort
 
 Run = Callable[..., Any]
-Make = Callable[[], tuple[Cell, Mic488Device]]
+Make = Callable[[], tuple[RealTimeDriver, Mic488Device]]
 
 INPUTS = bytes.fromhex("010213880008FD62")
 INPUTS_ANSWER = bytes.fromhex("01020100A188")
@@ -31,18 +31,18 @@ PLAIN = [key for key, transport in TRANSPORTS.items() if transport.is_address an
 SET_BAUD = bytes((255, 251, 44, 255, 250, 44, 1, 0, 0, 0x25, 0x80, 255, 240))  # RFC 2217: WILL COM-PORT-OPTION, 9600 bit/s
 
 
-def opened(run: Run, make_cell: Make, key: str, where: str, play: Callable[[OpenLink], Any], **changes: Any) -> Any:
+def opened(run: Run, make_realtime: Make, key: str, where: str, play: Callable[[OpenLink], Any], **changes: Any) -> Any:
     async def scene() -> Any:
-        cell, device = make_cell()
+        realtime, device = make_realtime()
         opening = LinkArguments(
-            where=where, make_port=lambda: RtuSlavePort({1: device}), line=TwinLine(), cell=cell, clients=Clients()
+            where=where, make_port=lambda: RtuSlavePort({1: device}), line=TwinLine(), realtime=realtime, clients=Clients()
         )
         found = await TRANSPORTS[key].open(replace(opening, **changes))
         try:
             return await play(found)
         finally:
             await found.link.close()
-            cell.close()
+            realtime.close()
 
     return run(scene())
 
@@ -63,57 +63,59 @@ def test_there_is_one_for_every_key_and_lines_name_no_others() -> None:
 
 
 @pytest.mark.parametrize("key", PLAIN)
-def test_those_that_listen_say_where_and_answer_there(run: Run, make_cell: Make, key: str) -> None:
+def test_those_that_listen_say_where_and_answer_there(run: Run, make_realtime: Make, key: str) -> None:
     async def play(found: OpenLink) -> tuple[str, dict[str, Any], bytes]:
         return found.place, dict(found.details), await asked(found, INPUTS, len(INPUTS_ANSWER))
 
-    place, details, answer = opened(run, make_cell, key, "127.0.0.1:0", play)
+    place, details, answer = opened(run, make_realtime, key, "127.0.0.1:0", play)
     assert place == f"127.0.0.1:{details['port']}"
     assert answer == INPUTS_ANSWER
 
 
 @pytest.mark.parametrize("key", PLAIN)
-def test_those_that_listen_need_permission_for_other_networks(run: Run, make_cell: Make, key: str) -> None:
+def test_those_that_listen_need_permission_for_other_networks(run: Run, make_realtime: Make, key: str) -> None:
     async def play(found: OpenLink) -> str:
         return found.place
 
     with pytest.raises(Misuse, match="is not a loopback address"):
-        opened(run, make_cell, key, "0.0.0.0:0", play)
-    assert opened(run, make_cell, key, "0.0.0.0:0", play, listen_any=True).startswith("0.0.0.0:")
+        opened(run, make_realtime, key, "0.0.0.0:0", play)
+    assert opened(run, make_realtime, key, "0.0.0.0:0", play, listen_any=True).startswith("0.0.0.0:")
 
 
-def test_settings_of_a_network_serial_port_are_compared_with_the_line(run: Run, make_cell: Make) -> None:
+def test_settings_of_a_network_serial_port_are_compared_with_the_line(run: Run, make_realtime: Make) -> None:
     notices: list[str] = []
 
     async def play(found: OpenLink) -> None:
         await asked(found, SET_BAUD + INPUTS, 3 + 9 + len(INPUTS_ANSWER))
 
-    opened(run, make_cell, "rfc2217", "127.0.0.1:0", play, line=TwinLine(lambda: 38400, False, notices.append))
+    opened(run, make_realtime, "rfc2217", "127.0.0.1:0", play, line=TwinLine(lambda: 38400, False, notices.append))
     assert [notice.partition(":")[2] for notice in notices] == [
         " 9600 bit/s 8N1 is set by its client, the line has 38400 bit/s 8N1: served all the same, as line timing is off"
     ]
 
 
-def test_a_pseudo_terminal_is_a_path(run: Run, make_cell: Make, tmp_path: Path) -> None:
+def test_a_pseudo_terminal_is_a_path(run: Run, make_realtime: Make, tmp_path: Path) -> None:
     path = tmp_path / "line"
 
     async def play(found: OpenLink) -> tuple[str, object, bool]:
         return found.place, found.details, path.is_symlink()
 
-    assert opened(run, make_cell, "pty", str(path), play) == (str(path), {"path": str(path)}, True)
+    assert opened(run, make_realtime, "pty", str(path), play) == (str(path), {"path": str(path)}, True)
 
 
-def test_a_system_without_pseudo_terminals(run: Run, make_cell: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_system_without_pseudo_terminals(
+    run: Run, make_realtime: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(ptys, "HAS_PTYS", False)
 
     async def play(found: OpenLink) -> None: ...
 
     with pytest.raises(Misuse, match=r"they exist on Linux and macOS only; use TCP, RTU over TCP or a network serial port"):
-        opened(run, make_cell, "pty", str(tmp_path / "line"), play)
+        opened(run, make_realtime, "pty", str(tmp_path / "line"), play)
 
 
-def test_a_serial_port_has_the_rate_of_its_line(run: Run, make_cell: Make) -> None:
+def test_a_serial_port_has_the_rate_of_its_line(run: Run, make_realtime: Make) -> None:
     async def play(found: OpenLink) -> None: ...
 
     with pytest.raises(LineFailure, match="cannot open serial port /dev/none at 4800 bit/s"):
-        opened(run, make_cell, "serial", "/dev/none", play, line=TwinLine(lambda: 4800))
+        opened(run, make_realtime, "serial", "/dev/none", play, line=TwinLine(lambda: 4800))

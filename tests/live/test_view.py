@@ -9,10 +9,10 @@ from typing import Any
 from rich.console import Console, Group
 
 from steptwin.files.world import World
-from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.display import banner
 from steptwin.live.output import Output
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.server import EndPoint
 from steptwin.live.view import LiveView, page
 from steptwin.live.world import LiveWorld, PlacePort
@@ -38,7 +38,7 @@ def screen(run: Run, world: World, width: int, height: int, *requests: bytes, ki
 
     async def scene() -> list[str]:
         live = LiveWorld(world)
-        view = LiveView(live, Cell(live, Clock()), Output(None))
+        view = LiveView(live, RealTimeDriver(live, Clock()), Output(None))
         view.begin(banner(world, END_POINTS, REMARKS), {})
         port = PlacePort(live, LINE, "tcp-1", kind)
         for request in requests:
@@ -122,7 +122,7 @@ def test_pulses_have_no_decimals(run: Run) -> None:
 def test_notices_are_among_the_events(run: Run) -> None:
     async def scene() -> list[str]:
         live = LiveWorld(demo())
-        view = LiveView(live, Cell(live, Clock()), Output(None))
+        view = LiveView(live, RealTimeDriver(live, Clock()), Output(None))
         view.begin(banner(live.world, END_POINTS, REMARKS), {})
         for number in range(9):
             view.notice(f"notice {number}")

@@ -53,7 +53,7 @@ class Asked(Rig):
         super().__init__(world or World.from_toml(LAMP, {"lamp.prg": PROGRAM}))
 
     def keep_past(self) -> Lookback:
-        return Lookback(self.live, self.cell, self.pace)
+        return Lookback(self.live, self.realtime, self.pace)
 
     async def why(self, question: str | None = None, **fields: object) -> Any:
         asked = {"question": question, **fields}

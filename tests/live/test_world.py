@@ -14,9 +14,9 @@ from steptwin.errors import Misuse
 from steptwin.files.session import session_of
 from steptwin.files.world import World
 from steptwin.live.batches import batches
-from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.links import Feed
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.sharedreads import share_reads
 from steptwin.live.world import LiveWorld, PlacePort, VisionPort
 from steptwin.live.world_frames import follow_frames
@@ -68,21 +68,21 @@ def test_a_read_through_a_world_takes_few_more_calls_than_one_of_a_served_contro
         world = World.from_toml(LINE)
         world.stop_recording()
         live = LiveWorld(world)
-        cell = Cell(live, Clock())
-        live.share_reads(cell)
+        realtime = RealTimeDriver(live, Clock())
+        live.share_reads(realtime)
         scheduler, device = Scheduler(), Mic488Device(ControllerConfig(), "1.70")
         scheduler.add("twin", device)
-        served = Cell(scheduler, Clock())
+        served = RealTimeDriver(scheduler, Clock())
         port = FaultyPort(TcpSlavePort(share_reads({1: device}, served)), "tcp-1", Faults(), FaultLine.TCP)
         clients = Client(), Client()
-        feeds = Feed(served, port, clients[0]), Feed(cell, PlacePort(live, "bus", "tcp-1", "tcp"), clients[1])
-        for one, feed in zip((served, cell), feeds, strict=True):
+        feeds = Feed(served, port, clients[0]), Feed(realtime, PlacePort(live, "bus", "tcp-1", "tcp"), clients[1])
+        for one, feed in zip((served, realtime), feeds, strict=True):
             one.start()
             feed.take(READ)  # connects
         few, many = (calls(lambda feed=feed: feed.take(READ)) for feed in feeds)
         assert clients[0].heard == clients[1].heard != b""
         assert many.total() <= few.total() + MORE_CALLS, many - few
-        for one in (served, cell):
+        for one in (served, realtime):
             one.close()
 
     asyncio.run(run())
@@ -147,11 +147,11 @@ def test_clients_that_are_served_together_share_what_they_read() -> None:
     async def run() -> None:
         world = World.from_toml(LINE)
         live = LiveWorld(world)
-        cell = Cell(live, Clock(wall_ns=lambda: 0))
-        live.share_reads(cell)
+        realtime = RealTimeDriver(live, Clock(wall_ns=lambda: 0))
+        live.share_reads(realtime)
         clients = [Client() for _ in range(3)]
-        feeds = [Feed(cell, PlacePort(live, "bus", f"tcp-{i}", "tcp"), client) for i, client in enumerate(clients)]
-        cell.start()
+        feeds = [Feed(realtime, PlacePort(live, "bus", f"tcp-{i}", "tcp"), client) for i, client in enumerate(clients)]
+        realtime.start()
         batches().current = 7
         assert calls(lambda: [feed.take(READ) for feed in feeds])["Mic488Device.execute"] == 1
         write = bytes.fromhex("00 01 00 00 00 06 01 05 17 70 ff 00")
@@ -159,20 +159,20 @@ def test_clients_that_are_served_together_share_what_they_read() -> None:
         assert calls(lambda: [feed.take(request) for feed in feeds for request in (READ, write)])["Mic488Device.execute"] == 5
         assert len({client.heard for client in clients}) == 1
         batches().current = 0
-        cell.close()
+        realtime.close()
 
     asyncio.run(run())
 
 
 def test_reads_of_scripts_are_not_shared() -> None:
-    """Scripts read at many moments while a cell brings the world to one."""
+    """Scripts read at many moments while a real-time driver brings the world to one."""
 
     async def run() -> None:
         world = World.from_toml(LINE)
         live = LiveWorld(world)
         wall = [0]
-        cell = Cell(live, Clock(wall_ns=lambda: wall[0]))
-        live.share_reads(cell)
+        realtime = RealTimeDriver(live, Clock(wall_ns=lambda: wall[0]))
+        live.share_reads(realtime)
         answers: list[bytes | None] = []
 
         def operator() -> do.Steps:
@@ -184,8 +184,8 @@ def test_reads_of_scripts_are_not_shared() -> None:
 
         world.script(operator)
         wall[0] = SECOND
-        cell.enter()
-        cell.close()
+        realtime.enter()
+        realtime.close()
         assert answers == [bytes.fromhex("02 01 00"), bytes.fromhex("02 01 01")]
 
     asyncio.run(run())

@@ -12,9 +12,9 @@ import pytest
 from steptwin.errors import Misuse
 from steptwin.files.session import session_of
 from steptwin.files.world import World
-from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.pace import Pace
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import SECOND
@@ -34,9 +34,9 @@ class Rig:
         loop = asyncio.get_running_loop()
         self.world = World.load(EXAMPLES / "feeder.toml")
         self.live = LiveWorld(self.world)
-        self.cell = Cell(self.live, Clock(wall_ns=lambda: round(loop.time() * SECOND)))
-        self.pace = Pace(self.live, self.cell, lambda _: None, has_clients=True)
-        self.control = WorldControl(self.cell, self.live, self.pace, lambda: ["here"])
+        self.realtime = RealTimeDriver(self.live, Clock(wall_ns=lambda: round(loop.time() * SECOND)))
+        self.pace = Pace(self.live, self.realtime, lambda _: None, has_clients=True)
+        self.control = WorldControl(self.realtime, self.live, self.pace, lambda: ["here"])
         self.pace.begin(1.0)
 
 
@@ -44,7 +44,7 @@ def scene(run: Run, play: Callable[[Rig], Awaitable[None]]) -> None:
     async def played() -> None:
         rig = Rig()
         await play(rig)
-        rig.cell.close()
+        rig.realtime.close()
         session = session_of(rig.world)
         assert session.replay().trace.digest() == session.digest
 

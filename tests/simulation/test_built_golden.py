@@ -113,7 +113,7 @@ to = "a.IN6"
 
 
 def described(world: World) -> Iterator[str]:
-    yield f"schedulers: {'; '.join(' '.join(names) for names in world.blueprint.joined or ())}"
+    yield f"schedulers: {'; '.join(' '.join(names) for names in world.blueprint.connected or ())}"
     for name, axis in world.parts.built(AXIS).items():
         yield f"axis {name}: {axis.mechanism.build}, {float(axis.scale.pulses_per_unit):.12g} imp/{axis.scale.unit}"
     yield from (f"view {'.'.join(name)}: {view}" for name, view in axis_views(world).items())

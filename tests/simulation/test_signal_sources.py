@@ -96,7 +96,7 @@ OF_ELEMENTS = {
 
 
 class Layout:
-    """A random world without scripts. Its machines are joined by wires."""
+    """A random world without scripts. Its machines are connected by wires."""
 
     def __init__(self, random: Random) -> None:
         self.random = random

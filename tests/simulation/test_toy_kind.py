@@ -19,10 +19,10 @@ from steptwin.files.export import axis_views, read_trace, write_trace
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.live import twins
-from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.options import LiveOptions, UpOptions
 from steptwin.live.output import Output
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.running import up
 from steptwin.live.view import LiveView
 from steptwin.live.world import LiveWorld, PlacePort, announced
@@ -196,7 +196,7 @@ def test_a_program_outside_talks_to_it() -> None:
 def test_the_live_view_shows_it(run: Callable[..., Any]) -> None:
     async def scene() -> list[str]:
         live = LiveWorld(World.from_toml(TEXT))
-        view = LiveView(live, Cell(live, Clock()), Output(None))
+        view = LiveView(live, RealTimeDriver(live, Clock()), Output(None))
         live.advance(100_000_000)
         return [line.plain for line in view.lines(80, 40)]
 

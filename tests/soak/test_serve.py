@@ -14,8 +14,8 @@ from soak import scaled
 from virtual_loop import run_virtually
 
 from steptwin.files.world import World
-from steptwin.live.cell import Cell
 from steptwin.live.links import Feed
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.live.world_frames import follow_frames
 from steptwin.m1486.events import EVENTS_KEPT
@@ -41,7 +41,7 @@ class Client:
         self.received += len(data)
 
 
-Begin = Callable[[LiveWorld, Cell], Callable[[bytes], None]]
+Begin = Callable[[LiveWorld, RealTimeDriver], Callable[[bytes], None]]
 
 
 def fill(live: LiveWorld) -> None:
@@ -64,10 +64,10 @@ def small(text: str, files: dict[str, bytes] | None = None, *, watched: bool) ->
 async def _grown(live: LiveWorld, begin: Begin, sent: Iterator[bytes], requests: int, pause_s: float) -> tuple[Held, Held]:
     """What is held after the first requests and after many more, each time when all work is done."""
     loop: Any = asyncio.get_running_loop()
-    cell = Cell(live, loop.clock())
+    realtime = RealTimeDriver(live, loop.clock())
     live.world.trace.watchers.append(lambda record: None)
-    send = begin(live, cell)
-    cell.start()
+    send = begin(live, realtime)
+    realtime.start()
 
     async def level(requests: int) -> Held:
         for data in islice(sent, requests):
@@ -75,10 +75,10 @@ async def _grown(live: LiveWorld, begin: Begin, sent: Iterator[bytes], requests:
             await asyncio.sleep(pause_s)
         await asyncio.sleep(10.0)
         fill(live)  # the events that are kept are as long as those of the other level
-        return held(live, cell, send)
+        return held(live, realtime, send)
 
     levels = await level(FIRST), await level(requests)
-    cell.close()
+    realtime.close()
     return levels
 
 
@@ -107,9 +107,9 @@ def characters(chance: random.Random) -> Iterator[bytes]:
             data = data[size:]
 
 
-def to_chips(live: LiveWorld, cell: Cell) -> Callable[[bytes], None]:
+def to_chips(live: LiveWorld, realtime: RealTimeDriver) -> Callable[[bytes], None]:
     """A client that types and reads, one that has stopped reading."""
-    feeds = [Feed(cell, PlacePort(live, LINE, name, "raw"), Client()) for name in ("pty", "tcp-1")]
+    feeds = [Feed(realtime, PlacePort(live, LINE, name, "raw"), Client()) for name in ("pty", "tcp-1")]
     feeds[1].is_read = False
     return feeds[0].take
 
@@ -127,7 +127,7 @@ def test_a_chip_that_sends_to_nobody() -> None:
     program = {"p.m1486": b"[\n@1\nw10\nu20\nc1\nt1\nj1\n]"}
     live = small(m1486_world(Whole(name="soak"), [15], {"variant": "B", "program": "p.m1486"}), program, watched=False)
 
-    def nobody(live: LiveWorld, cell: Cell) -> Callable[[bytes], None]:
+    def nobody(live: LiveWorld, realtime: RealTimeDriver) -> Callable[[bytes], None]:
         return lambda data: None
 
     assert_level(live, nobody, repeat(b""), REQUESTS, 0.012)
@@ -163,9 +163,9 @@ def tcp_requests(chance: random.Random) -> Iterator[bytes]:
 
 
 def one_client(kind: str) -> Begin:
-    def begin(live: LiveWorld, cell: Cell) -> Callable[[bytes], None]:
-        live.share_reads(cell)
-        return Feed(cell, PlacePort(live, LINE, f"{kind}-1", kind), Client()).take
+    def begin(live: LiveWorld, realtime: RealTimeDriver) -> Callable[[bytes], None]:
+        live.share_reads(realtime)
+        return Feed(realtime, PlacePort(live, LINE, f"{kind}-1", kind), Client()).take
 
     return begin
 
@@ -184,10 +184,10 @@ def test_requests_to_mic488_controllers(kind: str, frames: bool) -> None:
 def test_clients_that_come_and_go(kind: str) -> None:
     chance, numbers = random.Random(4), count(1)
 
-    def begin(live: LiveWorld, cell: Cell) -> Callable[[bytes], None]:
+    def begin(live: LiveWorld, realtime: RealTimeDriver) -> Callable[[bytes], None]:
         def visit(data: bytes) -> None:
             place = PlacePort(live, LINE, f"tcp-{next(numbers)}", "raw" if kind == "m1486" else "tcp")
-            feed = Feed(cell, place, Client())
+            feed = Feed(realtime, place, Client())
             feed.take(data)
             feed.close()
 

@@ -23,7 +23,7 @@ from steptwin.drivers.place import LineAddress
 from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart
 from steptwin.drivers.tasks import TaskLine
 from steptwin.live.bridge import _Devices, connections_of
-from steptwin.live.cell import Cell
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program import ProgramState
@@ -43,8 +43,8 @@ BEGINS = ("moves", "seeks")
 class SilentLine:
     """A Modbus TCP line to a twin. While it is silent, what is sent waits, in its order."""
 
-    def __init__(self, cell: Cell, device: Mic488Device) -> None:
-        self._cell = cell
+    def __init__(self, realtime: RealTimeDriver, device: Mic488Device) -> None:
+        self._realtime = realtime
         self._port = TcpSlavePort({1: device})
         self._protocol: asyncio.Protocol | None = None
         self._waiting: list[bytes] = []
@@ -73,9 +73,9 @@ class SilentLine:
         if self._is_silent:
             self._waiting.append(data)
             return
-        now = self._cell.enter()
+        now = self._realtime.enter()
         answer = self._port.exchange(data, now)
-        self._cell.leave()
+        self._realtime.leave()
         if answer and self._protocol is not None:
             asyncio.get_running_loop().call_soon(self._protocol.data_received, answer)
 
@@ -119,14 +119,14 @@ class BridgeRig(BridgedDevice):
         scheduler = Scheduler()
         scheduler.add("table", self.device)
         loop: Any = asyncio.get_running_loop()
-        self.cell = Cell(scheduler, loop.clock())
-        self.line = SilentLine(self.cell, self.device)
+        self.realtime = RealTimeDriver(scheduler, loop.clock())
+        self.line = SilentLine(self.realtime, self.device)
 
     async def open(self) -> None:
-        self.cell.start()
+        self.realtime.start()
         endpoint: Any = self.line
-        exchanger, notes = modbus_exchanger(LineAddress(endpoint, framed=True), 100.0, None)
-        driver_line: TaskLine[Any, Any] = TaskLine(endpoint, exchanger, notes)
+        exchanger, shared = modbus_exchanger(LineAddress(endpoint, framed=True), 100.0, None)
+        driver_line: TaskLine[Any, Any] = TaskLine(endpoint, exchanger, shared)
         await driver_line.open()
         mic = AsyncMic488(driver_line, 1, firmware="1.70", config=self.device.config, timeout_s=3.0, observe=True)
         await mic.open()
@@ -135,17 +135,17 @@ class BridgeRig(BridgedDevice):
 
     async def close(self) -> None:
         await self.connected.close()
-        self.cell.close()
+        self.realtime.close()
 
     async def wait(self, seconds: float) -> None:
         await asyncio.sleep(seconds)
-        self.cell.enter()
-        self.cell.leave()
+        self.realtime.enter()
+        self.realtime.leave()
 
     @property
     def is_moving(self) -> bool:
-        self.cell.enter()
-        return self.device.axes[AXIS - 1].profile.moving(self.cell.scheduler.now)
+        self.realtime.enter()
+        return self.device.axes[AXIS - 1].profile.moving(self.realtime.scheduler.now)
 
     @property
     def is_running(self) -> bool:
@@ -153,8 +153,8 @@ class BridgeRig(BridgedDevice):
 
     @property
     def position(self) -> float:
-        self.cell.enter()
-        return self.device.axes[AXIS - 1].profile.position(self.cell.scheduler.now)
+        self.realtime.enter()
+        return self.device.axes[AXIS - 1].profile.position(self.realtime.scheduler.now)
 
 
 class ChipBridgeRig(BridgedDevice):

@@ -155,8 +155,8 @@ def typed(wire: ChipWire) -> str:
 
 def chip_line(wire: ChipWire, log: Callable[[str], object] | None = None) -> ThreadLine[ChipRequest, bytes]:
     endpoint = MemoryEndpoint(wire)
-    exchanger, notes = talking(endpoint, BAUD, log)
-    return ThreadLine(endpoint, exchanger, notes, clock=wire.clock, sleeping=wire.sleep)
+    exchanger, shared = talking(endpoint, BAUD, log)
+    return ThreadLine(endpoint, exchanger, shared, clock=wire.clock, sleeping=wire.sleep)
 
 
 def chip_task_line(wire: ChipWire) -> TaskLine[ChipRequest, bytes]:

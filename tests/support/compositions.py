@@ -17,7 +17,7 @@ from random_worlds import shown
 
 from steptwin.campaign.properties import read_property
 from steptwin.debug.debugger import Debugger
-from steptwin.debug.scout import Goal
+from steptwin.debug.lookahead import Goal
 from steptwin.files.world import World
 from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.kinds.mic488.build import _loaded

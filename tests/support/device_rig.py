@@ -6,7 +6,7 @@ from steptwin.drivers.m1486 import M1486
 from steptwin.drivers.mic488.sync import Mic488
 from steptwin.files.world import World
 from steptwin.live.world import LiveWorld, PlacePort
-from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, joined_chip, joined_driver
+from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, connected_chip, connected_driver
 
 CELL = """
 [world]
@@ -62,6 +62,6 @@ class Rig:
         self.time = VirtualTime(self.live)
         bus = MemoryEndpoint(self.time, lambda: PlacePort(self.live, "bus", "tcp-1", "tcp"), "bus")
         config = self.world.mic488["table"].device.config
-        self.mic: Mic488 = joined_driver(bus, self.time, 1, framed=True, firmware="1.70", config=config)
+        self.mic: Mic488 = connected_driver(bus, self.time, 1, framed=True, firmware="1.70", config=config)
         chips = MemoryEndpoint(self.time, lambda: PlacePort(self.live, "chips", "raw-1", "raw"), "chips")
-        self.chip: M1486 = joined_chip(chips, self.time, 3)
+        self.chip: M1486 = connected_chip(chips, self.time, 3)

@@ -23,7 +23,7 @@ from steptwin.subject import commands as command
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Following
-from steptwin.subject.jogs import Held, WorldJogs
+from steptwin.subject.jogs import ExtendableJog, WorldJogs
 from steptwin.subject.world import WorldSubject
 
 
@@ -54,7 +54,7 @@ class GatewayWorld:
             raise self.silence
         return self.inner.do(wanted)
 
-    async def begin_jog(self, wanted: command.Jog, /) -> Held:
+    async def begin_jog(self, wanted: command.Jog, /) -> ExtendableJog:
         return await self.jogs.begin_jog(wanted)
 
     def follow(self, what: Filter, bound: int) -> Following:

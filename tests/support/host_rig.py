@@ -195,28 +195,28 @@ def fill(wire: Wire) -> None:
 
 
 def _exchanger(wire: Wire, interval: int, log: list[str] | None) -> tuple[Exchanger[ModbusQuery, bytes], dict[str, object]]:
-    notes: dict[str, object] = {"tcp": wire.tcp}
+    shared: dict[str, object] = {"tcp": wire.tcp}
     observer = None
     if log is not None:
         frames = FrameWords(tcp=wire.tcp)
         frames.sinks.append(lambda frame: log.append(f"{frame.direction.value if frame.direction else '?'} {frame.meaning}"))
-        notes["frames"] = frames
+        shared["frames"] = frames
         observer = frames.observe
     discipline = TcpMaster("memory", on_frame=observer) if wire.tcp else RtuMaster(on_frame=observer)
-    return Exchanger(discipline, "memory", interval), notes
+    return Exchanger(discipline, "memory", interval), shared
 
 
 def thread_line(wire: Wire, *, interval: int = INTERVAL, log: list[str] | None = None) -> ThreadLine[ModbusQuery, bytes]:
-    exchanger, notes = _exchanger(wire, interval, log)
+    exchanger, shared = _exchanger(wire, interval, log)
     line = ThreadLine(MemoryEndpoint(wire), exchanger, clock=wire.clock, sleeping=wire.sleep)
-    line.notes.update(notes)
+    line.shared.update(shared)
     return line
 
 
 def task_line(wire: Wire, *, interval: int = INTERVAL, log: list[str] | None = None) -> TaskLine[ModbusQuery, bytes]:
-    exchanger, notes = _exchanger(wire, interval, log)
+    exchanger, shared = _exchanger(wire, interval, log)
     line = TaskLine(MemoryEndpoint(wire), exchanger)
-    line.notes.update(notes)
+    line.shared.update(shared)
     return line
 
 

@@ -8,9 +8,9 @@ from typing import Any
 from steptwin.devices.composite import CompositeSubject
 from steptwin.devices.worldpart import WorldPart
 from steptwin.files.world import World
-from steptwin.live.cell import Cell
 from steptwin.live.gateways import LiveWorldSubject
 from steptwin.live.pace import Pace
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_control import WorldControl
 from steptwin.machine import Nanos
@@ -62,35 +62,35 @@ class UpRig:
         self.world = World.from_toml(text.format(timing=timing, kind=kind), {"p.prg": LOOPING.encode()})
         loop: Any = asyncio.get_running_loop()
         self.live = LiveWorld(self.world)
-        self.cell = Cell(self.live, loop.clock())
-        pace = Pace(self.live, self.cell, lambda _: None, has_clients=True)
-        self.control = WorldControl(self.cell, self.live, pace, list)
+        self.realtime = RealTimeDriver(self.live, loop.clock())
+        pace = Pace(self.live, self.realtime, lambda _: None, has_clients=True)
+        self.control = WorldControl(self.realtime, self.live, pace, list)
         self.subject = LiveWorldSubject(self.control, self.live)
         jogs = WorldJogs(self.live.subject, self.control.at_present)
-        self.live.companion = jogs
+        self.live.external_actor = jogs
         world = WorldPart(self.control, self.live.subject.followers, jogs)
         self.composite = CompositeSubject(world, lambda: self.live.now, self.live.subject.numbering)
 
     async def open(self) -> None:
-        self.cell.start()
-        self.cell.clock.run(1.0)
+        self.realtime.start()
+        self.realtime.clock.run(1.0)
         self._followed = self.subject.follow(filter_of(["plan", "status"]), 100_000)
         self._begun: list[Nanos] = []
 
     async def close(self) -> None:
-        self.cell.close()
+        self.realtime.close()
 
     async def wait(self, seconds: float) -> None:
         await asyncio.sleep(seconds)
-        self.cell.enter()
-        self.cell.leave()
+        self.realtime.enter()
+        self.realtime.leave()
 
     async def begin_program(self, text: str) -> None:
         await self.subject.do(Download("table", "program", text))
 
     @property
     def now(self) -> Nanos:
-        self.cell.enter()
+        self.realtime.enter()
         return self.live.now
 
     @property
@@ -106,6 +106,6 @@ class UpRig:
 
     @property
     def is_moving(self) -> bool:
-        self.cell.enter()
+        self.realtime.enter()
         (reading,) = self.subject.read("table.M1.moving" if self.kind == "MIC488" else "table.moving")
         return reading.value == 1.0

@@ -100,7 +100,7 @@ class CaseRunner:
         common = self._blueprint(overrides)
         blueprint = common.with_seed(seed)
         world = World(blueprint, keep_trace=keep, keep_inputs=keep)
-        common.joined = blueprint.joined
+        common.connected = blueprint.connected
         return world
 
     def _blueprint(self, overrides: Overrides) -> Blueprint:

@@ -1,9 +1,9 @@
 """A debugger of the programs in a world, forwards and backwards in time.
 
-It stands between two moments of the world. Before the world goes on, a second one, the scout, goes ahead and finds the moment at
-which the run is to stop (`steptwin.debug.scout`); then the world is run to the end of the moment before it. So the world itself
-is only run, as ever. The scout is also what is looked at in the past, to which it is brought by a state and the inputs since
-(`steptwin.simulation.world.history`).
+It stands between two moments of the world. Before the world goes on, a second one, the look-ahead run, goes ahead and finds the
+moment at which the run is to stop (`steptwin.debug.lookahead`); then the world is run to the end of the moment before it. So the
+world itself is only run, as ever. The look-ahead run is also what is looked at in the past, to which it is brought by a state and
+the inputs since (`steptwin.simulation.world.history`).
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import TypeAlias, TypeVar
 from steptwin.debug import scopes
 from steptwin.debug.breakpoints import AnyPoint
 from steptwin.debug.calculation import number_text
+from steptwin.debug.lookahead import Goal, LookAheadRun, Parts
 from steptwin.debug.observer import Logged
-from steptwin.debug.scout import Goal, Parts, Scout
 from steptwin.debug.values import Events, Location, Scope, SetPoint, ShownValue, StackFrame, Stopped, StopReason
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
@@ -88,7 +88,7 @@ class Debugger:
         self._history = History(world) if history is None else history
         self._history.take()
         self._why = PastQuestions(self._history)
-        self._scout = Scout(self._history)
+        self._lookahead = LookAheadRun(self._history)
         self._is_past = False
 
     def close(self) -> None:
@@ -102,18 +102,18 @@ class Debugger:
     @property
     def on_log(self) -> Callable[[Logged], None]:
         """Called with the text of log points, once for each time that they are passed."""
-        return self._scout.on_log
+        return self._lookahead.on_log
 
     @on_log.setter
     def on_log(self, on_log: Callable[[Logged], None]) -> None:
-        self._scout.on_log = on_log
+        self._lookahead.on_log = on_log
 
     # ------------------------------------------------------------------ where it stands
 
     @property
     def view(self) -> Simulation:
         """The world as it is where the debugger stands; to look at only."""
-        return self._scout.world if self._is_past else self._world
+        return self._lookahead.world if self._is_past else self._world
 
     @property
     def now(self) -> Nanos:
@@ -187,13 +187,13 @@ class Debugger:
             raise Misuse(NOT_IN_THE_PAST(name=name, ago=ago))
         value = scopes.evaluate(self._world, machine, text).number or 0.0
         self._apply_input(scopes.setting(self._world, machine, name, value))
-        self._scout.changed(self.now)
+        self._lookahead.changed(self.now)
         return ShownValue(name, number_text(value), value, is_settable=True)
 
     def branch(self) -> None:
         """Have the world go on from here: what came later has not happened."""
         if self._is_past:
-            self._go_back(self._scout.world.snapshot(with_inputs=False))
+            self._go_back(self._lookahead.world.snapshot(with_inputs=False))
             self.gone_back()
 
     def _take_back(self, snapshot: SimulationSnapshot) -> None:
@@ -203,18 +203,18 @@ class Debugger:
     def gone_back(self) -> None:
         """The world has gone back to its present moment."""
         self._is_past = False
-        self._scout.changed(self.now)
+        self._lookahead.changed(self.now)
 
     # ------------------------------------------------------------------ breakpoints
 
     def set_breakpoints(self, points: Sequence[AnyPoint]) -> Sequence[SetPoint]:
         """Set these breakpoints and no others; what became of each."""
-        self._scout.release()
-        return self._scout.points.set(points, self.view if self._is_own_history else None)
+        self._lookahead.release()
+        return self._lookahead.points.set(points, self.view if self._is_own_history else None)
 
     def set_events(self, events: Iterable[Events]) -> None:
         """Stop at these events and no others."""
-        self._scout.stop_at([code for event in events for code in event.codes])
+        self._lookahead.stop_at([code for event in events for code in event.codes])
 
     # ------------------------------------------------------------------ what steps look for
 
@@ -276,22 +276,22 @@ class Debugger:
         start = self.now
         if not self._is_past:
             self._history.take()
-        yield from self._scout.look_at(start)
+        yield from self._lookahead.look_at(start)
         slices = self._slices(goal)
-        while until is None or self._scout.now < until:
-            begin = self._scout.now
+        while until is None or self._lookahead.now < until:
+            begin = self._lookahead.now
             end = self._slice_end(begin, begin + next(slices), until)
             if end is None:
                 yield from self._stand_at(begin)
                 return Stopped(StopReason.IDLE, self.now, text=self._why_idle())
-            stop = yield from self._scout.find(end, goal, start)
+            stop = yield from self._lookahead.find(end, goal, start)
             if stop is not None:
                 yield from self._stand_at(stop.time)
                 return stop
             if end > self.present:
                 self._bring_world(end)
             yield
-        yield from self._stand_at(self._scout.now)
+        yield from self._stand_at(self._lookahead.now)
         return Stopped(StopReason.LIMIT, self.now)
 
     def _slices(self, goal: Goal) -> Iterator[Nanos]:
@@ -303,10 +303,10 @@ class Debugger:
             count = min(2 * count, most)
 
     def _slice_end(self, begin: Nanos, end: Nanos, until: Nanos | None) -> Nanos | None:
-        """Up to where the scout goes next; None where nothing will happen any more."""
+        """Up to where the look-ahead run goes next; None where nothing will happen any more."""
         if begin < self.present:
             end = min(end, self.present)
-        elif (due := next_due(self._scout.world)) is not None:
+        elif (due := next_due(self._lookahead.world)) is not None:
             end = max(end, due)
         elif until is None:
             return None
@@ -319,22 +319,22 @@ class Debugger:
     def look_ahead(self, until: Nanos, goal: Goal, after: Nanos) -> Stopped | None:
         """The first reason to stop between the present and ``until``, after another moment; the world is brought to it, or to
         ``until``, before the next call."""
-        scout = self._scout
+        lookahead = self._lookahead
         self._is_past = False
-        if not scout.looks_for(goal):
+        if not lookahead.looks_for(goal):
             return None
-        stop, slices = _finished(scout.catch_up(goal)), self._slices(goal)
-        while stop is None and scout.now < until:
-            stop = _finished(scout.find(min(scout.now + next(slices), until), goal, after))
+        stop, slices = _finished(lookahead.catch_up(goal)), self._slices(goal)
+        while stop is None and lookahead.now < until:
+            stop = _finished(lookahead.find(min(lookahead.now + next(slices), until), goal, after))
         if stop is not None:
-            scout.stopped()
+            lookahead.stopped()
         return stop
 
     def stand(self) -> None:
         """Look at the present, at which the world stands now."""
         self._is_past = False
         self._history.take()
-        _finished(self._scout.look_at(self.present))
+        _finished(self._lookahead.look_at(self.present))
 
     # ------------------------------------------------------------------ backwards
 
@@ -372,7 +372,7 @@ class Debugger:
         slices = self._slices(goal)
         while upper > self.begin:
             lower = max(self._history.state_at(upper - 1)[0].now, upper - next(slices))
-            stop = yield from self._scout.find_back(lower, upper, goal, self.begin, before)
+            stop = yield from self._lookahead.find_back(lower, upper, goal, self.begin, before)
             if stop is not None:
                 yield from self._stand_at(stop.time)
                 return stop
@@ -385,13 +385,13 @@ class Debugger:
 
     def pause(self) -> Stopped:
         """Stand where the run that was ended has come to."""
-        _finished(self._going(max(self.begin, min(self._scout.now, self.present))))
+        _finished(self._going(max(self.begin, min(self._lookahead.now, self.present))))
         return Stopped(StopReason.PAUSE, self.now)
 
     def _stand_at(self, moment: Nanos) -> Parts:
         """Look at a moment that has been, or run the world to one that comes."""
         if moment < self.present:
-            yield from self._scout.look_at(moment)
+            yield from self._lookahead.look_at(moment)
             self._is_past = True
             return
         self._is_past = False

@@ -19,7 +19,7 @@ from steptwin.subject.commands import COMMANDS, Command, type_of
 from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
 from steptwin.subject.events import Event, Numbering
 from steptwin.subject.following import Filter, Followers, Following
-from steptwin.subject.jogs import Held
+from steptwin.subject.jogs import ExtendableJog
 
 TIME = "time"
 
@@ -43,7 +43,7 @@ class SubjectPart(Protocol):
         """The address on the line that characters begin with selecting; None without one."""
         ...
 
-    async def begin_jog(self, wanted: command.Jog) -> Held: ...
+    async def begin_jog(self, wanted: command.Jog) -> ExtendableJog: ...
 
 
 UNKNOWN_MACHINE = Message("devices.unknown-machine", "no machine is called {machine!r}{hint}; {known}")
@@ -262,5 +262,5 @@ class CompositeSubject:
 
     # ------------------------------------------------------------------ as `Jogs`
 
-    async def begin_jog(self, wanted: command.Jog) -> Held:
+    async def begin_jog(self, wanted: command.Jog) -> ExtendableJog:
         return await self._part_called(wanted.machine).begin_jog(wanted)

@@ -12,8 +12,8 @@ import contextlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from steptwin.devices.digitalshadow import DigitalShadow, Known
 from steptwin.devices.jog import LeasedJog
-from steptwin.devices.shadow import Known, Shadow
 from steptwin.diagnostics import SourceText
 from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart, RawEffect
 from steptwin.errors import LineFailure, Refusal, SteptwinError
@@ -27,7 +27,7 @@ from steptwin.subject.commands import Command, type_of
 from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Followers
-from steptwin.subject.jogs import Held
+from steptwin.subject.jogs import ExtendableJog
 from steptwin.subject.payloads import NOT_ENABLED, InputPayload, StatusPayload
 from steptwin.tracing import span
 
@@ -95,7 +95,7 @@ class ConnectedDevice:
         self._jogs: dict[int, LeasedJog] = {}
         self._jog_turns: dict[int, asyncio.Lock] = {}
         self._wanted = asyncio.Event()
-        self._shadow: Shadow | None = None
+        self._shadow: DigitalShadow | None = None
         self._registers_due: Nanos = 0
         self._polling = asyncio.get_running_loop().create_task(self._poll())
 
@@ -329,7 +329,7 @@ class ConnectedDevice:
                 raise Refusal(AXIS_IS_JOGGED(name=self.name))
             twin = await self._device.twin(self.name)
             now = self._around.clock()
-            self._shadow = Shadow(self.name, self._subject.description.machines[0].datasheet, twin, now)
+            self._shadow = DigitalShadow(self.name, self._subject.description.machines[0].datasheet, twin, now)
             self._registers_due = now + REGISTERS_NS
         self._wanted.set()
 
@@ -339,7 +339,7 @@ class ConnectedDevice:
     def shadow_state(self, after: Nanos) -> Mapping[str, object] | None:
         return None if self._shadow is None else self._shadow.plain(after)
 
-    async def _compare(self, shadow: Shadow) -> None:
+    async def _compare(self, shadow: DigitalShadow) -> None:
         """Not while a command is executed, of which the twin knows nothing yet."""
         async with self._turn:
             begun = self._around.clock()
@@ -355,14 +355,14 @@ class ConnectedDevice:
 
     # ------------------------------------------------------------------ jogs
 
-    async def begin_jog(self, wanted: command.Jog) -> Held:
+    async def begin_jog(self, wanted: command.Jog) -> ExtendableJog:
         return await later(self._begin_jog(wanted))
 
     async def _begin_jog(self, wanted: command.Jog) -> LeasedJog:
         if self.lost is not None:
             raise LineFailure(CONNECTION_IS_LOST(command="jog", lost=text_of(self.lost)))
         self._refuse_while_stopping(wanted)
-        jog = self._device.held_jog(wanted)
+        jog = self._device.dead_man_jog(wanted)
         stops = self._stops
         turn = self._jog_turns.setdefault(wanted.axis, asyncio.Lock())
         try:

@@ -20,7 +20,7 @@ JOG_NOT_BEGUN = Message("devices.jog-not-begun", "the jog was not begun: {why}")
 
 
 class LeasedJog:
-    """See `steptwin.subject.jogs.Held`. ``report`` is called with an error at its end."""
+    """See `steptwin.subject.jogs.ExtendableJog`. ``report`` is called with an error at its end."""
 
     lasts_ns = LEASE_NS
 
@@ -77,7 +77,7 @@ class LeasedJog:
             except Exception as error:  # noqa: BLE001  no caller waits for the end
                 self._report(error)
 
-    # ------------------------------------------------------------------ as `Held`
+    # ------------------------------------------------------------------ as `ExtendableJog`
 
     def extend(self) -> None:
         now = self._clock()

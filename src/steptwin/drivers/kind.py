@@ -140,7 +140,7 @@ class DeviceMotion(Generic[D]):
     """Effect that a stop spoils, as the end of a sentence."""
 
 
-class DeviceHeldJog(Protocol):
+class DeviceDeadManJog(Protocol):
     """A jog that has to be held: ``with jog: while ...: jog.hold()``. At the end of the block the axis brakes."""
 
     def __enter__(self) -> object: ...
@@ -400,8 +400,8 @@ class DriverKind(OptionalMethods, ABC, Generic[D]):
         """The same, for a motion until a line has its end level."""
         raise self.lacks("seek")
 
-    def jog(self, driver: D, axis: int, velocity: float, hold_s: float) -> DeviceHeldJog:
-        """A jog of an axis, which lasts for ``hold_s`` after each `DeviceHeldJog.hold`."""
+    def jog(self, driver: D, axis: int, velocity: float, hold_s: float) -> DeviceDeadManJog:
+        """A jog of an axis, which lasts for ``hold_s`` after each `DeviceDeadManJog.hold`."""
         raise self.lacks("jog")
 
     @abstractmethod

@@ -25,10 +25,10 @@ LOCK_SLICE_S = 1.0
 class DriverLine(Protocol[Q, A]):
     """A line that several drivers, tasks or threads may share.
 
-    ``notes`` holds the state that drivers of one device on the line share.
+    ``shared`` holds the state that drivers of one device on the line share.
     """
 
-    notes: dict[Hashable, Any]
+    shared: dict[Hashable, Any]
 
     @property
     def place(self) -> str:

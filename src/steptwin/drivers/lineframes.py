@@ -11,7 +11,7 @@ from steptwin.errors import LineFailure
 from steptwin.wire.slave import FrameDirection
 
 FRAMES = "line frames"
-"""The key of the `LineFrames` in a line's notes."""
+"""The key of the `LineFrames` in a line's shared state."""
 
 
 class SeenFrame(NamedTuple):

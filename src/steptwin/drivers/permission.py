@@ -4,8 +4,8 @@ A program can be suspended at any moment, by a debugger, SIGSTOP, the sleep of a
 hours later. A person at the machine does not expect a motion then. So a motion has a permission that expires; it is checked
 against the clock immediately before sending.
 
-A held jog has one permission from before its first motion to its end, of the hold time: each answer of the device that belongs
-to the motion extends it, and nothing else. A process that was away for longer finds it expired, for good (ADR 12).
+A dead-man jog has one permission from before its first motion to its end, of the hold time: each answer of the device that
+belongs to the motion extends it, and nothing else. A process that was away for longer finds it expired, for good (ADR 12).
 """
 
 from __future__ import annotations

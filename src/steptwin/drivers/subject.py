@@ -127,7 +127,7 @@ class DevicePart(Protocol):
         """Forget the last call of `look`: the next one gives samples of all axes."""
         ...
 
-    def held_jog(self, wanted: command.Jog) -> DeviceJog:
+    def dead_man_jog(self, wanted: command.Jog) -> DeviceJog:
         """A jog of bounded motions that lasts while it is held. Raises `Misuse`."""
         ...
 
@@ -279,7 +279,7 @@ class AsyncDeviceSubject:
 
     def _follow_frames(self) -> None:
         """Observe the frames of the device while somebody follows them."""
-        frames: LineFrames | None = self._line.notes.get(FRAMES)
+        frames: LineFrames | None = self._line.shared.get(FRAMES)
         is_wanted = "frame" in self.followers.kinds
         if is_wanted and self._end_frames is None and frames is not None:
             self._end_frames = frames.follow(self._framed)

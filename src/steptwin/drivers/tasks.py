@@ -23,8 +23,8 @@ CLOSE_S = 1.0
 class TaskLine(Generic[Q, A]):
     """See `steptwin.drivers.line.DriverLine`. It belongs to one event loop; ``async with`` opens and closes it."""
 
-    def __init__(self, endpoint: Endpoint, exchanger: Exchanger[Q, A], notes: Mapping[Hashable, Any] | None = None) -> None:
-        self.notes: dict[Hashable, Any] = {} if notes is None else dict(notes)
+    def __init__(self, endpoint: Endpoint, exchanger: Exchanger[Q, A], shared: Mapping[Hashable, Any] | None = None) -> None:
+        self.shared: dict[Hashable, Any] = {} if shared is None else dict(shared)
         self._endpoint = endpoint
         self._engine = exchanger
         self._loop: asyncio.AbstractEventLoop | None = None

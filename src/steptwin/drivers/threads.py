@@ -28,12 +28,12 @@ class ThreadLine(Generic[Q, A]):
         self,
         endpoint: Endpoint,
         exchanger: Exchanger[Q, A],
-        notes: Mapping[Hashable, Any] | None = None,
+        shared: Mapping[Hashable, Any] | None = None,
         *,
         clock: Callable[[], Nanos] = time.monotonic_ns,
         sleeping: Callable[[float], None] = time.sleep,
     ) -> None:
-        self.notes: dict[Hashable, Any] = {} if notes is None else dict(notes)
+        self.shared: dict[Hashable, Any] = {} if shared is None else dict(shared)
         self.now = clock
         self._endpoint = endpoint
         self._engine = exchanger

@@ -11,7 +11,7 @@ from steptwin.gateways.sampling import SharedSamples
 from steptwin.simulation.kinds.lines import LineTraffic
 from steptwin.subject.commands import Jog
 from steptwin.subject.contract import AsyncSubject
-from steptwin.subject.jogs import Held
+from steptwin.subject.jogs import ExtendableJog
 
 
 class PastValue(NamedTuple):
@@ -60,8 +60,8 @@ class GatewaySubject(AsyncSubject, Protocol):
         """None where commands are not recorded."""
         ...
 
-    async def begin_jog(self, wanted: Jog, /) -> Held:
-        """A jog that goes on while it is extended (`Held.lasts_ns`). Raises as `do`."""
+    async def begin_jog(self, wanted: Jog, /) -> ExtendableJog:
+        """A jog that goes on while it is extended (`ExtendableJog.lasts_ns`). Raises as `do`."""
         ...
 
     def traffic(self) -> Mapping[str, LineTraffic]:

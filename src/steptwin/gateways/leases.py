@@ -18,7 +18,7 @@ from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.machine import SECOND
 from steptwin.subject.commands import Jog, StopAxes
-from steptwin.subject.jogs import Held
+from steptwin.subject.jogs import ExtendableJog
 
 LEASE_S = (0.1, 5.0)
 RENEWALS = 3.0
@@ -31,7 +31,7 @@ class _Lease:
     wanted: Jog
     until: float
     """By the clock of the event loop, s."""
-    held: Held | None = None
+    held: ExtendableJog | None = None
     """None while it begins."""
     cancelled: str | None = None
     """The reason for its end while it was beginning."""
@@ -101,7 +101,7 @@ class JogLeases:
         lease.held = held
         lease.task = asyncio.create_task(self._hold(lease, held))
 
-    async def _hold(self, lease: _Lease, held: Held) -> None:
+    async def _hold(self, lease: _Lease, held: ExtendableJog) -> None:
         """Until it is over and its client has let go."""
         loop = asyncio.get_running_loop()
         while (left := lease.until - loop.time()) > 0:

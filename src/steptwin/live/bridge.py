@@ -33,7 +33,7 @@ from steptwin.subject.commands import Command, Jog
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event, Numbering
 from steptwin.subject.following import Filter, Following
-from steptwin.subject.jogs import Held
+from steptwin.subject.jogs import ExtendableJog
 from steptwin.textcodec import decode
 
 
@@ -121,7 +121,7 @@ class _Devices:
     async def do(self, wanted: Command, /) -> Result:
         return await result_of(start(self._subject.do(wanted)))
 
-    async def begin_jog(self, wanted: Jog, /) -> Held:
+    async def begin_jog(self, wanted: Jog, /) -> ExtendableJog:
         return await result_of(start(self._subject.begin_jog(wanted)))
 
     def follow(self, what: Filter, bound: int) -> Following:

@@ -15,13 +15,13 @@ from typing import NamedTuple
 
 from steptwin.debug.breakpoints import AnyPoint
 from steptwin.debug.debugger import Debugger, DebugTravel
+from steptwin.debug.lookahead import Goal
 from steptwin.debug.observer import Logged
-from steptwin.debug.scout import Goal
 from steptwin.debug.values import DataPoint, Events, LabelPoint, LinePoint, SetPoint, ShownValue, Stopped, StopReason
 from steptwin.errors import Misuse, Refusal, SteptwinError
-from steptwin.live.cell import Cell
 from steptwin.live.lookback import PART_S, Lookback, take_back
 from steptwin.live.pace import Pace
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.world import LiveWorld
 from steptwin.machine import Nanos
 from steptwin.messages import NONE, Message, text_of
@@ -55,9 +55,9 @@ UNKNOWN_PROGRAM = Message("live.unknown-program", "{machine} has no program {pro
 class Debugging:
     """Debugger of ``live``; ``pace`` is that of its time."""
 
-    def __init__(self, live: LiveWorld, cell: Cell, pace: Pace) -> None:
+    def __init__(self, live: LiveWorld, realtime: RealTimeDriver, pace: Pace) -> None:
         self._live = live
-        self._cell = cell
+        self._realtime = realtime
         self._pace = pace
         self._breakpoints: dict[int, _Requested] = {}
         """They stay without a follower; time does not stop at them then."""
@@ -86,7 +86,7 @@ class Debugging:
         if self._open is None:
             if not self._is_followed:
                 raise Refusal(STOPS_NEED_A_FOLLOWER(kind=StoppedPayload.kind))
-            self._open = _OpenDebugger(self._live, self._cell, self._pace, self._renew, self._numbers)
+            self._open = _OpenDebugger(self._live, self._realtime, self._pace, self._renew, self._numbers)
             self._open.debugger.set_events([_EVENTS[name] for name in self._events])
             self._renew()
         return self._open
@@ -219,17 +219,17 @@ class _OpenDebugger:
     def __init__(
         self,
         live: LiveWorld,
-        cell: Cell,
+        realtime: RealTimeDriver,
         pace: Pace,
         on_new_text: Callable[[], None],
         numbers: Callable[[Sequence[int]], tuple[int, ...]],
     ) -> None:
         self._live = live
-        self._cell = cell
+        self._realtime = realtime
         self._pace = pace
         self._on_new_text = on_new_text
         self._numbers = numbers
-        self._lookback = Lookback(live, cell, pace) if live.history is None else None
+        self._lookback = Lookback(live, realtime, pace) if live.history is None else None
         try:
             self.debugger = Debugger(live.world, live.history, live.apply_input, self._take_back)
         except SteptwinError:
@@ -264,13 +264,13 @@ class _OpenDebugger:
 
     def close(self) -> None:
         self._end_travel()
-        self._cell.enter()
+        self._realtime.enter()
         self._live.run_control = None
         self._live.world.input_watchers.remove(self._given)
         self.debugger.close()
         self._end_lookback()
         self._live.stale = True
-        self._cell.leave()
+        self._realtime.leave()
 
     def _end_lookback(self) -> None:
         if self._lookback is not None:

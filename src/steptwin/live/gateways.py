@@ -25,7 +25,7 @@ from steptwin.subject.commands import Command, Jog, type_of
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Following
-from steptwin.subject.jogs import Held, WorldJogs
+from steptwin.subject.jogs import ExtendableJog, WorldJogs
 from steptwin.tracing import span
 
 if TYPE_CHECKING:
@@ -124,10 +124,10 @@ class LiveWorldSubject:
             noted.note("number", result.number)
         return result
 
-    async def begin_jog(self, wanted: Jog, /) -> Held:
-        if not isinstance(self._live.companion, WorldJogs):
-            self._live.companion = WorldJogs(self._live.subject, self._control.at_present)
-        return await self._live.companion.begin_jog(wanted)
+    async def begin_jog(self, wanted: Jog, /) -> ExtendableJog:
+        if not isinstance(self._live.external_actor, WorldJogs):
+            self._live.external_actor = WorldJogs(self._live.subject, self._control.at_present)
+        return await self._live.external_actor.begin_jog(wanted)
 
     def follow(self, what: Filter, bound: int) -> Following:
         return self._control.follow(what, bound)

@@ -6,7 +6,7 @@ import asyncio
 from pathlib import Path
 from typing import Protocol
 
-from steptwin.live.cell import Cell
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.machine import Nanos, Port, SendingPort, sends_by_itself
 
 SLICE_BYTES = 2048
@@ -20,10 +20,10 @@ class Writer(Protocol):
 class Feed:
     """Connects a stream of bytes with a port: input, answers, and timers for later output."""
 
-    __slots__ = ("_cell", "_loop", "_port", "_talks", "_timer", "_writer", "is_read")
+    __slots__ = ("_loop", "_port", "_realtime", "_talks", "_timer", "_writer", "is_read")
 
-    def __init__(self, cell: Cell, port: Port, writer: Writer) -> None:
-        self._cell = cell
+    def __init__(self, realtime: RealTimeDriver, port: Port, writer: Writer) -> None:
+        self._realtime = realtime
         self._port = port
         self._writer = writer
         self._loop = asyncio.get_running_loop()
@@ -36,12 +36,12 @@ class Feed:
             port.on_output = self._fetch_soon
 
     def take(self, data: bytes) -> None:
-        cell = self._cell
-        answer = self._port.exchange(data, cell.enter())
+        realtime = self._realtime
+        answer = self._port.exchange(data, realtime.enter())
         if answer:
             self._writer.write(answer)
-        if cell.scheduler.stale:
-            cell.leave()
+        if realtime.scheduler.stale:
+            realtime.leave()
         if self._talks is None:
             due = self._port.deadline()
             if due is not None:
@@ -50,7 +50,7 @@ class Feed:
     def _arm(self, due: Nanos) -> None:
         if self._timer is not None:
             self._timer.cancel()
-        self._timer = self._loop.call_later(self._cell.clock.wait_s(due), self._wake)
+        self._timer = self._loop.call_later(self._realtime.clock.wait_s(due), self._wake)
 
     def _fetch_soon(self) -> None:
         # The port calls this while machines are being advanced.
@@ -60,12 +60,12 @@ class Feed:
 
     def _wake(self) -> None:
         self._timer = None
-        now = self._cell.enter()
+        now = self._realtime.enter()
         is_taken = self.is_read or self._talks is None
         for _, data in self._port.to_send(now):
             if is_taken:
                 self._writer.write(data)
-        self._cell.leave()
+        self._realtime.leave()
         due = self._port.deadline() if self._talks is None else None
         if due is not None:
             self._arm(due)

@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 
 from steptwin.errors import Refusal, SteptwinError
 from steptwin.later import Later
-from steptwin.live.cell import Cell
 from steptwin.live.pace import Pace
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.world import LiveWorld
 from steptwin.machine import Nanos
 from steptwin.messages import Message
@@ -35,19 +35,19 @@ TOO_MANY_LOOK_BACK = Message("live.too-many-look-back", "{most} viewers look bac
 class Lookback:
     """Past of ``live``, from now on, or with ``history`` from its beginning. A `Link` of its server."""
 
-    def __init__(self, live: LiveWorld, cell: Cell, pace: Pace, history: History | None = None) -> None:
+    def __init__(self, live: LiveWorld, realtime: RealTimeDriver, pace: Pace, history: History | None = None) -> None:
         self._live = live
-        self._cell = cell
+        self._realtime = realtime
         self._pace = pace
         self._looks = 0
         self._history = live.history = history or History(live.world)
         self._timer = asyncio.get_running_loop().call_later(STATE_S, self._keep)
 
     def _keep(self) -> None:
-        self._cell.enter()
+        self._realtime.enter()
         self._history.take()
         self._live.stale = True
-        self._cell.leave()
+        self._realtime.leave()
         self._timer = asyncio.get_running_loop().call_later(STATE_S, self._keep)
 
     async def close(self) -> None:

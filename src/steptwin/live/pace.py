@@ -18,7 +18,7 @@ from steptwin.files import session as sessions
 from steptwin.files.beginning import check_session_target, is_session
 from steptwin.files.export import axis_views, check_target, write_trace
 from steptwin.files.textfiles import check_folder
-from steptwin.live.cell import Cell
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message, text_of
 from steptwin.numerals import read_number
@@ -76,18 +76,18 @@ NO_LAST_RECORDS = Message(
 class Pace:
     """The pace of a live world; at first it is paused. ``show`` is called with notices for the user."""
 
-    def __init__(self, live: LiveWorld, cell: Cell, show: Callable[[str], None], *, has_clients: bool) -> None:
+    def __init__(self, live: LiveWorld, realtime: RealTimeDriver, show: Callable[[str], None], *, has_clients: bool) -> None:
         self.speed = 1.0
         """Virtual seconds per second while it runs; infinite: as fast as possible."""
         self.is_paused = True
         self._live = live
-        self._cell = cell
+        self._realtime = realtime
         self._show = show
         self._has_clients = has_clients
         self._turn: asyncio.Handle | None = None
         self._is_held = False
         """Whether the debugger has ended a step."""
-        cell.clock.stop(live.now)
+        realtime.clock.stop(live.now)
         live.on_break = self._hold
 
     def begin(self, speed: float) -> None:
@@ -114,8 +114,8 @@ class Pace:
         """The debugger has stopped it."""
         self._is_held = True
         self.close()
-        self._cell.close()
-        self._cell.clock.stop(self._live.now)
+        self._realtime.close()
+        self._realtime.clock.stop(self._live.now)
         if not self.is_paused:
             self._stand()
 
@@ -150,8 +150,8 @@ class Pace:
     def _halt(self) -> None:
         """Advance the world to the present and stop the clock there."""
         self.close()
-        self._cell.enter()
-        self._cell.clock.stop(self._live.now)
+        self._realtime.enter()
+        self._realtime.clock.stop(self._live.now)
 
     def _go(self) -> None:
         if self._live.run_control is not None:
@@ -159,9 +159,9 @@ class Pace:
         if self.speed == inf:
             self._turn = asyncio.get_running_loop().call_soon(self._run_freely)
             return
-        self._cell.close()  # its timer was set for another clock
-        self._cell.clock.run(self.speed)
-        self._cell.start()
+        self._realtime.close()  # its timer was set for another clock
+        self._realtime.clock.run(self.speed)
+        self._realtime.start()
 
     def _run_freely(self) -> None:
         """Run without a clock, in slices."""
@@ -171,7 +171,7 @@ class Pace:
             world.run(for_=SLICE_NS / SECOND)
             end = world.now
         self._live.advance(end)
-        self._cell.clock.stop(world.now)
+        self._realtime.clock.stop(world.now)
         if not self.is_paused and world.stopped is None:
             self._turn = asyncio.get_running_loop().call_soon(self._run_freely)
 
@@ -186,9 +186,9 @@ class Pace:
         try:
             self._live.go_back(snapshot, name)
         finally:
-            self._cell.clock.stop(self._live.now)
-            self._cell.close()
-            self._cell.moments += 1  # what was read at this moment is shared no more
+            self._realtime.clock.stop(self._live.now)
+            self._realtime.close()
+            self._realtime.moments += 1  # what was read at this moment is shared no more
 
     # ------------------------------------------------------------------ steps
 
@@ -218,8 +218,8 @@ class Pace:
                     return False
                 moves = True
         finally:
-            self._cell.clock.stop(live.now)
-            self._cell.close()  # a timer set for what has been done would find that it was held up
+            self._realtime.clock.stop(live.now)
+            self._realtime.close()  # a timer set for what has been done would find that it was held up
 
     # ------------------------------------------------------------------ commands
 
@@ -287,7 +287,7 @@ class Pace:
             return self._save_ring(path)
         check_session_target(path)
         check_folder(path)
-        self._cell.enter()
+        self._realtime.enter()
         session = self._live.session()
         sessions.save(session, path)
         return {**self.where(), "file": wanted.file, "inputs": len(session.inputs), "digest": session.digest}
@@ -298,7 +298,7 @@ class Pace:
         if ring is None:
             raise Misuse(NO_LAST_RECORDS(path=path))
         check_target(path)
-        self._cell.enter()
+        self._realtime.enter()
         trace = ring.trace()
         begin = next((record.time for record in trace), world.now)
         written = write_trace(trace, path, views=axis_views(world), title=world.spec.name, begin=begin, ended=world.now)

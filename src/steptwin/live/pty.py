@@ -12,8 +12,8 @@ from pathlib import Path
 
 from steptwin.errors import LineFailure, Misuse
 from steptwin.files.ownership import InUse, Ownership
-from steptwin.live.cell import Cell
 from steptwin.live.links import SLICE_BYTES, Feed
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.machine import Port
 from steptwin.system import HAS_EPOLL, reason
 
@@ -30,8 +30,8 @@ class PtyLink:
     program that opens it within a fraction of a millisecond after the previous one cannot be distinguished from it.)
     """
 
-    def __init__(self, cell: Cell, path: Path, make_port: Callable[[], Port]) -> None:
-        self._cell = cell
+    def __init__(self, realtime: RealTimeDriver, path: Path, make_port: Callable[[], Port]) -> None:
+        self._realtime = realtime
         self.path = path.absolute()
         self._make_port = make_port
         self._loop = asyncio.get_running_loop()
@@ -97,7 +97,7 @@ class PtyLink:
         self._make_raw()
         if self._feed is not None:
             self._feed.close()
-        self._feed = Feed(self._cell, self._make_port(), self)
+        self._feed = Feed(self._realtime, self._make_port(), self)
         self._quiet = True
         if self._stirring is not None:
             self._loop.add_reader(self._stirring.fileno(), self._stirred)

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from steptwin.errors import Misuse
-from steptwin.live.cell import Cell
 from steptwin.live.links import PlacedLink
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.machine import Port
 from steptwin.system import HAS_PTYS
 
 
-def pty_link(cell: Cell, path: Path, make_port: Callable[[], Port]) -> PlacedLink:
+def pty_link(realtime: RealTimeDriver, path: Path, make_port: Callable[[], Port]) -> PlacedLink:
     """A link at ``path``, not yet open. Raises `Misuse` on a system without pseudo terminals."""
     if not HAS_PTYS:
         raise Misuse(
@@ -21,4 +21,4 @@ def pty_link(cell: Cell, path: Path, make_port: Callable[[], Port]) -> PlacedLin
         )
     from steptwin.live.pty import PtyLink
 
-    return PtyLink(cell, path, make_port)
+    return PtyLink(realtime, path, make_port)

@@ -23,7 +23,6 @@ from steptwin.files.export import axis_views, check_target, growing_file, read_t
 from steptwin.files.export.tracefile import Kept, Ring, TraceFile, read_kept
 from steptwin.files.world import World
 from steptwin.gateways.contract import OpenGateway
-from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.display import Display, Lines, Notices, banner, remarks_on
 from steptwin.live.gateways import LiveWorldSubject, open_gateways, recording
@@ -31,6 +30,7 @@ from steptwin.live.lookback import Lookback
 from steptwin.live.options import UpOptions
 from steptwin.live.output import Output
 from steptwin.live.pace import Pace, read_speed
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.rfc2217 import TwinLine
 from steptwin.live.server import Server, clear_ready_file
 from steptwin.live.serving import check_name, shows_live_view
@@ -142,13 +142,13 @@ async def _serve(
         stack.callback(output.close)
         stack.enter_context(options.log.tracing(world.spec.name, output.notice))
         live = LiveWorld(world)
-        cell = Cell(live, Clock(begin=world.now))
+        realtime = RealTimeDriver(live, Clock(begin=world.now))
         quiet = addition is not None
-        display = Notices(live, output, frames=options.live.log_frames) if quiet else _display(live, cell, output, options)
+        display = Notices(live, output, frames=options.live.log_frames) if quiet else _display(live, realtime, output, options)
         live.show = display.notice
-        server = Server(cell, display.notice)
-        live.share_reads(cell)
-        pace = Pace(live, cell, display.notice, has_clients=any(line.is_open for line in world.spec.lines))
+        server = Server(realtime, display.notice)
+        live.share_reads(realtime)
+        pace = Pace(live, realtime, display.notice, has_clients=any(line.is_open for line in world.spec.lines))
         live.on_stop = server.end if addition is None else None
         begun, recorder = False, None
         try:
@@ -159,7 +159,7 @@ async def _serve(
             display.begin(head, server.announcement(), past)
             pace.begin(read_speed(options.live.speed, least=0))
             await display.show(server)
-            cell.enter()
+            realtime.enter()
         finally:
             pace.close()
             await server.close()
@@ -167,13 +167,13 @@ async def _serve(
                 _keep(options, live, output, recorder, kept, reports)
 
 
-def _display(live: LiveWorld, cell: Cell, output: Output, options: UpOptions) -> Display:
+def _display(live: LiveWorld, realtime: RealTimeDriver, output: Output, options: UpOptions) -> Display:
     selection = read_selection(options.shown.of, options.shown.show, named_in(live.world.parts))
     if not shows_live_view(output, log_frames=options.live.log_frames):
         return Lines(live, output, frames=options.live.log_frames, selection=selection)
     from steptwin.live.view import LiveView
 
-    return LiveView(live, cell, output, selection)
+    return LiveView(live, realtime, output, selection)
 
 
 def _recorder(live: LiveWorld, kept: Kept) -> TraceFile | None:
@@ -238,7 +238,7 @@ def _write_trace(recorder: TraceFile, where: Path, ended: Nanos) -> list[Path]:
 
 async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions, addition: Addition | None) -> None:
     name = options.live.name or live.world.spec.name
-    control = WorldControl(server.cell, live, pace, server.announcement)
+    control = WorldControl(server.realtime, live, pace, server.announcement)
     server.introduce(name, partial(announced, live.world), options.world)
     services = read_services(live.world.spec.text)
     if options.audit is None and services.history is not None:
@@ -247,7 +247,7 @@ async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions,
     if not options.is_closed:
         await _open_for_others(server, live, control, options)
     if options.past:
-        server.join(Lookback(live, server.cell, pace))
+        server.join(Lookback(live, server.realtime, pace))
     running = Running(server, live, pace, control)
     if addition is not None:
         await addition(running)

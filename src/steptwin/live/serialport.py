@@ -9,8 +9,8 @@ from typing import cast
 import serialx
 
 from steptwin.errors import LineFailure
-from steptwin.live.cell import Cell
 from steptwin.live.links import Feed
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.machine import Port
 from steptwin.system import reason
 
@@ -24,8 +24,10 @@ class SerialLink:
     If the device disappears (a USB adapter is unplugged), it is reopened when it is back; ``notice`` is called for both.
     """
 
-    def __init__(self, cell: Cell, device: str, baud: int, make_port: Callable[[], Port], notice: Callable[[str], None]) -> None:
-        self._cell = cell
+    def __init__(
+        self, realtime: RealTimeDriver, device: str, baud: int, make_port: Callable[[], Port], notice: Callable[[str], None]
+    ) -> None:
+        self._realtime = realtime
         self._device = device
         self._baud = baud
         self._make_port = make_port
@@ -45,7 +47,7 @@ class SerialLink:
         return self._device
 
     def _make_line(self) -> _SerialProtocol:
-        return _SerialProtocol(self._cell, self._make_port(), self._lost)
+        return _SerialProtocol(self._realtime, self._make_port(), self._lost)
 
     def _lost(self, error: Exception | None) -> None:
         self._transport = None
@@ -75,14 +77,14 @@ class SerialLink:
 class _SerialProtocol(asyncio.Protocol):
     """The protocol of the serial port. While the other end does not accept output, no input is read."""
 
-    def __init__(self, cell: Cell, port: Port, lost: Callable[[Exception | None], None]) -> None:
-        self._cell = cell
+    def __init__(self, realtime: RealTimeDriver, port: Port, lost: Callable[[Exception | None], None]) -> None:
+        self._realtime = realtime
         self._port = port
         self._lost = lost
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast(asyncio.Transport, transport)
-        self._feed = Feed(self._cell, self._port, self._transport)
+        self._feed = Feed(self._realtime, self._port, self._transport)
 
     def data_received(self, data: bytes) -> None:
         self._feed.take(data)

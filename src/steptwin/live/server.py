@@ -1,4 +1,4 @@
-"""A served twin: its cell, links and control endpoint, from start to clean end."""
+"""A served twin: its real-time driver, links and control endpoint, from start to clean end."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from steptwin.access.audit import CommandLog
 from steptwin.errors import LineFailure, Misuse, SteptwinError
 from steptwin.files.writing import new_text
 from steptwin.inputfiles import read_bytes
-from steptwin.live.cell import Cell
 from steptwin.live.clients import Clients
 from steptwin.live.control import ControlEndpoint
 from steptwin.live.filelimit import allow_many_files
 from steptwin.live.links import Link
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.rfc2217 import TwinLine
 from steptwin.live.signals import on_end
 from steptwin.live.transports import LinkArguments, Transport
@@ -69,8 +69,8 @@ class Server:
     ``show`` is called with notices for the user.
     """
 
-    def __init__(self, cell: Cell, show: Callable[[str], None]) -> None:
-        self.cell = cell
+    def __init__(self, realtime: RealTimeDriver, show: Callable[[str], None]) -> None:
+        self.realtime = realtime
         self.audit: CommandLog | None = None
         """Records what clients write that prove who they are; of links that are opened from then on."""
         self.end_points: list[EndPoint] = []
@@ -83,7 +83,7 @@ class Server:
         self._file: Path | None = None
         self._ended: asyncio.Event = asyncio.Event()
         self._failure: str | None = None
-        cell.on_lag = self._lagged
+        realtime.on_lag = self._lagged
         loop = asyncio.get_running_loop()
         loop.set_exception_handler(self._trouble)
         # its warning that a client has gone while it was written to is no news
@@ -123,7 +123,7 @@ class Server:
                 where=where,
                 make_port=make_port,
                 line=wire,
-                cell=self.cell,
+                realtime=self.realtime,
                 clients=self._clients,
                 listen_any=listen_any,
                 tls=tls,
@@ -197,7 +197,7 @@ class Server:
     async def until_ended(self) -> None:
         """Serve until SIGINT, SIGTERM or SIGHUP. Raises `LineFailure` when the server could not go on."""
         gc.freeze()  # what is there from the start stays; to look through it takes 0.2 s, in which clients would wait
-        self.cell.start()
+        self.realtime.start()
         await self._ended.wait()
         if self._failure is not None:
             raise LineFailure(self._failure)
@@ -223,7 +223,7 @@ class Server:
         gc.unfreeze()
         async with contextlib.AsyncExitStack() as stack:
             stack.callback(self._remove_ready_file)
-            stack.callback(self.cell.close)
+            stack.callback(self.realtime.close)
             for link in self._links:
                 stack.push_async_callback(link.close)
             self._links.clear()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from steptwin.live.cell import Cell
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.machine import Nanos
 from steptwin.wire.pdu import READS
 from steptwin.wire.slave import SlaveDevice
@@ -13,11 +13,11 @@ from steptwin.wire.slave import SlaveDevice
 class _SharedReads:
     """A unit that keeps its answers to reads until time passes, signals settle or another request is executed."""
 
-    __slots__ = ("_answers", "_cell", "_execute", "_moment")
+    __slots__ = ("_answers", "_execute", "_moment", "_realtime")
 
-    def __init__(self, device: SlaveDevice, cell: Cell) -> None:
+    def __init__(self, device: SlaveDevice, realtime: RealTimeDriver) -> None:
         self._execute = device.execute
-        self._cell = cell
+        self._realtime = realtime
         self._moment = -1
         self._answers: dict[bytes, bytes] = {}
 
@@ -25,7 +25,7 @@ class _SharedReads:
         if pdu[0] not in READS:
             self._moment = -1
             return self._execute(pdu, now)
-        moment = self._cell.moments
+        moment = self._realtime.moments
         if moment != self._moment:
             self._moment = moment
             self._answers = {}
@@ -35,7 +35,7 @@ class _SharedReads:
         return answer
 
 
-def share_reads(devices: Mapping[int, SlaveDevice], cell: Cell) -> dict[int, SlaveDevice]:
-    """The units of a line for clients that a cell serves together. Units must not change each other but by the cell's
-    scheduler."""
-    return {unit: _SharedReads(device, cell) for unit, device in devices.items()}
+def share_reads(devices: Mapping[int, SlaveDevice], realtime: RealTimeDriver) -> dict[int, SlaveDevice]:
+    """The units of a line for clients that one real-time driver serves together. Units must not change each other but by the
+    cell's scheduler."""
+    return {unit: _SharedReads(device, realtime) for unit, device in devices.items()}

@@ -12,10 +12,10 @@ from typing import cast
 from steptwin.drivers.kind import Decoder
 from steptwin.drivers.place import LineAddress
 from steptwin.errors import LineFailure, Misuse
-from steptwin.live.cell import Cell
 from steptwin.live.clients import Clients
 from steptwin.live.clock import Clock
 from steptwin.live.pty import PtyLink
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.tcp import TcpLink
 from steptwin.machine import SECOND, Nanos, Port
 from steptwin.simulation.scheduler.scheduler import Scheduler
@@ -126,7 +126,7 @@ async def sniff(
         raise Misuse("a Modbus TCP connection cannot be monitored from outside: use a relay, --listen HOST:PORT")
     tap = Tap(decoder, is_relay=listen is not None or pty is not None)
     transport = await place.endpoint.connect(lambda: tap)
-    cell = Cell(Scheduler(), Clock())
+    realtime = RealTimeDriver(Scheduler(), Clock())
     links: list[TcpLink | PtyLink] = []
 
     def port() -> Port:
@@ -134,11 +134,11 @@ async def sniff(
 
     try:
         if listen is not None:
-            tcp = TcpLink(cell, listen, port, Clients())
+            tcp = TcpLink(realtime, listen, port, Clients())
             links.append(tcp)
             ready(str(await tcp.open()))
         if pty is not None:
-            terminal = PtyLink(cell, pty, port)
+            terminal = PtyLink(realtime, pty, port)
             links.append(terminal)
             ready(str(await terminal.open()))
         if not links:
@@ -149,4 +149,4 @@ async def sniff(
         for link in links:
             await link.close()
         transport.abort()
-        cell.close()
+        realtime.close()

@@ -8,8 +8,8 @@ from collections.abc import Callable
 from typing import Protocol
 
 from steptwin.errors import LineFailure
-from steptwin.live.cell import Cell
 from steptwin.live.clients import Clients, listening
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.tcp_asyncio import AsyncioListener
 from steptwin.live.tcp_epoll import EpollListener
 from steptwin.machine import Port
@@ -21,7 +21,12 @@ class Listener(Protocol):
     """Accepts the clients of a listening socket and serves them."""
 
     def __init__(
-        self, listening: socket.socket, address: Address, cell: Cell, make_port: Callable[[], Port], clients: Clients
+        self,
+        listening: socket.socket,
+        address: Address,
+        realtime: RealTimeDriver,
+        make_port: Callable[[], Port],
+        clients: Clients,
     ) -> None: ...
     async def start(self) -> None: ...
     async def close(self) -> None:
@@ -48,13 +53,13 @@ class TcpLink:
 
     def __init__(
         self,
-        cell: Cell,
+        realtime: RealTimeDriver,
         address: Address,
         make_port: Callable[[], Port],
         clients: Clients,
         listener: type[Listener] = LISTENER,
     ) -> None:
-        self._cell = cell
+        self._realtime = realtime
         self._asked = address
         self._make_port = make_port
         self._clients = clients
@@ -65,7 +70,7 @@ class TcpLink:
         """Listen; returns the address with the port in use. Raises `LineFailure` naming the address."""
         listener = listening_at(self._asked)
         address = Address(self._asked.host, listener.getsockname()[1])
-        self._listener = self._kind(listener, address, self._cell, self._make_port, self._clients)
+        self._listener = self._kind(listener, address, self._realtime, self._make_port, self._clients)
         await self._listener.start()
         return address
 

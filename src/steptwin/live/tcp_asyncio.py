@@ -9,9 +9,9 @@ from collections.abc import Callable
 from typing import cast
 from weakref import WeakSet
 
-from steptwin.live.cell import Cell
 from steptwin.live.clients import BACKLOG, Clients, set_up
 from steptwin.live.links import SLICE_BYTES, Feed
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.machine import Port, SourcedPort
 from steptwin.simulation.toml.addresses import Address
 
@@ -20,10 +20,15 @@ class AsyncioListener:
     """See `steptwin.live.tcp.Listener`."""
 
     def __init__(
-        self, listening: socket.socket, address: Address, cell: Cell, make_port: Callable[[], Port], clients: Clients
+        self,
+        listening: socket.socket,
+        address: Address,
+        realtime: RealTimeDriver,
+        make_port: Callable[[], Port],
+        clients: Clients,
     ) -> None:
         self._listening = listening
-        self._cell = cell
+        self._realtime = realtime
         self._make_port = make_port
         self._clients = clients
         self._connections: WeakSet[AsyncioConnection] = WeakSet()
@@ -36,7 +41,7 @@ class AsyncioListener:
     def _welcome(self) -> asyncio.Protocol:
         if not self._clients.have_room():
             return TurnedAway()
-        connection = AsyncioConnection(self._cell, self._make_port(), self._clients)
+        connection = AsyncioConnection(self._realtime, self._make_port(), self._clients)
         self._connections.add(connection)
         return connection
 
@@ -58,8 +63,8 @@ class TurnedAway(asyncio.Protocol):
 class AsyncioConnection(asyncio.Protocol):
     """One client of a port. While it does not read its answers, its requests are not read; large input is served in slices."""
 
-    def __init__(self, cell: Cell, port: Port, clients: Clients) -> None:
-        self._cell = cell
+    def __init__(self, realtime: RealTimeDriver, port: Port, clients: Clients) -> None:
+        self._realtime = realtime
         self.port = port
         self._clients = clients
         self._loop = asyncio.get_running_loop()
@@ -76,7 +81,7 @@ class AsyncioConnection(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast(asyncio.Transport, transport)
-        self._feed = Feed(self._cell, self.port, self)
+        self._feed = Feed(self._realtime, self.port, self)
         self._transport.set_write_buffer_limits(high=1)  # report pending data at once; with 0, TLS reports none, too
         with contextlib.suppress(OSError):  # the client is gone already; the loop will notice
             set_up(transport.get_extra_info("socket"))

@@ -8,10 +8,10 @@ from collections.abc import Callable
 from typing import Any
 from weakref import WeakSet
 
-from steptwin.live.cell import Cell
 from steptwin.live.clients import RETRY_S, Clients
 from steptwin.live.descriptors import descriptors
 from steptwin.live.links import SLICE_BYTES, Feed
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.machine import Port, SourcedPort
 from steptwin.simulation.toml.addresses import Address
 from steptwin.system import reason
@@ -37,7 +37,7 @@ class EpollConnection:
         "port",
     )
 
-    def __init__(self, client: socket.socket, peer: Address, cell: Cell, port: Port, clients: Clients) -> None:
+    def __init__(self, client: socket.socket, peer: Address, realtime: RealTimeDriver, port: Port, clients: Clients) -> None:
         self.port = port
         self._peer = peer
         self._socket = client
@@ -46,7 +46,7 @@ class EpollConnection:
         self._clients = clients
         self._unsent = b""
         self._ending = False
-        self._feed = Feed(cell, port, self)
+        self._feed = Feed(realtime, port, self)
         if isinstance(port, SourcedPort):
             port.used_by(str(peer))
         self._descriptors = descriptors()
@@ -117,11 +117,16 @@ class EpollListener:
     """See `steptwin.live.tcp.Listener`."""
 
     def __init__(
-        self, listening: socket.socket, address: Address, cell: Cell, make_port: Callable[[], Port], clients: Clients
+        self,
+        listening: socket.socket,
+        address: Address,
+        realtime: RealTimeDriver,
+        make_port: Callable[[], Port],
+        clients: Clients,
     ) -> None:
         self._listening = listening
         self._address = address
-        self._cell = cell
+        self._realtime = realtime
         self._make_port = make_port
         self._clients = clients
         self._connections: WeakSet[EpollConnection] = WeakSet()
@@ -149,7 +154,7 @@ class EpollListener:
             client.close()
             return
         client.setblocking(False)
-        self._connections.add(EpollConnection(client, Address(*peer[:2]), self._cell, self._make_port(), self._clients))
+        self._connections.add(EpollConnection(client, Address(*peer[:2]), self._realtime, self._make_port(), self._clients))
 
     async def close(self) -> None:
         if self._retry is not None:

@@ -32,7 +32,7 @@ def exporting(url: str, subject: str, notice: Callable[[str], object]) -> Genera
         raise Misuse(f"--traces {url}: expected http://HOST:PORT/v1/traces")
     logging.getLogger("opentelemetry").addHandler(logging.NullHandler())
     logging.getLogger("opentelemetry").propagate = False
-    exporter = _TellingExporter(OTLPSpanExporter(endpoint=url, timeout=TIMEOUT_S), url, notice)
+    exporter = _NotifyingExporter(OTLPSpanExporter(endpoint=url, timeout=TIMEOUT_S), url, notice)
     with traces_to(BatchSpanProcessor(exporter), subject):
         yield
 
@@ -70,7 +70,7 @@ class _NotedSpan:
         self._span.set_attribute(f"steptwin.{name}", value)
 
 
-class _TellingExporter(SpanExporter):
+class _NotifyingExporter(SpanExporter):
     """Says once when spans are lost, and once when they are not any more."""
 
     def __init__(self, inner: SpanExporter, url: str, notice: Callable[[str], object]) -> None:

@@ -10,8 +10,8 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from steptwin.live.cell import Cell
 from steptwin.live.output import Output
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.server import Server
 from steptwin.live.view_controller import controller_lines
 from steptwin.live.world import LiveWorld
@@ -32,10 +32,10 @@ FEWEST_FRAMES = 4
 class LiveView:
     """Controllers, the last events and frames, ten times a second, on the terminal's second screen."""
 
-    def __init__(self, live: LiveWorld, cell: Cell, output: Output, selection: Selection = ALL) -> None:
+    def __init__(self, live: LiveWorld, realtime: RealTimeDriver, output: Output, selection: Selection = ALL) -> None:
         self._live = live
         self._selection = selection
-        self._cell = cell
+        self._realtime = realtime
         self._output = output
         self._console = Console(file=output, force_terminal=True)  # type: ignore[arg-type]
         self._frames: deque[FrameLine] = deque(maxlen=LINES_KEPT)
@@ -70,8 +70,8 @@ class LiveView:
 
     def _draw(self, screen: Live) -> None:
         self._timer = asyncio.get_running_loop().call_later(REFRESH_S, self._draw, screen)
-        self._cell.enter()
-        self._cell.leave()
+        self._realtime.enter()
+        self._realtime.leave()
         width, height = self._console.size
         screen.update(page(self.lines(width, height)), refresh=True)
 

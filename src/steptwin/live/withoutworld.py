@@ -7,15 +7,15 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from steptwin.live.cell import Cell
 from steptwin.live.clock import Clock
 from steptwin.live.options import LogOptions
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.server import Server, clear_ready_file
 from steptwin.machine import Nanos
 
 
 class _Nothing:
-    """A world without contents, for a cell. See `steptwin.live.cell.Advanceable`."""
+    """A world without contents, for a real-time driver. See `steptwin.live.realtimedriver.Advanceable`."""
 
     stale = False
 
@@ -39,7 +39,7 @@ async def serve_without_world(
         stack.enter_context(log.tracing("devices", output.notice))
         if ready_file is not None:
             clear_ready_file(ready_file)
-        server = Server(Cell(_Nothing(), Clock()), output.notice)
+        server = Server(RealTimeDriver(_Nothing(), Clock()), output.notice)
         try:
             if not await server.unless_ended(addition(server)):
                 return

@@ -11,7 +11,7 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.files import session as sessions
 from steptwin.files.export.tracefile import Ring
 from steptwin.files.world import World
-from steptwin.live.cell import Cell
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.sharedreads import share_reads
 from steptwin.live.tracedport import traced
 from steptwin.machine import Nanos
@@ -58,7 +58,7 @@ class RecordedSession(NamedTuple):
     """Whether it has ended because there was no room for more."""
 
 
-class Companion(Protocol):
+class ExternalActor(Protocol):
     """Acts on a world from outside at exact moments: `advance` is called when the world has reached them."""
 
     def deadline(self) -> Nanos | None: ...
@@ -101,7 +101,7 @@ NO_SESSION_IS_RECORDED = Message(
 
 
 class LiveWorld:
-    """A world that a `Cell` advances in real time."""
+    """A world that a `RealTimeDriver` advances in real time."""
 
     def __init__(self, world: World, show: Callable[[str], None] = lambda _: None) -> None:
         self.world = world
@@ -124,7 +124,7 @@ class LiveWorld:
         """Where its trace is written as it happens."""
         self.ports: set[PlacePort] = set()
         """Programs that are connected to lines."""
-        self.companion: Companion | None = None
+        self.external_actor: ExternalActor | None = None
         """``stale`` is to be set when its deadline has changed."""
         self.on_stop: Callable[[], None] | None = None
         """Called when a script has stopped the world. None: that is reported, and the world goes on."""
@@ -136,13 +136,13 @@ class LiveWorld:
     def now(self) -> Nanos:
         return self.world.now
 
-    def share_reads(self, cell: Cell) -> None:
-        """Let clients that ``cell`` serves at one moment share their reads."""
+    def share_reads(self, realtime: RealTimeDriver) -> None:
+        """Let clients that ``realtime`` serves at one moment share their reads."""
         for line in self.world.lines.values():
             names = {unit: name for name, (on, unit) in self.world.parts.line_of.items() if on is line}
 
             def served(devices: Mapping[int, SlaveDevice], names: Mapping[int, str] = names) -> Mapping[int, SlaveDevice]:
-                return share_reads(traced(devices, names) if is_traced() else devices, cell)
+                return share_reads(traced(devices, names) if is_traced() else devices, realtime)
 
             line.serve_by(served)
 
@@ -181,7 +181,7 @@ class LiveWorld:
             raise Refusal(MEMORY_CANNOT_GO_BACK(place=world.state))
         if self.trace_file is not None:
             raise Refusal(TRACE_FILE_CANNOT_GO_BACK())
-        if self.companion is not None and self.companion.deadline() is not None:
+        if self.external_actor is not None and self.external_actor.deadline() is not None:
             raise Refusal(AXIS_IS_JOGGED())
         self.subject.go_back(snapshot, name)
         self._recorded_bytes = sum(size_of(given.what) for given in world.inputs)
@@ -238,9 +238,9 @@ class LiveWorld:
             self._advance(now)
 
     def _advance_controlled(self, control: RunControl, now: Nanos) -> None:
-        """Advance in parts, between which the companion acts: the run control cannot foresee that."""
+        """Advance in parts, between which the external actor acts: the run control cannot foresee that."""
         while True:
-            acts = None if self.companion is None else self.companion.deadline()
+            acts = None if self.external_actor is None else self.external_actor.deadline()
             part = now if acts is None else min(now, max(acts, self.now + 1))
             free, stops = control.look_ahead(part)
             self._advance(free)
@@ -259,8 +259,8 @@ class LiveWorld:
                 if world.stopped is not None:
                     break
                 self._dues.advance(due)
-                if self.companion is not None:
-                    self.companion.advance(due)
+                if self.external_actor is not None:
+                    self.external_actor.advance(due)
             self.stale = True
             world.advance(now)
             if world.stopped is None:
@@ -290,7 +290,7 @@ class LiveWorld:
             return None
         due, own = self._dues.first(), self.world.next()
         due = due if own is None else own if due is None else min(due, own)
-        other = None if self.companion is None else self.companion.deadline()
+        other = None if self.external_actor is None else self.external_actor.deadline()
         return due if other is None else max(other, self.now) if due is None else min(due, max(other, self.now))
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from steptwin.live.cell import Cell
 from steptwin.live.debugging import Debugging
 from steptwin.live.pace import Pace
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.why import LiveWhy
 from steptwin.live.world import LiveWorld
 from steptwin.subject import commands as command
@@ -22,15 +22,15 @@ T = TypeVar("T")
 class WorldControl:
     """The commands of a live world. ``end_points``: its addresses."""
 
-    def __init__(self, cell: Cell, live: LiveWorld, pace: Pace, end_points: Callable[[], object]) -> None:
-        self._cell = cell
+    def __init__(self, realtime: RealTimeDriver, live: LiveWorld, pace: Pace, end_points: Callable[[], object]) -> None:
+        self._realtime = realtime
         self._live = live
         self.subject = live.subject
         self._of_pace = pace.actions()
         self.subject.dispatcher.add(
             {
                 **self._of_pace,
-                **Debugging(live, cell, pace).actions(),
+                **Debugging(live, realtime, pace).actions(),
                 debugcommands.AskWhy: LiveWhy(live).ask,
                 command.Time: lambda _: pace.where(),
                 command.EndPoints: lambda _: end_points(),
@@ -64,9 +64,9 @@ class WorldControl:
 
     def at_present(self, action: Callable[[], T]) -> T:
         """Do something at the present moment, and set the timer for its consequences."""
-        self._cell.enter()
+        self._realtime.enter()
         try:
             return action()
         finally:
             self._live.stale = True
-            self._cell.leave()
+            self._realtime.leave()

@@ -66,7 +66,7 @@ class Variant:
 
 _BAUD = (300, 1_200, 2_400, 4_800)
 SLOWEST_JOG = 1_200
-"""Lowest rate of a line on which a held jog can be renewed in time, bit/s: each of its moves takes a dozen characters."""
+"""Lowest rate of a line on which a dead-man jog can be renewed in time, bit/s: each of its moves takes a dozen characters."""
 
 _A = Variant("A", 15, 96, 864, Store.RAM, 0x41, shared_bits=8 * 16)
 _B = Variant("B", 80, 256, 2032, Store.RAM, 0x42)

@@ -13,7 +13,7 @@ from steptwin.subject.shapes import MOMENT, NUMBER, TEXT, WHOLE, list_of, member
 
 _DIFFERENCE = members(
     {
-        "at_ns": {**MOMENT, "description": "Since when, from the beginning of the shadow, as decimal text [ns]"},
+        "at_ns": {**MOMENT, "description": "Since when, from the beginning of the digital shadow, as decimal text [ns]"},
         "what": {**TEXT, "description": "An axis or a register."},
         "device": NUMBER,
         "twin": NUMBER,
@@ -54,24 +54,25 @@ class ReadSettings:
 
 
 @request(
-    "shadow",
+    "digital_shadow",
     KEEP,
     "Put a twin beside a device at rest, which is given the same commands from then on, or remove it. Of the device it only "
     "reads.",
 )
 @dataclass(frozen=True, slots=True)
-class SetShadow:
+class SetDigitalShadow:
     machine: _Device
     on: Annotated[bool, Meaning("Whether there is to be one.")] = True
 
 
-@request("shadow_state", LOOK, "How a device and the twin beside it differ; null without one.", or_null(_SHADOW))
+@request("digital_shadow_state", LOOK, "How a device and the twin beside it differ; null without one.", or_null(_SHADOW))
 @dataclass(frozen=True, slots=True)
-class ReadShadow:
+class ReadDigitalShadow:
     machine: _Device
     after: Annotated[
-        Nanos, Meaning("Only samples later than this, from the beginning of the shadow.", TIME, unit="ns", name="after_ns")
+        Nanos,
+        Meaning("Only samples later than this, from the beginning of the digital shadow.", TIME, unit="ns", name="after_ns"),
     ] = 0
 
 
-DeviceRequest: TypeAlias = ReadSettings | SetShadow | ReadShadow
+DeviceRequest: TypeAlias = ReadSettings | SetDigitalShadow | ReadDigitalShadow

@@ -1,4 +1,4 @@
-"""State shared by all viewers: list of viewers, control, held jogs, watched points, streams of events, the clock.
+"""State shared by all viewers: list of viewers, control, dead-man jogs, watched points, streams of events, the clock.
 
 Pure: moments of the wall clock are arguments; sessions (`steptwin.studio.session`) fetch the messages to send.
 """
@@ -41,7 +41,7 @@ from steptwin.subject import commands as command
 from steptwin.subject.commands import COMMANDS
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.following import filter_of
-from steptwin.subject.jogs import Held, Jogs
+from steptwin.subject.jogs import ExtendableJog, Jogs
 
 MOST_VIEWERS = 64
 MOST_LEASES = 32
@@ -61,7 +61,7 @@ class Lease:
     number: int
     viewer: Viewer
     jog: command.Jog
-    held: Held
+    held: ExtendableJog
 
     def plain(self) -> dict[str, object]:
         head = {"lease": self.number, "viewer": self.viewer.number, "machine": self.jog.machine, "axis": self.jog.axis}
@@ -333,7 +333,7 @@ class Hub:
                 self._end(lease, lease.held.cut)
 
     async def stop_all(self) -> Result:
-        """Every held jog ends, too."""
+        """Every dead-man jog ends, too."""
         for lease in list(self._leases.values()):
             self._end(lease, lease.held.cut)
         return await self.subject.do(command.StopAll())

@@ -8,12 +8,12 @@ from typing import Any, Protocol, TypeAlias
 from steptwin.errors import Refusal
 from steptwin.machine import Nanos
 from steptwin.messages import Message, text_of
-from steptwin.simulation.script.heldjog import Given, HeldJog
+from steptwin.simulation.script.deadmanjog import DeadManJog, Given
 from steptwin.subject.commands import Jog
 from steptwin.subject.world import WorldSubject
 
 
-class Held(Protocol):
+class ExtendableJog(Protocol):
     """An active jog."""
 
     @property
@@ -44,7 +44,7 @@ class Held(Protocol):
 
 
 class Jogs(Protocol):
-    async def begin_jog(self, wanted: Jog) -> Held:
+    async def begin_jog(self, wanted: Jog) -> ExtendableJog:
         """Raises `Misuse`, `Refusal` and `LineFailure`. Waits for nothing but a `steptwin.later.Later`."""
         ...
 
@@ -57,7 +57,7 @@ def _at_once(action: Callable[[], Any]) -> Any:
 
 
 class WorldJogs:
-    """Those of a world, which ends them by itself: it is a companion of the world (`steptwin.live.world.Companion`).
+    """Those of a world, which ends them by itself: it is an external actor of the world (`steptwin.live.world.ExternalActor`).
 
     ``at_present`` calls a function at the present moment of the world.
     """
@@ -65,13 +65,13 @@ class WorldJogs:
     def __init__(self, subject: WorldSubject, at_present: AtPresent = _at_once) -> None:
         self._subject = subject
         self._at_present = at_present
-        self._held: list[_Held] = []
+        self._held: list[_WorldJog] = []
 
-    async def begin_jog(self, wanted: Jog) -> Held:
+    async def begin_jog(self, wanted: Jog) -> ExtendableJog:
         return self._at_present(lambda: self._begin(wanted))
 
-    def _begin(self, wanted: Jog) -> Held:
-        held = _Held(self._subject, self._subject.held_jog(wanted), self._at_present)
+    def _begin(self, wanted: Jog) -> ExtendableJog:
+        held = _WorldJog(self._subject, self._subject.dead_man_jog(wanted), self._at_present)
         held.extend()
         self._held.append(held)
         return held
@@ -90,8 +90,8 @@ class WorldJogs:
 JOG_HAS_ENDED = Message("subject.jog-has-ended", "the jog has ended: {why}")
 
 
-class _Held:
-    def __init__(self, subject: WorldSubject, jog: HeldJog, at_present: AtPresent) -> None:
+class _WorldJog:
+    def __init__(self, subject: WorldSubject, jog: DeadManJog, at_present: AtPresent) -> None:
         self._subject = subject
         self._at_present = at_present
         self.jog = jog

@@ -19,7 +19,7 @@ from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.script import steps
 from steptwin.simulation.script.command import declared
 from steptwin.simulation.script.control import ControllerCommand, Halt, Jog, StopAxes, ended, standstill
-from steptwin.simulation.script.heldjog import HeldJog
+from steptwin.simulation.script.deadmanjog import DeadManJog
 from steptwin.simulation.world.inputs import Download, EndScripts, ExternalInput, See
 from steptwin.simulation.world.model import WORLD
 from steptwin.simulation.world.motions import ordered
@@ -73,7 +73,7 @@ class WorldSubject:
         self._machine_of = {(line.name, unit): name for name, (line, unit) in world.parts.line_of.items()}
         self._is_watching = False
         self._statements: StatementFollower | None = None
-        self._jogs: list[tuple[Jog, HeldJog]] = []
+        self._jogs: list[tuple[Jog, DeadManJog]] = []
         """Those that have not ended."""
 
     def _actions(self) -> dict[Any, Action]:
@@ -176,8 +176,8 @@ class WorldSubject:
             self._cut_jogs(step)
 
     def _cut_jogs(self, halt: Halt) -> None:
-        """A stop ends the held jogs of its axis, whoever holds them; that of a controller or of its program all of it. They may
-        be between two of their motions, where there was nothing to stop."""
+        """A stop ends the dead-man jogs of its axis, whoever holds them; that of a controller or of its program all of it.
+        They may be between two of their motions, where there was nothing to stop."""
         self._jogs = [(wanted, jog) for wanted, jog in self._jogs if jog.over is None]
         for wanted, jog in self._jogs:
             if wanted.machine == halt.machine and halt.axis in (None, wanted.axis):
@@ -199,13 +199,13 @@ class WorldSubject:
                 self._cut_jogs(halt)
         return {"machines": list(world.machines), "scripts": sorted(before - {script.name for script in world.scripts})}
 
-    def held_jog(self, wanted: Jog) -> HeldJog:
+    def dead_man_jog(self, wanted: Jog) -> DeadManJog:
         """A jog that lasts only while it is extended; it has not started yet. Raises `Misuse` and `Refusal`."""
         world, name = self.world, wanted.machine
         kind, machine = world.kind(name), world.machine(name)
         world.touch(name)
         on = world.parts.line_of.get(name)
-        held = kind.held_jog(machine, None if on is None else on[0].name, wanted)
+        held = kind.dead_man_jog(machine, None if on is None else on[0].name, wanted)
         self._jogs = [(one, jog) for one, jog in self._jogs if jog.over is None] + [(wanted, held)]
         return held
 

@@ -27,7 +27,7 @@ from steptwin.simulation.describe.small import Whole
 from steptwin.simulation.describe.small_m1486 import chip_name, m1486_world
 from steptwin.testing.realtime import RealTime, WallTime
 from steptwin.testing.rig import LineRig, Observe, check_time, check_word
-from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, joined_chip
+from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, connected_chip
 
 T = TypeVar("T")
 
@@ -148,7 +148,7 @@ class M1486Rig(LineRig):
             given = parse_device(self._device)
             return host.M1486(given.place, given.number, baud=given.baud, variant=given.variant)
         if isinstance(time, VirtualTime):
-            return joined_chip(MemoryEndpoint(time, self._port, "the M1486"), time, options.address)
+            return connected_chip(MemoryEndpoint(time, self._port, "the M1486"), time, options.address)
         return host.M1486(self.address, options.address)
 
     def _baud(self) -> int:

@@ -31,7 +31,7 @@ from steptwin.simulation.script import steps as do
 from steptwin.testing.devices import driver_of
 from steptwin.testing.realtime import RealTime, WallTime
 from steptwin.testing.rig import LineRig, Observe, check_time, check_word
-from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, joined_driver
+from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, connected_driver
 
 T = TypeVar("T")
 
@@ -195,7 +195,7 @@ class Mic488Rig(LineRig):
         if not isinstance(time, VirtualTime):
             return Mic488(self.address, options.unit, firmware=firmware, config=config)
         endpoint = MemoryEndpoint(time, self._port, "the MIC488")
-        return joined_driver(endpoint, time, options.unit, framed=options.link == "tcp", firmware=firmware, config=config)
+        return connected_driver(endpoint, time, options.unit, framed=options.link == "tcp", firmware=firmware, config=config)
 
     # ------------------------------------------------------------------ inputs, faults, power
 

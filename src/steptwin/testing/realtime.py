@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from steptwin.errors import Misuse, SteptwinError
-from steptwin.live.cell import Advanceable, Cell
 from steptwin.live.clients import Clients
 from steptwin.live.clock import Clock
 from steptwin.live.links import Link
 from steptwin.live.ptys import pty_link
+from steptwin.live.realtimedriver import Advanceable, RealTimeDriver
 from steptwin.live.tcp import TcpLink
 from steptwin.machine import SECOND, Nanos, Port
 from steptwin.simulation.toml.addresses import LOOPBACK, Address
@@ -69,8 +69,8 @@ class RealTime:
         self._loop.set_exception_handler(self._trouble)
         self._ended = asyncio.Event()
         self._clock = Clock(self.speed)
-        self.cell = Cell(self.machines, self._clock)
-        self.cell.start()
+        self.realtime = RealTimeDriver(self.machines, self._clock)
+        self.realtime.start()
         self._ready.set()
         try:
             await self._ended.wait()
@@ -78,7 +78,7 @@ class RealTime:
             await _settle()
             for link in self._links:
                 await link.close()
-            self.cell.close()
+            self.realtime.close()
             await _settle()
 
     def _trouble(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
@@ -121,10 +121,10 @@ class RealTime:
 
     def _do(self, act: Callable[[Nanos], T]) -> T:
         try:
-            return act(self.cell.enter())
+            return act(self.realtime.enter())
         finally:
             self.machines.stale = True
-            self.cell.leave()
+            self.realtime.leave()
 
     def later(self, seconds: float, act: Callable[[], object]) -> None:
         """Do something when so many seconds of the twin have passed, in its thread."""
@@ -152,7 +152,7 @@ class RealTime:
         """Listen on a free port of the loopback interface."""
 
         async def opened() -> Address:
-            link = TcpLink(self.cell, Address(LOOPBACK, 0), make_port, self._clients)
+            link = TcpLink(self.realtime, Address(LOOPBACK, 0), make_port, self._clients)
             address = await link.open()
             self._links.append(link)
             return address
@@ -163,7 +163,7 @@ class RealTime:
         """A pseudo terminal behind the link ``path``."""
 
         async def opened() -> Path:
-            link = pty_link(self.cell, path, make_port)
+            link = pty_link(self.realtime, path, make_port)
             self._links.append(link)
             return await link.open()
 

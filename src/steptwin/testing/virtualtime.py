@@ -15,7 +15,7 @@ from steptwin.drivers.mic488.lines import FRAMES_PER_SECOND, modbus_exchanger
 from steptwin.drivers.place import LineAddress
 from steptwin.drivers.tcp import Channel
 from steptwin.drivers.threads import ThreadLine
-from steptwin.live.cell import Advanceable
+from steptwin.live.realtimedriver import Advanceable
 from steptwin.machine import MILLISECOND, SECOND, Nanos, Port
 from steptwin.mic488.config import ControllerConfig
 
@@ -129,17 +129,17 @@ class MemoryChannel:
         self._port.close()
 
 
-def joined_driver(
+def connected_driver(
     endpoint: MemoryEndpoint, time: VirtualTime, unit: int, *, framed: bool, firmware: str, config: ControllerConfig
 ) -> Mic488:
     """A driver; while it waits, the time of the twin advances. ``framed``: Modbus TCP rather than RTU."""
-    exchanger, notes = modbus_exchanger(LineAddress(endpoint, framed=framed), FRAMES_PER_SECOND, None)
-    line = ThreadLine(endpoint, exchanger, notes, clock=time.now, sleeping=time.sleep)
+    exchanger, shared = modbus_exchanger(LineAddress(endpoint, framed=framed), FRAMES_PER_SECOND, None)
+    line = ThreadLine(endpoint, exchanger, shared, clock=time.now, sleeping=time.sleep)
     return Mic488(line, unit, firmware=firmware, config=config)
 
 
-def joined_chip(endpoint: MemoryEndpoint, time: VirtualTime, address: int) -> M1486:
+def connected_chip(endpoint: MemoryEndpoint, time: VirtualTime, address: int) -> M1486:
     """A driver of a chip; while it waits, the time of the twin advances."""
-    exchanger, notes = talking(endpoint, BAUD, None)
-    line = ThreadLine(endpoint, exchanger, notes, clock=time.now, sleeping=time.sleep)
+    exchanger, shared = talking(endpoint, BAUD, None)
+    line = ThreadLine(endpoint, exchanger, shared, clock=time.now, sleeping=time.sleep)
     return M1486(line, address)

@@ -32,7 +32,7 @@ from steptwin.subject.commands import Command, ListFaults
 from steptwin.testing.devices import ANY, driver_of
 from steptwin.testing.realtime import RealTime, WallTime
 from steptwin.testing.rig import Observe, Rig, check_time
-from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, joined_driver
+from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, connected_driver
 
 T = TypeVar("T")
 
@@ -170,7 +170,7 @@ class WorldRig(Rig):
         if not isinstance(self._time, VirtualTime):
             return Mic488(self.address(line), unit, firmware=firmware, config=device.config)
         endpoint = MemoryEndpoint(self._time, lambda: self._port(line, "tcp"), f"line {line!r}")
-        return joined_driver(endpoint, self._time, unit, framed=True, firmware=firmware, config=device.config)
+        return connected_driver(endpoint, self._time, unit, framed=True, firmware=firmware, config=device.config)
 
     def channel(self, line: str) -> Channel:
         """Characters to the M1486 chips of a line and back; closed after the test. Raises `Misuse`."""

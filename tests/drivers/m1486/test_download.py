@@ -49,7 +49,7 @@ def test_a_program_whose_chip_was_recovered_is_not_held_any_more() -> None:
     wire.sleep(0.3)
     wire.send(b"k\r")  # of another master: the program goes on behind C75
     wire.sleep(1.0)
-    chip._driver._unit.notes.is_killed = True
+    chip._driver._unit.shared.is_killed = True
     with pytest.raises(Busy, match="is held by Kill because its function 51 is OFF"):
         chip.counter()
     chip.recover()
@@ -126,7 +126,7 @@ def test_what_takes_one_of_the_last_places_of_the_buffer_is_followed_by_a_pause(
     chip = chip_driver(wire)
     chip.configure(**KNOWN)  # type: ignore[arg-type]
     chip.download("\n".join(["l2", f"f{64 * steps}", "r", *commands.split(), "e"]))
-    assert chip._driver._unit.notes.uploads == b""
+    assert chip._driver._unit.shared.uploads == b""
     assert chip.wait().ok
     assert wire.true() == 2 * 64 * steps
     assert "wrong-data" not in wire.codes()

@@ -227,7 +227,7 @@ def test_a_move_of_nothing_is_over_at_once_and_types_nothing() -> None:
 def test_settings_typed_by_hand_are_known_again() -> None:
     wire = ChipWire("B")
     chip = chip_driver(wire)
-    function = chip._driver._unit.notes.function
+    function = chip._driver._unit.shared.function
     chip.configure(**KNOWN)
     chip.command("s300")
     assert (chip.settings.start_stop, chip.settings.velocity) == (300, KNOWN["velocity"])

@@ -128,7 +128,7 @@ def test_after_an_ordinary_session_no_letter_is_expected_and_a_stray_one_counts(
     chip.move_by(10.0)
     assert chip.wait().ok
     chip.status()
-    talk = chip._driver.line.notes[TALK]
+    talk = chip._driver.line.shared[TALK]
     assert (talk.surplus, talk.owed, talk.dirty) == (0, {}, False)
     wire.inject(b"B")
     wire.sleep(0.1)
@@ -145,15 +145,15 @@ def test_of_the_functions_those_are_found_that_a_stop_depends_on() -> None:
         first.set_function(number, not first.functions()[number])
     expected = first.functions()
     chip = chip_driver(wire)
-    notes = chip._driver._unit.notes
+    shared = chip._driver._unit.shared
     assert [number for number, on in expected.items() if on] == [41, 42, *(48, 49, 50), *range(52, 56), 60]
     known = {number: on for number, on in expected.items() if number < 48}
-    assert {number: notes.function(number) for number in expected} == dict.fromkeys(expected) | known
+    assert {number: shared.function(number) for number in expected} == dict.fromkeys(expected) | known
     wire.chain.receive(b"t57\r", wire.now)
     wire.sleep(2.0)
     wire.unread = b""
     reporting = chip_driver(wire)
-    assert reporting._driver._unit.notes.function(57) is None
+    assert reporting._driver._unit.shared.function(57) is None
     assert not wire.chip.unit.on(57)
     assert reporting.functions() == expected
 

@@ -161,11 +161,11 @@ def test_what_is_not_stored_takes_no_time_of_the_memory() -> None:
     wire = ChipWire("E1")
     chip = chip_driver(wire)
     wire.sleep(5.0)
-    notes = chip._driver._unit.notes
+    shared = chip._driver._unit.shared
     chip.recover()
-    assert notes.ready_at <= wire.now
+    assert shared.ready_at <= wire.now
     chip.set_flag(80, True)
-    assert notes.ready_at > wire.now
+    assert shared.ready_at > wire.now
 
 
 def test_an_end_says_how_long_it_was_waited_for() -> None:

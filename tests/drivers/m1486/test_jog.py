@@ -158,7 +158,7 @@ def test_a_stop_between_the_distance_and_its_move_ends_the_jog() -> None:
 
     def stop(data: bytes) -> None:
         if data.startswith(b"f"):
-            chip._unit.notes.stops += 1
+            chip._unit.shared.stops += 1
 
     wire.before_each = stop
     assert not finish(jog.hold())
@@ -172,7 +172,7 @@ def test_a_jog_that_is_refused_at_its_beginning_puts_the_velocity_back() -> None
 
     def stop(data: bytes) -> None:
         if data.startswith(b"f"):
-            chip._unit.notes.stops += 1
+            chip._unit.shared.stops += 1
 
     wire.before_each = stop
     with pytest.raises(Overtaken):
@@ -209,7 +209,7 @@ def test_ramps_that_are_slower_than_known_end_a_jog() -> None:
     """What is not known is taken as at power-up, A 5000; with A 500 such a move takes longer than the hold time."""
     wire, chip = ready()
     finish(chip.configure(acceleration=500))
-    chip._unit.notes.settings = ChipSettings(microstep=1)
+    chip._unit.shared.settings = ChipSettings(microstep=1)
     jog = begun(chip, 2000.0)
     assert jog.reach == 128
     assert not finish(jog.hold())

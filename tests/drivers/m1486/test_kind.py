@@ -94,7 +94,7 @@ def test_what_is_no_seek(texts: list[str], message: str) -> None:
             motion(texts)
 
 
-def test_a_held_jog() -> None:
+def test_a_dead_man_jog() -> None:
     wire = ChipWire(addresses=(7,))
     chip = ready(wire)
     jog = M1486_DRIVER.jog(chip, 1, 400.0, 0.3)

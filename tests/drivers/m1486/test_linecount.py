@@ -53,7 +53,7 @@ def test_without_an_address_nothing_moves_on_a_line_of_several(motion: str, addr
         chip_driver(wire)
     assert refused.value.addresses == addresses
     chip = M1486(chip_line(wire), variant="B")
-    chip._driver._unit.notes.variant = chip._driver._variant
+    chip._driver._unit.shared.variant = chip._driver._variant
     with pytest.raises(SeveralChips):
         MOTIONS[motion](chip)
     wire.sleep(1.0)

@@ -345,7 +345,7 @@ def test_a_letter_too_many_is_not_that_of_the_next_move() -> None:
     """A letter comes doubled, when the first of two moves ends; the other one ends a little later."""
     wire = ChipWire("B", (0, 7))
     chips = moving(wire, 1000.0, 1100.0)
-    motion = chips[0]._driver._unit.notes.motion
+    motion = chips[0]._driver._unit.shared.motion
     assert motion is not None
     wire.sleep((motion.end - wire.now) / SECOND - 0.02)
     wire.put(Fault("to host", len("x0|u20|"), "double"))
@@ -368,7 +368,7 @@ def test_a_watch_ends_at_its_limit(monkeypatch: pytest.MonkeyPatch) -> None:
     def watched(limit: int | None = None) -> int:
         wire = ChipWire("B", (0, 7))
         unit = moving(wire, 1000.0, 1000.0)[0]._driver._unit
-        motion = unit.notes.motion
+        motion = unit.shared.motion
         assert motion is not None
         finish(watching.watch(unit, motion, motion.end if limit is None else limit))
         return wire.now
@@ -382,7 +382,7 @@ def test_a_chip_that_was_reset_meanwhile_is_watched_no_more() -> None:
     """A stop has found out so, while the watch asked another chip."""
     wire = ChipWire("B", (0, 7))
     chips = moving(wire, 1000.0, 1000.0)
-    motion, other = chips[0]._driver._unit.notes.motion, chips[1]._driver._unit.notes
+    motion, other = chips[0]._driver._unit.shared.motion, chips[1]._driver._unit.shared
     assert motion is not None
     wire.sleep((motion.end - wire.now) / SECOND - 0.02)  # both are to be asked now
     asked: list[bytes] = []

@@ -12,7 +12,7 @@ import pytest
 from steptwin.drivers.exchange import LineLost
 from steptwin.drivers.m1486.failures import DoubtfulMove, Garbled, NoEcho, NoRoom, Restarted, unconfirmed
 from steptwin.drivers.m1486.motion import ChipMotion, ChipMotionCommand, ChipMoveEnd, ChipReason
-from steptwin.drivers.m1486.notes import ChipNotes
+from steptwin.drivers.m1486.sharedstate import SharedChipState
 from steptwin.drivers.m1486.watching import _is_watched, _Mover, early_ns, watch
 from steptwin.machine import SECOND
 
@@ -94,8 +94,8 @@ class Waited:
     """What a mover asks of its unit: one with an EEPROM that takes 0.5 s for a question."""
 
     def __init__(self, stops: int = 0) -> None:
-        self.notes = ChipNotes()
-        self.notes.stops = stops
+        self.shared = SharedChipState()
+        self.shared.stops = stops
         self.write_ns = SECOND // 2
 
 
@@ -110,30 +110,30 @@ def test_when_the_end_of_a_motion_is_expected() -> None:
 
 
 def test_a_motion_is_watched_until_300_ms_after_its_time() -> None:
-    notes = ChipNotes()
-    assert not _is_watched(notes, AT)
-    notes.motion = ChipMotionCommand(ChipMotion.MOVE, AT, 0, duration_s=10.0)
+    shared = SharedChipState()
+    assert not _is_watched(shared, AT)
+    shared.motion = ChipMotionCommand(ChipMotion.MOVE, AT, 0, duration_s=10.0)
     end = AT + 10_300_000_000
-    assert [_is_watched(notes, at) for at in (AT, end - 1, end)] == [True, True, False]
-    notes.stops = 1
-    assert not _is_watched(notes, AT)
-    notes.stops = 0
-    notes.motion.over_at = AT
-    assert not _is_watched(notes, AT)
-    notes.motion = ChipMotionCommand(ChipMotion.ENDLESS, AT, 0)
-    assert not _is_watched(notes, AT)
+    assert [_is_watched(shared, at) for at in (AT, end - 1, end)] == [True, True, False]
+    shared.stops = 1
+    assert not _is_watched(shared, AT)
+    shared.stops = 0
+    shared.motion.over_at = AT
+    assert not _is_watched(shared, AT)
+    shared.motion = ChipMotionCommand(ChipMotion.ENDLESS, AT, 0)
+    assert not _is_watched(shared, AT)
 
 
 def test_a_watch_ends_where_its_time_has_passed_in_a_suspension() -> None:
     """It has just seen that the motion is not over, then comes the suspension."""
     motion = ChipMotionCommand(ChipMotion.MOVE, AT, 0, duration_s=10.0)
-    notes = ChipNotes()
-    notes.motion = motion
+    shared = SharedChipState()
+    shared.motion = motion
     moments = iter([AT + 10_299_999_999])
     line = SimpleNamespace(
-        now=lambda: next(moments, AT + 60 * SECOND), notes={"m1486 chips": [None], ("m1486", None): notes}, sleep=pytest.fail
+        now=lambda: next(moments, AT + 60 * SECOND), shared={"m1486 chips": [None], ("m1486", None): shared}, sleep=pytest.fail
     )
-    unit: Any = SimpleNamespace(line=line, notes=notes, talk=SimpleNamespace(wire_ns=lambda count: count), turn=nullcontext)
+    unit: Any = SimpleNamespace(line=line, shared=shared, talk=SimpleNamespace(wire_ns=lambda count: count), turn=nullcontext)
     asyncio.run(watch(unit, motion, AT + 100 * SECOND))
     assert next(moments, None) is None
     assert motion.over_at is None

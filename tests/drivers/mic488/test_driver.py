@@ -250,10 +250,10 @@ def test_a_stop_of_any_axis_overtakes_the_start_of_the_program(axis: int) -> Non
     """A program moves whatever it likes."""
     wire = Wire()
     mic = driver(wire)
-    notes = mic._driver._unit.notes
+    shared = mic._driver._unit.shared
 
     def now() -> int:
-        notes.stops[axis] = 1  # of another thread, right after the call
+        shared.stops[axis] = 1  # of another thread, right after the call
         return wire.now
 
     mic._driver.line.now = now  # type: ignore[method-assign]
@@ -276,11 +276,11 @@ def test_a_running_program_is_paused_before_what_waits_and_ended_by_a_stop() -> 
         await inner(item, value, **options)  # type: ignore[arg-type]
 
     unit.write = write  # type: ignore[method-assign]
-    stops = list(unit.notes.stops)
+    stops = list(unit.shared.stops)
     mic.program.pause()
     mic.program.stop()
     assert asked == [(ProgramState.PAUSED, True, 5), (ProgramState.STOPPED, True, 5)]
-    counted = [after - before for after, before in zip(unit.notes.stops, stops, strict=True)]
+    counted = [after - before for after, before in zip(unit.shared.stops, stops, strict=True)]
     assert counted == [2, 0, 0, 0, 0]
     assert twin.program.state == ProgramState.STOPPED
     wire.severed = True
@@ -329,11 +329,11 @@ def test_what_stops_is_written_by_name_and_what_is_behind_it_in_the_same_write(n
 
 def test_a_stop_of_another_client_between_own_stops_refuses_the_rest() -> None:
     wire, mic = moving()
-    notes = mic._driver._unit.notes
+    shared = mic._driver._unit.shared
 
     def stop(_: bytes) -> None:
         wire.before_each = None
-        notes.stops[1] += 1
+        shared.stops[1] += 1
 
     wire.before_each = stop
     with pytest.raises(Overtaken):
@@ -434,7 +434,7 @@ def test_what_moves_is_sent_within_5_s_or_twice_the_time_of_its_tries(timeout_s:
     assert unit.permission(1).patience_ns == patience_s * SECOND
     assert unit.permission(1, patience_ns=7).patience_ns == 7
     stopped, other = unit.permission(1, 3), unit.permission(2)
-    unit.notes.stops[3] += 1
+    unit.shared.stops[3] += 1
     assert (stopped.is_stopped(), other.is_stopped()) == (True, False)
 
 
@@ -518,8 +518,8 @@ def test_time_outs_have_bounds(timeout_s: float) -> None:
 def test_frames_in_words_of_both_sorts_of_lines(*, framed: bool) -> None:
     """Read 2 words from 10020; with the address and the CRC of RTU, or the header of Modbus TCP."""
     log: list[str] = []
-    _, notes = modbus_exchanger(LineAddress(MemoryEndpoint(Wire()), framed=framed), None, log.append)
-    frames = notes["frames"]
+    _, shared = modbus_exchanger(LineAddress(MemoryEndpoint(Wire()), framed=framed), None, log.append)
+    frames = shared["frames"]
     assert isinstance(frames, FrameWords)
     request = bytes.fromhex("03 27 24 00 02")
     frame = bytes.fromhex("00 01 00 00 00 06 01") + request if framed else rtu.encode_frame(1, request)

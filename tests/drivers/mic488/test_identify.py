@@ -133,7 +133,7 @@ def test_a_gateway_that_ignores_the_unit() -> None:
 
         wire.before_each = passed_on
         line = thread_line(wire)
-        line.notes["tcp"] = True
+        line.shared["tcp"] = True
         assert finish(scan(line, [1, 2, 3])) == [FoundUnit(1, "1.70", every), FoundUnit(2, "1.70", every)]
         assert finish(scan(line, [1])) == [FoundUnit(1, "1.70")]
 

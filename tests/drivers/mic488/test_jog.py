@@ -414,7 +414,7 @@ def stopping_at(wire: Wire, mic: Mic488, what: str) -> None:
 
     def stop(frame: bytes) -> None:
         if frame[2:4] == address:
-            mic._driver._unit.notes.stops[1] += 1
+            mic._driver._unit.shared.stops[1] += 1
 
     wire.before_each = stop
 
@@ -436,7 +436,7 @@ def test_a_stop_while_a_jog_is_released() -> None:
     jog = mic.axis(1).jog(5.0)
     jog.__enter__()
     assert jog.hold()
-    mic._driver._unit.notes.stops[1] += 1
+    mic._driver._unit.shared.stops[1] += 1
     jog.release()
     assert jog.end is not None
     assert (jog.end.reason, jog.end.detail) == (Reason.STOPPED, "by this program")

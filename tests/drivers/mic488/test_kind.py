@@ -110,7 +110,7 @@ def test_an_end_that_does_not_come_in_time_is_overdue() -> None:
     assert not wire.moving(1)
 
 
-def test_a_held_jog() -> None:
+def test_a_dead_man_jog() -> None:
     wire = Wire()
     mic = enabled(wire, 2)
     jog = MIC488_DRIVER.jog(mic, 2, 10.0, 0.4)

@@ -33,7 +33,7 @@ class Unit:
         self.config = config
         self.values = {"POS_ACT": 3.0, "VEL_ACT": -4.0, "ACC": 8.0, "DEC": 5.0, "VMAX": 10.0}
         self.wording = SimpleNamespace(data_type=DataType.REAL)
-        self.notes = SimpleNamespace(control=None)
+        self.shared = SimpleNamespace(control=None)
         self.line: Any = self
         self.moment = BEGIN
         self.asked: list[int | None] = []

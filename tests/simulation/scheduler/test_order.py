@@ -41,7 +41,7 @@ OUTPUTS = 3
 
 @st.composite
 def networks(draw: st.DrawFn) -> tuple[list[tuple[str, list[int]]], list[int]]:
-    """Gates, each with its kind and what it is joined to (outputs of the controller, then gates); the order of their tables."""
+    """Gates, each with its kind and its connections (outputs of the controller, then gates); the order of their tables."""
     gates = []
     for number in range(draw(st.integers(2, 7))):
         inputs = draw(st.lists(st.integers(0, OUTPUTS + number - 1), min_size=1, max_size=3))

@@ -1,4 +1,4 @@
-"""Machines joined by wires and position switches."""
+"""Machines connected by wires and position switches."""
 
 from __future__ import annotations
 

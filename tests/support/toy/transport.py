@@ -26,7 +26,7 @@ class UnixClient(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast(asyncio.Transport, transport)
-        self._feed = Feed(self._link.opening.cell, self._port, self._transport)
+        self._feed = Feed(self._link.opening.realtime, self._port, self._transport)
         self._link.clients.add(self)
 
     def data_received(self, data: bytes) -> None:

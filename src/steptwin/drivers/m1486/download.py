@@ -145,13 +145,13 @@ async def send_program(
 
 async def _interface(unit: ChipUnit, text: str, permission: Permission) -> Interface:
     """The driver interface to check a program for. The chip is asked only where it makes a difference."""
-    if unit.notes.interface is None:
+    if unit.shared.interface is None:
         sound = [check(text, unit.variant, interface).is_sound for interface in INTERFACES]
         if any(sound) and not all(sound):
             async with unit.turn(permission):
                 await unit.rest()
                 await unit.find_interface()
-    return unit.notes.interface or STEP_DIRECTION
+    return unit.shared.interface or STEP_DIRECTION
 
 
 TAKES_NO_CHARACTERS = Message("drivers.m1486.takes-no-characters", "{place}: {chip} takes no more characters: it {why}")
@@ -210,18 +210,18 @@ class _Typist:
             await reset(unit)
             return b""
         if command.key == "K":
-            was_stopped, stops = self.permission.is_stopped(), unit.notes.stops
+            was_stopped, stops = self.permission.is_stopped(), unit.shared.stops
             await unit.kill()
-            if not was_stopped and unit.notes.stops == stops + 1:  # only by this K, which does not end the text
+            if not was_stopped and unit.shared.stops == stops + 1:  # only by this K, which does not end the text
                 self.permission = unit.permission()
             return b""
         if self._typed + len(text) + 1 + len(TYPE_QUERY) + 1 > self._capacity - 3:
             await self._empty()
-        unit.notes.note_downloaded(text, unit.stored_bits)
+        unit.shared.note_downloaded(text, unit.stored_bits)
         if text[0] in MOVES:
             await begin(unit, text, ChipMotion.BLOCK, self.permission)
         else:
-            unit.notes.settings = ChipSettings()
+            unit.shared.settings = ChipSettings()
             if command.key == "U":
                 await self._empty()
                 return await unit.send(text, answers=True)
@@ -266,13 +266,13 @@ async def type_file(unit: ChipUnit, lines: Sequence[str], permission: Permission
     is_whole = False
     try:
         for count, line in enumerate(lines[:-1], start=1):
-            unit.notes.note_downloaded(line, unit.stored_bits)
+            unit.shared.note_downloaded(line, unit.stored_bits)
             await unit.act(line, permission, once=True, retype=count == 1)
             if unit.talk.nearly_full:
                 await unit.line.sleep(FULL_PAUSE_NS / SECOND)
             permission.extend()
             report(count)
-        unit.notes.note_downloaded(lines[-1], unit.stored_bits)
+        unit.shared.note_downloaded(lines[-1], unit.stored_bits)
         is_whole = True
         await begin(unit, lines[-1], ChipMotion.BLOCK, permission, retype=False)
     except (LineFailure, Refusal) as failure:
@@ -300,21 +300,21 @@ async def begin(
     label: int | None = None,
 ) -> None:
     """Send a command that begins a motion, once. ``label``: where it starts a program."""
-    notes = unit.notes
-    stops = notes.stops  # a command that is sent too late is stopped before it is noted
+    shared = unit.shared
+    stops = shared.stops  # a command that is sent too late is stopped before it is noted
 
     def register_motion(target_u: int | None, duration_s: float | None) -> None:
         if kind is ChipMotion.BLOCK:
-            notes.settings = ChipSettings()
-            unit.talk.uploads = notes.uploads = bytearray()
+            shared.settings = ChipSettings()
+            unit.talk.uploads = shared.uploads = bytearray()
         # An E type executes a command after it has written it to its EEPROM.
-        notes.motion = ChipMotionCommand(
+        shared.motion = ChipMotionCommand(
             kind, unit.line.now() + unit.write_ns, stops, target_u, duration_s, unit.talk.spoilt.get(unit.address, 0), label=label
         )
 
-    notes.motion = None
+    shared.motion = None
     if kind is ChipMotion.BLOCK:
-        notes.note_begin(label)
+        shared.note_begin(label)
     try:
         await unit.act(text, permission, once=True, retype=retype)
     except SentLate:
@@ -331,12 +331,12 @@ async def begin(
 async def reset(unit: ChipUnit) -> None:
     """``\\``, and the time an E type takes for it."""
     await unit.send("\\", stored=False)
-    notes = unit.notes
+    shared = unit.shared
     unit.talk.forget(unit.address)
-    notes.forget()
-    notes.note_defaults()
-    notes.was_awake = False
-    notes.is_position_valid = True
-    notes.settings = ChipSettings() if notes.interface is None else after_reset(unit.variant, notes.interface)
+    shared.forget()
+    shared.note_defaults()
+    shared.was_awake = False
+    shared.is_position_valid = True
+    shared.settings = ChipSettings() if shared.interface is None else after_reset(unit.variant, shared.interface)
     if unit.variant.erase_ns:
         await unit.line.sleep(unit.variant.erase_ns / SECOND + ERASE_MARGIN_S)

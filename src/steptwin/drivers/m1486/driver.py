@@ -14,8 +14,8 @@ from steptwin.drivers.m1486.failures import Busy, PositionUnknown, ProgramLost, 
 from steptwin.drivers.m1486.jog import AsyncM1486Jog
 from steptwin.drivers.m1486.lines import BAUD, AsyncM1486Line
 from steptwin.drivers.m1486.motion import UNKNOWN_S, ChipMotion, ChipMotionCommand, ChipMoveEnd, ChipMoveFailed
-from steptwin.drivers.m1486.notes import FUNCTION_BYTES
 from steptwin.drivers.m1486.settings import COMMANDS, ChipSettings, checked_number
+from steptwin.drivers.m1486.sharedstate import FUNCTION_BYTES
 from steptwin.drivers.m1486.talk import ChipRequest
 from steptwin.drivers.m1486.unit import PATIENCE_NS, SLICE_NS, ChipUnit
 from steptwin.drivers.m1486.waiting import wait_for
@@ -194,7 +194,7 @@ class AsyncM1486:
     @property
     def settings(self) -> ChipSettings:
         """The settings of the chip as far as drivers on this line have made them."""
-        return self._unit.notes.settings
+        return self._unit.shared.settings
 
     # ------------------------------------------------------------------ opening
 
@@ -205,28 +205,28 @@ class AsyncM1486:
         Raises `NoEcho`, `Busy` while it moves, `SeveralChips`, `WrongType`.
         """
         await self.line.open()
-        notes = self._unit.notes
-        before = notes.variant
+        shared = self._unit.shared
+        before = shared.variant
         try:
             async with self._unit.turn():
                 self._take_type()
                 await self._unit.look()
         except BaseException as error:
             is_known = isinstance(error, Busy) or (self._variant is not None and not isinstance(error, WrongType))
-            notes.variant = before if is_known else None  # else there may be another chip now
+            shared.variant = before if is_known else None  # else there may be another chip now
             await self.close()
             raise
 
     def _take_type(self) -> None:
         """Take the type that was named. Raises `Misuse` where another one is known; one for 24 MHz answers like that for 12 MHz,
         so the clock that was named counts."""
-        notes, named = self._unit.notes, self._variant
-        known = notes.variant
+        shared, named = self._unit.shared, self._variant
+        known = shared.variant
         if named is None or named is known:
             return
         if known is not None and known.type_letter != named.type_letter:
             raise Misuse(OTHER_TYPE_IS_KNOWN(place=self.line.place, name=self._unit.name, title=known.title, named=named.title))
-        notes.variant = named
+        shared.variant = named
 
     async def open_line(self) -> None:
         """Open the line only: sufficient for `stop` and `stop_program` of a moving chip, which does not respond."""
@@ -260,7 +260,7 @@ class AsyncM1486:
         return self._shown(counter)
 
     def _check_position(self) -> None:
-        if not self._unit.notes.is_position_valid:
+        if not self._unit.shared.is_position_valid:
             raise PositionUnknown(COUNTER_SHOWS_THE_TARGET(place=self.line.place, chip=self._unit.name))
 
     def _shown(self, counter_u: int) -> float:
@@ -308,7 +308,7 @@ class AsyncM1486:
         return self._functions()
 
     def _functions(self) -> dict[int, bool]:
-        return {number: bool(self._unit.notes.function(number)) for number in FUNCTIONS}
+        return {number: bool(self._unit.shared.function(number)) for number in FUNCTIONS}
 
     async def status(self) -> ChipStatus:
         """Ask the chip whether it is at rest, and return what is known of it: each byte that was read since the last command that
@@ -323,25 +323,25 @@ class AsyncM1486:
 
     def known(self) -> ChipStatus:
         """Known state of the chip, as `status` returns it. Nothing is sent."""
-        notes = self._unit.notes
-        counter, flags, is_valid = notes.reading(1), notes.readings.get(14), notes.is_position_valid
+        shared = self._unit.shared
+        counter, flags, is_valid = shared.reading(1), shared.readings.get(14), shared.is_position_valid
         return ChipStatus(
             type=self.variant.title,
-            interface=None if notes.interface is None else notes.interface.title,
-            series=notes.readings.get(16),
+            interface=None if shared.interface is None else shared.interface.title,
+            series=shared.readings.get(16),
             counter_u=counter,
             position=None if counter is None else self._shown(counter),
             unit=self.unit,
             is_position_valid=is_valid,
-            variable=notes.reading(4),
+            variable=shared.reading(4),
             flags=None if flags is None else _flags(flags),
-            functions=self._functions() if notes.readings.keys() >= set(FUNCTION_BYTES) else None,
+            functions=self._functions() if shared.readings.keys() >= set(FUNCTION_BYTES) else None,
         )
 
     async def interface(self) -> Interface | None:
         """The driver interface, which pins select; it is read once. None for a number that no interface has."""
         async with self._unit.turn():
-            if self._unit.notes.interface is None:
+            if self._unit.shared.interface is None:
                 await self._unit.rest()
             return await self._unit.find_interface()
 
@@ -380,24 +380,24 @@ class AsyncM1486:
         numbers = {
             name: checked_number(COMMANDS[name], value, unit.variant, name) for name, value in given.items() if value is not None
         }
-        wanted = unit.notes.settings.with_(**numbers)
+        wanted = unit.shared.settings.with_(**numbers)
         wanted.check()
         async with unit.turn():
             await unit.rest()
             for name, number in numbers.items():
-                unit.notes.settings = unit.notes.settings.with_(**{name: None})
+                unit.shared.settings = unit.shared.settings.with_(**{name: None})
                 await unit.send(f"{COMMANDS[name]}{number}")
-                unit.notes.settings = unit.notes.settings.with_(**{name: number})
+                unit.shared.settings = unit.shared.settings.with_(**{name: number})
 
     async def set_position(self, position: float) -> None:
         """Set the position counter. The motor does not move."""
         counter = self._counter_of(position)
         async with self._unit.turn():
             await self._unit.rest()
-            self._unit.notes.is_position_valid = False
+            self._unit.shared.is_position_valid = False
             await self._unit.send(f"={counter}" if counter else "c100")
-            self._unit.notes.note_counter(counter)
-            self._unit.notes.is_position_valid = True
+            self._unit.shared.note_counter(counter)
+            self._unit.shared.is_position_valid = True
 
     async def set_output(self, line: int, on: bool) -> None:
         """Set B1 to B21 high or low."""
@@ -423,7 +423,7 @@ class AsyncM1486:
         if function in (RETURN, REPORT):
             raise Misuse(FUNCTION_IS_OF_THE_DRIVER(function=function, level="ON" if function == RETURN else "OFF"))
         await self._switch(function, on)
-        self._unit.notes.note_function(function, on=on)
+        self._unit.shared.note_function(function, on=on)
 
     async def set_limit(self, on: bool) -> None:
         """Select whether LIMIT stops the motor (function 42 OFF), for example to leave the switch."""
@@ -485,8 +485,8 @@ class AsyncM1486:
 
     async def _move(self, specification: str, distance_u: int, target_u: int, permission: Permission) -> None:
         if distance_u == 0:
-            notes = self._unit.notes
-            notes.motion = ChipMotionCommand(ChipMotion.MOVE, self.line.now(), notes.stops, target_u, 0.0)
+            shared = self._unit.shared
+            shared.motion = ChipMotionCommand(ChipMotion.MOVE, self.line.now(), shared.stops, target_u, 0.0)
             return
         await self._unit.send(specification)
         duration = self.settings.travel_s(distance_u, self.variant)
@@ -534,7 +534,7 @@ class AsyncM1486:
         checked_number("j", label, self.variant, "the label")
         unit = self._unit
         permission = unit.permission()
-        part = unit.notes.sent.part(label, unit.variant, unit.notes.interface)
+        part = unit.shared.sent.part(label, unit.variant, unit.shared.interface)
         if part is not None and part.has_end:
             raise Misuse(END_IS_REACHED(label=label))
         async with unit.turn(permission):
@@ -545,7 +545,7 @@ class AsyncM1486:
             await unit.send(f":{label}")
             await begin(unit, "j", ChipMotion.BLOCK, permission, label=label)
             if not await unit.runs_at_once():
-                unit.notes.motion = None
+                unit.shared.motion = None
                 raise ProgramLost(PROGRAM_IS_NOT_STARTED(place=self.line.place, chip=unit.name, label=label))
 
     async def stop(self) -> bool:
@@ -563,18 +563,18 @@ class AsyncM1486:
     def _note_stop(self) -> None:
         """Note that the counter does not show the position any more, where a stop cuts a move short (M-16). Nothing is known of
         what a chip does that was not opened."""
-        notes = self._unit.notes
-        motion = notes.motion
+        shared = self._unit.shared
+        motion = shared.motion
         is_cut = motion is not None and motion.kind in (ChipMotion.MOVE, ChipMotion.BLOCK) and not motion.is_over(self.line.now())
-        if is_cut or notes.variant is None:
-            notes.is_position_valid = False
+        if is_cut or shared.variant is None:
+            shared.is_position_valid = False
 
     async def recover(self) -> None:
         """Continue what Kill has stopped (C75), if function 51 is OFF. A program may move the motor at once."""
         permission = self._unit.permission()
         async with self._unit.turn(permission):
             await self._unit.act("c75", permission, stored=False)
-            self._unit.notes.is_killed = False
+            self._unit.shared.is_killed = False
 
     async def stop_program(self, timeout_s: float = 10.0) -> None:
         """End motion and program: the motion by Kill, the program by wrong data (function 44 must be OFF). Nothing is erased.
@@ -584,19 +584,19 @@ class AsyncM1486:
         and only `reset` or RST helps, and the position is lost.
         """
         unit = self._unit
-        notes = unit.notes
+        shared = unit.shared
         self._note_stop()
         has_ended = await unit.kill(program=True)
-        is_held = notes.function(RECOVER) is not True and not has_ended
+        is_held = shared.function(RECOVER) is not True and not has_ended
         # Another stop does not forbid C75: it leaves nothing that could begin.
         permission = Permission(self.line.now, PATIENCE_NS)
         async with unit.turn(permission):
             unit.talk.settle(unit.address)  # questions went with the program
             if has_ended:
-                if notes.function(RECOVER) is not True:
+                if shared.function(RECOVER) is not True:
                     await unit.act("c75", permission, stored=False)
-                notes.is_killed = False
-            notes.motion = None
+                shared.is_killed = False
+            shared.motion = None
             if await unit.query_type(round(timeout_s * SECOND)) is None:
                 if is_held:
                     raise Busy(IS_NOT_AT_REST(place=self.line.place, chip=unit.name))
@@ -648,14 +648,14 @@ class AsyncM1486:
 
     def _learn(self, typed: str) -> None:
         """Forget a setting that a typed command changes, until it is configured again."""
-        notes = self._unit.notes
+        shared = self._unit.shared
         name = next((name for name, letter in COMMANDS.items() if letter == typed[0]), None)
         if name is not None:
-            notes.settings = notes.settings.with_(**{name: int(typed[1:]) if typed[1:] else None})
+            shared.settings = shared.settings.with_(**{name: int(typed[1:]) if typed[1:] else None})
         if typed[0] in "tc" and typed[1:].isdecimal() and int(typed[1:]) in FUNCTIONS:
-            notes.note_function(int(typed[1:]), on=typed[0] == "t")
+            shared.note_function(int(typed[1:]), on=typed[0] == "t")
         elif typed in ("t", "c"):  # the internal variable has the number
-            notes.forget_functions(*FUNCTIONS)
+            shared.forget_functions(*FUNCTIONS)
 
     async def run_block(self, commands: Iterable[str], timeout_s: float | None = None) -> ChipMoveEnd:
         """Have commands done one after the other, as a file in ``[ ]`` that nothing of runs before it is there whole, and wait
@@ -679,8 +679,8 @@ class AsyncM1486:
         async with unit.turn(permission):
             await unit.rest()
             await type_file(unit, ["[", *typed, MARK, "]"], permission, lambda count: None)
-            if unit.notes.motion is not None:
-                unit.notes.motion.is_marked = True
+            if unit.shared.motion is not None:
+                unit.shared.motion.is_marked = True
         return await self.wait(timeout_s if timeout_s is not None else UNKNOWN_S)
 
     async def uploaded(self, count: int = 1, timeout_s: float = 10.0) -> bytes:
@@ -694,10 +694,10 @@ class AsyncM1486:
         unit = self._unit
         if count < 1:
             raise Misuse(f"{count} bytes: at least 1")
-        kept = unit.notes.uploads
+        kept = unit.shared.uploads
         if kept is None:
             raise Misuse(f"{self.line.place}: no program of {unit.name} was started here: download or start_program")
-        if any(notes.motion is not None and notes.motion.kind is ChipMotion.BLOCK for notes in unit.others()):
+        if any(shared.motion is not None and shared.motion.kind is ChipMotion.BLOCK for shared in unit.others()):
             raise Misuse(
                 f"{self.line.place}: another chip runs a program too, so that bytes are not attributable: wait for its end"
             )

@@ -133,7 +133,7 @@ class AsyncM1486Jog:
         chip = self._chip
         grid_u = chip.settings.grid_u
         speed_u = self._velocity * FULL_STEP * chip.variant.clock
-        longest_u = chip.settings.longest_u(MOST_NS, chip.variant, self._unit.notes.interface or STEP_DIRECTION)
+        longest_u = chip.settings.longest_u(MOST_NS, chip.variant, self._unit.shared.interface or STEP_DIRECTION)
         return min(round(speed_u * LINK_S / grid_u) * grid_u, longest_u)  # V16, the least, makes 2.4 steps
 
     async def hold(self) -> bool:

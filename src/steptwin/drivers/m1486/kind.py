@@ -301,7 +301,7 @@ def _sought(texts: Sequence[str]) -> _Sought:
 
 
 class _ChipJog:
-    """See `steptwin.drivers.kind.DeviceHeldJog`."""
+    """See `steptwin.drivers.kind.DeviceDeadManJog`."""
 
     def __init__(self, chip: M1486, velocity: float) -> None:
         self._chip = chip

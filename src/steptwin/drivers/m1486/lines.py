@@ -21,13 +21,13 @@ from steptwin.wire.slave import FrameDirection
 BAUD = 4800
 """Baud rate with BR1 and BR0 open, bit/s."""
 TALK = "m1486 talk"
-"""The key of the `CharacterTalk` in a line's notes."""
+"""The key of the `CharacterTalk` in a line's shared state."""
 
 
 def talking(
     endpoint: Endpoint, baud: int, log: Callable[[str], object] | None
 ) -> tuple[Exchanger[ChipRequest, bytes], dict[Hashable, object]]:
-    """The exchanger of a line of chips, and the notes of its drivers: with the protocol, `TALK`."""
+    """The exchanger of a line of chips, and the shared state of its drivers: with the protocol, `TALK`."""
     talk = CharacterTalk(SerialLine(baud), str(endpoint))
     exchanger = Exchanger(talk, str(endpoint))
 

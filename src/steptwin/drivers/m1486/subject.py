@@ -16,7 +16,7 @@ from steptwin.drivers.line import DriverLine
 from steptwin.drivers.m1486.driver import AsyncM1486, ChipStatus
 from steptwin.drivers.m1486.failures import Busy
 from steptwin.drivers.m1486.jog import AsyncM1486Jog
-from steptwin.drivers.m1486.notes import FUNCTION_BYTES
+from steptwin.drivers.m1486.sharedstate import FUNCTION_BYTES
 from steptwin.drivers.m1486.talk import ChipRequest
 from steptwin.drivers.subject import DeviceAction, RawEffect, ValueAndUnit
 from steptwin.errors import Misuse, Refusal
@@ -91,9 +91,9 @@ class M1486Part:
         echo, which takes no command memory."""
         unit = self._chip._unit
         async with unit.turn():
-            if unit.notes.is_at_rest:
+            if unit.shared.is_at_rest:
                 await unit.greet()
-                return not unit.notes.is_at_rest
+                return not unit.shared.is_at_rest
             if not unit.talk.owes(unit.address) and not unit.has_room_for_questions(1):
                 return True
             return await unit.query_type() is None
@@ -102,7 +102,7 @@ class M1486Part:
         """Bytes as a number; each is read once after a command, and none for which a program would be overwritten."""
         unit = self._chip._unit
         async with unit.turn():
-            if not (unit.notes.readings.keys() >= set(numbers) or unit.has_room_for_questions(2 * len(numbers) + 1)):
+            if not (unit.shared.readings.keys() >= set(numbers) or unit.has_room_for_questions(2 * len(numbers) + 1)):
                 return None
             return int.from_bytes(bytes(await unit.reading(*numbers)), "little")
 
@@ -267,7 +267,7 @@ class M1486Part:
 
     # ------------------------------------------------------------------ what faces need besides
 
-    def held_jog(self, wanted: command.Jog) -> AsyncM1486Jog:
+    def dead_man_jog(self, wanted: command.Jog) -> AsyncM1486Jog:
         self._check_axis(wanted.axis)
         return self._chip.jog(wanted.velocity)
 

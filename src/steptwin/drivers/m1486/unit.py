@@ -14,7 +14,7 @@ from steptwin.drivers.m1486.failures import Busy, Garbled, NoEcho, Restarted, Se
 from steptwin.drivers.m1486.linecount import find_chips
 from steptwin.drivers.m1486.lines import TALK
 from steptwin.drivers.m1486.motion import ChipMotion
-from steptwin.drivers.m1486.notes import FUNCTION_BYTES, ChipNotes
+from steptwin.drivers.m1486.sharedstate import FUNCTION_BYTES, SharedChipState
 from steptwin.drivers.m1486.talk import INVALID_COMMAND, TYPE_QUERY, CharacterTalk, ChipRequest, ChipRequestKind, chip_name
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse
@@ -92,12 +92,12 @@ class ChipUnit:
         self.line = line
         self.address = address
         self.timeout_ns = timeout_ns
-        self.talk: CharacterTalk = line.notes[TALK]
-        known = line.notes.setdefault("m1486 chips", set())
+        self.talk: CharacterTalk = line.shared[TALK]
+        known = line.shared.setdefault("m1486 chips", set())
         if (None in known) is not (address is None) and known:
             raise Misuse(NOT_ALONE_ON_ITS_LINE(place=line.place))
         known.add(address)
-        self.notes: ChipNotes = line.notes.setdefault(("m1486", address), ChipNotes())
+        self.shared: SharedChipState = line.shared.setdefault(("m1486", address), SharedChipState())
 
     @property
     def name(self) -> str:
@@ -115,18 +115,18 @@ class ChipUnit:
     @property
     def is_alone(self) -> bool:
         """Whether the line has no driver of another chip."""
-        return len(self.line.notes["m1486 chips"]) == 1
+        return len(self.line.shared["m1486 chips"]) == 1
 
     @property
     def write_ns(self) -> Nanos:
         """Time for writing a command into the EEPROM, ns; 0 without EEPROM or if unknown."""
-        return 0 if self.notes.variant is None else self.notes.variant.write_ns
+        return 0 if self.shared.variant is None else self.shared.variant.write_ns
 
     @property
     def variant(self) -> Variant:
-        if self.notes.variant is None:
+        if self.shared.variant is None:
             raise Misuse(IS_NOT_OPEN(place=self.place, chip=self.name))
-        return self.notes.variant
+        return self.shared.variant
 
     def turn(self, permission: Permission | None = None) -> AbstractAsyncContextManager[object]:
         """Hold the line for exchanges that belong together. Waiting for it extends ``permission``."""
@@ -135,11 +135,11 @@ class ChipUnit:
     def permission(self, patience_ns: Nanos | None = None) -> Permission:
         """Permission for a motion requested now. It ends with a stop of the chip, or after too long without progress. While a
         stop is not acknowledged there is none."""
-        notes = self.notes
-        before = None if notes.pending_stops else notes.stops
+        shared = self.shared
+        before = None if shared.pending_stops else shared.stops
         if patience_ns is None:
             patience_ns = max(PATIENCE_NS, 4 * TRIES * self.timeout_ns)
-        return Permission(self.line.now, patience_ns, lambda: notes.stops != before)
+        return Permission(self.line.now, patience_ns, lambda: shared.stops != before)
 
     # ------------------------------------------------------------------ exchanges
 
@@ -193,14 +193,14 @@ class ChipUnit:
         await self._blind(text if address is None else f"{text}{select}\r", pause)
         await self._exchange(ChipRequest(self.address, select, acts=False))
         self.talk.echoing.add(self.address)
-        self.notes.was_awake = True
+        self.shared.was_awake = True
 
     async def _ready(self) -> None:
         """Wait until the chip echoes, is the only one where it has no address, and its EEPROM is free."""
-        restarted, self.notes.restarted = self.notes.restarted, None
+        restarted, self.shared.restarted = self.shared.restarted, None
         if restarted is not None:
             raise restarted
-        rest = self.notes.ready_at - self.line.now()
+        rest = self.shared.ready_at - self.line.now()
         if rest > 0:
             await self.line.sleep(rest / SECOND)
         if not self.talk.knows(self.address):
@@ -211,12 +211,12 @@ class ChipUnit:
 
     async def _wake_again(self) -> None:
         """Raises `Restarted` for a chip that does not echo any more: its settings are lost. (The line may also have failed.)"""
-        known = self.notes.was_awake
+        known = self.shared.was_awake
         if known and await self._still_echoes():
             return
         await self.wake("\r" if known else "")
         if known:
-            self.notes.forget()
+            self.shared.forget()
             raise Restarted(self.place, self.name)
 
     async def _still_echoes(self) -> bool:
@@ -245,7 +245,7 @@ class ChipUnit:
                 self.talk.only = address
                 if not found.letters:
                     self.talk.owed[None] = 1
-                    self.notes.asked_at = self.line.now()
+                    self.shared.asked_at = self.line.now()
                 return
         self.talk.forget(None)
         raise LineFailure(UNKNOWN_NUMBER_OF_CHIPS(place=self.place))
@@ -259,8 +259,8 @@ class ChipUnit:
 
     def _written(self) -> None:
         """Register a command in the memory. While the type is unknown, no more is sent than the input buffer holds."""
-        if self.notes.variant is not None:
-            self.notes.ready_at = self.line.now() + self.notes.variant.write_ns
+        if self.shared.variant is not None:
+            self.shared.ready_at = self.line.now() + self.shared.variant.write_ns
 
     async def send(
         self,
@@ -280,7 +280,7 @@ class ChipUnit:
         tries = 0
         while True:
             await self._ready()
-            self.notes.note_command(text)
+            self.shared.note_command(text)
             request = ChipRequest(self.address, text, answers=answers, acts=once or acts)
             try:
                 answer = await self._exchange(request, permission=permission, timeout_ns=self._patience(answers))
@@ -308,26 +308,26 @@ class ChipUnit:
 
         Raises `Overtaken`, `TooLate`; `SentLate` when it was sent too late, and then the motor was stopped.
         """
-        notes, write_ns = self.notes, self.write_ns if stored else 0
+        shared, write_ns = self.shared, self.write_ns if stored else 0
         try:
             await self.send(text, once=once, acts=True, permission=permission, retype=retype, stored=stored)
         except (Overtaken, TooLate):
             await self.drop_line()
             raise
         except SentLate:
-            notes.begins_at = self.line.now() + write_ns
-            notes.is_position_valid = False
+            shared.begins_at = self.line.now() + write_ns
+            shared.is_position_valid = False
             await self.kill()
             raise
         except LineFailure:  # it may be there even so
-            notes.begins_at = self.line.now() + write_ns
+            shared.begins_at = self.line.now() + write_ns
             raise
-        notes.begins_at = self.line.now() + write_ns
+        shared.begins_at = self.line.now() + write_ns
 
     def _patience(self, answers: bool) -> Nanos:
         """The time to wait for an answer, ns: it may have to wait for the EEPROM; for an unknown type, for all commands of
         `wake`, and for one more question."""
-        variant = self.notes.variant
+        variant = self.shared.variant
         write_ns = (WAKE_COMMANDS + 2) * LONGEST_WRITE_NS if variant is None else variant.write_ns
         return self.timeout_ns + write_ns if answers else self.timeout_ns
 
@@ -364,9 +364,9 @@ class ChipUnit:
     async def _note_rest(self) -> None:
         """Register that the chip has answered."""
         await self._receive_rest()
-        self.notes.is_killed = False
-        self.notes.is_at_rest = True
-        if self.talk.uploads is self.notes.uploads:
+        self.shared.is_killed = False
+        self.shared.is_at_rest = True
+        if self.talk.uploads is self.shared.uploads:
             self.talk.uploads = None
 
     async def runs_at_once(self) -> bool:
@@ -382,15 +382,15 @@ class ChipUnit:
 
     def _is_near_its_end(self) -> bool:
         """Whether the motion was stopped by this program, or should have ended as computed."""
-        motion = self.notes.motion
+        motion = self.shared.motion
         if motion is None:
             return False
-        return motion.stops != self.notes.stops or (motion.duration_s is not None and self.line.now() >= motion.end)
+        return motion.stops != self.shared.stops or (motion.duration_s is not None and self.line.now() >= motion.end)
 
     def _is_query_gone(self) -> bool:
         """Whether a query that was not answered in time is to be repeated: the answer may have been lost, or the query with a
         program that wrong data have ended (`should_ask_again`)."""
-        motion = self.notes.motion
+        motion = self.shared.motion
         if motion is not None and motion.kind is ChipMotion.BLOCK:
             return self.should_ask_again(ASK_AGAIN_NS)
         return self.talk.owes(self.address) == 1
@@ -403,7 +403,7 @@ class ChipUnit:
         """
         owed = self.talk.owes(self.address)
         most = self.variant.input_bits // (8 * (len(TYPE_QUERY) + 1)) - 1
-        is_due = 0 < owed < most and self.line.now() >= self.notes.asked_at + (interval_ns << owed - 1)
+        is_due = 0 < owed < most and self.line.now() >= self.shared.asked_at + (interval_ns << owed - 1)
         return is_due and self.has_room_for_questions(1)
 
     async def _receive_rest(self) -> None:
@@ -420,10 +420,10 @@ class ChipUnit:
         """Request the type letter, which the chip sends when it has executed all commands."""
         self.talk.arrived.pop(self.address, None)
         await self.send(TYPE_QUERY)
-        notes = self.notes
-        notes.asked_at = self.line.now()
-        if notes.motion is not None and notes.motion.asked_at is None:
-            notes.motion.asked_at = notes.asked_at
+        shared = self.shared
+        shared.asked_at = self.line.now()
+        if shared.motion is not None and shared.motion.asked_at is None:
+            shared.motion.asked_at = shared.asked_at
 
     async def _listen(self, patience_ns: Nanos, permission: Permission | None = None) -> int | None:
         """Wait for a pending letter, in slices that stops can interrupt."""
@@ -454,9 +454,9 @@ class ChipUnit:
         with suppress(NoAnswer):
             await self._exchange(ChipRequest(self.address, "", sort=ChipRequestKind.UPLOAD), timeout_ns=patience_ns)
 
-    def others(self) -> list[ChipNotes]:
+    def others(self) -> list[SharedChipState]:
         """The shared state of the other chips on the line."""
-        return [self.line.notes[("m1486", address)] for address in self.line.notes["m1486 chips"] if address != self.address]
+        return [self.line.shared[("m1486", address)] for address in self.line.shared["m1486 chips"] if address != self.address]
 
     async def rest(self) -> int:
         """Check that the chip is at rest; returns its type letter. Raises `Busy` if it is not, `WrongType` if it has another
@@ -464,21 +464,21 @@ class ChipUnit:
         letter = await self.query_type()
         if letter is None:
             raise Busy(IS_BUSY(place=self.place, chip=self.name, why=self.why_busy()))
-        notes = self.notes
-        if notes.variant is None or letter == notes.variant.type_letter:
+        shared = self.shared
+        if shared.variant is None or letter == shared.variant.type_letter:
             return letter
         (letter,) = await self.read(20, rests=True)
-        if letter != notes.variant.type_letter:
+        if letter != shared.variant.type_letter:
             raise WrongType(
-                REPORTS_ANOTHER_TYPE(place=self.place, chip=self.name, letter=_NAMES.get(letter, "?"), title=notes.variant.title)
+                REPORTS_ANOTHER_TYPE(place=self.place, chip=self.name, letter=_NAMES.get(letter, "?"), title=shared.variant.title)
             )
         return letter
 
     def why_busy(self) -> MessageText:
-        if self.notes.is_killed and self.notes.function(RECOVER) is False:
+        if self.shared.is_killed and self.shared.function(RECOVER) is False:
             return IS_HELD_BY_KILL()
-        if self.notes.motion is not None:
-            return IS_NOT_DONE(motion=self.notes.motion.kind.value)
+        if self.shared.motion is not None:
+            return IS_NOT_DONE(motion=self.shared.motion.kind.value)
         return DOES_NOT_ANSWER_YET()
 
     # ------------------------------------------------------------------ reading
@@ -492,7 +492,7 @@ class ChipUnit:
         for _ in range(READINGS):
             found = tuple([(await self.send(f"u{number}", answers=True))[0] for number in numbers])
             if found == before:
-                self.notes.note_readings(numbers, found)
+                self.shared.note_readings(numbers, found)
                 return found
             before = found
         raise self._differs(*numbers)
@@ -508,7 +508,7 @@ class ChipUnit:
     async def look(self) -> None:
         """Find the type of the chip, and functions 40 to 47: what a stop ends depends on 44. Nothing else is asked, because each
         question takes a place in the command memory, in which most types have their program."""
-        notes = self.notes
+        shared = self.shared
         letter = await self.rest()
         for again in range(READINGS):
             before = letter
@@ -525,22 +525,22 @@ class ChipUnit:
             raise self._differs(20)
         if letter not in _NAMES:
             raise WrongType(UNKNOWN_TYPE_LETTER(place=self.place, chip=self.name, letter=letter))
-        if notes.variant is None:
-            notes.variant = next(variant for variant in VARIANTS if variant.type_letter == letter)
+        if shared.variant is None:
+            shared.variant = next(variant for variant in VARIANTS if variant.type_letter == letter)
         await self.read(FUNCTION_BYTES[0], rests=True)
 
     async def find_interface(self) -> Interface | None:
         """The driver interface, which pins select; None for a number that no interface has. The chip is at rest."""
-        notes = self.notes
-        if notes.interface is None:
+        shared = self.shared
+        if shared.interface is None:
             (code,) = await self.read(15, rests=True)
-            notes.interface = next((interface for interface in INTERFACES if interface.code == code), None)
-        return notes.interface
+            shared.interface = next((interface for interface in INTERFACES if interface.code == code), None)
+        return shared.interface
 
     async def reading(self, *numbers: int) -> tuple[int, ...]:
         """Bytes as they were read since the last command; others are read now. Raises `Busy`."""
-        known = self.notes.readings
-        if not (self.notes.is_at_rest and known.keys() >= set(numbers)):
+        known = self.shared.readings
+        if not (self.shared.is_at_rest and known.keys() >= set(numbers)):
             await self.read(*numbers)
         return tuple(known[number] for number in numbers)
 
@@ -564,7 +564,7 @@ class ChipUnit:
         """The bits that can still be sent before a downloaded program is overwritten, negative if it is; None where no program
         is known. ``begins_at``: the bits that had been sent before its first command, by default of the oldest."""
         size = self.variant.memory_bits
-        begins_at = self.notes.sent.begins_at(self.stored_bits - size) if begins_at is None else begins_at
+        begins_at = self.shared.sent.begins_at(self.stored_bits - size) if begins_at is None else begins_at
         return None if begins_at is None else size - (self.stored_bits - begins_at)
 
     def has_room_for_questions(self, count: int) -> bool:
@@ -588,26 +588,26 @@ class ChipUnit:
         again when what may lie in an EEPROM has begun, and only that confirms the stop. Returns whether a program that ran
         has ended; where it is not known, False. Raises `Unconfirmed`.
         """
-        notes = self.notes
-        notes.stops += 1
-        notes.is_killed = True
+        shared = self.shared
+        shared.stops += 1
+        shared.is_killed = True
         stop = object()
-        notes.pending_stops.add(stop)
+        shared.pending_stops.add(stop)
         try:
             return await self._kill(program=program)
         finally:
-            notes.pending_stops.discard(stop)
+            shared.pending_stops.discard(stop)
 
     async def _kill(self, *, program: bool) -> bool:
-        notes = self.notes
+        shared = self.shared
         if not program and self._has_begun():
             await self._send_kill("k")
             return True
         await self._send_kill(STOP)
-        if notes.function(CONTINUE) is False:
+        if shared.function(CONTINUE) is False:
             self.talk.settle(self.address)  # questions went with the program
             return True
-        write_ns = LONGEST_WRITE_NS if notes.variant is None else notes.variant.write_ns
+        write_ns = LONGEST_WRITE_NS if shared.variant is None else shared.variant.write_ns
         await self.line.sleep((write_ns + BEGUN_NS) / SECOND)
         await self._send_kill(STOP)
         return False
@@ -615,13 +615,13 @@ class ChipUnit:
     def _has_begun(self) -> bool:
         """Whether all that the chip may have to do is a motion, which has begun. After its computed end, or where that is not
         known, somebody else may have started a program."""
-        motion, now = self.notes.motion, self.line.now()
-        if motion is None or now < self.notes.begins_at + BEGUN_NS:
+        motion, now = self.shared.motion, self.line.now()
+        if motion is None or now < self.shared.begins_at + BEGUN_NS:
             return False
         return motion.kind is ChipMotion.ENDLESS or (motion.kind is ChipMotion.MOVE and now < motion.end)
 
     async def _send_kill(self, text: str) -> None:
-        notes = self.notes
+        shared = self.shared
         failure: LineFailure | None = None
         for attempt in range(STOP_TRIES):
             if attempt and not self.talk.knows(self.address):
@@ -636,10 +636,10 @@ class ChipUnit:
         select = "" if self.address is None else f"x{self.address:x}\r"
         await self._blind(2 * f"{select}{text}\r", PAUSES_NS[1], urgent=True)
         try:
-            had_echoed = notes.was_awake
+            had_echoed = shared.was_awake
             await self.wake()
             if had_echoed:  # it was switched off; of one that had never echoed nothing is known, function 44 neither
-                notes.forget()
+                shared.forget()
             await self._exchange(ChipRequest(self.address, text, sort=ChipRequestKind.KILL), urgent=True)
         except (NoEcho, Garbled, NoAnswer) as error:
             raise unconfirmed(self.name, failure or error) from error

@@ -23,8 +23,8 @@ async def wait_for(
     A failing line is raised with ``check``, else returned as the end.
     """
     check_wait(timeout_s)
-    notes = unit.notes
-    motion = notes.motion
+    shared = unit.shared
+    motion = shared.motion
     begin = unit.line.now()
 
     def ended(
@@ -40,38 +40,38 @@ async def wait_for(
             await watch(unit, motion, limit)
         async with unit.turn():
             if motion is None or motion.over_at is None:
-                marked = motion if motion is not None and motion.is_marked and unit.talk.uploads is notes.uploads else None
+                marked = motion if motion is not None and motion.is_marked and unit.talk.uploads is shared.uploads else None
                 if marked is not None:
                     await _end_of_block(unit, limit)
                 letter = await unit.query_type(max(limit - unit.line.now(), SLICE_NS))
                 if marked is not None and letter is not None:
-                    marked.is_unfinished = not notes.uploads
-                    notes.uploads = None
+                    marked.is_unfinished = not shared.uploads
+                    shared.uploads = None
                 if letter is None:
-                    is_stopped = motion is not None and motion.stops != notes.stops
+                    is_stopped = motion is not None and motion.stops != shared.stops
                     return ended(ChipReason.STOPPED if is_stopped else ChipReason.OVERDUE, None, unit.why_busy())
                 if motion is not None and motion.label is not None and await unit.runs_at_once():
                     return ended(ChipReason.OVERDUE, None, f"its end leads to the J behind it, and to label {motion.label} again")
             over_at = unit.line.now() - unit.write_ns if motion is None or motion.over_at is None else motion.over_at
             counter = await unit.read_number(1, rests=True)
-            notes.motion = None
+            shared.motion = None
     except LineFailure as failure:
         if check:
             raise
         return ended(ChipReason.COMMUNICATION, None, str(failure), failure)
     reason, detail = _reason(unit, motion, counter, over_at)
     if motion is not None and motion.kind is ChipMotion.MOVE and reason in (ChipReason.EARLY, ChipReason.STOPPED):
-        notes.is_position_valid = False  # M-16
+        shared.is_position_valid = False  # M-16
     is_in_doubt = motion is not None and reason in (ChipReason.CAME_TO_REST, ChipReason.DIVERTED)
     target_u = motion.target_u if motion is not None and is_in_doubt else None
-    return ended(reason, shown(counter) if notes.is_position_valid else None, detail, target_u=target_u)
+    return ended(reason, shown(counter) if shared.is_position_valid else None, detail, target_u=target_u)
 
 
 async def _end_of_block(unit: ChipUnit, limit: Nanos) -> None:
     """Wait until a block has sent its mark, the chip answers without it, or ``limit``."""
-    line, talk, notes = unit.line, unit.talk, unit.notes
+    line, talk, shared = unit.line, unit.talk, unit.shared
     begin = line.now()
-    while not notes.uploads and unit.address not in talk.arrived and line.now() < limit:
+    while not shared.uploads and unit.address not in talk.arrived and line.now() < limit:
         is_first = not talk.owes(unit.address) and line.now() >= begin + ASK_AGAIN_NS
         if is_first or unit.should_ask_again(2 * ASK_AGAIN_NS):
             await unit.ask()
@@ -79,7 +79,7 @@ async def _end_of_block(unit: ChipUnit, limit: Nanos) -> None:
 
 
 def _time_out_s(unit: ChipUnit, motion: ChipMotionCommand | None) -> float:
-    if motion is None or motion.stops != unit.notes.stops:
+    if motion is None or motion.stops != unit.shared.stops:
         return UNKNOWN_S
     if motion.kind is ChipMotion.ENDLESS:
         raise Misuse(f"{unit.name} runs without end: give timeout_s")
@@ -93,7 +93,7 @@ def _reason(unit: ChipUnit, motion: ChipMotionCommand | None, counter: int, over
     """The reason of the end, and details. ``over_at``: the time at which the end was detected."""
     if motion is None:
         return ChipReason.REST, ""
-    if motion.stops != unit.notes.stops:
+    if motion.stops != unit.shared.stops:
         return ChipReason.STOPPED, ""
     if motion.kind is ChipMotion.BLOCK:
         if unit.talk.spoilt.get(unit.address, 0) != motion.spoilt:

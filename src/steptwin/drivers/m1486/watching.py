@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from steptwin.drivers.m1486.failures import Restarted
 from steptwin.drivers.m1486.motion import EARLY, EARLY_S, ChipMotionCommand
-from steptwin.drivers.m1486.notes import ChipNotes
+from steptwin.drivers.m1486.sharedstate import SharedChipState
 from steptwin.drivers.m1486.talk import TYPE_QUERY
 from steptwin.drivers.m1486.unit import SLICE_NS, ChipUnit
 from steptwin.errors import LineFailure, Refusal
@@ -32,14 +32,14 @@ def early_ns(motion: ChipMotionCommand) -> Nanos:
     return motion.at + round((EARLY * duration_s - EARLY_S) * SECOND)
 
 
-def _is_watched(notes: ChipNotes, now: Nanos) -> bool:
+def _is_watched(shared: SharedChipState, now: Nanos) -> bool:
     """Whether the chip makes a move with a computed end that has not been detected yet."""
-    motion = notes.motion
+    motion = shared.motion
     return (
         motion is not None
         and bool(motion.duration_s)
         and motion.over_at is None
-        and motion.stops == notes.stops
+        and motion.stops == shared.stops
         and now < motion.end + GRACE_NS
     )
 
@@ -48,13 +48,13 @@ async def watch(unit: ChipUnit, motion: ChipMotionCommand, limit: Nanos) -> None
     """Watch until the end of ``motion`` is detected (`ChipMotionCommand.over_at`), until ``limit``, or until nothing is left to
     watch."""
     line = unit.line
-    while _is_watched(unit.notes, now := line.now()) and unit.notes.motion is motion and now < limit:
+    while _is_watched(unit.shared, now := line.now()) and unit.shared.motion is motion and now < limit:
         due = min(_Watch(unit).begins().values(), default=now)  # none where the program was suspended meanwhile
         if due > now:
             await line.sleep(min(due - now, limit - now, 2 * SLICE_NS) / SECOND)
         else:
             async with unit.turn():
-                if _is_watched(unit.notes, line.now()):
+                if _is_watched(unit.shared, line.now()):
                     await _Watch(unit).run(limit)
 
 
@@ -72,7 +72,7 @@ class _Mover:
 
     def is_near(self, at: Nanos) -> bool:
         """Whether its end is expected at that time."""
-        if self.motion.stops != self.unit.notes.stops:
+        if self.motion.stops != self.unit.shared.stops:
             return True
         return early_ns(self.motion) <= self.rest_at(at) < self.motion.end + GRACE_NS
 
@@ -103,10 +103,10 @@ class _Watch:
         line = self._own.line
         now = line.now()
         moving: dict[int | None, ChipMotionCommand] = {}
-        for address in line.notes["m1486 chips"]:
-            notes: ChipNotes = line.notes[("m1486", address)]
-            if notes.motion is not None and _is_watched(notes, now):
-                moving[address] = notes.motion
+        for address in line.shared["m1486 chips"]:
+            shared: SharedChipState = line.shared[("m1486", address)]
+            if shared.motion is not None and _is_watched(shared, now):
+                moving[address] = shared.motion
         lead = len(moving) * (ASK_NS + self._own.talk.wire_ns(20))
         known = self._movers.keys() | self._given_up
         return {address: early_ns(motion) - lead for address, motion in moving.items() if address not in known}
@@ -135,7 +135,7 @@ class _Watch:
     async def _begin(self, address: int | None) -> None:
         own = self._own
         unit = own if address == own.address else ChipUnit(own.line, address, timeout_ns=own.timeout_ns)
-        motion = unit.notes.motion
+        motion = unit.shared.motion
         if motion is None:
             return
         mover = self._movers[address] = _Mover(unit, motion)
@@ -155,7 +155,7 @@ class _Watch:
         if unit is self._own:
             raise failure
         if isinstance(failure, Restarted):
-            unit.notes.restarted = failure
+            unit.shared.restarted = failure
         del self._movers[unit.address]
         self._given_up.add(unit.address)
 

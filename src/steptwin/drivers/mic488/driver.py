@@ -97,7 +97,7 @@ class AsyncMic488:
             raise Misuse(f"a time-out of {timeout_s:g} s is outside 0 to 60 s")
         self._own = isinstance(where, str)
         self.line: DriverLine[ModbusQuery, bytes] = self._own_line(where, baud, log) if isinstance(where, str) else where
-        check_unit(unit, tcp=bool(self.line.notes.get("tcp")))
+        check_unit(unit, tcp=bool(self.line.shared.get("tcp")))
         self._firmware = firmware
         self._observe = observe
         if isinstance(config, str | Path):

@@ -138,7 +138,7 @@ async def scan(
 
 async def _answers_every_unit(line: DriverLine[ModbusQuery, bytes], look: pdu.ReadRequest, timeout_ns: Nanos) -> bool:
     """Whether a unit that no device has is answered; over RTU it cannot be asked."""
-    if not line.notes.get("tcp"):
+    if not line.shared.get("tcp"):
         return False
     try:
         await line.exchange(Job(ModbusQuery(_NO_UNIT, look), timeout_ns))

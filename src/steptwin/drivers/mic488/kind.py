@@ -272,7 +272,7 @@ def _ended(end: MoveEnd) -> EndedMotion:
 
 
 class _AxisJog:
-    """See `steptwin.drivers.kind.DeviceHeldJog`."""
+    """See `steptwin.drivers.kind.DeviceDeadManJog`."""
 
     def __init__(self, axis: Mic488Axis, velocity_u: float, hold_s: float) -> None:
         self._axis = axis

@@ -22,7 +22,7 @@ FRAMES_PER_SECOND = 100.0
 def modbus_exchanger(
     place: LineAddress, frames_per_second: float | None, log: Callable[[str], object] | None
 ) -> tuple[Exchanger[ModbusQuery, bytes], dict[Hashable, object]]:
-    """The exchanger of a Modbus line, and the notes of its drivers. ``frames_per_second`` to each device; None: any."""
+    """The exchanger of a Modbus line, and the shared state of its drivers. ``frames_per_second`` to each device; None: any."""
     if frames_per_second is not None and frames_per_second <= 0.0:
         raise Misuse(f"{frames_per_second:g} frames per second: must be above 0")
     interval: Nanos = 0 if frames_per_second is None else round(SECOND / frames_per_second)

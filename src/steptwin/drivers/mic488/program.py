@@ -30,7 +30,7 @@ class AsyncMic488Program:
             await unit.write(unit.item("PROGRAM_CTRL"), ProgramState.RUNNING, permission=permission)
 
     async def pause(self) -> None:
-        """Pause the program; motions that have begun, and held jogs, go on. It precedes all waiting requests. Raises
+        """Pause the program; motions that have begun, and dead-man jogs, go on. It precedes all waiting requests. Raises
         `Unconfirmed`."""
         await self._unit.end_program(ProgramState.PAUSED, "paused")
 

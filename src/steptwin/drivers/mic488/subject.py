@@ -275,7 +275,7 @@ class Mic488Part:
 
     # ------------------------------------------------------------------ what faces need besides
 
-    def held_jog(self, wanted: command.Jog) -> AsyncMic488Jog:
+    def dead_man_jog(self, wanted: command.Jog) -> AsyncMic488Jog:
         return self._mic.axis(wanted.axis).jog(wanted.velocity)
 
     async def settings_text(self) -> str:

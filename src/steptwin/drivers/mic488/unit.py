@@ -77,7 +77,7 @@ class ControlRegisters(NamedTuple):
     """M1_STATUS … M4_STATUS."""
 
 
-class UnitNotes:
+class SharedUnitState:
     """The state that all drivers of one controller on one line share."""
 
     def __init__(self) -> None:
@@ -116,7 +116,7 @@ class Unit:
         self.scales = scales if config is None else [AxisScale(axis.unit_name, axis.gear) for axis in config.axes]
         self.timeout_ns = timeout_ns
         self.tries = tries
-        self.notes: UnitNotes = line.notes.setdefault(("mic488", number), UnitNotes())
+        self.shared: SharedUnitState = line.shared.setdefault(("mic488", number), SharedUnitState())
         self._queries: dict[tuple[int, int, int], ModbusQuery]
         self._plans: dict[tuple[RegisterItem, ...], list[Block]]
         self.use(registers)
@@ -125,7 +125,7 @@ class Unit:
         """Use the register map of that firmware."""
         self.registers = registers
         self.wording = Wording(registers, self.scales)
-        frames = self.line.notes.get("frames")
+        frames = self.line.shared.get("frames")
         if isinstance(frames, FrameWords):
             frames.know(self.number, self.wording)
         self._queries = {}
@@ -313,7 +313,7 @@ class Unit:
 
     async def control(self, after: Nanos | None = None, timeout_ns: Nanos | None = None) -> ControlRegisters:
         """The control registers, read now, or by another driver since ``after``."""
-        known = self.notes.control
+        known = self.shared.control
         if after is not None and known is not None and known.at >= after:
             return known
         at = self.line.now()
@@ -325,7 +325,7 @@ class Unit:
         status = found[3] if self._has_status else None
         control = ControlRegisters(at, DataType(found[0]), found[1], found[2] == 1, status, tuple(found[-AXES:]))
         self.wording.data_type = control.data_type
-        self.notes.control = control
+        self.shared.control = control
         return control
 
     async def ready(self, *axes: int) -> ControlRegisters:
@@ -362,8 +362,8 @@ class Unit:
         ``has_begun``: for what goes on when the program is stopped. ``own``: number of stops since now, of each axis, that do not
         end it.
         """
-        stops, places = self.notes.stops, axes if has_begun else (PROGRAM, *axes)
-        is_stopping = any(not set(places).isdisjoint(ended) for ended in tuple(self.notes.unanswered))
+        stops, places = self.shared.stops, axes if has_begun else (PROGRAM, *axes)
+        is_stopping = any(not set(places).isdisjoint(ended) for ended in tuple(self.shared.unanswered))
         before = [stops[place] - own.get(place, 0) for place in places]
         if patience_ns is None:
             patience_ns = max(PATIENCE_NS, 2 * self.tries * self.timeout_ns)
@@ -377,12 +377,12 @@ class Unit:
     def stopping(self, *ended: int) -> Generator[None]:
         """Stop axes and `PROGRAM` inside: motions that were requested before its end are not begun after it."""
         for place in ended:
-            self.notes.stops[place] += 1
-        self.notes.unanswered.append(ended)
+            self.shared.stops[place] += 1
+        self.shared.unanswered.append(ended)
         try:
             yield
         finally:
-            self.notes.unanswered.remove(ended)
+            self.shared.unanswered.remove(ended)
 
     @asynccontextmanager
     async def stopping_if_late(self, *axes: int, program: bool = False) -> AsyncGenerator[None]:

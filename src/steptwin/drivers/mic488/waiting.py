@@ -93,7 +93,7 @@ class AxisWait:
         """In units if these are known, with its unit."""
         unit = self._unit
         item = unit.item("POS_ACT", self._axis)
-        control = unit.notes.control
+        control = unit.shared.control
         data_type = unit.wording.data_type if control is None else control.data_type
         value, name = unit.shown(item, (await unit.read([item], data_type))[item], data_type)
         return float(value), name

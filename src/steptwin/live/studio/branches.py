@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 from steptwin.errors import Misuse, Refusal
 from steptwin.eventloop import later
-from steptwin.live.cell import Cell
 from steptwin.live.lookback import Lookback
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.studio.options import StudioOptions
 from steptwin.live.studio.processes import ChildProcesses, Process
 from steptwin.live.world import LiveWorld
@@ -59,9 +59,9 @@ class WorldBranches:
     """See `steptwin.studio.branchrequests.Branches`. A `Link` of the server. ``own``: how their pages are served; None: they
     cannot be reached, so there are none."""
 
-    def __init__(self, live: LiveWorld, cell: Cell, lookback: Lookback, own: StudioOptions | None) -> None:
+    def __init__(self, live: LiveWorld, realtime: RealTimeDriver, lookback: Lookback, own: StudioOptions | None) -> None:
         self._live = live
-        self._cell = cell
+        self._realtime = realtime
         self._lookback = lookback
         self._own = own
         self._processes = ChildProcesses()
@@ -84,7 +84,7 @@ class WorldBranches:
             raise Refusal(TOO_MANY_BRANCHES(most=MOST_BRANCHES))
         self._starting += 1
         try:
-            self._cell.enter()
+            self._realtime.enter()
             snapshot = await self._lookback.state_at(self._live.now if moment is None else moment)
             number = next(self._numbers)
             branch = await later(asyncio.to_thread(self._begin, self._own, number, snapshot))

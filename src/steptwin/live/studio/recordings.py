@@ -18,7 +18,7 @@ from steptwin.files.beginning import SESSION_SUFFIX, is_session
 from steptwin.files.export import FORMATS
 from steptwin.files.ownfolder import place_in
 from steptwin.files.savedsessions import SavedSession, path_of, read_saved, saved_sessions
-from steptwin.live.cell import Cell
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.studio.processes import ChildProcesses, Process, last_words
 from steptwin.live.world import MOST_INPUT_BYTES, MOST_INPUTS, LiveWorld
 from steptwin.messages import Message, text_of
@@ -44,10 +44,10 @@ class WorldRecordings:
     """
 
     def __init__(
-        self, live: LiveWorld, cell: Cell, folder: Path, stem: str, file: Path | None, access: Sequence[str] | None
+        self, live: LiveWorld, realtime: RealTimeDriver, folder: Path, stem: str, file: Path | None, access: Sequence[str] | None
     ) -> None:
         self._live = live
-        self._cell = cell
+        self._realtime = realtime
         self._folder = folder
         self._stem = stem
         self._file = file
@@ -69,7 +69,7 @@ class WorldRecordings:
 
     async def save(self, name: str | None) -> Mapping[str, object]:
         path = place_in(self._folder, path_of(self._folder, name or f"{self._stem}-{datetime.now(UTC):%Y%m%d-%H%M%S}").name)
-        self._cell.enter()
+        self._realtime.enter()
         return _plain(await later(asyncio.to_thread(_save, self._live.session(), path)))
 
     def place(self, file: str) -> str:

@@ -205,22 +205,22 @@ class _Page:
         live, pace, server = running.live, running.pace, running.server
 
         def moment() -> PresentMoment:
-            clock = server.cell.clock
+            clock = server.realtime.clock
             goes = not pace.is_paused and live.world.stopped is None
             return PresentMoment(max(clock.now(), live.now) if goes and pace.speed != inf else live.now, goes, pace.speed)
 
         jogs = WorldJogs(live.subject, running.control.at_present)
-        live.companion = jogs
+        live.external_actor = jogs
         world = WorldPart(running.control, live.subject.followers, jogs)
         subject = CompositeSubject(world, lambda: moment().time, live.subject.numbering)
 
         def configuration(machine: str) -> SourceText | None:
             return configuration_text(live.world, machine) if machine in live.world.machines else None
 
-        lookback = Lookback(live, server.cell, pace, history)
+        lookback = Lookback(live, server.realtime, pace, history)
         server.join(lookback)
         recordings = None if beside is None else self._recordings(running, beside)
-        branches = WorldBranches(live, server.cell, lookback, self._branch_options())
+        branches = WorldBranches(live, server.realtime, lookback, self._branch_options())
         server.join(branches)
         campaigns = _campaigns(None if beside is None else beside.world)
         if campaigns is not None:
@@ -245,7 +245,7 @@ class _Page:
         stem = live.world.spec.name if beside.world is None else beside.world.stem
         may_view = is_loopback(self._entrance.address.host)
         access = self._access_of_views() if may_view else None
-        recordings = WorldRecordings(live, server.cell, folder, stem, beside.run.session, access)
+        recordings = WorldRecordings(live, server.realtime, folder, stem, beside.run.session, access)
         server.join(recordings)
         return recordings
 

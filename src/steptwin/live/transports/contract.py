@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from steptwin.access.audit import CommandLog
-from steptwin.live.cell import Cell
 from steptwin.live.clients import Clients
 from steptwin.live.links import Link
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.rfc2217 import TwinLine
 from steptwin.machine import Port
 from steptwin.simulation.kinds.links import TlsFiles
@@ -25,8 +25,8 @@ class LinkArguments:
     """A port of the line for one more program."""
     line: TwinLine
     """Present rate and timing of the line, and where events of the link are shown."""
-    cell: Cell
-    """The cell that takes received bytes as inputs."""
+    realtime: RealTimeDriver
+    """The real-time driver that takes received bytes as inputs."""
     clients: Clients
     """All clients over TCP, of which there is a limit."""
     listen_any: bool = False

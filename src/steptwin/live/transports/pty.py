@@ -9,7 +9,7 @@ from steptwin.live.transports.contract import LinkArguments, OpenLink, Transport
 
 
 async def _open(opening: LinkArguments) -> OpenLink:
-    link = pty_link(opening.cell, Path(opening.where), opening.make_port)
+    link = pty_link(opening.realtime, Path(opening.where), opening.make_port)
     path = str(await link.open())
     return OpenLink(link, path, {"path": path})
 

@@ -9,7 +9,7 @@ async def _open(opening: LinkArguments) -> OpenLink:
     from steptwin.live.serialport import SerialLink
 
     device, baud = opening.where, opening.line.baud()
-    link = SerialLink(opening.cell, device, baud, opening.make_port, opening.line.notice)
+    link = SerialLink(opening.realtime, device, baud, opening.make_port, opening.line.notice)
     await link.open()
     return OpenLink(link, f"{device} at {baud} bit/s", {"device": device, "baud": baud})
 

@@ -9,7 +9,7 @@ from steptwin.simulation.toml.addresses import parse_address
 
 async def listen(opening: LinkArguments) -> OpenLink:
     address = parse_address(opening.where, listen_any=opening.listen_any)
-    link = TcpLink(opening.cell, address, opening.make_port, opening.clients)
+    link = TcpLink(opening.realtime, address, opening.make_port, opening.clients)
     listening = await link.open()
     return OpenLink(link, str(listening), {"host": listening.host, "port": listening.port})
 

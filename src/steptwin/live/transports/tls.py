@@ -62,7 +62,7 @@ _unproved: ContextVar[asyncio.Transport | None] = ContextVar("_unproved", defaul
 """The connection on which a handshake is begun."""
 
 
-class _TellingObject(ssl.SSLObject):
+class _AlertingObject(ssl.SSLObject):
     """Sends the alert with which a handshake fails. asyncio closes the connection without it."""
 
     outgoing: ssl.MemoryBIO
@@ -79,19 +79,19 @@ class _TellingObject(ssl.SSLObject):
             raise
 
 
-class _TellingContext(ssl.SSLContext):
-    sslobject_class = _TellingObject
+class _AlertingContext(ssl.SSLContext):
+    sslobject_class = _AlertingObject
 
     def wrap_bio(self, incoming: ssl.MemoryBIO, outgoing: ssl.MemoryBIO, *arguments: Any, **named: Any) -> ssl.SSLObject:
         made = super().wrap_bio(incoming, outgoing, *arguments, **named)
-        if isinstance(made, _TellingObject):
+        if isinstance(made, _AlertingObject):
             made.outgoing, made.plain = outgoing, _unproved.get()
         return made
 
 
 def server_context(files: TlsFiles, folder: Path) -> ssl.SSLContext:
     """TLS 1.2 or newer, with a certificate of the client that is trusted. Files are relative to ``folder``. Raises `Misuse`."""
-    context = _TellingContext(ssl.PROTOCOL_TLS_SERVER)
+    context = _AlertingContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
     context.verify_mode = ssl.CERT_REQUIRED
     context.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN  # a certificate that is trusted needs no authority
@@ -275,7 +275,7 @@ class TlsLink:
         if self._opening.audit is not None or not all(may_ask(client.role, function) for function in WRITES | READS):
             opening = self._opening
             port = SendingTlsPort(made, client, opening) if sends_by_itself(made) else TlsPort(made, client, opening)
-        connection = AsyncioConnection(self._opening.cell, port, self.clients)
+        connection = AsyncioConnection(self._opening.realtime, port, self.clients)
         self._connections.add(connection)
         transport.set_protocol(connection)
         connection.connection_made(transport)

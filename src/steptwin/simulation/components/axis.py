@@ -123,7 +123,7 @@ def _refers(spec: AxisSpec, described: ElementSpecs) -> Iterator[Reference]:
         drives = {axis.name: axis.drive[0] for axis in described.of(AXIS)}
         followed = spec.encoder.follows
         others = (one.name for specs in described.values() for one in specs if isinstance(one, NamedSpec))
-        if followed in drives or followed in others:  # one that is not an axis is joined, too: what is wrong is `follows`
+        if followed in drives or followed in others:  # one that is not an axis is connected, too: what is wrong is `follows`
             yield Reference(spec.drive[0], drives.get(followed, followed), (*spec.encoder.path, "follows"))
 
 

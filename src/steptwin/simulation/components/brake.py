@@ -31,7 +31,7 @@ class BrakeSpec(BoardSpec):
 
     axis: str = key(NameOf("axis"), "the axis whose motor it holds")
     torque: float = key(number_value(0.0, above=True), "N·m at the motor, of a brake that is not worn")
-    release: Terminal | None = key(OUTPUT_PIN, "output joined to RELEASE; without it a wire may be", default=None)
+    release: Terminal | None = key(OUTPUT_PIN, "output connected to RELEASE; without it a wire may be", default=None)
     release_time: Nanos = key(time_value, "from RELEASE on until it lets go", default=30 * MILLISECOND)
     apply_time: Nanos = key(time_value, "from RELEASE off until it acts", default=20 * MILLISECOND)
 

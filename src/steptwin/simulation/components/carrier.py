@@ -23,8 +23,8 @@ PICK, PLACE, HELD = "PICK", "PLACE", "HELD"
 
 @table()
 class CarrierSpec(BoardSpec):
-    pick: Terminal | None = key(OUTPUT_PIN, "output joined to PICK: it is where it picks up", default=None)
-    place: Terminal | None = key(OUTPUT_PIN, "output joined to PLACE: it is where it puts down", default=None)
+    pick: Terminal | None = key(OUTPUT_PIN, "output connected to PICK: it is where it picks up", default=None)
+    place: Terminal | None = key(OUTPUT_PIN, "output connected to PLACE: it is where it puts down", default=None)
     source: str | None = key(
         NameOf("conveyor"),
         "conveyor that it picks from; without one a workpiece is there whenever PICK is on",

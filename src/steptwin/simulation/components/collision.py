@@ -27,7 +27,7 @@ from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, text_value, wo
 class CollisionSpec(BoardSpec):
     when: str = key(text_value, "the condition under which parts touch, such as 'x.position > 300 and z.position < 50'")
     effect: str = key(word(REPORT, JAM), "report, or jam: the axes in the condition, or of what is in it, stand", default=REPORT)
-    reset: Terminal | None = key(OUTPUT_PIN, "output joined to RESET, which frees jammed axes", default=None)
+    reset: Terminal | None = key(OUTPUT_PIN, "output connected to RESET, which frees jammed axes", default=None)
 
     @property
     def terminals(self) -> Terminals:

@@ -24,7 +24,7 @@ class StopSpec(TableSpec):
 
     at: float = key(number(0.0), "mm from the beginning of the belt, where fronts of workpieces stand")
     hold: Terminal | None = key(
-        OUTPUT_PIN, "output joined to STOP1 (of the second STOP2 ...), which holds workpieces while it is on", default=None
+        OUTPUT_PIN, "output connected to STOP1 (of the second STOP2 ...), which holds workpieces while it is on", default=None
     )
 
 
@@ -39,11 +39,11 @@ def _mark_places(value: Any) -> tuple[float, ...]:
 class ConveyorSpec(BoardSpec):
     length: float = key(number(0.0, above=True), "mm")
     speed: float | None = key(number(0.0, above=True), "mm/s while RUN is on", default=None)
-    run: Terminal | None = key(OUTPUT_PIN, "with speed: output joined to RUN; without it a wire may be", default=None)
+    run: Terminal | None = key(OUTPUT_PIN, "with speed: output connected to RUN; without it a wire may be", default=None)
     axis: str | None = key(NameOf("axis"), "the axis that moves the belt, instead of speed", default=None)
     mm_per_unit: float = key(number(0.0, above=True), "with axis: mm of the belt per unit of the axis", default=1.0)
     feed: Terminal | None = key(
-        OUTPUT_PIN, "output joined to FEED, which puts a workpiece on when it is switched on", default=None
+        OUTPUT_PIN, "output connected to FEED, which puts a workpiece on when it is switched on", default=None
     )
     feed_every: Nanos | None = key(positive_time, "a workpiece comes after each such time", default=None)
     workpiece: float = key(number(0.0, above=True), "length of a workpiece, mm", default=50.0)

@@ -20,9 +20,9 @@ MOST = 2**31 - 1
 @table("[[counter]]")
 class CounterSpec(BoardSpec):
     preset: int = key(whole(1, MOST), "the count from which OUT is on")
-    up: Terminal | None = key(OUTPUT_PIN, "output joined to UP, whose edges from 0 to 1 count up", default=None)
-    down: Terminal | None = key(OUTPUT_PIN, "output joined to DOWN, whose edges from 0 to 1 count down", default=None)
-    reset: Terminal | None = key(OUTPUT_PIN, "output joined to RESET; the count is 0 while it is on", default=None)
+    up: Terminal | None = key(OUTPUT_PIN, "output connected to UP, whose edges from 0 to 1 count up", default=None)
+    down: Terminal | None = key(OUTPUT_PIN, "output connected to DOWN, whose edges from 0 to 1 count down", default=None)
+    reset: Terminal | None = key(OUTPUT_PIN, "output connected to RESET; the count is 0 while it is on", default=None)
 
     @property
     def terminals(self) -> Terminals:

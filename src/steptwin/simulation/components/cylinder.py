@@ -33,8 +33,8 @@ SINGLE, DOUBLE = "single", "double"
 @table("[[cylinder]]")
 class CylinderSpec(BoardSpec):
     valve: str = key(word(SINGLE, DOUBLE), "single: one coil and a spring; double: two coils", default=SINGLE)
-    extend: Terminal | None = key(OUTPUT_PIN, "output joined to the coil EXTEND; without it a wire may be", default=None)
-    retract: Terminal | None = key(OUTPUT_PIN, "valve double: output joined to the coil RETRACT", default=None)
+    extend: Terminal | None = key(OUTPUT_PIN, "output connected to the coil EXTEND; without it a wire may be", default=None)
+    retract: Terminal | None = key(OUTPUT_PIN, "valve double: output connected to the coil RETRACT", default=None)
     stroke: float = key(number(0.0, above=True), "mm", default=100.0)
     extend_time: Nanos = key(positive_time, "from end to end", default=300 * MILLISECOND)
     retract_time: Nanos = key(positive_time, "from end to end", default=300 * MILLISECOND)

@@ -79,7 +79,7 @@ class Element(ElementTable[S, B]):
         if not self.is_named and self.signals is not None:
             raise IncompleteTable(f"{where} has signals and lacks a name that they could be asked for by")
         if not self.is_named and self.terminals is not None:
-            raise IncompleteTable(f"{where} has terminals and lacks a name that they could be joined by")
+            raise IncompleteTable(f"{where} has terminals and lacks a name that they could be connected by")
         for fault in self.faults:
             if fault.layer is not Layer.ELEMENT or not self.is_named:
                 raise IncompleteTable(f"{where}: fault {fault.name} is of the layer {Layer.ELEMENT}, and its element has a name")

@@ -46,7 +46,7 @@ class GantrySpec(BoardSpec):
     mass: float = key(number_value(0.0), "kg of the beam and what is on it; each motor moves half", default=0.0)
     friction_force: float = key(number_value(0.0), "N against its motion; each motor moves half", default=0.0)
     effect: str = key(word(REPORT, JAM), "of too much skew: report, or jam (both axes stand)", default=JAM)
-    reset: Terminal | None = key(OUTPUT_PIN, "output joined to RESET, which frees jammed axes", default=None)
+    reset: Terminal | None = key(OUTPUT_PIN, "output connected to RESET, which frees jammed axes", default=None)
 
     @property
     def terminals(self) -> Terminals:

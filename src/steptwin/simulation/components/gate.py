@@ -30,7 +30,7 @@ FUNCTIONS: Mapping[str, Callable[[list[bool]], bool]] = {
 
 @dataclass(frozen=True, slots=True)
 class GateInputs(PinOf):
-    """Outputs that it is joined to, or how many inputs it has."""
+    """Outputs that it is connected to, or how many inputs it has."""
 
     def __call__(self, value: Any) -> int | tuple[Terminal, ...]:
         return whole(1, self.most)(value) if isinstance(value, int) else PinOf.__call__(self, value)
@@ -41,7 +41,7 @@ class GateSpec(BoardSpec):
     kind: str = key(word(*FUNCTIONS), ", ".join(FUNCTIONS))
     inputs: int | tuple[Terminal, ...] = key(
         GateInputs(OUTPUT, MOST_INPUTS),
-        "outputs joined to IN1, IN2 ...: MACHINE.PIN or ELEMENT.TERMINAL; or how many inputs, for wires and contacts",
+        "outputs connected to IN1, IN2 ...: MACHINE.PIN or ELEMENT.TERMINAL; or how many inputs, for wires and contacts",
     )
 
     @property

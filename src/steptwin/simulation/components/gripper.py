@@ -30,7 +30,7 @@ CLOSE, OPENED, CLOSED = "CLOSE", "OPENED", "CLOSED"
 class GripperSpec(CarrierSpec):
     close: Terminal | None = key(
         OUTPUT_PIN,
-        "output joined to CLOSE, which closes the jaws while it is on; without it a wire may be",
+        "output connected to CLOSE, which closes the jaws while it is on; without it a wire may be",
         default=None,
         order=-1,
     )

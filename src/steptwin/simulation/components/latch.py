@@ -17,8 +17,8 @@ SET, RESET, OUT = "SET", "RESET", "OUT"
 
 @table("[[latch]]")
 class LatchSpec(BoardSpec):
-    set: Terminal | None = key(OUTPUT_PIN, "output joined to SET; without it wires and contacts may be", default=None)
-    reset: Terminal | None = key(OUTPUT_PIN, "output joined to RESET; without it wires and contacts may be", default=None)
+    set: Terminal | None = key(OUTPUT_PIN, "output connected to SET; without it wires and contacts may be", default=None)
+    reset: Terminal | None = key(OUTPUT_PIN, "output connected to RESET; without it wires and contacts may be", default=None)
     priority: str = key(word("set", "reset"), "what wins while both are on", default="reset")
 
     @property

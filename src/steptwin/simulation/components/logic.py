@@ -29,7 +29,7 @@ from steptwin.state import Stateful
 
 
 class Joint(NamedTuple):
-    """An output, which the key ``key`` names, joined to an input of the element."""
+    """An output, which the key ``key`` names, connected to an input of the element."""
 
     key: str
     input: str

@@ -21,7 +21,7 @@ COIL, NO, NC = "COIL", "NO", "NC"
 @table("[[relay]]")
 class RelaySpec(BoardSpec):
     coil: Terminal | None = key(
-        OUTPUT_PIN, "output joined to COIL; without it wires and contacts may be, such as emergency stops", default=None
+        OUTPUT_PIN, "output connected to COIL; without it wires and contacts may be, such as emergency stops", default=None
     )
     pull_in: Nanos = key(time_value, "from energising the coil to the contact", default=0)
     drop_out: Nanos = key(time_value, "from switching the coil off to the contact", default=0)

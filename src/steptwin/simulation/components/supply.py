@@ -46,7 +46,7 @@ class SupplySpec(BoardSpec):
     """Voltages in V."""
 
     feeds: tuple[str, ...] = key(_names, "the controllers that it feeds: a name, or a list of them")
-    on: Terminal | None = key(OUTPUT_PIN, "output joined to ON, such as the output good of another supply", default=None)
+    on: Terminal | None = key(OUTPUT_PIN, "output connected to ON, such as the output good of another supply", default=None)
     switched: bool = key(
         flag, "whether wires or contacts switch ON; without it and on: it is on from the beginning", default=False
     )

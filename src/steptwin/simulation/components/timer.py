@@ -21,7 +21,7 @@ ON_DELAY, OFF_DELAY, PULSE = "on-delay", "off-delay", "pulse"
 class TimerSpec(BoardSpec):
     kind: str = key(word(ON_DELAY, OFF_DELAY, PULSE), "on-delay (TON), off-delay (TOF) or pulse (TP)")
     time: Nanos = key(positive_time, "such as '200 ms'")
-    input: Terminal | None = key(OUTPUT_PIN, "output joined to IN; without it wires and contacts may be", default=None)
+    input: Terminal | None = key(OUTPUT_PIN, "output connected to IN; without it wires and contacts may be", default=None)
 
     @property
     def terminals(self) -> Terminals:

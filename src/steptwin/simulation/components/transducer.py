@@ -91,7 +91,7 @@ def _build(spec: TransducerSpec, site: Site) -> Transducer:
     found = find_signal(site.parts, spec.of)
     found.watch(spec.of)
     if all(source.scheduler is not scheduler for source in found.bring(scheduler.now)):
-        raise Misuse(f"of = {spec.of!r} is no quantity of what {spec.target[0]!r} is joined to")
+        raise Misuse(f"of = {spec.of!r} is no quantity of what {spec.target[0]!r} is connected to")
     transducer = Transducer(scheduler, spec, found)
     scheduler.add_part(transducer, name=spec.name)
     return transducer

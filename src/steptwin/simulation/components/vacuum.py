@@ -26,7 +26,7 @@ EJECTOR = "EJECTOR"
 
 @table("[[vacuum]]")
 class VacuumSpec(CarrierSpec):
-    ejector: Terminal | None = key(OUTPUT_PIN, "output joined to EJECTOR; without it a wire may be", default=None, order=-1)
+    ejector: Terminal | None = key(OUTPUT_PIN, "output connected to EJECTOR; without it a wire may be", default=None, order=-1)
     vacuum: float = key(number(0.0, 101.0, above=True), "kPa below the pressure of the air, with a closed cup", default=70.0)
     threshold: float = key(number(0.0, 101.0, above=True), "kPa, from which HELD is on", default=50.0)
     build_up: Nanos = key(positive_time, "from 0 to the threshold", default=100 * MILLISECOND)

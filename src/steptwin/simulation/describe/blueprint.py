@@ -44,8 +44,8 @@ class Blueprint:
         """About the files that the description names, by name."""
         self.makers: dict[str, Callable[[bytes | None], Any]] = {}
         """Make the machine of each controller whose files have no errors, as `ControllerKind.build`."""
-        self.joined: Sequence[Sequence[str]] | None = None
-        """Groups that share a scheduler, by name (`joined_names`), once a world was built."""
+        self.connected: Sequence[Sequence[str]] | None = None
+        """Groups that share a scheduler, by name (`connected_names`), once a world was built."""
         self.memo = BuildMemo()
         for controller in spec.controllers:
             spec.text.unless_wrong(controller.path, partial(self._prepare, controller))

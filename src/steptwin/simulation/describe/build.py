@@ -14,7 +14,7 @@ from steptwin.simulation.components.parts import WorldParts
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.components.site import Site
 from steptwin.simulation.describe.blueprint import Blueprint, memory_file
-from steptwin.simulation.describe.joined import joined_names
+from steptwin.simulation.describe.connected import connected_names
 from steptwin.simulation.faults import Faults
 from steptwin.simulation.faults.element import FaultyElement
 from steptwin.simulation.kinds.kind import ControllerSpec, Member, Terminals
@@ -73,9 +73,9 @@ class _Builder:
         """Machines connected by a line, a wire or mechanics share a scheduler; schedulers are ordered by their first machine."""
         memo = self.blueprint.memo
         boards = memo.once(("boards",), lambda: {spec.name: (spec, terminals) for spec, terminals in self._boards()})
-        if self.blueprint.joined is None:
-            self.blueprint.joined = joined_names(self.spec, self.parts.machines)
-        for names in self.blueprint.joined:
+        if self.blueprint.connected is None:
+            self.blueprint.connected = connected_names(self.spec, self.parts.machines)
+        for names in self.blueprint.connected:
             scheduler = Scheduler(record=self.parts.record, is_checked=memo.is_checked, is_blank=self._is_blank)
             self.parts.schedulers.append(scheduler)
             for name in names:

@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from steptwin.simulation.kinds.programtexts import Destination, Downloading, ProgramText, TextLanguage
     from steptwin.simulation.mechanics.lanes import AxisLane
     from steptwin.simulation.scheduler.trace import RecordSink
-    from steptwin.simulation.script.heldjog import HeldJog
+    from steptwin.simulation.script.deadmanjog import DeadManJog
     from steptwin.simulation.script.steps import Step
     from steptwin.wire.frameline import FrameLine
 
@@ -103,7 +103,7 @@ def text_of(context: BuildContext, name: str) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Terminals:
-    """Names of pins that wires, switches, buttons and sources may be joined to; a pin may be both input and output."""
+    """Names of pins that wires, switches, buttons and sources may be connected to; a pin may be both input and output."""
 
     digital_inputs: Sequence[str] = ()
     analog_inputs: Sequence[str] = ()
@@ -471,7 +471,7 @@ class ControllerKind(OptionalMethods, ABC, Generic[S, M, V]):
         state does not show how a motion ended."""
         raise self.lacks(name, "status of motions: send its commands, and wait for a condition")
 
-    def held_jog(self, machine: M, line: str | None, wanted: Jog, /) -> HeldJog:
+    def dead_man_jog(self, machine: M, line: str | None, wanted: Jog, /) -> DeadManJog:
         """A jog that lasts only while it is extended."""
         raise Refusal(CANNOT_BE_JOGGED(name=wanted.machine, kind=self.title))
 

@@ -470,13 +470,13 @@ class Scheduler:
             if self.followers is not None:
                 self.followers.news |= self.followers.by_name.get(self._alone[0], {})
         else:
-            self._settle_joined()
+            self._settle_connected()
         if self.followers is not None and self.followers.news:
             self.followers.tell(self.now)
         if self.on_change is not None:
             self.on_change(self)
 
-    def _settle_joined(self) -> None:
+    def _settle_connected(self) -> None:
         for _ in range(MAX_ROUNDS_PER_INSTANT):
             self.stale = False
             for number in self._parts.all:

@@ -1,1 +1,1 @@
-"""Steps of scripts, commands and held jogs as values. Sees faults and what is below them."""
+"""Steps of scripts, commands and dead-man jogs as values. Sees faults and what is below them."""

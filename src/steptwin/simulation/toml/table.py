@@ -3,7 +3,7 @@
 ```python
 @table("[[latch]]")
 class LatchSpec(BoardSpec):
-    set: Terminal | None = key(OUTPUT_PIN, "output joined to SET", default=None)
+    set: Terminal | None = key(OUTPUT_PIN, "output connected to SET", default=None)
 ```
 """
 

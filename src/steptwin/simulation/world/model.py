@@ -62,7 +62,7 @@ class Model:
         self.files = blueprint.files
         self.trace = Trace(names, keep=keep_trace)
         self.parts: WorldParts = build(blueprint, self.trace.add, keep_memory, is_blank=is_blank)
-        self.trace.read_together(blueprint.joined or ())
+        self.trace.read_together(blueprint.connected or ())
         self.now: Nanos = 0
         self.stopped: str | None = None
         """The reason a script gave for ending the run; None if none did."""

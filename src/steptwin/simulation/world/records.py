@@ -94,7 +94,7 @@ def named_in(parts: WorldParts) -> Iterable[str]:
 
 
 def owner_of(machine: str, facts: Iterable[Fact]) -> str:
-    """Who reports an event: the element that its facts name, which is recorded under a controller that it is joined to."""
+    """Who reports an event: the element that its facts name, which is recorded under a controller that it is connected to."""
     return str(dict(facts).get("element", machine))
 
 

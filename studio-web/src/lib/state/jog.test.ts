@@ -1,6 +1,6 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { RequestError } from "../protocol/connection";
-import { HeldJog } from "./jog";
+import { DeadManJog } from "./jog";
 
 let asked: string[];
 let answer: (name: string) => Promise<unknown>;
@@ -10,7 +10,7 @@ const FIELDS = { machine: "table", axis: 1, velocity: 10 };
 const ask = (async (name: string) => {
   asked.push(name);
   return answer(name);
-}) as Parameters<typeof HeldJog.begin>[0];
+}) as Parameters<typeof DeadManJog.begin>[0];
 
 beforeEach(() => {
   vi.useFakeTimers();
@@ -21,7 +21,7 @@ beforeEach(() => {
 afterEach(() => vi.useRealTimers());
 
 test("it is renewed every 80 ms for as long as it is held", async () => {
-  const jog = HeldJog.begin(ask, FIELDS, failed);
+  const jog = DeadManJog.begin(ask, FIELDS, failed);
   await vi.advanceTimersByTimeAsync(250);
   expect(asked).toEqual(["jog", "renew", "renew", "renew"]);
   jog.end();
@@ -31,20 +31,20 @@ test("it is renewed every 80 ms for as long as it is held", async () => {
 
 test("a shorter lease is renewed more often", async () => {
   answer = async () => ({ lease: 3, lasts_ms: 60 });
-  HeldJog.begin(ask, FIELDS, failed);
+  DeadManJog.begin(ask, FIELDS, failed);
   await vi.advanceTimersByTimeAsync(60);
   expect(asked).toEqual(["jog", "renew", "renew", "renew"]);
 });
 
 test("one that was let go before its lease came is let go when it comes", async () => {
-  HeldJog.begin(ask, FIELDS, failed).end();
+  DeadManJog.begin(ask, FIELDS, failed).end();
   await vi.advanceTimersByTimeAsync(1000);
   expect(asked).toEqual(["jog", "let_go"]);
 });
 
 test("one that is refused is not renewed", async () => {
   answer = () => Promise.reject(new RequestError("refusal", "drive off"));
-  const jog = HeldJog.begin(ask, FIELDS, failed);
+  const jog = DeadManJog.begin(ask, FIELDS, failed);
   await vi.advanceTimersByTimeAsync(1000);
   jog.end();
   expect(asked).toEqual(["jog"]);
@@ -52,7 +52,7 @@ test("one that is refused is not renewed", async () => {
 });
 
 test("one that ends by itself is not renewed, and is said to have ended", async () => {
-  HeldJog.begin(ask, FIELDS, failed);
+  DeadManJog.begin(ask, FIELDS, failed);
   await vi.advanceTimersByTimeAsync(10);
   answer = () => Promise.reject(new RequestError("refusal", "no lease 3"));
   await vi.advanceTimersByTimeAsync(1000);

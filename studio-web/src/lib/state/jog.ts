@@ -10,7 +10,7 @@ const RENEW_MS = 80;
  *
  * The lease is renewed from the page itself, not from a worker: a page that hangs renews nothing, and the axis stops.
  */
-export class HeldJog {
+export class DeadManJog {
   private lease: number | null = null;
   private isHeld = true;
   private timer: ReturnType<typeof setInterval> | undefined;
@@ -20,8 +20,8 @@ export class HeldJog {
     private readonly failed: (error: unknown) => void,
   ) {}
 
-  static begin(ask: Ask, fields: Fields<"jog">, failed: (error: unknown) => void): HeldJog {
-    const jog = new HeldJog(ask, failed);
+  static begin(ask: Ask, fields: Fields<"jog">, failed: (error: unknown) => void): DeadManJog {
+    const jog = new DeadManJog(ask, failed);
     ask("jog", fields).then(
       ({ lease, lasts_ms }) => jog.leased(lease, lasts_ms),
       (error: unknown) => {

@@ -1,4 +1,4 @@
-import { HeldJog } from "../../lib/state/jog";
+import { DeadManJog } from "../../lib/state/jog";
 import { keep, restore } from "../../lib/state/kept";
 import type { AxisModel } from "../../lib/state/model";
 import type { Studio } from "../../lib/state/studio.svelte";
@@ -18,7 +18,7 @@ export class Jogging {
   percent = $state(restore("jog.percent", VERSION, isPercent) ?? FIRST_PERCENT);
   /** Full velocities that were typed, by axis. */
   full = $state<Record<string, string>>(restore("jog.full", VERSION, isTexts) ?? {});
-  private readonly held = new Map<string, HeldJog>();
+  private readonly held = new Map<string, DeadManJog>();
   /** Greatest velocities, by axis, as they were before a jog. */
   private readonly greatest = new Map<string, number>();
 
@@ -60,7 +60,7 @@ export class Jogging {
     this.end(axis);
     const velocity = (sign * this.fullOf(axis) * percent) / 100;
     const fields = { machine: axis.machine, axis: axis.number, velocity };
-    const jog: HeldJog = HeldJog.begin(
+    const jog: DeadManJog = DeadManJog.begin(
       (name, given, within) => this.studio.ask(name, given, within),
       fields,
       (error) => {
@@ -82,7 +82,7 @@ export class Jogging {
   }
 
   /** An answer may come late: the axis may have another jog by now, which has to be ended when it is let go. */
-  private failed(axis: AxisModel, jog: HeldJog, error: unknown): void {
+  private failed(axis: AxisModel, jog: DeadManJog, error: unknown): void {
     if (this.held.get(axis.id) === jog) this.held.delete(axis.id);
     this.studio.report(error);
   }

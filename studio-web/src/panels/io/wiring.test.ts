@@ -21,7 +21,7 @@ const model = (connections: Connection[]): Model =>
     connections,
   }) as unknown as Model;
 
-test("each controller and element has its joined terminals", () => {
+test("each controller and element has its connected terminals", () => {
   const [cell, safety, ...others] = nodesOf(model([wire("x.switch1", "cell.IN1"), wire("cell.OUT1", "safety.coil")]));
   expect(cell?.inputs).toEqual([
     { terminal: "cell.IN1", short: "IN1", join: null, ends: [{ name: "x.switch1", inverted: false, delay_ns: 0 }] },

@@ -8,7 +8,7 @@ export interface End {
   delay_ns: number;
 }
 
-export interface Joined {
+export interface ConnectedTerminal {
   /** With its owner: `table.IN1`. */
   terminal: string;
   /** Without: `IN1`. */
@@ -18,19 +18,19 @@ export interface Joined {
   join: string | null;
 }
 
-/** A controller or an element with the terminals that are joined to something. */
+/** A controller or an element with the terminals that are connected to something. */
 export interface Node {
   name: string;
   kind: string;
-  inputs: readonly Joined[];
-  outputs: readonly Joined[];
+  inputs: readonly ConnectedTerminal[];
+  outputs: readonly ConnectedTerminal[];
 }
 
 const byNumber = new Intl.Collator("en", { numeric: true });
 const ownerOf = (terminal: string) => terminal.slice(0, terminal.indexOf("."));
 const shortOf = (terminal: string) => terminal.slice(terminal.indexOf(".") + 1);
 
-function joined(connections: readonly Connection[], side: "source" | "target"): Joined[] {
+function connected(connections: readonly Connection[], side: "source" | "target"): ConnectedTerminal[] {
   const other = side === "source" ? "target" : "source";
   const found = new Map<string, { ends: End[]; join: string | null }>();
   for (const one of connections) {
@@ -54,11 +54,11 @@ export function nodesOf({ machines, elements, connections }: Model): Node[] {
     .map(({ name, kind }) => ({
       name,
       kind,
-      inputs: joined(
+      inputs: connected(
         connections.filter(({ target }) => ownerOf(target) === name),
         "target",
       ),
-      outputs: joined(
+      outputs: connected(
         connections.filter(({ source }) => ownerOf(source) === name && shortOf(source) !== ""),
         "source",
       ),

@@ -35,8 +35,8 @@ from steptwin.simulation.kinds.m1486 import build, memory
 from steptwin.simulation.kinds.m1486 import table as its_table
 from steptwin.simulation.kinds.m1486.axes import motor
 from steptwin.simulation.kinds.m1486.control import line_number, number, on_grid, refuse_busy, typed_for
+from steptwin.simulation.kinds.m1486.deadmanjog import M1486DeadManJog
 from steptwin.simulation.kinds.m1486.faults import M1486Body
-from steptwin.simulation.kinds.m1486.heldjog import M1486HeldJog
 from steptwin.simulation.kinds.m1486.linekind import CharacterLines
 from steptwin.simulation.kinds.m1486.programs import ChipPrograms
 from steptwin.simulation.kinds.m1486.table import M1486Spec
@@ -219,8 +219,8 @@ class M1486Kind(ControllerKind[M1486Spec, M1486Chip, M1486View]):
             sought = f" and {name}.counter == 0 and {name}.{seek.pin} == {0 if line_number(seek.pin) in SEEK_ENDS_LOW else 1}"
         return MotionEnds(f"not {name}.busy{pending}", f"{name}.valid{sought}")
 
-    def held_jog(self, chip: M1486Chip, line: str | None, wanted: Jog) -> M1486HeldJog:
-        return M1486HeldJog(chip, line, wanted)
+    def dead_man_jog(self, chip: M1486Chip, line: str | None, wanted: Jog) -> M1486DeadManJog:
+        return M1486DeadManJog(chip, line, wanted)
 
     def halt(self, chip: M1486Chip, wanted: Halt, now: Nanos) -> None:
         """Every stop ends motion and program: the memory has one row of commands, whether they were typed or belong to a program,

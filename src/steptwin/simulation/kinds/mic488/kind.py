@@ -45,8 +45,8 @@ from steptwin.simulation.kinds.kind import (
 )
 from steptwin.simulation.kinds.mic488 import build, memory
 from steptwin.simulation.kinds.mic488.configuration import Mic488Configuration
+from steptwin.simulation.kinds.mic488.deadmanjog import Mic488DeadManJog
 from steptwin.simulation.kinds.mic488.faults import Mic488Body
-from steptwin.simulation.kinds.mic488.heldjog import Mic488HeldJog
 from steptwin.simulation.kinds.mic488.linekind import ModbusLines
 from steptwin.simulation.kinds.mic488.program_watch import ProgramWatch
 from steptwin.simulation.kinds.mic488.programs import WbcPrograms
@@ -275,8 +275,8 @@ class Mic488Kind(ControllerKind[Mic488Spec, Mic488Device, Mic488View]):
         over = " and ".join(f"{status} != {one.value}" for one in busy)
         return MotionEnds(over, f"{status} == {AxisStatus.REACHED.value}")
 
-    def held_jog(self, device: Mic488Device, line: str | None, wanted: Jog) -> Mic488HeldJog:
-        return Mic488HeldJog(device, line, wanted)
+    def dead_man_jog(self, device: Mic488Device, line: str | None, wanted: Jog) -> Mic488DeadManJog:
+        return Mic488DeadManJog(device, line, wanted)
 
     def halt(self, device: Mic488Device, wanted: Halt, now: Nanos) -> None:
         """By the registers by which a master does it, but where no fault of protocol or line comes between."""

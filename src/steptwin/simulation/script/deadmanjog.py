@@ -21,7 +21,7 @@ Given: TypeAlias = Sequence[do.Write | do.Send]
 """Steps for the controller at the present moment."""
 
 
-class HeldJog(Protocol):
+class DeadManJog(Protocol):
     """One axis that is jogged; the machine is at ``now`` in every call."""
 
     @property

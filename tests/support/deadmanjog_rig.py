@@ -1,4 +1,4 @@
-"""Worlds with held jogs, in virtual time."""
+"""Worlds with dead-man jogs, in virtual time."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from steptwin.machine import MILLISECOND, Nanos
 from steptwin.motion.divisions import profile_of
 from steptwin.subject.commands import Enable, Jog
 from steptwin.subject.following import filter_of
-from steptwin.subject.jogs import Held, WorldJogs
+from steptwin.subject.jogs import ExtendableJog, WorldJogs
 from steptwin.subject.payloads import FramePayload, PlanPayload
 from steptwin.subject.world import WorldSubject
 
@@ -44,7 +44,7 @@ TIMED = 'timing = "real"'
 
 
 class Rig:
-    """A world in virtual time with held jogs, as a live world keeps them."""
+    """A world in virtual time with dead-man jogs, as a live world keeps them."""
 
     def __init__(self, text: str) -> None:
         self.world = World.from_toml(dedent(text))
@@ -52,7 +52,7 @@ class Rig:
         self.jogs = WorldJogs(self.subject)
         self.followed = self.subject.follow(filter_of(["plan", "frame"]), 100_000)
 
-    def begin(self, wanted: Jog) -> Held:
+    def begin(self, wanted: Jog) -> ExtendableJog:
         return start(self.jogs.begin_jog(wanted)).result()
 
     def run(self, for_ms: float) -> None:

@@ -1,15 +1,15 @@
-"""As test_heldjog_mic488, of chips."""
+"""As test_deadmanjog_mic488, of chips."""
 
 from __future__ import annotations
 
 import pytest
-from heldjog_rig import TIMED, Rig, chip
+from deadmanjog_rig import TIMED, Rig, chip
 
 from steptwin.errors import Misuse, Refusal
 from steptwin.m1486.drive import speed_curve
 from steptwin.machine import MILLISECOND, SECOND
 from steptwin.motion.ramps import plan_distance
-from steptwin.simulation.kinds.m1486.heldjog import M1486HeldJog
+from steptwin.simulation.kinds.m1486.deadmanjog import M1486DeadManJog
 from steptwin.simulation.script import steps as do
 from steptwin.subject.commands import Jog, StopAxes
 
@@ -104,18 +104,18 @@ def test_a_slow_jog_of_an_m1486_makes_whole_steps(variant: str, velocity: float,
 def test_a_jog_of_an_m1486_begins_with_its_first_extension() -> None:
     rig = chip()
     wanted = Jog("drum", 1, 6400.0)
-    held = M1486HeldJog(rig.world.m1486["drum"].chip, "chips", wanted)
+    held = M1486DeadManJog(rig.world.m1486["drum"].chip, "chips", wanted)
     assert (held.deadline(), held.advance(rig.world.now)) == (None, ())
     assert held.extend(rig.world.now) == (do.Send("chips", b"x7\rv100\rf640\rr\r"),)
 
 
 @pytest.mark.parametrize("variant", ["A", "A2x"])
 @pytest.mark.parametrize("velocity", [33, 100, 640, 1999, 5000])
-def test_a_move_of_a_held_jog_of_an_m1486_is_the_longest_that_ends_in_time(variant: str, velocity: int) -> None:
+def test_a_move_of_a_dead_man_jog_of_an_m1486_is_the_longest_that_ends_in_time(variant: str, velocity: int) -> None:
     """100 ms: with one microstep more it would take longer."""
     rig = chip(variant)
     unit = 64 * rig.world.m1486["drum"].chip.variant.clock
-    held = M1486HeldJog(rig.world.m1486["drum"].chip, "chips", Jog("drum", 1, float(unit * velocity)))
+    held = M1486DeadManJog(rig.world.m1486["drum"].chip, "chips", Jog("drum", 1, float(unit * velocity)))
     (given,) = held.extend(rig.world.now)
     assert isinstance(given, do.Send)
     _, _, text, _, _ = given.data.decode().split("\r")
@@ -131,7 +131,7 @@ def test_a_move_of_a_held_jog_of_an_m1486_is_the_longest_that_ends_in_time(varia
 
 def test_a_jog_of_an_m1486_lapses_in_its_last_nanosecond() -> None:
     rig = chip()
-    held = M1486HeldJog(rig.world.m1486["drum"].chip, "chips", Jog("drum", 1, -6400.0))
+    held = M1486DeadManJog(rig.world.m1486["drum"].chip, "chips", Jog("drum", 1, -6400.0))
     begun = rig.world.now
     held.extend(begun)
     assert held.deadline() == begun + MILLISECOND
@@ -146,7 +146,7 @@ def test_a_jog_of_an_m1486_lapses_in_its_last_nanosecond() -> None:
 
 def test_a_chip_that_does_something_else_for_two_seconds_ends_its_jog() -> None:
     rig = chip()
-    held = M1486HeldJog(rig.world.m1486["drum"].chip, "chips", Jog("drum", 1, 6400.0))
+    held = M1486DeadManJog(rig.world.m1486["drum"].chip, "chips", Jog("drum", 1, 6400.0))
     begun = rig.world.now
     held.extend(begun)
     rig.subject.do(Jog("drum", 1, 64.0 * 640))

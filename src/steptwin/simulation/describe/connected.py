@@ -11,41 +11,41 @@ from steptwin.simulation.toml.tomlplaces import Path
 from steptwin.simulation.toml.values import NameOf
 
 
-def joined_names(spec: WorldSpec, machines: Iterable[str]) -> list[list[str]]:
+def connected_names(spec: WorldSpec, machines: Iterable[str]) -> list[list[str]]:
     """The names in each scheduler. Schedulers, and names in them, are in order: machines, lines, elements.
 
     Names that do not exist are reported in the text of the description.
     """
     with_terminals = [element for element in ELEMENTS.values() if element.terminals is not None]
     boards = [one.name for element in with_terminals for one in element.named(spec.elements[element.name])]
-    joined = {name: name for name in [*machines, *(line.name for line in spec.lines), *boards]}
+    connected = {name: name for name in [*machines, *(line.name for line in spec.lines), *boards]}
 
     def root(name: str) -> str:
-        while joined[name] != name:
-            joined[name] = joined[joined[name]]
-            name = joined[name]
+        while connected[name] != name:
+            connected[name] = connected[connected[name]]
+            name = connected[name]
         return name
 
     placed = _placed(spec)
-    for reference in _joints(spec):
+    for reference in _connections(spec):
         one, other = (placed.get(name, name) for name in reference[:2])
-        if other not in joined:
-            _report(spec, reference.path, other, joined)
-        elif one in joined:
-            joined[root(other)] = root(one)
+        if other not in connected:
+            _report(spec, reference.path, other, connected)
+        elif one in connected:
+            connected[root(other)] = root(one)
     groups: dict[str, list[str]] = {}
-    for name in joined:
+    for name in connected:
         groups.setdefault(root(name), []).append(name)
     return list(groups.values())
 
 
-def _report(spec: WorldSpec, path: Path, name: str, joined: Iterable[str]) -> None:
+def _report(spec: WorldSpec, path: Path, name: str, connected: Iterable[str]) -> None:
     """Report a name that nothing has, with those that may stand there: of one kind of element for some keys."""
     text, element = spec.text, _element_named_by(path)
     if text.may_be_broken(name):
         return
     if element is None:
-        what, there = "nothing", list(joined)
+        what, there = "nothing", list(connected)
         elements = (one.name for element in ELEMENTS.values() for one in element.named(spec.elements[element.name]))
         known = [*there, *elements]
     else:
@@ -73,7 +73,7 @@ def _placed(spec: WorldSpec) -> Mapping[str, str]:
     }
 
 
-def _joints(spec: WorldSpec) -> Iterator[Reference]:
+def _connections(spec: WorldSpec) -> Iterator[Reference]:
     for controller in spec.controllers:
         if controller.line is not None:
             yield Reference(controller.name, controller.line, (*controller.path, "line"))

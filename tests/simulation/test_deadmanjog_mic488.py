@@ -1,4 +1,4 @@
-"""Held jogs of twins, kept as the studio keeps them: bounded moves only, and a standstill in time whatever happens."""
+"""Dead-man jogs of twins, kept as the studio keeps them: bounded moves only, and a standstill in time whatever happens."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from heldjog_rig import MIC, TIMED, Rig, chip, mic
+from deadmanjog_rig import MIC, TIMED, Rig, chip, mic
 from mic488_rig import loaded
 
 from steptwin.errors import Misuse, Refusal
@@ -14,10 +14,10 @@ from steptwin.files.world import World
 from steptwin.machine import MILLISECOND
 from steptwin.mic488.registers import AXIS_STATUS_TEXTS
 from steptwin.mic488.status import AxisStatus
-from steptwin.simulation.kinds.m1486.heldjog import M1486HeldJog
-from steptwin.simulation.kinds.mic488.heldjog import Mic488HeldJog
+from steptwin.simulation.kinds.m1486.deadmanjog import M1486DeadManJog
+from steptwin.simulation.kinds.mic488.deadmanjog import Mic488DeadManJog
 from steptwin.simulation.script import steps as do
-from steptwin.simulation.script.heldjog import STOP_NS
+from steptwin.simulation.script.deadmanjog import STOP_NS
 from steptwin.subject.commands import Enable, Home, Jog, StopAxes
 from steptwin.subject.payloads import FramePayload, PlanPayload
 
@@ -76,7 +76,7 @@ def test_an_axis_that_is_let_go_has_its_whole_ramp() -> None:
     assert rig.stands_at() == pytest.approx(last + 500 * MILLISECOND, abs=5 * MILLISECOND)
 
 
-def test_a_held_jog_of_a_mic488_runs_evenly_and_goes_where_it_is_held() -> None:
+def test_a_dead_man_jog_of_a_mic488_runs_evenly_and_goes_where_it_is_held() -> None:
     rig = mic(4000.0)
     held = rig.begin(Jog("a", 1, -40.0))
     rig.run(50)
@@ -206,7 +206,7 @@ def test_a_mic488_with_a_position_error_is_not_jogged() -> None:
         rig.begin(Jog("a", 1, 10.0))
 
 
-def asked(held: Mic488HeldJog, world: World) -> tuple[tuple[tuple[str, float], ...], ...]:
+def asked(held: Mic488DeadManJog, world: World) -> tuple[tuple[tuple[str, float], ...], ...]:
     """What it asks for with its first extension; the requests are carried out."""
     given = held.extend(world.now)
     return tuple(values(one) for one in given)
@@ -233,11 +233,11 @@ def values(one: object) -> tuple[tuple[str, float], ...]:
         (5000.0, 0.001, 0.0, 0.01),
     ],
 )
-def test_how_far_a_move_of_a_held_jog_goes(acc: float, velocity: float, going: float, way: float) -> None:
+def test_how_far_a_move_of_a_dead_man_jog_goes(acc: float, velocity: float, going: float, way: float) -> None:
     rig = mic(acc)
     rig.world.mic488["a"].write("M1_VEL_ABS", going)
     rig.run(1000)
-    held = Mic488HeldJog(rig.world.mic488["a"].device, "bus", Jog("a", 1, velocity))
+    held = Mic488DeadManJog(rig.world.mic488["a"].device, "bus", Jog("a", 1, velocity))
     assert (held.deadline(), held.advance(rig.world.now)) == (None, ())
     ((*first, (name, distance)),) = asked(held, rig.world)
     assert first == ([] if abs(velocity) == 40.0 else [("M1_VMAX", abs(velocity))])
@@ -249,7 +249,7 @@ def test_how_far_a_move_of_a_held_jog_goes(acc: float, velocity: float, going: f
 def test_a_jog_of_a_mic488_that_is_let_go_before_it_moves_is_stopped_behind_its_move() -> None:
     """Its first move may still be on the line."""
     rig = mic()
-    held = Mic488HeldJog(rig.world.mic488["a"].device, "bus", Jog("a", 1, 10.0))
+    held = Mic488DeadManJog(rig.world.mic488["a"].device, "bus", Jog("a", 1, 10.0))
     held.extend(rig.world.now)
     assert held.release(rig.world.now) == (do.Write((("a", "M1_VEL_ABS", 0.0), ("a", "M1_VMAX", 40.0))),)
     assert (held.over, held.deadline(), held.release(rig.world.now)) == ("let go", rig.world.now + STOP_NS, ())
@@ -259,7 +259,7 @@ def test_a_jog_of_a_mic488_that_is_let_go_before_it_moves_is_stopped_behind_its_
 
 def test_a_jog_of_a_mic488_that_was_never_begun_has_nothing_to_stop() -> None:
     rig = mic()
-    held = Mic488HeldJog(rig.world.mic488["a"].device, "bus", Jog("a", 1, 10.0))
+    held = Mic488DeadManJog(rig.world.mic488["a"].device, "bus", Jog("a", 1, 10.0))
     assert held.release(rig.world.now) == (do.Write((("a", "M1_VMAX", 40.0),)),)
     assert (held.over, held.deadline()) == ("let go", None)
 
@@ -269,7 +269,7 @@ def test_what_a_moving_axis_is_told_at_the_end_of_a_jog(ends: str) -> None:
     rig = mic(20.0)
     rig.world.mic488["a"].write("M1_VEL_ABS", 10.0)
     rig.run(1000)
-    held = Mic488HeldJog(rig.world.mic488["a"].device, "bus", Jog("a", 1, 10.0))
+    held = Mic488DeadManJog(rig.world.mic488["a"].device, "bus", Jog("a", 1, 10.0))
     begun = rig.world.now
     for given in held.extend(begun):
         rig.world.apply_input(given)
@@ -292,7 +292,7 @@ def test_what_a_moving_axis_is_told_at_the_end_of_a_jog(ends: str) -> None:
 def test_a_jog_of_a_mic488_that_another_has_stopped_is_over() -> None:
     rig = mic()
     device = rig.world.mic488["a"].device
-    held = Mic488HeldJog(device, "bus", Jog("a", 1, 40.0))
+    held = Mic488DeadManJog(device, "bus", Jog("a", 1, 40.0))
     held.extend(rig.world.now)
     begun = rig.world.now
     # Its request has not arrived within 200 ms.
@@ -318,9 +318,9 @@ def test_a_jog_that_is_over_asks_for_nothing_more() -> None:
 
 def test_a_jog_that_is_cut_says_so_and_asks_for_nothing_more() -> None:
     of_mic, of_chip = mic(), chip()
-    makers: list[tuple[Rig, Callable[[], Mic488HeldJog | M1486HeldJog]]] = [
-        (of_mic, lambda: Mic488HeldJog(of_mic.world.mic488["a"].device, "bus", Jog("a", 1, 10.0))),
-        (of_chip, lambda: M1486HeldJog(of_chip.world.m1486["drum"].chip, "chips", Jog("drum", 1, 6400.0))),
+    makers: list[tuple[Rig, Callable[[], Mic488DeadManJog | M1486DeadManJog]]] = [
+        (of_mic, lambda: Mic488DeadManJog(of_mic.world.mic488["a"].device, "bus", Jog("a", 1, 10.0))),
+        (of_chip, lambda: M1486DeadManJog(of_chip.world.m1486["drum"].chip, "chips", Jog("drum", 1, 6400.0))),
     ]
     for rig, make in makers:
         for begun in (False, True):

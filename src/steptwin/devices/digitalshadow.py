@@ -3,8 +3,8 @@
 Pure: moments are arguments. The twin goes on in a world of its own, whose time begins with the shadow.
 
 Of commands only beginning and end are known, and a poll takes a while, so positions of a moving axis are compared with a
-tolerance: the distance that it can go meanwhile. Where an axis comes to rest after a stop or a held jog depends on the moment of
-its end, so it is not compared until then, and the twin takes that place over.
+tolerance: the distance that it can go meanwhile. Where an axis comes to rest after a stop or a dead-man jog depends on the moment
+of its end, so it is not compared until then, and the twin takes that place over.
 """
 
 from __future__ import annotations
@@ -74,8 +74,9 @@ class _ComparedAxis:
     first: Deviation | None = None
 
 
-class Shadow:
-    """Shadow of the controller ``name``, from the moment ``now`` on. Raises `SteptwinError` where its twin cannot be made."""
+class DigitalShadow:
+    """Digital shadow of the controller ``name``, from the moment ``now`` on. Raises `SteptwinError` where its twin cannot be
+    made."""
 
     def __init__(self, name: str, sheet: Datasheet, twin: DeviceTwin, now: Nanos) -> None:
         self.name = name
@@ -138,7 +139,7 @@ class Shadow:
         self._tell(replace(wanted, line=self._twin.line) if isinstance(wanted, steps.Request) else wanted)
 
     def jogs(self, number: int, *, on: bool) -> None:
-        """A held jog of an axis begins or has ended. The twin waits where it is."""
+        """A dead-man jog of an axis begins or has ended. The twin waits where it is."""
         axis = self._axes[number]
         axis.is_jogged, axis.takes_over = on, True
 
@@ -209,7 +210,7 @@ class Shadow:
     # ------------------------------------------------------------------ as JSON
 
     def plain(self, after: Nanos) -> dict[str, object]:
-        """With samples later than ``after``, from the beginning of the shadow."""
+        """With samples later than ``after``, from the beginning of the digital shadow."""
         return {
             "machine": self.name,
             "axes": [_plain(axis, after) for axis in self._axes.values()],

@@ -1,4 +1,4 @@
-"""A held jog of a MIC488: relative moves, each as far as the axis gets until it is to brake, and then its braking distance.
+"""A dead-man jog of a MIC488: relative moves, each as far as the axis gets until it is to brake, and then its braking distance.
 
 A move runs at VMAX, so VMAX is the velocity of the jog for as long as that lasts, as with the driver
 (`steptwin.drivers.mic488.jog`); it is never raised.
@@ -15,7 +15,7 @@ from steptwin.mic488.registers import AXES, AXIS_STATUS_TEXTS
 from steptwin.mic488.status import AxisStatus, ProgramState
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.control import Jog
-from steptwin.simulation.script.heldjog import STOP_NS, Given
+from steptwin.simulation.script.deadmanjog import STOP_NS, Given
 
 SHORTEST_NS: Nanos = 160 * MILLISECOND
 LONGEST_NS: Nanos = 250 * MILLISECOND
@@ -42,9 +42,9 @@ WRONG_VELOCITY = Message(
 )
 
 
-class Mic488HeldJog:
-    """See `steptwin.simulation.script.heldjog.HeldJog`. Raises `Misuse` for a velocity, `Refusal` for an axis that cannot be
-    jogged now."""
+class Mic488DeadManJog:
+    """See `steptwin.simulation.script.deadmanjog.DeadManJog`. Raises `Misuse` for a velocity, `Refusal` for an axis that cannot
+    be jogged now."""
 
     def __init__(self, device: Mic488Device, line: str | None, wanted: Jog) -> None:
         if not 1 <= wanted.axis <= AXES:
@@ -86,7 +86,7 @@ class Mic488HeldJog:
     def _has_same_speed(self) -> bool:
         return abs(self._axis.vmax_p - self._speed_p) <= SAME * self._speed_p
 
-    # ------------------------------------------------------------------ as `HeldJog`
+    # ------------------------------------------------------------------ as `DeadManJog`
 
     def extend(self, now: Nanos) -> Given:
         if self.over is not None:

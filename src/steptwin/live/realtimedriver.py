@@ -1,4 +1,5 @@
-"""A scheduler in real time: `Cell.start` begins it, and an input for its machines comes between `Cell.enter` and `Cell.leave`."""
+"""A scheduler in real time: `RealTimeDriver.start` begins it, and an input for its machines comes between `RealTimeDriver.enter`
+and `RealTimeDriver.leave`."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ LONGEST_DELAY_NS: Nanos = 500 * MILLISECOND
 
 
 class Advanceable(Protocol):
-    """Subject of a cell, which advances it in real time: a scheduler or a whole world. The methods are those of `Scheduler`."""
+    """Subject of a real-time driver, which advances it in real time: a scheduler or a whole world. The methods are those of
+    `Scheduler`."""
 
     stale: bool
 
@@ -28,7 +30,7 @@ class Advanceable(Protocol):
     def deadline(self) -> Nanos | None: ...
 
 
-class Cell:
+class RealTimeDriver:
     """Machines in real time, advanced together at their deadlines and when an input arrives.
 
     While the process does not run, virtual time stands still, so that there is no backlog; ``on_lag`` is called with the delay.

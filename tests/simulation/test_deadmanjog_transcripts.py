@@ -1,7 +1,7 @@
-"""What held jogs send to controllers, what moves by it and when it stands: golden/heldjogs.txt.
+"""What dead-man jogs send to controllers, what moves by it and when it stands: golden/deadmanjogs.txt.
 
-Rules have their own tests (test_heldjog_*.py); here whole sessions are compared.
-Regenerate with ``PYTHONPATH=tests/support python tests/simulation/test_heldjog_transcripts.py`` and read the diff.
+Rules have their own tests (test_deadmanjog_*.py); here whole sessions are compared.
+Regenerate with ``PYTHONPATH=tests/support python tests/simulation/test_deadmanjog_transcripts.py`` and read the diff.
 """
 
 from __future__ import annotations
@@ -10,19 +10,19 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from heldjog_rig import CHIPS, MIC, TIMED, Rig
+from deadmanjog_rig import CHIPS, MIC, TIMED, Rig
 from mic488_rig import loaded
 from transcripts import Bench, Case, cases, regenerate
 
 from steptwin.machine import MILLISECOND
 from steptwin.motion.divisions import profile_of
-from steptwin.simulation.kinds.m1486.heldjog import M1486HeldJog
-from steptwin.simulation.kinds.mic488.heldjog import Mic488HeldJog
+from steptwin.simulation.kinds.m1486.deadmanjog import M1486DeadManJog
+from steptwin.simulation.kinds.mic488.deadmanjog import Mic488DeadManJog
 from steptwin.simulation.script import steps as script
 from steptwin.subject import commands
 from steptwin.subject.payloads import FramePayload, PlanPayload
 
-GOLDENS = [Path(__file__).parent / "golden/heldjogs.txt"]
+GOLDENS = [Path(__file__).parent / "golden/deadmanjogs.txt"]
 
 
 class JogWire:
@@ -79,11 +79,11 @@ def bench(options: str) -> Bench:
     def program(text: str) -> None:
         rig.world.mic488["a"].device.load_program(0, loaded(text)[0])
 
-    def chip_jog(velocity: float, axis: int = 1, line: str | None = "chips") -> M1486HeldJog:
-        return M1486HeldJog(rig.world.m1486["drum"].chip, line, commands.Jog("drum", axis, velocity))
+    def chip_jog(velocity: float, axis: int = 1, line: str | None = "chips") -> M1486DeadManJog:
+        return M1486DeadManJog(rig.world.m1486["drum"].chip, line, commands.Jog("drum", axis, velocity))
 
-    def mic_jog(velocity: float, axis: int = 1) -> Mic488HeldJog:
-        return Mic488HeldJog(rig.world.mic488["a"].device, "bus", commands.Jog("a", axis, velocity))
+    def mic_jog(velocity: float, axis: int = 1) -> Mic488DeadManJog:
+        return Mic488DeadManJog(rig.world.mic488["a"].device, "bus", commands.Jog("a", axis, velocity))
 
     of_rig = {"begin": rig.begin, "do": rig.subject.do, "at": rig.position, "jogs": rig.jogs, "world": rig.world}
     own = {"run": run, "write": write, "program": program, "chip_jog": chip_jog, "mic_jog": mic_jog}

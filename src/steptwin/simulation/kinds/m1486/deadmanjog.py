@@ -1,4 +1,4 @@
-"""A held jog of an M1486: a row of short moves (F or B), each of which begins when the one before it has ended.
+"""A dead-man jog of an M1486: a row of short moves (F or B), each of which begins when the one before it has ended.
 
 G+ and G- are never used: nothing ends them. No move is cut short, because Kill makes the position counter wrong (M-16).
 """
@@ -18,7 +18,7 @@ from steptwin.messages import Message, text_of
 from steptwin.motion.ramps import longest_within
 from steptwin.simulation.kinds.m1486.control import IS_NOT_AT_REST, IS_ON_NO_LINE, ONE_AXIS_ONLY, typed
 from steptwin.simulation.script.control import Jog
-from steptwin.simulation.script.heldjog import REST_NS, STOP_NS, Given
+from steptwin.simulation.script.deadmanjog import REST_NS, STOP_NS, Given
 
 LINK_NS: Nanos = 100 * MILLISECOND
 """A move takes at most this, unless a single microstep takes longer."""
@@ -37,8 +37,8 @@ LINE_IS_TOO_SLOW_TO_JOG = Message(
 )
 
 
-class M1486HeldJog:
-    """See `steptwin.simulation.script.heldjog.HeldJog`. Raises `Misuse` for a velocity, `Refusal` for a chip that cannot be
+class M1486DeadManJog:
+    """See `steptwin.simulation.script.deadmanjog.DeadManJog`. Raises `Misuse` for a velocity, `Refusal` for a chip that cannot be
     jogged now."""
 
     def __init__(self, chip: M1486Chip, line: str | None, wanted: Jog) -> None:
@@ -76,7 +76,7 @@ class M1486HeldJog:
         curve = speed_curve(settings, drive.qualification, self._chip.variant.clock)
         return longest_within(LINK_NS, drive.grid_u, curve)
 
-    # ------------------------------------------------------------------ as `HeldJog`
+    # ------------------------------------------------------------------ as `DeadManJog`
 
     def extend(self, now: Nanos) -> Given:
         if self.over is not None:

@@ -1,6 +1,6 @@
-"""The scout of a debugger: a second world with the state of the first, which goes ahead of it or back, and is observed.
+"""The look-ahead run of a debugger: a second world with the state of the first, which goes ahead of it or back, and is observed.
 
-The first one is only run, as ever, to where the scout has found a reason to stop.
+The first one is only run, as ever, to where the look-ahead run has found a reason to stop.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ class Candidate(NamedTuple):
     begun: Begun | None = None
 
 
-class Scout:
-    """Look-ahead runs of the world of ``history``."""
+class LookAheadRun:
+    """Look-ahead run of the world of ``history``."""
 
     def __init__(self, history: History) -> None:
         self._history = history

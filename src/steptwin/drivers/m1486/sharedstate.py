@@ -1,4 +1,4 @@
-"""Common knowledge of the drivers of one chip."""
+"""State that the drivers of one chip share."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _CHANGES_NOTHING_READABLE = frozenset(
 """Commands after which a chip at rest still is, and uploads what it did before."""
 
 
-class ChipNotes:
+class SharedChipState:
     """The state that all drivers of one chip on one line share."""
 
     def __init__(self) -> None:
