@@ -56,11 +56,11 @@ JUMP AGAIN
 """
 
 
-def cost(machines: int, seconds: int, *, connected: bool) -> tuple[float, int]:
+def cost(controllers: int, seconds: int, *, connected: bool) -> tuple[float, int]:
     """Processor time of a run, s, and the number of records."""
-    text = "".join(CELL.format(n=n, speed=200 + n % 100 * 0.37) for n in range(machines))
+    text = "".join(CELL.format(n=n, speed=200 + n % 100 * 0.37) for n in range(controllers))
     if connected:
-        text += "".join(WIRE.format(n=n, next=n + 1) for n in range(machines - 1))
+        text += "".join(WIRE.format(n=n, next=n + 1) for n in range(controllers - 1))
     world = World.from_toml(text, {"cell.prg": PROGRAM}, keep_trace=False)
     begin = time.process_time()
     world.run(for_=seconds)
@@ -71,10 +71,10 @@ def main() -> None:
     sizes = [int(size) for size in os.environ.get("SIZES", "1,10,100,1000").split(",")]
     seconds = int(os.environ.get("SECONDS", "60"))
     for connected in (False, True):
-        for machines in sizes:
-            spent, records = cost(machines, seconds, connected=connected)
+        for controllers in sizes:
+            spent, records = cost(controllers, seconds, connected=connected)
             print(
-                f"{machines} {'connected' if connected else 'separate'} machines, {seconds} virtual seconds: {spent:.2f} s, "
+                f"{controllers} {'connected' if connected else 'separate'} machines, {seconds} virtual seconds: {spent:.2f} s, "
                 f"{records} records, {spent / records * 1e6:.0f} us each"
             )
 

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from time import process_time
 from unittest.mock import patch
 
+from steptwin.controller import MICROSECOND, Nanos
 from steptwin.debug.debugger import Debugger
 from steptwin.debug.values import LabelPoint
 from steptwin.files.world import World
-from steptwin.machine import MICROSECOND, Nanos
 from steptwin.wbc.interpreter import Interpreter
 
 STATEMENTS = 1_000_000
@@ -58,12 +58,12 @@ def measure(name: str, text: str, label: str) -> None:
         f"{name}: {rate:.2f} million statements/s, with a debugger and a breakpoint elsewhere {slower:.2f} (goal {RATE_GOAL:g}),"
         f" {slower / rate:.0%} of that"
     )
-    machine = debugger.threads[0]
+    controller = debugger.threads[0]
     longest = 0.0
     for part in range(STEPS_BACK):
         debugger.go(round((part + 0.37) / STEPS_BACK * STATEMENTS) * MICROSECOND)
         begin = process_time()
-        debugger.step_back(machine)
+        debugger.step_back(controller)
         longest = max(longest, process_time() - begin)
     print(f"{name}: a step back in {STATEMENTS} statements: at most {longest:.3f} s (goal {BACK_GOAL_S:g} s)")
 

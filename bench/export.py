@@ -8,8 +8,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.files.export import AxisLane, write_trace
-from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, plan_position
 from steptwin.simulation.mechanics.lanes import PhaseOutputs
 from steptwin.simulation.scheduler.trace import Trace, TraceRecord

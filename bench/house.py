@@ -90,8 +90,8 @@ def calls_of_a_move() -> tuple[int, int]:
 
     studio = Studio()
     tab = studio.open()
-    tab.ok("enable", machine="table", axis=1)
-    tab.ok("move", machine="table", axis=1, to=5.0)
+    tab.ok("enable", controller="table", axis=1)
+    tab.ok("move", controller="table", axis=1, to=5.0)
     files: Counter[str] = Counter()
 
     def count(frame: FrameType, event: str, _: object) -> None:
@@ -100,7 +100,7 @@ def calls_of_a_move() -> tuple[int, int]:
 
     sys.setprofile(count)
     try:
-        tab.ok("move", machine="table", axis=1, to=6.0)
+        tab.ok("move", controller="table", axis=1, to=6.0)
     finally:
         sys.setprofile(None)
     return files.total(), len(files)

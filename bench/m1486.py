@@ -5,11 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.lines import DUAL_DAC
 from steptwin.m1486.signals import step_pulses, strobes
 from steptwin.m1486.variants import variant
-from steptwin.machine import SECOND, Nanos
 from steptwin.motion.divisions import Microstepping, StepTrain, step_train
 from steptwin.motion.ramps import SpeedCurve, plan_distance
 

@@ -24,17 +24,17 @@ TURNS = int(os.environ.get("TURNS", "12"))
 
 def _properties(world: World) -> Iterator[str]:
     """A place, an output, an answer in time, and two comparisons that meet."""
-    machine = next(iter(world.machines))
-    sheet = world.kind(machine).datasheet(world.machines[machine])
+    controller = next(iter(world.controllers))
+    sheet = world.kind(controller).datasheet(world.controllers[controller])
     moving = next(point.path for point in sheet.points if point.path.endswith("moving"))
-    yield f"after {machine}.{moving} within 100 s not {machine}.{moving}"
-    output = next((pin for pin in world.machines[machine].pins() if pin.startswith("OUT")), None)
+    yield f"after {controller}.{moving} within 100 s not {controller}.{moving}"
+    output = next((pin for pin in world.controllers[controller].pins() if pin.startswith("OUT")), None)
     if output is not None:
-        yield f"count({machine}.{output}) < 100000"
+        yield f"count({controller}.{output}) < 100000"
     for axis in list(world.axes)[:1]:
         yield f"always {axis}.position < 100000"
         if output is not None:
-            yield f"never ({axis}.position > 100000 and {machine}.{output})"
+            yield f"never ({axis}.position > 100000 and {controller}.{output})"
 
 
 def _cost(first: World, texts: Sequence[str]) -> float:

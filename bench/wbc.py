@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from time import perf_counter
 
-from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program_banks import load
@@ -105,32 +105,32 @@ CONFIG = ControllerConfig(axes=(AxisConfig(gear=100.0, acc=1000.0, dec=1000.0, v
 def machine_hour() -> tuple[float, int]:
     """Seconds for an hour of a machine, statement time 1 ms, and the parts it made."""
     table, _ = parse_positions(ROWS)
-    machine = Mic488Device(CONFIG, programs={0: load(check(MACHINE, table))}, positions={0: table})
-    machine.command(partial(machine.program.command, 1), 0)
+    controller = Mic488Device(CONFIG, programs={0: load(check(MACHINE, table))}, positions={0: table})
+    controller.command(partial(controller.program.command, 1), 0)
     begin = perf_counter()
     for part in range(900):
         now = part * 4 * SECOND
-        machine.set_pin("IN1", 1.0, now)
-        machine.set_pin("IN1", 0.0, now + 3 * SECOND)
-    machine.advance(3600 * SECOND)
-    return perf_counter() - begin, machine.user[0]
+        controller.set_pin("IN1", 1.0, now)
+        controller.set_pin("IN1", 0.0, now + 3 * SECOND)
+    controller.advance(3600 * SECOND)
+    return perf_counter() - begin, controller.user[0]
 
 
 def cell_hour() -> tuple[float, int]:
     """Seconds for an hour of a machine and its feeder, a controller too, on the wires of a world."""
     table, _ = parse_positions(ROWS)
-    machine = Mic488Device(CONFIG, programs={0: load(check(MACHINE, table))}, positions={0: table})
+    controller = Mic488Device(CONFIG, programs={0: load(check(MACHINE, table))}, positions={0: table})
     feeder = Mic488Device(CONFIG, programs={0: load(check(FEEDER))})
     scheduler = Scheduler()
-    scheduler.add("machine", machine)
+    scheduler.add("machine", controller)
     scheduler.add("feeder", feeder)
     scheduler.connect(Wire(PinName("feeder", "OUT1"), PinName("machine", "IN1")))
     scheduler.connect(Wire(PinName("machine", "OUT2"), PinName("feeder", "IN1")))
-    for device in (machine, feeder):
+    for device in (controller, feeder):
         device.command(partial(device.program.command, 1), 0)
     begin = perf_counter()
     scheduler.advance(3600 * SECOND)
-    return perf_counter() - begin, machine.user[0]
+    return perf_counter() - begin, controller.user[0]
 
 
 def polling_hour() -> float:

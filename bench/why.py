@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from time import process_time
 
+from steptwin.controller import SECOND
 from steptwin.debug.debugger import Debugger
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 
 GOAL_S = 0.1
 MOVES = (

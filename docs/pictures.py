@@ -8,8 +8,8 @@ from pathlib import Path
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 
+from steptwin.controller import SECOND
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 
 IMAGES = Path(__file__).parent / "images"
 CONTROLLER = """

@@ -62,7 +62,7 @@ def test_names_in_docstrings_exist() -> None:
     cited = {name: file.name for file in sources for name in re.findall(r"`(steptwin(?:\.\w+)+)`", file.read_text())}
     assert len(cited) > 100
     assert {name: file for name, file in cited.items() if not exists(name)} == {}
-    assert not exists("steptwin.machine.WirePort")
+    assert not exists("steptwin.controller.WirePort")
     assert not exists("steptwin.room.Port")
 
 

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from steptwin.controller import SECOND
 from steptwin.durations import LONGEST_NS, duration, duration_text
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND
 
 NANOSECONDS = {"us": 10**3, "ms": 10**6, "s": 10**9, "min": 60 * 10**9, "h": 3600 * 10**9}
 

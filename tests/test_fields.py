@@ -8,12 +8,12 @@ from typing import Annotated, Any, NamedTuple
 import pytest
 
 from steptwin.errors import Misuse
-from steptwin.fields import MISSING, TIME, MachineName, Meaning, RequestType, fields_of, whole
+from steptwin.fields import MISSING, TIME, ControllerName, Meaning, RequestType, fields_of, whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cut:
-    machine: MachineName
+    controller: ControllerName
     depth: Annotated[float, Meaning("How deep.", unit="mm")] = 0.5
     passes: Annotated[int, Meaning("How often.", whole(1, 9))]
     pause: Annotated[int | None, Meaning("Between two of them.", TIME, unit="ns", name="pause_ns")] = None
@@ -30,7 +30,7 @@ CUT = RequestType("cut", Cut, "Cut.", fields_of(Cut))
 
 def test_fields_are_what_the_attributes_say() -> None:
     assert [(one.name, one.key, one.default, one.unit) for one in CUT.fields] == [
-        ("machine", "machine", MISSING, ""),
+        ("controller", "controller", MISSING, ""),
         ("depth", "depth", 0.5, "mm"),
         ("passes", "passes", MISSING, ""),
         ("pause_ns", "pause", None, "ns"),
@@ -42,18 +42,18 @@ def test_fields_are_what_the_attributes_say() -> None:
 
 
 def test_a_request_is_read_with_the_defaults_of_its_class() -> None:
-    assert CUT.read({"machine": "a", "passes": 2}) == Cut(machine="a", passes=2)
-    assert CUT.read({"machine": "a", "passes": 2, "pause_ns": "70"}) == Cut(machine="a", passes=2, pause=70)
-    assert CUT.read({"machine": "a", "passes": 2, "pause_ns": None}) == Cut(machine="a", passes=2)
+    assert CUT.read({"controller": "a", "passes": 2}) == Cut(controller="a", passes=2)
+    assert CUT.read({"controller": "a", "passes": 2, "pause_ns": "70"}) == Cut(controller="a", passes=2, pause=70)
+    assert CUT.read({"controller": "a", "passes": 2, "pause_ns": None}) == Cut(controller="a", passes=2)
 
 
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"machine": "a"}, "cut: passes is missing, expected a whole number from 1 to 9: How often."),
-        ({"machine": "a", "passes": 10}, "cut: passes: 10: expected a whole number from 1 to 9"),
-        ({"machine": "a", "passes": 1, "depth": None}, "cut: depth: None: expected a number from -1e+300 to 1e+300"),
-        ({"speed": 1}, "cut: no field 'speed'; fields are machine, depth, passes, pause_ns, tools"),
+        ({"controller": "a"}, "cut: passes is missing, expected a whole number from 1 to 9: How often."),
+        ({"controller": "a", "passes": 10}, "cut: passes: 10: expected a whole number from 1 to 9"),
+        ({"controller": "a", "passes": 1, "depth": None}, "cut: depth: None: expected a number from -1e+300 to 1e+300"),
+        ({"speed": 1}, "cut: no field 'speed'; fields are controller, depth, passes, pause_ns, tools"),
     ],
 )
 def test_wrong_fields_are_refused(given: dict[str, Any], message: str) -> None:

@@ -47,7 +47,7 @@ def brought_by(modules: list[str]) -> set[str]:
 
 def test_pure_packages_bring_nothing_heavy() -> None:
     modules = modules_of(*PURE)
-    assert {"steptwin.machine", "steptwin.motion.planner"} <= set(modules)
+    assert {"steptwin.controller", "steptwin.motion.planner"} <= set(modules)
     assert brought_by(modules) & HEAVY == set()
 
 

@@ -48,7 +48,10 @@ DONE = (
     *(f"drivers/{name}.py" for name in ("address", "exchange", "place", "subject", "tcp", "*/failures", "*/jog", "*/subject")),
     *(f"drivers/{name}.py" for name in ("m1486/chip", "mic488/axis")),
     *(f"live/studio/{name}.py" for name in ("branches", "campaigns", "drawing", "services", "processes", "recordings", "work")),
-    *(f"simulation/faults/{name}.py" for name in ("active", "element", "fault", "kinds_physics", "machine", "places", "table")),
+    *(
+        f"simulation/faults/{name}.py"
+        for name in ("active", "element", "fault", "kinds_physics", "controller", "places", "table")
+    ),
     *(
         f"simulation/kinds/{name}.py"
         for name in ("kind", "lines", "master", "*/control", "*/deadmanjog", "*/kind", "*/memory", "m1486/programs")

@@ -12,7 +12,7 @@ from toy import lamp
 from whole_world import READ, everything
 
 import steptwin
-from steptwin.machine import MILLISECOND, SECOND
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.vision import Com1Port
@@ -179,7 +179,7 @@ def parts(thing: object, seen: dict[int, Stateful]) -> None:
 def product_classes() -> Iterator[type[Stateful]]:
     """Classes with state that are no base of others."""
     for module in pkgutil.walk_packages(steptwin.__path__, "steptwin."):
-        if module.name.split(".")[1] in ("machine", "m1486", "mic488", "motion", "simulation", "state", "wbc", "wire"):
+        if module.name.split(".")[1] in ("controller", "m1486", "mic488", "motion", "simulation", "state", "wbc", "wire"):
             importlib.import_module(module.name)
 
     def below(base: type[Stateful]) -> Iterator[type[Stateful]]:
@@ -197,6 +197,6 @@ def test_everything_that_has_state_is_in_these_tests() -> None:
     seen: dict[int, Stateful] = {}
     parts([Ports(), plan.faults, plan.lines], seen)
     for scheduler in plan.schedulers:
-        parts([scheduler.machines, scheduler.parts], seen)
+        parts([scheduler.controllers, scheduler.parts], seen)
     missing = {found.__name__ for found in product_classes()} - {type(part).__name__ for part in seen.values()}
     assert not missing, f"state of {', '.join(sorted(missing))} is in no snapshot test"

@@ -16,6 +16,7 @@ import pytest
 from register_bank import RegisterBank
 
 from steptwin.baseprotocol import message_bytes, read_body
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.drivers.mic488.frames import FrameWords
 from steptwin.drivers.mic488.listening import RtuListener, TcpListener
 from steptwin.drivers.modbus import ModbusQuery, RtuMaster, TcpMaster
@@ -26,7 +27,6 @@ from steptwin.live.control import _Conversation
 from steptwin.live.rfc2217 import Telnet
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.variants import variant
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.wire import mbap
 from steptwin.wire.crc import with_crc
 from steptwin.wire.gateway import ModbusGateway, ScriptPort, TcpGatewayPort
@@ -203,7 +203,7 @@ ROWS = {
     "M1486": Reader(from_chip, b"; r\rv12800000\r", b"v12800000\r"),
     "RFC 2217": Reader(from_telnet, b"\xff\xfa\x2c\x00" + b"AA" + b"\xff\xf0" + b"A", b"A"),
     "control endpoint": Reader(
-        from_control, b'{"do":"state","machine":"m","id":' + json.dumps(_REQUEST.decode()).encode() + b"}\n", _REQUEST + b"\n"
+        from_control, b'{"do":"state","controller":"m","id":' + json.dumps(_REQUEST.decode()).encode() + b"}\n", _REQUEST + b"\n"
     ),
     "editor server and debug adapter": Reader(bodies, message_bytes({"text": _MESSAGE.decode()}), _MESSAGE),
     "spool of a history": Reader(unless_refused(read_batch), b'["[0]",1,2,3,false,[],[],[]]', b'["x",1,2,3,false,[],[],[]]'),

@@ -12,9 +12,9 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeAlias, TypeVar, cast
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.datasheet import AxisDescription, Datasheet, Detail, plain
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss
@@ -142,63 +142,63 @@ class ControllerState:
 
 @dataclass(frozen=True, slots=True)
 class DetailRow(Generic[M]):
-    """A detail of a kind of controller, and how it is read at the present moment of the machine."""
+    """A detail of a kind of controller, and how it is read at the present moment of the controller."""
 
     detail: Detail
     read: Callable[[M, Nanos], DetailValue]
 
 
 class StateReader(ABC, Generic[M]):
-    """Reads the state of a kind of controller at the present moment of the machine: all of it, or some of its parts, which are
+    """Reads the state of a kind of controller at the present moment of the controller: all of it, or some of its parts, which are
     ``status``, ``program``, ``pins``, ``details`` and its axes by name."""
 
     details: Sequence[DetailRow[M]] = ()
 
     @abstractmethod
-    def datasheet(self, machine: M, /) -> Datasheet: ...
+    def datasheet(self, controller: M, /) -> Datasheet: ...
 
     @abstractmethod
-    def status(self, machine: M, now: Nanos, /) -> StateStatus: ...
+    def status(self, controller: M, now: Nanos, /) -> StateStatus: ...
 
     @abstractmethod
-    def program(self, machine: M, now: Nanos, /) -> StateProgram: ...
+    def program(self, controller: M, now: Nanos, /) -> StateProgram: ...
 
     @abstractmethod
-    def axis(self, machine: M, described: AxisDescription, now: Nanos, /) -> StateAxis: ...
+    def axis(self, controller: M, described: AxisDescription, now: Nanos, /) -> StateAxis: ...
 
-    def pins(self, machine: M, now: Nanos, /) -> Mapping[str, float]:
+    def pins(self, controller: M, now: Nanos, /) -> Mapping[str, float]:
         """The levels of all pins."""
-        return machine.pins()
+        return controller.pins()
 
-    def pin(self, machine: M, name: str, now: Nanos, /) -> float:
-        return machine.pin(name)
+    def pin(self, controller: M, name: str, now: Nanos, /) -> float:
+        return controller.pin(name)
 
-    def __call__(self, machine: M, now: Nanos) -> ControllerState:
-        sheet = self.datasheet(machine)
+    def __call__(self, controller: M, now: Nanos) -> ControllerState:
+        sheet = self.datasheet(controller)
         return ControllerState(
             kind=sheet.kind,
             variant=sheet.variant,
             time_s=now / SECOND,
-            status=self.status(machine, now),
-            program=self.program(machine, now),
-            axes=tuple([self.axis(machine, axis, now) for axis in sheet.axes]),
-            pins=dict(self.pins(machine, now)),
-            details=details_of(self.details, machine, now),
+            status=self.status(controller, now),
+            program=self.program(controller, now),
+            axes=tuple([self.axis(controller, axis, now) for axis in sheet.axes]),
+            pins=dict(self.pins(controller, now)),
+            details=details_of(self.details, controller, now),
         )
 
-    def parts(self, machine: M, now: Nanos, wanted: Collection[str]) -> dict[str, object]:
+    def parts(self, controller: M, now: Nanos, wanted: Collection[str]) -> dict[str, object]:
         """As JSON, as far as there is anything of them. Raises `Misuse` for a name that is none."""
-        sheet = self.datasheet(machine)
+        sheet = self.datasheet(controller)
         found: dict[str, object] = {}
         if "status" in wanted:
-            found["status"] = self.status(machine, now).plain()
+            found["status"] = self.status(controller, now).plain()
         if "program" in wanted:
-            found["program"] = self.program(machine, now).plain()
-        found["axes"] = [self.axis(machine, axis, now).plain() for axis in sheet.axes if axis.name in wanted]
+            found["program"] = self.program(controller, now).plain()
+        found["axes"] = [self.axis(controller, axis, now).plain() for axis in sheet.axes if axis.name in wanted]
         if "pins" in wanted:
-            found["pins"] = dict(self.pins(machine, now))
+            found["pins"] = dict(self.pins(controller, now))
         if "details" in wanted:
-            found["details"] = plain(details_of(self.details, machine, now))
+            found["details"] = plain(details_of(self.details, controller, now))
         if len(found) - 1 + len(cast("list[object]", found["axes"])) != len(wanted):
             check_parts(sheet, wanted)
         return found
@@ -227,8 +227,8 @@ def parts_of(state: ControllerState, sheet: Datasheet, wanted: Collection[str]) 
     return {**found, "axes": [axis.plain() for axis in state.axes if axis.name in wanted]}
 
 
-def details_of(rows: Iterable[DetailRow[M]], machine: M, now: Nanos) -> dict[str, DetailValue]:
-    return {row.detail.name: row.read(machine, now) for row in rows}
+def details_of(rows: Iterable[DetailRow[M]], controller: M, now: Nanos) -> dict[str, DetailValue]:
+    return {row.detail.name: row.read(controller, now) for row in rows}
 
 
 def detail_text(value: DetailValue) -> str:

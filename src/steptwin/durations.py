@@ -6,8 +6,8 @@ import re
 from decimal import Decimal
 from functools import lru_cache
 
+from steptwin.controller import MICROSECOND, MILLISECOND, SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import MICROSECOND, MILLISECOND, SECOND, Nanos
 from steptwin.messages import Message
 
 UNITS: dict[str, Nanos] = {"us": MICROSECOND, "ms": MILLISECOND, "s": SECOND, "min": 60 * SECOND, "h": 3600 * SECOND}

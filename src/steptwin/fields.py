@@ -382,4 +382,4 @@ SPEED = ValueType(
 _FORMS: Mapping[object, ValueType] = {str: TEXT, bool: FLAG, float: number(), tuple[str, ...]: NAMES}
 """By type, where it says all."""
 AxisNumber: TypeAlias = Annotated[int, Meaning("The number of an axis.", whole(1, 64))]
-MachineName: TypeAlias = Annotated[str, Meaning("The name of a machine.")]
+ControllerName: TypeAlias = Annotated[str, Meaning("The name of a controller.")]

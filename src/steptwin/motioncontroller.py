@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
-from steptwin.machine import Machine, Nanos, PinEdge
+from steptwin.controller import Controller, Nanos, PinEdge
 from steptwin.motion.divisions import Plan
 
 
@@ -33,8 +33,8 @@ class Drive(Protocol):
         ...
 
 
-class MotionController(Machine, Protocol):
-    """A machine with named pins and axes: the interface of a controller to scheduler, mechanics, faults and snapshots.
+class MotionController(Controller, Protocol):
+    """A controller with named pins and axes: the interface of a controller to scheduler, mechanics, faults and snapshots.
 
     Inputs take timestamped changes, outputs give timestamped edges. STEP is never an edge: it stays a plan of its axis.
     """

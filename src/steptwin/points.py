@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from math import inf
 from typing import TypeAlias
 
+from steptwin.controller import Nanos
 from steptwin.datasheet import Point
-from steptwin.machine import Nanos
 from steptwin.motion import Profile
 
 FARTHEST_NS: Nanos = 1 << 55

@@ -262,7 +262,7 @@ def m1486(request: pytest.FixtureRequest, tmp_path: Any) -> Iterator[M1486Rig]:
 def steptwin_world(request: pytest.FixtureRequest) -> Iterator[WorldRig]:
     """A running world (`steptwin.testing.WorldRig`), new for each test.
 
-    ``@pytest.mark.steptwin_world("machine.toml")`` names its file. Its lines are on free ports, whatever the file gives.
+    ``@pytest.mark.steptwin_world("controller.toml")`` names its file. Its lines are on free ports, whatever the file gives.
     """
     from steptwin.testing.rig import options_of
     from steptwin.testing.world import WorldOptions, WorldRig

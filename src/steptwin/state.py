@@ -1,7 +1,7 @@
-"""Plain state that can be copied out of a machine and put back: snapshots.
+"""Plain state that can be copied out of a controller and put back: snapshots.
 
-A machine and its parts keep their state in slots, so that a new attribute cannot be forgotten. What is not a state -
-configuration, hooks, the machine a part belongs to - is in ``FIXED``, which is a part of the slots:
+A controller and its parts keep their state in slots, so that a new attribute cannot be forgotten. What is not a state -
+configuration, hooks, the controller a part belongs to - is in ``FIXED``, which is a part of the slots:
 ``__slots__ = (*FIXED, "position")``.
 """
 

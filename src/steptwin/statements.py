@@ -1,8 +1,8 @@
 """Hooks on the statements of programs: one contract for the languages of all controllers.
 
 A hook is called before each statement is executed, with its moment and its number: the step of a WBC program, the place of an
-M1486 command in its memory. It must not change the machine. A WAIT that looks again is not executed again, and what a machine
-skips while a program rests is not executed.
+M1486 command in its memory. It must not change the controller. A WAIT that looks again is not executed again, and what a
+controller skips while a program rests is not executed.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from typing import NamedTuple, TypeAlias
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 
 StatementHook: TypeAlias = Callable[[Nanos, int], None]
 
@@ -26,7 +26,7 @@ class HookedStatements(NamedTuple):
 
 
 StatementHooks: TypeAlias = tuple[HookedStatements, ...]
-"""The hooks of one machine, in the order in which they are called."""
+"""The hooks of one controller, in the order in which they are called."""
 
 
 def hook_before(hooks: StatementHooks, number: int) -> StatementHook | None:

@@ -12,8 +12,8 @@ from steptwin.access.origin import Origins
 from steptwin.access.rate import RateLimit, RateLimits
 from steptwin.access.roles import Role
 from steptwin.access.tokens import AccessGate, Token, read_tokens
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse, Refusal
-from steptwin.machine import MILLISECOND, SECOND
 
 ENGINEER = Token(Role.ENGINEER, "anna", "e" * 16)
 VIEWER = Token(Role.VIEWER, "hall", "ż" * 16)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from steptwin.access.notices import AT_ONCE, MOST_HOSTS, ClientNotices
-from steptwin.machine import SECOND
+from steptwin.controller import SECOND
 
 
 def test_a_client_that_goes_on_for_ever_gives_a_line_in_a_minute() -> None:

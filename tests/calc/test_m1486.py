@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 
 from steptwin.calc import Calculation, Calculator, M1486Model
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse
 from steptwin.m1486.drive import ChipDrive
 from steptwin.m1486.lines import STEP_DIRECTION, TWO_DACS
 from steptwin.m1486.variants import variant
-from steptwin.machine import SECOND
 
 A = Calculator(M1486Model())
 

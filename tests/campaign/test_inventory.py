@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from steptwin.campaign.inventory import FaultyPart, PossibleFault, occasions, possible_faults
+from steptwin.controller import SECOND
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 from steptwin.simulation.faults import read
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"

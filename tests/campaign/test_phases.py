@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from steptwin.campaign.phases import cycle_phases
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND, SECOND
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 

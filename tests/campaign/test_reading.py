@@ -10,8 +10,8 @@ from campaigns import CAMPAIGN, campaign_file
 from steptwin.campaign.description import CampaignDescription
 from steptwin.campaign.reading import TABLES, load_campaign, read_campaign
 from steptwin.campaign.variation import Between, Choice, Normal
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND
 from steptwin.simulation.describe.pieces import no_files
 from steptwin.simulation.toml.reader import WorldError
 from steptwin.simulation.world.check import diagnose

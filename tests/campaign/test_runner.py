@@ -11,9 +11,9 @@ from campaigns import CAMPAIGN, WORLD, campaign_file
 from steptwin.campaign.campaign import Campaign
 from steptwin.campaign.findings import shrinker
 from steptwin.campaign.shrink import failures_of
+from steptwin.controller import SECOND
 from steptwin.coverage.counts import Coverage
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND
 from steptwin.simulation.script.steps import Set
 
 

@@ -42,7 +42,7 @@ class Toy:
         return CaseResult(case.number, (verdict,), "", case.end_ns, {})
 
 
-def machines(case: Case) -> set[str]:
+def controllers(case: Case) -> set[str]:
     return {one.fault.split()[1].removeprefix("machine=") for one in case.faults}
 
 
@@ -50,8 +50,8 @@ def machines(case: Case) -> set[str]:
 def test_exactly_the_needed_faults_stay(drawn: tuple[int, set[int]]) -> None:
     count, needed = drawn
     wanted = {f"m{n}" for n in needed}
-    found = shrink(case_of(count, steps=3), SAFE, Toy(lambda case: wanted <= machines(case)))
-    assert machines(found.case) == wanted
+    found = shrink(case_of(count, steps=3), SAFE, Toy(lambda case: wanted <= controllers(case)))
+    assert controllers(found.case) == wanted
     assert found.case.steps == ()
     assert found.repeats
     assert found.is_complete

@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 from tests.conftest import STEPTWIN, until
 
+from steptwin.controller import MILLISECOND
 from steptwin.drivers.address import parse_device
 from steptwin.drivers.m1486 import unit
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND
 
 PROGRAM = "[\n@1\nf640\nr\nw100\nd\nr\nj1\n]\n"
 

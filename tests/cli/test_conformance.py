@@ -18,11 +18,11 @@ from typing import Any
 import pytest
 
 from steptwin.cli import main
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 from steptwin.files.world import World
 from steptwin.live.remote import RemoteSubject, ask
 from steptwin.live.world import LiveWorld, PlacePort
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.registermap import Space
 from steptwin.mic488.registers import register_map
 from steptwin.subject.commands import read_command
@@ -91,18 +91,18 @@ class Twin:
             return family(error), str(error)
 
     @cached_property
-    def machine(self) -> str:
+    def controller(self) -> str:
         with RemoteSubject("twin") as subject:
-            return subject.description.machines[0].name
+            return subject.description.controllers[0].name
 
     def set(self, levels: dict[str, Any]) -> object:
-        return self.asked(do="set", levels={f"{self.machine}.{pin}": level for pin, level in levels.items()})
+        return self.asked(do="set", levels={f"{self.controller}.{pin}": level for pin, level in levels.items()})
 
     def pins(self) -> object:
-        return self.asked(do="pins", machine=self.machine)
+        return self.asked(do="pins", controller=self.controller)
 
     def state(self) -> object:
-        return self.asked(do="state", machine=self.machine)
+        return self.asked(do="state", controller=self.controller)
 
     def connection(self, kind: str) -> socket.socket:
         if kind not in self._sockets:
@@ -239,17 +239,17 @@ def names_of_pins(twin: Twin) -> object:
 
 
 def encoders(twin: Twin) -> object:
-    turns = [twin.asked(do="turn", machine=twin.machine, axis=axis, counts=counts) for axis, counts in ((1, 40), (9, 1))]
-    return turns, twin.asked(do="encoders", machine=twin.machine)
+    turns = [twin.asked(do="turn", controller=twin.controller, axis=axis, counts=counts) for axis, counts in ((1, 40), (9, 1))]
+    return turns, twin.asked(do="encoders", controller=twin.controller)
 
 
 def coupling_of_encoders(twin: Twin) -> object:
-    told = [twin.asked(do="couple", machine=twin.machine, axis=1, to=word) for word in ("blocked", "drive", "nothing")]
-    return told, twin.asked(do="encoders", machine=twin.machine)
+    told = [twin.asked(do="couple", controller=twin.controller, axis=1, to=word) for word in ("blocked", "drive", "nothing")]
+    return told, twin.asked(do="encoders", controller=twin.controller)
 
 
 def requests_for_units(twin: Twin) -> object:
-    return twin.asked(do="state", machine="nobody"), twin.asked(do="state", machine="")
+    return twin.asked(do="state", controller="nobody"), twin.asked(do="state", controller="")
 
 
 def faults(twin: Twin) -> object:
@@ -269,7 +269,7 @@ def occasions_of_faults(twin: Twin) -> object:
 
 def power_cycle(twin: Twin) -> object:
     twin.pdu("0507d0ff00")
-    return twin.asked(do="power_cycle", machine=twin.machine), twin.pdu("0107d00001"), without_time(twin.state())
+    return twin.asked(do="power_cycle", controller=twin.controller), twin.pdu("0107d00001"), without_time(twin.state())
 
 
 def known_requests(twin: Twin) -> object:
@@ -277,7 +277,11 @@ def known_requests(twin: Twin) -> object:
 
 
 def wrong_requests(twin: Twin) -> object:
-    asked: list[dict[str, Any]] = [{"do": "set", "levels": ["IN1"]}, {"do": "state", "machine": []}, {"do": "fault", "fault": 1}]
+    asked: list[dict[str, Any]] = [
+        {"do": "set", "levels": ["IN1"]},
+        {"do": "state", "controller": []},
+        {"do": "fault", "fault": 1},
+    ]
     return [twin.asked(**request) for request in asked]
 
 
@@ -318,7 +322,7 @@ def chip_pins(twin: Twin) -> object:
 
 
 def chip_power_cycle(twin: Twin) -> object:
-    return twin.asked(do="power_cycle", machine=twin.machine), without_time(twin.state())
+    return twin.asked(do="power_cycle", controller=twin.controller), without_time(twin.state())
 
 
 def chip_faults(twin: Twin) -> object:
@@ -328,7 +332,7 @@ def chip_faults(twin: Twin) -> object:
 
 
 def chip_encoder(twin: Twin) -> object:
-    return twin.asked(do="encoders", machine=twin.machine)
+    return twin.asked(do="encoders", controller=twin.controller)
 
 
 def chip_shell_codes(twin: Twin) -> object:
@@ -387,8 +391,8 @@ class InProcess(Twin):
         self.port = PlacePort(self.live, "bus", "tcp-1", "tcp" if kind == "mic488" else "raw")
 
     @cached_property
-    def machine(self) -> str:
-        return self.live.subject.description.machines[0].name
+    def controller(self) -> str:
+        return self.live.subject.description.controllers[0].name
 
     def asked(self, **request: object) -> object:
         try:

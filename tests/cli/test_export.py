@@ -7,8 +7,8 @@ import pytest
 
 from steptwin.cli import main
 from steptwin.cli.export import ExportFormat
+from steptwin.controller import SECOND
 from steptwin.files.export import FORMATS, write_trace
-from steptwin.machine import SECOND
 from steptwin.motion import MotionState, plan_position
 from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 
@@ -72,7 +72,7 @@ def test_a_directory_is_its_trace(run: Run, trace: Path) -> None:
     [
         ([], "nothing to write: name formats with --to (html, png,"),
         (["--to", "html", "--from", "soon"], "--from: 'soon' is not a time"),
-        (["--to", "csv", "--machine", "b"], "no machine 'b' in the trace: there are a"),
+        (["--to", "csv", "--machine", "b"], "no controller 'b' in the trace: there are a"),
     ],
 )
 def test_misuse_is_told_in_a_line(arguments: list[str], message: str, run: Run, trace: Path) -> None:

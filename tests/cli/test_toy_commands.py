@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 from shell import Shell
+from toy.controller import Toy
 from toy.driver import registered_driver
-from toy.machine import Toy
 
 
 @pytest.fixture

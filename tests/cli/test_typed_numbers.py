@@ -56,8 +56,8 @@ def test_json_takes_numbers_only(value: object) -> None:
     for name, fields in (
         ("write", {"values": {"table.M1_ACC": value}}),
         ("set", {"levels": {"table.AIN1": value}}),
-        ("seek", {"machine": "table", "axis": 1, "velocity": value}),
-        ("seek", {"machine": "table", "axis": value, "velocity": 1}),
+        ("seek", {"controller": "table", "axis": 1, "velocity": value}),
+        ("seek", {"controller": "table", "axis": value, "velocity": 1}),
         ("follow", {"bound": value}),
     ):
         with pytest.raises(Misuse):

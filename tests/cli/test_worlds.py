@@ -12,8 +12,8 @@ import pytest
 from typer.testing import CliRunner
 
 from steptwin.cli import app
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND
 
 FEEDER = Path(__file__).parents[2] / "examples" / "worlds" / "feeder.toml"
 runner = CliRunner()
@@ -231,7 +231,7 @@ def test_a_place_where_nothing_can_be_written_is_refused_before_anything_runs(tm
 def test_options_for_programs_are_refused() -> None:
     with pytest.raises(Misuse, match="--firmware is not for worlds, whose file has these settings"):
         invoke("run", str(FEEDER), "--firmware", "1.70")
-    with pytest.raises(Misuse, match=r"--input IN1: expected MACHINE\.PIN; machines are table, drum"):
+    with pytest.raises(Misuse, match=r"--input IN1: expected CONTROLLER\.PIN; controllers are table, drum"):
         invoke("run", str(FEEDER), "--input", "IN1=1@2s")
     with pytest.raises(Misuse, match=r"--input table\.IN1: IN1 = 2: a digital input is 0 or 1"):
         invoke("run", str(FEEDER), "--input", "table.IN1=2@1s")

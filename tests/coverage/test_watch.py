@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.coverage.counts import Coverage, Summary, TextCoverage
 from steptwin.coverage.watch import WorldCoverage
 from steptwin.diagnostics import SourceText
 from steptwin.files.session import session_of
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.inputs import Download
 

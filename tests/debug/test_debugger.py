@@ -10,27 +10,27 @@ from debug_rig import BOTH, ONE, make, started
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.debug.breakpoints import Breakpoint
 from steptwin.debug.debugger import Debugger
 from steptwin.debug.values import DataPoint, Events, LabelPoint, LinePoint, Stopped, StopReason
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.simulation.world.simulation import Simulation
 
 
-def line(debugger: Debugger, machine: str = "m") -> int:
-    return debugger.stack(machine)[0].location.line
+def line(debugger: Debugger, controller: str = "m") -> int:
+    return debugger.stack(controller)[0].location.line
 
 
 def at(number: int, **more: str) -> LinePoint:
-    return LinePoint(machine="m", text="program 0", line=number, **more)
+    return LinePoint(controller="m", text="program 0", line=number, **more)
 
 
 def state(world: Simulation) -> str:
     """All state of a world, as text. A controller at rest may know a moment before: looking at it does not count as a change."""
-    for machine in world.machines.values():
-        machine.advance(world.now)
+    for controller in world.controllers.values():
+        controller.advance(world.now)
     found = world.snapshot(with_inputs=False)
     text = repr((found.now, found.schedulers, found.scripts, found.faults_state, world.trace.digest()))
     return re.sub(r" at 0x[0-9a-f]+", "", text)
@@ -50,16 +50,16 @@ ACTS = st.lists(
 
 
 def act(debugger: Debugger, what: str, number: int) -> None:
-    machine = debugger.threads[number % 2]
+    controller = debugger.threads[number % 2]
     match what:
         case "in":
-            debugger.step_in(machine)
+            debugger.step_in(controller)
         case "over":
-            debugger.step_over(machine)
+            debugger.step_over(controller)
         case "out":
             debugger.run(debugger.now + number * MILLISECOND)
         case "back":
-            debugger.step_back(machine)
+            debugger.step_back(controller)
         case "run":
             debugger.run(debugger.now + 100 * MILLISECOND)
         case "run back":
@@ -95,7 +95,7 @@ def test_a_world_that_is_debugged_does_what_it_does_without() -> None:
     plain = make(world=BOTH)
     plain.run_to(SECOND)
     debugger = Debugger(make(world=BOTH))
-    debugger.set_breakpoints([at(8), LinePoint(machine="c", text="program", line=8)])
+    debugger.set_breakpoints([at(8), LinePoint(controller="c", text="program", line=8)])
     while debugger.run(SECOND).reason is not StopReason.LIMIT:
         debugger.step_back("c")
         debugger.step_in("c")
@@ -229,7 +229,7 @@ def test_a_condition_with_signals_is_decided_while_the_world_runs(condition: str
     debugger = started(world=BOTH + AXIS)
     assert [one.is_set for one in debugger.set_breakpoints([at(8, condition=condition)])] == [True]
     looked: list[int] = []
-    monkeypatch.setattr(Breakpoint, "holds", lambda point, machine, now: looked.append(now))
+    monkeypatch.setattr(Breakpoint, "holds", lambda point, controller, now: looked.append(now))
     assert debugger.run().reason is StopReason.BREAKPOINT
     assert (line(debugger), debugger.evaluate("m", "n").number) == (8, 3.0)
     assert looked == []
@@ -238,15 +238,15 @@ def test_a_condition_with_signals_is_decided_while_the_world_runs(condition: str
 def test_conditions_of_two_controllers_on_each_other() -> None:
     """One of them has gone ahead where the other one executes a statement: there the world is looked at once more."""
     debugger = started(world=BOTH)
-    points = [at(8, condition="c.variable >= 0"), LinePoint(machine="c", text="program", line=8, condition="m.OUT2 = 0")]
+    points = [at(8, condition="c.variable >= 0"), LinePoint(controller="c", text="program", line=8, condition="m.OUT2 = 0")]
     assert [one.is_set for one in debugger.set_breakpoints(points)] == [True, True]
     stops = [debugger.run() for _ in range(4)]
-    assert {stop.machine for stop in stops} == {"m", "c"}
+    assert {stop.controller for stop in stops} == {"m", "c"}
     for stop in reversed(stops[:-1]):
         assert debugger.run_back().time == stop.time
     alone = started(world=BOTH)
     alone.set_breakpoints(points[1:])
-    assert next(stop for stop in stops if stop.machine == "c").time == alone.run().time
+    assert next(stop for stop in stops if stop.controller == "c").time == alone.run().time
 
 
 def test_a_log_with_a_condition_on_a_signal_does_not_stop() -> None:
@@ -269,9 +269,9 @@ def test_a_label_and_an_interrupt() -> None:
 
 def test_a_data_breakpoint_stops_after_the_change() -> None:
     debugger = started()
-    debugger.set_breakpoints([DataPoint(machine="m", name="n")])
+    debugger.set_breakpoints([DataPoint(controller="m", name="n")])
     assert debugger.run() == Stopped(StopReason.DATA, MILLISECOND * 2, "m", "n: 0 → 1", (1,))
-    debugger.set_breakpoints([DataPoint(machine="m", name="OUT1", condition="= 1")])
+    debugger.set_breakpoints([DataPoint(controller="m", name="OUT1", condition="= 1")])
     stops = [debugger.run() for _ in range(2)]
     assert [stop.reason for stop in stops] == [StopReason.DATA] * 2
     assert line(debugger) == 9
@@ -325,15 +325,15 @@ def test_other_events_to_stop_at(event: Events, world: str, files: dict[str, byt
     [
         (at(99), "no statement is in line 99 of m.prg or after it"),
         (at(1, condition="y.position > 3"), "'y.position' means nothing to m (did you mean 'M1.position'?): its variables are n"),
-        (DataPoint(machine="m", name="OTU1"), "'OTU1' means nothing to m (did you mean 'OUT1'?): its variables are n"),
-        (DataPoint(machine="m", name="n", condition="n > mm"), "'mm' means nothing to m: its variables are n"),
+        (DataPoint(controller="m", name="OTU1"), "'OTU1' means nothing to m (did you mean 'OUT1'?): its variables are n"),
+        (DataPoint(controller="m", name="n", condition="n > mm"), "'mm' means nothing to m: its variables are n"),
         (at(1, condition="n >"), "expression 'n >' ends too early: expected a name or a number"),
         (at(1, condition="n = = 2"), "expression 'n = = 2', column 5: found '=', expected a name or a number"),
         (at(1, hits="0"), "hit count '0': expected a number from 1 on, after nothing, or one of = < <= > >= %"),
         (at(1, log="{n"), "log '{n': a brace has no partner"),
         (LabelPoint(label="MIAN"), "no label is called 'MIAN' (did you mean 'MAIN'?); there are MAIN, COUNT, INT_IN3"),
-        (LinePoint(machine="x", text="program 0", line=1), "'x' has no program: m has one"),
-        (LinePoint(machine="m", text="program 3", line=1), "m has no text 'program 3': texts are program 0"),
+        (LinePoint(controller="x", text="program 0", line=1), "'x' has no program: m has one"),
+        (LinePoint(controller="m", text="program 3", line=1), "m has no text 'program 3': texts are program 0"),
     ],
 )
 def test_what_is_no_breakpoint_has_its_reason(point: LinePoint, problem: str) -> None:
@@ -366,7 +366,7 @@ def test_the_past_cannot_be_changed_unless_it_becomes_a_branch() -> None:
         (lambda d: d.evaluate("m", "nothing"), "'nothing' means nothing to m: its variables are n"),
         (lambda d: d.evaluate("m", "1 / 0"), "division by zero"),
         (lambda d: d.scope("m", "x"), "no group of values is called 'x'"),
-        (lambda d: d.stack("x"), "no machine is called 'x'"),
+        (lambda d: d.stack("x"), "no controller is called 'x'"),
         (lambda d: d.go(5 * SECOND), "5 s: the past is kept from 0 s to 999.999 us"),
     ],
 )
@@ -439,6 +439,6 @@ def test_a_breakpoint_that_no_run_comes_to_says_so() -> None:
 
 def test_a_command_of_an_m1486_that_was_executed_at_power_on() -> None:
     debugger = Debugger(make(world=BOTH))
-    found = debugger.set_breakpoints([LinePoint(machine="c", text="program", line=number) for number in (2, 5, 10)])
+    found = debugger.set_breakpoints([LinePoint(controller="c", text="program", line=number) for number in (2, 5, 10)])
     once = "from where it is, the program comes to line 2 only if it is started again"
     assert [point.note for point in found] == [once, "", ""]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from debug_rig import BOTH, ENTRY, started
 
+from steptwin.controller import SECOND
 from steptwin.debug.debugger import Debugger
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 
 
 def test_values_are_read_and_set_with_their_units() -> None:
@@ -28,8 +28,8 @@ def test_values_are_read_and_set_with_their_units() -> None:
 def test_whether_an_axis_moves_is_said_once() -> None:
     debugger = started(world=BOTH)
 
-    def status(machine: str) -> str:
-        return next(value.text for value in debugger.scope(machine, "Axes").values if value.name == "M1.status")
+    def status(controller: str) -> str:
+        return next(value.text for value in debugger.scope(controller, "Axes").values if value.name == "M1.status")
 
     assert (status("c"), status("m")) == ("at rest", "off, at rest")
 
@@ -50,16 +50,16 @@ def test_pins_of_a_driver_interface_are_those_of_the_moment() -> None:
 
 
 @pytest.mark.parametrize("scope", ["Variables", "Axes", "Pins", "Registers", "World"])
-@pytest.mark.parametrize("machine", ["m", "c"])
-def test_what_is_shown_can_be_evaluated(machine: str, scope: str) -> None:
+@pytest.mark.parametrize("controller", ["m", "c"])
+def test_what_is_shown_can_be_evaluated(controller: str, scope: str) -> None:
     debugger = started(world=BOTH)
-    shown = debugger.scope(machine, scope).values
-    lacking = {("c", "Pins"): ["S&D"], ("c", "Axes"): ["M1.status"]}.get((machine, scope), [])
+    shown = debugger.scope(controller, scope).values
+    lacking = {("c", "Pins"): ["S&D"], ("c", "Axes"): ["M1.status"]}.get((controller, scope), [])
     assert [value.name for value in shown if not value.expression] == lacking
     for value in shown:
-        found = debugger.evaluate(machine, value.expression or "0").number
+        found = debugger.evaluate(controller, value.expression or "0").number
         assert value.number is None or found == (value.number if value.expression else 0.0)
-    if machine == "c" and scope == "Axes":
+    if controller == "c" and scope == "Axes":
         assert [value.expression for value in shown][:2] == ["position", "velocity"]
 
 

@@ -9,10 +9,10 @@ import pytest
 from bridge_rig import BridgeRig
 from virtual_loop import run_virtually
 
+from steptwin.controller import SECOND
 from steptwin.devices.device import MOST_WAITING, ConnectedDevice, DeviceSurroundings
 from steptwin.drivers.subject import RawEffect
 from steptwin.errors import LineFailure, Refusal, SteptwinError
-from steptwin.machine import SECOND
 from steptwin.simulation.script import steps
 from steptwin.subject import commands as command
 from steptwin.subject.following import Followers

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import pytest
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.drivers.exchange import Exchanger, Job, LineLost, NoAnswer, Overtaken, SendNext, SentLate, TooLate
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse, Refusal
-from steptwin.machine import MILLISECOND, SECOND
 
 TIMEOUT = 300 * MILLISECOND
 

@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import pytest
 
+from steptwin.controller import MICROSECOND, MILLISECOND, SECOND
 from steptwin.drivers.exchange import LineLost, SendNext
 from steptwin.drivers.modbus import LATE_NS, NOISE_NS, QUIET_NS, ModbusQuery, RtuMaster, TcpMaster, bits, check_unit, words
 from steptwin.errors import Misuse
-from steptwin.machine import MICROSECOND, MILLISECOND, SECOND
 from steptwin.wire import mbap, rtu
 from steptwin.wire.line import SerialLine
 from steptwin.wire.pdu import (

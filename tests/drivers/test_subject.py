@@ -12,6 +12,7 @@ from device_rig import Rig
 from host_rig import Wire, async_driver, driver, run_virtual, task_line
 from mic488_rig import loaded
 
+from steptwin.controller import SECOND
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.exchange import Overtaken
 from steptwin.drivers.m1486.subject import M1486Part
@@ -19,7 +20,6 @@ from steptwin.drivers.mic488.subject import Mic488Part
 from steptwin.drivers.mic488.sync import Mic488
 from steptwin.drivers.subject import AsyncDeviceSubject, DeviceSubject, RawEffect
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
-from steptwin.machine import SECOND
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.registers import register_map
 from steptwin.mic488.status import ControllerStatus
@@ -65,17 +65,17 @@ def test_what_only_a_twin_can_do_is_refused(table: DeviceSubject, wanted: comman
 
 
 def test_the_description_of_a_device(table: DeviceSubject, rig: Rig) -> None:
-    twin = WorldSubject(rig.world).description.machines[0]
+    twin = WorldSubject(rig.world).description.controllers[0]
     found = table.description
-    (machine,) = found.machines
-    assert (machine.name, machine.unit, machine.datasheet) == (twin.name, twin.unit, twin.datasheet)
+    (controller,) = found.controllers
+    assert (controller.name, controller.unit, controller.datasheet) == (twin.name, twin.unit, twin.datasheet)
     assert read_description(json.loads(json.dumps(found.plain()))) == found
     assert found.lines[0].baud is None
 
 
 def test_pulses_are_unknown_without_the_configuration() -> None:
     bare = Mic488("tcp://127.0.0.1:1", firmware="1.70")
-    axes = bare.subject().description.machines[0].datasheet.axes
+    axes = bare.subject().description.controllers[0].datasheet.axes
     assert {(axis.unit, axis.pulses_per_unit) for axis in axes} == {("u", None)}
 
 
@@ -135,7 +135,7 @@ def framed(subject: DeviceSubject, act: Any) -> list[tuple[str, str, str]]:
     act()
     events = Following.take(following).events  # without a poll
     following.close()
-    assert {event.machine for event in events} <= {subject.description.lines[0].name}
+    assert {event.controller for event in events} <= {subject.description.lines[0].name}
     seen = [event.payload for event in events if isinstance(event.payload, FramePayload)]
     assert {one.client for one in seen} <= {"steptwin"}
     return [(one.direction, one.data.hex(), one.words) for one in seen]

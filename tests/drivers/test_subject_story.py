@@ -15,11 +15,11 @@ import pytest
 from device_rig import CELL, Rig
 from tests.conftest import until
 
+from steptwin.controller import SECOND
 from steptwin.controllerstate import read_state
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
 from steptwin.live.remote import RemoteSubject
-from steptwin.machine import SECOND
 from steptwin.simulation.script import steps as do
 from steptwin.subject import commands as command
 from steptwin.subject.contract import UNKNOWN, Reading, Subject

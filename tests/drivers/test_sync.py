@@ -8,6 +8,7 @@ import pytest
 from host_rig import Wire
 from line_rig import MemoryEndpoint
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.drivers.m1486.driver import AsyncM1486
 from steptwin.drivers.m1486.lines import TALK, AsyncM1486Line, ThreadM1486Line
 from steptwin.drivers.m1486.sync import M1486, M1486Line
@@ -15,7 +16,6 @@ from steptwin.drivers.mic488.driver import AsyncMic488
 from steptwin.drivers.mic488.lines import AsyncModbusLine, ThreadModbusLine
 from steptwin.drivers.mic488.sync import Mic488, ModbusLine
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import ControllerConfig
 
 NOWHERE = "tcp://127.0.0.1:1"

@@ -10,12 +10,12 @@ import pytest
 from host_rig import INTERVAL, TIMEOUT, Fault, Wire, async_driver, driver, fill, run_virtual, task_line, thread_line
 from line_rig import MemoryEndpoint, MemoryTransport
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.drivers import LineLost, Mic488, NoAnswer, Overtaken
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.exchange import Job
 from steptwin.drivers.modbus import ModbusQuery, words
 from steptwin.errors import LineFailure, Misuse
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.tracing import traced_by
 from steptwin.wire.pdu import ReadRequest
 

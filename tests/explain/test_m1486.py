@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from m1486_rig import Bench
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.explain.m1486 import explain
@@ -16,7 +17,6 @@ from steptwin.m1486.encoding import encode
 from steptwin.m1486.structure import streams
 from steptwin.m1486.syntax import parse
 from steptwin.m1486.variants import variant
-from steptwin.machine import MILLISECOND, Nanos
 
 LABELS = (1, 2, 3, 4)
 

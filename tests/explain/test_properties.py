@@ -8,10 +8,10 @@ from functools import partial
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.diagnostics import SourceText
 from steptwin.explain.mic488 import explain
 from steptwin.explain.model import Explanation
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program_banks import load

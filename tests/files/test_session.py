@@ -12,10 +12,10 @@ from damage import VALUES, WAYS, damaged
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.simulation.faults import read
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.control import Move

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from world_rig import moved, small
 
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse
 from steptwin.files.session import session_of
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 from steptwin.simulation.script import steps as do
 from steptwin.wbc.check import check
 from steptwin.wbc.image import build

@@ -129,7 +129,7 @@ def test_a_save_that_failed_fails_in_the_replay_too(kind: str, tmp_path: Path, m
     def full(handle: int) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    text, save, (code, machine) = SAVING[kind]
+    text, save, (code, controller) = SAVING[kind]
     with _begin(tmp_path, text, '[world]\nstate = "memory"') as world:
         world.run(for_="1 s")
         with monkeypatch.context() as disk:
@@ -140,9 +140,9 @@ def test_a_save_that_failed_fails_in_the_replay_too(kind: str, tmp_path: Path, m
         world.run(for_="3 s")
         session = sessions.session_of(world)
         sessions.save(session, tmp_path / "s.json")
-        (failed,) = [record for record in world.trace.events(machine) if record.subject == code]
+        (failed,) = [record for record in world.trace.events(controller) if record.subject == code]
         assert "no space left on device" in str(failed.value)
-        assert [(one.time, one.machine) for one in world.failed_saves] == [(failed.time, machine)]
+        assert [(one.time, one.controller) for one in world.failed_saves] == [(failed.time, controller)]
     again = sessions.load(tmp_path / "s.json").replay()
     assert again.trace.digest() == session.digest
     assert sessions.session_of(again) == session

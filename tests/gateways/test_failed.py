@@ -93,8 +93,8 @@ def test_an_error_in_it_is_told_without_a_broker_too(keys: str, tmp_path: Path, 
 
 def test_an_error_in_the_reading_of_a_device_ends_what_is_published(monkeypatch: pytest.MonkeyPatch) -> None:
     subject = GatewayWorld(HALL)
-    (part,) = subject.description.machines
-    real = replace(subject.description, machines=(replace(part, is_real=True),))
+    (part,) = subject.description.controllers
+    real = replace(subject.description, controllers=(replace(part, is_real=True),))
     monkeypatch.setattr(GatewayWorld, "description", real)
     subject.silence = KeyError("M9")
     subject.silent.add("table")

@@ -12,10 +12,10 @@ from random_worlds import END_S, SCENES, Chance, described, do_from_outside
 from tests.subject.test_world import DEEDS
 
 from steptwin import World
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse, Refusal
 from steptwin.gateways.heldstate import HeldState, parts_only
 from steptwin.gateways.sampling import KINDS
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.motion import at_rest
 from steptwin.simulation.script.steps import PowerCycle, Send, Write
 from steptwin.simulation.world.inputs import Bytes
@@ -169,8 +169,8 @@ class Holder:
     def __init__(self, world: World) -> None:
         self.subject = WorldSubject(world)
         self.following = self.subject.follow(Filter(KINDS), 1 << 20)
-        self.held = {part.name: HeldState(part) for part in self.subject.description.machines}
-        self.parts = self.subject.description.machines
+        self.held = {part.name: HeldState(part) for part in self.subject.description.controllers}
+        self.parts = self.subject.description.controllers
         for name, held in self.held.items():
             held.put_all(*self._whole(name))
 
@@ -196,7 +196,7 @@ class Holder:
             for part in self.parts:
                 if isinstance(event.payload, RestoredPayload):
                     self.held[part.name].put_all(*self._whole(part.name))
-                elif event.machine in (part.name, part.line):
+                elif event.controller in (part.name, part.line):
                     self.held[part.name].take(event)
         for name, held in self.held.items():
             before = held.state

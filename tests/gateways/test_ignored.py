@@ -12,12 +12,12 @@ from gateway_rig import GatewayWorld
 from virtual_loop import run_virtually
 
 from steptwin.access.roles import Role
+from steptwin.controller import SECOND
 from steptwin.errors import Refusal
 from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.modbus.gateway import MasterGateway
 from steptwin.gateways.modbus.options import ModbusSpec
-from steptwin.machine import SECOND
 from steptwin.mic488.registermap import DataType
 from steptwin.mic488.registers import register_map
 from steptwin.mic488.values import encoded, named
@@ -112,7 +112,7 @@ async def raw(rig: BridgeRig, asked: str) -> tuple[str, list[str]]:
     known: Any = rig.subject
     known.audit = lambda who, do, fields, outcome: logged.append(outcome)
     gateway = MasterGateway(ModbusSpec(listen="127.0.0.1:0", units={}, role=None), rig.subject, Path())
-    (part,) = rig.subject.description.machines
+    (part,) = rig.subject.description.controllers
     return (await gateway.ask(ME, part, bytes.fromhex(asked))).hex(), logged
 
 

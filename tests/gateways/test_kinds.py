@@ -9,6 +9,7 @@ from importlib.metadata import packages_distributions
 
 import pytest
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.extras import libraries_of
 from steptwin.gateways.epics.options import EpicsSpec
 from steptwin.gateways.kinds import KINDS, read_gateways
@@ -17,7 +18,6 @@ from steptwin.gateways.mqtt.options import MqttSpec, SparkplugSpec
 from steptwin.gateways.opcua.options import OpcUaSpec
 from steptwin.gateways.options import GatewaySpec, name_of
 from steptwin.gateways.prometheus.options import PrometheusSpec
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.simulation.describe.description import describe, read_world
 from steptwin.simulation.toml.reader import WorldError
 

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from gateway_rig import GatewayWorld
 
+from steptwin.controller import SECOND
 from steptwin.gateways.prometheus.gateway import Pages
 from steptwin.gateways.prometheus.metrics import MOST_EVENTS, Metrics
-from steptwin.machine import SECOND
 from steptwin.simulation.script import steps
 from steptwin.subject import commands as command
 

@@ -31,12 +31,12 @@ class Devices(GatewayWorld):
     def __init__(self, *units: int) -> None:
         super().__init__(HALL)
         inner = self.inner.description
-        machines = [
+        controllers = [
             replace(part, is_real=True, line=f"tcp://{part.name}:502", unit=unit)
-            for part, unit in zip(inner.machines, units, strict=False)
+            for part, unit in zip(inner.controllers, units, strict=False)
         ]
-        lines = tuple(LinePart(part.line or "", "modbus", None) for part in machines)
-        self._description = replace(inner, machines=tuple(machines), lines=lines)
+        lines = tuple(LinePart(part.line or "", "modbus", None) for part in controllers)
+        self._description = replace(inner, controllers=tuple(controllers), lines=lines)
         self.asked: list[Request] = []
         self.let = asyncio.Event()
         self.let.set()
@@ -143,7 +143,7 @@ def test_what_runs_past_the_last_address_is_answered_as_by_the_device(run: Any, 
         rig = BridgeRig()
         await rig.open()
         gateway = MasterGateway(spec(), rig.subject, Path())
-        (part,) = rig.subject.description.machines
+        (part,) = rig.subject.description.controllers
         asked = bytes.fromhex(request_)
         found = (
             await gateway.ask(GatewayClient("master", Role.ENGINEER), part, asked),

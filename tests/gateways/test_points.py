@@ -8,7 +8,7 @@ import pytest
 from gateway_rig import GatewayWorld
 
 from steptwin.errors import Misuse
-from steptwin.gateways.points import GatewayPoint, PointType, PointValue, points_of, registers_by_machine, values_of
+from steptwin.gateways.points import GatewayPoint, PointType, PointValue, points_of, registers_by_controller, values_of
 from steptwin.gateways.sampling import Sampler
 from steptwin.simulation.script.steps import Set, Write
 from steptwin.subject import commands as command
@@ -28,9 +28,9 @@ TEXT = """
 REGISTERS = ["USER_REGISTER[5]", "M1_VMAX", "M1_POS_ABS"]
 
 
-def values(world: GatewayWorld, machine: str, registers: list[str] | None = None) -> dict[str, PointValue]:
-    part = next(part for part in world.description.machines if part.name == machine)
-    sample = asyncio.run(Sampler(world.samples, {machine: registers or []}).take(machine))
+def values(world: GatewayWorld, controller: str, registers: list[str] | None = None) -> dict[str, PointValue]:
+    part = next(part for part in world.description.controllers if part.name == controller)
+    sample = asyncio.run(Sampler(world.samples, {controller: registers or []}).take(controller))
     assert sample.state is not None
     return {point.name: point.read(sample.state) for point in points_of(part, world.description, registers or [])}
 
@@ -56,14 +56,14 @@ def test_a_controller_in_motion() -> None:
     assert (found["M1.velocity"], found["M1.moving"], found["M1.enabled"]) == (40.0, True, True)
 
 
-@pytest.mark.parametrize(("machine", "registers"), [("table", REGISTERS), ("table", REGISTERS[:1]), ("drum", [])])
-def test_the_points_of_a_group_are_read_at_once(machine: str, registers: list[str]) -> None:
+@pytest.mark.parametrize(("controller", "registers"), [("table", REGISTERS), ("table", REGISTERS[:1]), ("drum", [])])
+def test_the_points_of_a_group_are_read_at_once(controller: str, registers: list[str]) -> None:
     world = GatewayWorld(TEXT)
     world.inner.do(command.Enable("table", 1))
     world.inner.do(command.Move("table", 1, to=40.0))
     world.inner.do(command.Advance(duration=600_000_000))
-    part = next(part for part in world.description.machines if part.name == machine)
-    state = asyncio.run(Sampler(world.samples, {machine: registers}).take(machine)).state
+    part = next(part for part in world.description.controllers if part.name == controller)
+    state = asyncio.run(Sampler(world.samples, {controller: registers}).take(controller)).state
     assert state is not None
     groups: dict[str, list[GatewayPoint]] = {}
     for point in points_of(part, world.description, registers):
@@ -75,7 +75,7 @@ def test_the_points_of_a_group_are_read_at_once(machine: str, registers: list[st
 
 def test_points_have_type_unit_and_range() -> None:
     world = GatewayWorld(TEXT)
-    part = world.description.machines[0]
+    part = world.description.controllers[0]
     points = {point.name: point for point in points_of(part, world.description, REGISTERS)}
     position = points["M1.position"]
     assert (position.type, position.unit, points["M1.velocity"].unit) == (PointType.NUMBER, "mm", "mm/s")
@@ -87,7 +87,7 @@ def test_points_have_type_unit_and_range() -> None:
 
 def test_inputs_are_set_outputs_and_registers_are_written() -> None:
     world = GatewayWorld(TEXT)
-    part = world.description.machines[0]
+    part = world.description.controllers[0]
     points = {point.name: point for point in points_of(part, world.description, REGISTERS)}
 
     def written(name: str) -> object:
@@ -110,19 +110,19 @@ def test_registers_are_read_and_what_is_only_written_is_unknown() -> None:
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ("tabel.M1_VMAX", "[x]: registers: no controller is called 'tabel' (did you mean 'table'?); expected MACHINE.POINT"),
+        ("tabel.M1_VMAX", "[x]: registers: no controller is called 'tabel' (did you mean 'table'?); expected CONTROLLER.POINT"),
         ("table.M1_VMAXX", "[x]: registers: no point is called 'table.M1_VMAXX' (did you mean 'M1_VMAX'?)"),
         ("table.USER_REGISTR[5]", "[x]: registers: no point is called 'table.USER_REGISTR[5]' (did you mean 'USER_REGISTER'?)"),
         ("table", "[x]: registers: no point is called 'table'"),
-        ("M1_VMAX", "[x]: registers: no controller is called 'M1_VMAX'; expected MACHINE.POINT"),
+        ("M1_VMAX", "[x]: registers: no controller is called 'M1_VMAX'; expected CONTROLLER.POINT"),
     ],
 )
 def test_a_register_that_is_not_there(wrong: str, message: str) -> None:
     with pytest.raises(Misuse) as found:
-        registers_by_machine("[x]", [wrong], GatewayWorld(TEXT).description)
+        registers_by_controller("[x]", [wrong], GatewayWorld(TEXT).description)
     assert str(found.value) == message
 
 
-def test_registers_by_machine() -> None:
-    found = registers_by_machine("[x]", ["table.M1_VMAX", "drum.variable"], GatewayWorld(TEXT).description)
+def test_registers_by_controller() -> None:
+    found = registers_by_controller("[x]", ["table.M1_VMAX", "drum.variable"], GatewayWorld(TEXT).description)
     assert found == {"table": ["M1_VMAX"], "drum": ["variable"]}

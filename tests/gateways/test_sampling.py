@@ -9,16 +9,16 @@ import pytest
 from gateway_rig import GatewayWorld
 from virtual_loop import run_virtually
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import LineFailure, Refusal, SteptwinError
 from steptwin.gateways.points import CLOCK, CLOCK_POINTS, State
 from steptwin.gateways.sampling import AT_ONCE, MOST_EVENTS, REST_S, TICK_S, Sampler
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.simulation.script.steps import Note, Send, Set, Turn
 from steptwin.subject import commands as command
 from steptwin.subject.contract import Result
 
 TEXT = '[[mic488]]\nname = "table"\n[[mic488]]\nname = "other"\n'
-MACHINES = ("table", "other")
+CONTROLLERS = ("table", "other")
 INTERVAL_S = 0.1
 
 
@@ -32,21 +32,21 @@ class Gateway:
         self.seen: list[tuple[float, str]] = []
         """When samples have come, s."""
         self.states: dict[str, State | None] = {}
-        self.sampler.watch(MACHINES)
+        self.sampler.watch(CONTROLLERS)
         self.task = asyncio.create_task(self._run())
 
     async def _run(self) -> None:
         loop = asyncio.get_running_loop()
         while True:
             for sample in await self.sampler.changed(INTERVAL_S):
-                self.seen.append((round(loop.time(), 3), sample.machine))
-                self.states[sample.machine] = sample.state
+                self.seen.append((round(loop.time(), 3), sample.controller))
+                self.states[sample.controller] = sample.state
 
     async def after(self, seconds: float) -> list[str]:
         """Whose samples come meanwhile."""
         self.seen.clear()
         await asyncio.sleep(seconds)
-        return [machine for _, machine in self.seen]
+        return [controller for _, controller in self.seen]
 
     async def rest(self) -> None:
         """What happens at the beginning has been seen, and both have just been looked at."""
@@ -61,7 +61,7 @@ class Gateway:
 
     @property
     def reads(self) -> int:
-        return len([one for one in self.world.done if isinstance(one, command.ReadState) and one.machine == "table"])
+        return len([one for one in self.world.done if isinstance(one, command.ReadState) and one.controller == "table"])
 
 
 def story(act: Callable[[Gateway], Awaitable[None]], *, registers: Iterable[str] = (), text: str = TEXT) -> None:
@@ -82,7 +82,7 @@ def test_controllers_at_rest_are_read_as_a_whole_now_and_then() -> None:
         await gateway.rest()
         gateway.world.done.clear()
         assert sorted(await gateway.after(REST_S)) == ["other", "table"]
-        assert gateway.world.done == [command.ReadState(machine) for _, machine in gateway.seen]
+        assert gateway.world.done == [command.ReadState(controller) for _, controller in gateway.seen]
 
     story(act)
 
@@ -151,7 +151,7 @@ def test_a_silent_controller_has_no_state(silence: SteptwinError) -> None:
         gateway.world.silence = silence
         gateway.world.silent.add("table")
         await gateway.rest()
-        assert [gateway.states[name] is None for name in MACHINES] == [True, False]
+        assert [gateway.states[name] is None for name in CONTROLLERS] == [True, False]
         gateway.world.silent.clear()
         await gateway.after(2 * INTERVAL_S)
         assert gateway.states["table"] is not None
@@ -199,13 +199,13 @@ def test_a_gateway_that_is_late_gets_the_latest_values() -> None:
 
     async def act(gateway: Gateway) -> None:
         sampler = Sampler(gateway.world.samples, {})
-        sampler.watch(MACHINES)
+        sampler.watch(CONTROLLERS)
         for number in range(50):
             set_pin(gateway, number % 2)
             await asyncio.sleep(INTERVAL_S)
         found = await sampler.changed(INTERVAL_S)
-        assert sorted(sample.machine for sample in found) == ["other", "table"]
-        (table,) = [sample.state for sample in found if sample.machine == "table"]
+        assert sorted(sample.controller for sample in found) == ["other", "table"]
+        (table,) = [sample.state for sample in found if sample.controller == "table"]
         assert table is not None
         assert table["pins"]["IN3"] == 1.0
         sampler.close()
@@ -217,7 +217,7 @@ def test_many_controllers_come_in_parts() -> None:
     async def act() -> None:
         world = GatewayWorld("".join(f'[[mic488]]\nname = "t{number}"\n' for number in range(AT_ONCE + 6)))
         sampler = Sampler(world.samples, {})
-        sampler.watch(part.name for part in world.description.machines)
+        sampler.watch(part.name for part in world.description.controllers)
         assert [len(await sampler.changed(INTERVAL_S)) for _ in range(2)] == [AT_ONCE, 6]
         sampler.close()
 
@@ -273,7 +273,7 @@ def test_an_edge_brings_its_level() -> None:
 
 def test_a_write_on_a_line_may_change_all_of_its_controllers() -> None:
     text = '[[line]]\nname = "chips"\nkind = "m1486"\n' + "".join(
-        f'[[m1486]]\nname = "{name}"\nline = "chips"\naddress = {number}\n' for number, name in enumerate(MACHINES, start=3)
+        f'[[m1486]]\nname = "{name}"\nline = "chips"\naddress = {number}\n' for number, name in enumerate(CONTROLLERS, start=3)
     )
 
     async def act(gateway: Gateway) -> None:

@@ -27,6 +27,7 @@ from virtual_loop import run_virtually
 from steptwin.access.audit import Audit
 from steptwin.access.roles import Role
 from steptwin.access.tokens import AccessGate
+from steptwin.controller import SECOND
 from steptwin.errors import SteptwinError
 from steptwin.eventloop import result_of
 from steptwin.gateways.clients import GatewayClient
@@ -44,7 +45,6 @@ from steptwin.gateways.opcua.gateway import OpcUaGateway
 from steptwin.gateways.points import CLOCK
 from steptwin.gateways.sampling import Sampler
 from steptwin.live.devicefile import read_device_file
-from steptwin.machine import SECOND
 from steptwin.mic488.registermap import DataType
 from steptwin.mic488.registers import register_map
 from steptwin.mic488.values import RegisterItem, encoded

@@ -56,7 +56,7 @@ variant = "E1"
 """
 LOOPING = "[\n@5\nF6400\nR\nW50\nB6400\nR\nJ5\n]"
 CHIPS = ("ram", "eeprom")
-MACHINES = ("table", *CHIPS)
+CONTROLLERS = ("table", *CHIPS)
 QUIET_S = 0.7
 """Longer than a command lies in an EEPROM."""
 
@@ -64,40 +64,40 @@ Places = Mapping[str, Mapping[str, Any]]
 Stop = Callable[[str, Places, RemoteSubject], None]
 
 
-def by_control(machine: str, places: Places, hall: RemoteSubject) -> None:
-    hall.do(command.StopAxes(machine))
+def by_control(controller: str, places: Places, hall: RemoteSubject) -> None:
+    hall.do(command.StopAxes(controller))
 
 
-def by_rest(machine: str, places: Places, hall: RemoteSubject) -> None:
-    answer = httpx.post(f"{places['http']['url']}api/do/stop", json={"machine": machine})
+def by_rest(controller: str, places: Places, hall: RemoteSubject) -> None:
+    answer = httpx.post(f"{places['http']['url']}api/do/stop", json={"controller": controller})
     assert (answer.status_code, answer.json()["ok"]) == (200, {"program": "stopped"})
 
 
-def by_websocket(machine: str, places: Places, hall: RemoteSubject) -> None:
+def by_websocket(controller: str, places: Places, hall: RemoteSubject) -> None:
     with connect(f"ws://127.0.0.1:{places['http']['port']}/ws") as socket:
-        socket.send(json.dumps({"do": "stop", "machine": machine, "axis": 1}))
+        socket.send(json.dumps({"do": "stop", "controller": controller, "axis": 1}))
         assert json.loads(socket.recv(10.0))["ok"] == {"program": "stopped"}
 
 
-def by_opcua(machine: str, places: Places, hall: RemoteSubject) -> None:
+def by_opcua(controller: str, places: Places, hall: RemoteSubject) -> None:
     with Client(places["opcua"]["url"]) as client:
-        client.get_node(f"ns=2;s={machine}").call_method(node_id("types.Controller.Stop"))
+        client.get_node(f"ns=2;s={controller}").call_method(node_id("types.Controller.Stop"))
 
 
-def by_channel_access(machine: str, places: Places, hall: RemoteSubject) -> None:
+def by_channel_access(controller: str, places: Places, hall: RemoteSubject) -> None:
     """Of pyepics, in a process of its own."""
-    program = f"import epics; assert epics.caput('{machine}:Stop', 1, wait=True, timeout=30) == 1"
+    program = f"import epics; assert epics.caput('{controller}:Stop', 1, wait=True, timeout=30) == 1"
     where = {"EPICS_CA_ADDR_LIST": f"127.0.0.1:{places['epics']['port']}", "EPICS_CA_AUTO_ADDR_LIST": "NO"}
     subprocess.run([sys.executable, "-c", program], env={**os.environ, **where}, check=True, timeout=100)
 
 
-def moving(hall: RemoteSubject, machine: str) -> bool:
-    (reading,) = hall.read("table.M1.moving" if machine == "table" else f"{machine}.moving")
+def moving(hall: RemoteSubject, controller: str) -> bool:
+    (reading,) = hall.read("table.M1.moving" if controller == "table" else f"{controller}.moving")
     return reading.value == 1.0
 
 
-def position(hall: RemoteSubject, machine: str) -> float | None:
-    (reading,) = hall.read("table.M1.position" if machine == "table" else f"{machine}.position")
+def position(hall: RemoteSubject, controller: str) -> float | None:
+    (reading,) = hall.read("table.M1.position" if controller == "table" else f"{controller}.position")
     return reading.value
 
 
@@ -134,8 +134,8 @@ def test_all_stop_by_a_broker_and_stay_there(require_peer: Callable[[str], str],
     with broker.subscribe("me/answers") as answers:
         ask = Requests(broker, answers, "steptwin/hall")
 
-        def by_broker(machine: str, places: Places, remote: RemoteSubject) -> None:
-            assert ask("stop", machine=machine)["ok"] == {"program": "stopped"}
+        def by_broker(controller: str, places: Places, remote: RemoteSubject) -> None:
+            assert ask("stop", controller=controller)["ok"] == {"program": "stopped"}
 
         check_stops(by_broker, hall)
 
@@ -144,28 +144,28 @@ def check_stops(stop: Stop, hall: Hall) -> None:
     """Each controller stands when its stop has been acknowledged, and none moves again."""
     places, remote, _ = hall
     remote.do(command.Enable("table", 1))
-    for machine in MACHINES:
-        remote.do(command.Jog(machine, 1, 1000.0 if machine == "table" else 64_000.0))
-    for machine in MACHINES:
-        until(lambda machine=machine: moving(remote, machine), "it moves")
-        stop(machine, places, remote)
-        until(lambda machine=machine: not moving(remote, machine), "it stands")
+    for controller in CONTROLLERS:
+        remote.do(command.Jog(controller, 1, 1000.0 if controller == "table" else 64_000.0))
+    for controller in CONTROLLERS:
+        until(lambda controller=controller: moving(remote, controller), "it moves")
+        stop(controller, places, remote)
+        until(lambda controller=controller: not moving(remote, controller), "it stands")
     check_rest(remote)
 
 
 def check_rest(remote: RemoteSubject) -> None:
-    stood = [position(remote, machine) for machine in MACHINES]
+    stood = [position(remote, controller) for controller in CONTROLLERS]
     time.sleep(QUIET_S)
-    assert [position(remote, machine) for machine in MACHINES] == stood
-    assert not any(moving(remote, machine) for machine in MACHINES)
+    assert [position(remote, controller) for controller in CONTROLLERS] == stood
+    assert not any(moving(remote, controller) for controller in CONTROLLERS)
 
 
 def test_stop_all_ends_the_programs_of_the_chips(hall: Hall) -> None:
     places, remote, _ = hall
-    for machine in CHIPS:
-        remote.do(Download(machine, "program", LOOPING))
+    for controller in CHIPS:
+        remote.do(Download(controller, "program", LOOPING))
     until(lambda: moving(remote, "ram"), "one moves, and the other one is being typed")
     answer = httpx.post(f"{places['http']['url']}api/do/stop_all")
-    assert (answer.status_code, answer.json()["ok"]["machines"]) == (200, ["table", "ram", "eeprom"])
+    assert (answer.status_code, answer.json()["ok"]["controllers"]) == (200, ["table", "ram", "eeprom"])
     until(lambda: not moving(remote, "ram"), "it stands")
     check_rest(remote)

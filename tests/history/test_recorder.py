@@ -9,8 +9,8 @@ from history_rig import BEGAN_US, RecordedWorld
 
 from steptwin.access.audit import Audit
 from steptwin.access.roles import Role
+from steptwin.controller import SECOND
 from steptwin.gateways.clients import GatewayClient
-from steptwin.machine import SECOND
 from steptwin.motion.plain import read_plan
 from steptwin.simulation.script.steps import Note, Set, Turn, Write
 from steptwin.subject import commands as command
@@ -163,10 +163,10 @@ def test_commands_are_kept_with_who_gave_them() -> None:
     audit = Audit(lambda: "2026-03-01T12:00:00.000+00:00")
     audit.watchers.append(made.recorder.note)
     client = GatewayClient("anna", Role.OPERATOR, "OPC UA, 127.0.0.1:5000")
-    audit.add(client, made.world.now, "move", {"machine": "table", "axis": 1, "to": 5.0}, "done")
+    audit.add(client, made.world.now, "move", {"controller": "table", "axis": 1, "to": 5.0}, "done")
     made.look()
     (row,) = [event for event in made.batches[-1].events if event.kind == "command"]
-    assert (row.machine, row.text) == ("table", "anna (OPC UA, 127.0.0.1:5000): move machine=table axis=1 to=5.0: done")
+    assert (row.machine, row.text) == ("table", "anna (OPC UA, 127.0.0.1:5000): move controller=table axis=1 to=5.0: done")
     assert json.loads(row.content)["role"] == "operator"
 
 

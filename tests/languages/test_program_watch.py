@@ -26,7 +26,7 @@ steps = [{ set = { "table.IN3" = 1, "other.IN1" = 1 } }]
 FIRST = "M1 = ON\nCOUNT = 2.5\nOUT1 = ON\nPREL M1 500\nWAIT IN3 = ON\nOUT1 = OFF\nEND\n"
 
 
-def machine(folder: Path) -> Path:
+def controller(folder: Path) -> Path:
     (folder / "first.prg").write_text(FIRST)
     (folder / "second.prg").write_text("END\n")
     (folder / "machine.toml").write_text(WORLD)
@@ -35,7 +35,7 @@ def machine(folder: Path) -> Path:
 
 def test_a_run_shows_what_a_program_does_with_its_statements(tmp_path: Path) -> None:
     said: list[str] = []
-    assert run(WorldRun(world=machine(tmp_path), limit=5_000_000_000), said.append, said.append)
+    assert run(WorldRun(world=controller(tmp_path), limit=5_000_000_000), said.append, said.append)
     shown = [re.split(r"  +", line.strip()) for line in said if " table " in line]
     assert shown == [
         ["0.001000 s", "table", "M1 on", "1", "M1 = ON"],
@@ -53,7 +53,7 @@ def test_what_is_shown_can_be_chosen(tmp_path: Path) -> None:
     def shown(names: tuple[str, ...] = (), kinds: tuple[str, ...] = ()) -> list[str]:
         said: list[str] = []
         assert run(
-            WorldRun(world=machine(tmp_path), limit=5_000_000_000, shown=ShownOptions(of=names, show=kinds)),
+            WorldRun(world=controller(tmp_path), limit=5_000_000_000, shown=ShownOptions(of=names, show=kinds)),
             said.append,
             said.append,
         )
@@ -66,7 +66,7 @@ def test_what_is_shown_can_be_chosen(tmp_path: Path) -> None:
 
 
 def test_watching_changes_nothing(tmp_path: Path) -> None:
-    path = machine(tmp_path)
+    path = controller(tmp_path)
     said: list[str] = []
     run(WorldRun(world=path, limit=5_000_000_000), said.append, said.append)
     run(WorldRun(world=path, limit=5_000_000_000, as_json=True), said.append, said.append)
@@ -76,7 +76,7 @@ def test_watching_changes_nothing(tmp_path: Path) -> None:
 
 
 def test_the_state_has_the_variables_of_a_program(tmp_path: Path) -> None:
-    world = World.load(machine(tmp_path))
+    world = World.load(controller(tmp_path))
     device = world.mic488["table"].device
     for moment, value in ((1_500_000, 0.0), (2_500_000, 2.5), (1_000_000_000, 2.5)):
         world.advance(moment)

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.files.export import read_trace
 from steptwin.files.timedinputs import parse_inputs
 from steptwin.files.world import World
 from steptwin.languages import program_run
 from steptwin.languages.run_m1486 import M1486Run, run
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.simulation.scheduler.trace import Trace
 
 EXAMPLE_6 = """

@@ -447,6 +447,8 @@ def test_the_world_it_runs_in_is_printed_and_runs_alike(
     world.run(for_="6 s")
     recorded = read_trace(tmp_path / "t.jsonl").trace
     kinds = ("edge", "plan", "event")
-    assert [r[:4] for r in world.trace.of(*kinds, machine="mic488")] == [r[:4] for r in recorded.of(*kinds, machine="mic488")]
+    assert [r[:4] for r in world.trace.of(*kinds, controller="mic488")] == [
+        r[:4] for r in recorded.of(*kinds, controller="mic488")
+    ]
     assert world.read("mic488.OUT1") == 1.0
     assert any("KL on IN3 assumed" in line for line in ran.lines)

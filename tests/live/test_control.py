@@ -45,8 +45,8 @@ def own_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (b"\xff\xfe\n", FORM_ERROR),
         (b"[" * 60000 + b"\n", FORM_ERROR),
         (b'{"do": "note", "text": "a", "id": %s}\n' % (b"9" * 5000), FORM_ERROR),
-        (b'{"do": "turn", "machine": "a", "axis": 1, "counts": NaN}\n', None),
-        (b'{"do": "turn", "machine": "a", "axis": 1, "counts": 1e999}\n', None),
+        (b'{"do": "turn", "controller": "a", "axis": 1, "counts": NaN}\n', None),
+        (b'{"do": "turn", "controller": "a", "axis": 1, "counts": 1e999}\n', None),
         (b"x" * 1_048_577, misuse("a request has at most 1048576 bytes")),
     ],
 )

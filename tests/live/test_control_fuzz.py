@@ -114,7 +114,7 @@ def requested(request: Mapping[str, Any]) -> bytes:
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@example(requests=[{"do": "set", "levels": [1]}, {"do": "turn", "machine": "table", "axis": 1, "counts": 2**40}])
+@example(requests=[{"do": "set", "levels": [1]}, {"do": "turn", "controller": "table", "axis": 1, "counts": 2**40}])
 @example(requests=[{"do": "set", "levels": {"table.IN1": 10**400}}, {"do": "resume", "speed": 10**400}])
 @example(requests=[{"do": "fault", "fault": f"stuck pin=IN1 count={10**400}"}, {"do": "clear_fault", "name": "a"}])
 @example(requests=[{"do": "fault", "fault": "busy unit=1 name=a"}, {"do": "fault", "fault": "busy unit=1 name=a"}])

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.session import session_of
 from steptwin.files.world import World
@@ -17,7 +18,6 @@ from steptwin.live.pace import Pace
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.live.world_control import WorldControl
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.simulation.world import history
 from steptwin.subject.commands import read_command
 from steptwin.subject.events import Event
@@ -72,7 +72,7 @@ class Rig:
         return self.control.do(read_command(what, fields)).value
 
     def line(self, **fields: object) -> Any:
-        return self.do("breakpoint", machine="table", program="program 0", **fields)
+        return self.do("breakpoint", controller="table", program="program 0", **fields)
 
     async def event(self) -> Event:
         """The next one."""
@@ -88,7 +88,7 @@ class Rig:
         return payload.reason, payload.line
 
     def value(self, expression: str) -> float:
-        return self.do("evaluate", machine="table", expression=expression)["number"]
+        return self.do("evaluate", controller="table", expression=expression)["number"]
 
 
 def scene(run: Run, play: Callable[[Rig], Awaitable[None]]) -> None:
@@ -111,8 +111,8 @@ def test_time_stops_before_the_line_of_a_breakpoint_and_goes_on(run: Run) -> Non
         assert rig.line(line=9)["line"] == 10
         assert await rig.stop() == ("breakpoint", 10)
         assert rig.pace.is_paused
-        assert rig.do("pins", machine="table")["table.OUT2"] == 0
-        stack = rig.do("stack", machine="table")
+        assert rig.do("pins", controller="table")["table.OUT2"] == 0
+        stack = rig.do("stack", controller="table")
         assert [(frame["name"], frame["line"]) for frame in stack[:2]] == [("PART", 10), ("MAIN", 5)]
         count, now = rig.value("n"), rig.world.now
         assert count > 5
@@ -131,18 +131,18 @@ def test_steps_take_as_long_as_their_statements(run: Run) -> None:
         rig.line(line=4)
         assert await rig.stop() == ("breakpoint", 4)
         loop = asyncio.get_running_loop()
-        rig.do("step_program", machine="table", way="over")
+        rig.do("step_program", controller="table", way="over")
         assert await rig.stop() == ("step", 5)
         begun = loop.time()
-        rig.do("step_program", machine="table", way="over")
+        rig.do("step_program", controller="table", way="over")
         assert await rig.stop() == ("step", 6)
         assert loop.time() - begun >= 0.1
         for line in (7, 3, 4):
-            rig.do("step_program", machine="table", way="over")
+            rig.do("step_program", controller="table", way="over")
             assert (await rig.stop())[1] == line
-        rig.do("step_program", machine="table", way="in")
+        rig.do("step_program", controller="table", way="in")
         assert await rig.stop() == ("step", 10)
-        rig.do("step_program", machine="table", way="out")
+        rig.do("step_program", controller="table", way="out")
         assert await rig.stop() == ("step", 5)
 
     scene(run, play)
@@ -156,7 +156,7 @@ def test_the_past_can_be_looked_at_and_gone_on_from(run: Run) -> None:
             rig.do("resume")
         assert await rig.stop() == ("breakpoint", 3)
         there, count = rig.world.now, rig.value("n")
-        rig.do("step_program", machine="table", way="back")
+        rig.do("step_program", controller="table", way="back")
         assert await rig.stop() == ("step", 7)
         place = rig.do("debug")
         assert place["past"]
@@ -165,7 +165,7 @@ def test_the_past_can_be_looked_at_and_gone_on_from(run: Run) -> None:
         assert await rig.stop() == ("breakpoint", 3)
         assert rig.value("n") == count - 1
         with pytest.raises(Misuse, match="branch"):
-            rig.do("set_value", machine="table", name="n", expression="7")
+            rig.do("set_value", controller="table", name="n", expression="7")
         rig.do("run")
         assert await rig.stop() == ("breakpoint", 3)
         assert not rig.do("debug")["past"]
@@ -194,7 +194,7 @@ def test_a_branch_takes_the_world_back(run: Run) -> None:
         rig.do("branch")
         assert await rig.stop() == ("pause", None)
         assert rig.world.now == then
-        rig.do("set_value", machine="table", name="n", expression="40 + 2")
+        rig.do("set_value", controller="table", name="n", expression="40 + 2")
         rig.do("resume")
         await rig.stop()
         assert rig.value("n") == 43
@@ -220,7 +220,7 @@ def test_the_past_begins_where_debugging_began(run: Run) -> None:
 
 def test_inputs_from_outside_are_seen(run: Run) -> None:
     async def play(rig: Rig) -> None:
-        watch = rig.do("breakpoint", machine="table", value="IN3")["number"]
+        watch = rig.do("breakpoint", controller="table", value="IN3")["number"]
         label = rig.do("breakpoint", label="INT_IN3")["number"]
         await asyncio.sleep(0.5)
         rig.do("set", levels={"table.IN3": 1})
@@ -330,20 +330,20 @@ def test_what_cannot_be_is_refused(run: Run) -> None:
     async def play(rig: Rig) -> None:
         for fields, message in (
             ({"line": 3, "label": "MAIN"}, "one of line, label and value"),
-            ({"line": 3, "machine": "table"}, "line needs program"),
+            ({"line": 3, "controller": "table"}, "line needs program"),
             ({"label": "MAIN", "log": "x"}, "label takes no log"),
-            ({"value": "n", "machine": "nobody"}, "'nobody' has no program: table has one"),
-            ({"value": "table.OUT99", "machine": "table"}, "no signal 'table.OUT99'"),
-            ({"value": "nobody.x", "machine": "table"}, "'nobody.x' means nothing"),
+            ({"value": "n", "controller": "nobody"}, "'nobody' has no program: table has one"),
+            ({"value": "table.OUT99", "controller": "table"}, "no signal 'table.OUT99'"),
+            ({"value": "nobody.x", "controller": "table"}, "'nobody.x' means nothing"),
             ({"label": "NOWHERE"}, "no label is called 'NOWHERE'"),
-            ({"line": 99, "machine": "table", "program": "program 0"}, "no statement is in line 99"),
-            ({"line": 3, "machine": "table", "program": "program 7"}, "no text 'program 7'"),
+            ({"line": 99, "controller": "table", "program": "program 0"}, "no statement is in line 99"),
+            ({"line": 3, "controller": "table", "program": "program 7"}, "no text 'program 7'"),
         ):
             with pytest.raises(Misuse, match=message):
                 rig.do("breakpoint", **fields)
         assert rig.do("breakpoints") == {"breakpoints": [], "stop_on": [], "stop": None}
         with pytest.raises(Refusal, match="the world is running"):
-            rig.do("step_program", machine="table", way="in")
+            rig.do("step_program", controller="table", way="in")
         with pytest.raises(Misuse, match="no breakpoint 5"):
             rig.do("clear_breakpoint", breakpoint=5)
         rig.do("pause")
@@ -359,7 +359,7 @@ def test_a_condition_without_a_finite_value_stops_and_the_world_goes_on(run: Run
         assert await rig.stop() == ("breakpoint", 3)
         for do, fields in (("evaluate", {}), ("set_value", {"name": "n"})):
             with pytest.raises(Misuse, match="a number up to"):
-                rig.do(do, machine="table", expression="1e400", **fields)
+                rig.do(do, controller="table", expression="1e400", **fields)
         rig.do("clear_breakpoint", breakpoint=1)
         rig.do("resume")
         now = rig.world.now

@@ -49,7 +49,7 @@ def test_everything_of_a_world_is_an_object(tmp_path: Path) -> None:
     by_kind = {one["kind"]: one for one in found}
     assert (by_kind["notice"]["level"], "connection refused" in by_kind["notice"]["event"]) == ("warning", True)
     note = by_kind["note"]
-    assert (note["machine"], note["data"]["note"], int(note["time_ns"]) > 0) == ("world", "zasilony → on", True)
+    assert (note["controller"], note["data"]["note"], int(note["time_ns"]) > 0) == ("world", "zasilony → on", True)
     frames = [(one["direction"], one["data"][14:], one["event"]) for one in found if one["kind"] == "frame"]
     assert frames[0] == ("in", "0507d0ff00", "write M1_EN = ON")
     assert found[-1]["event"].startswith("ran for ")

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.live.links import Feed
 from steptwin.live.realtimedriver import RealTimeDriver
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.mic488.device import Mic488Device
 from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import RtuSlavePort

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from tests.live.test_pace import READ_POSITION, Rig, feeder
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse, Refusal
 from steptwin.eventloop import result_of
 from steptwin.files.session import session_of
@@ -16,7 +17,6 @@ from steptwin.files.world import World
 from steptwin.live import lookback as module
 from steptwin.live.lookback import Look, Lookback
 from steptwin.live.world import PlacePort
-from steptwin.machine import SECOND, Nanos
 from steptwin.subject.commands import ReadPoints, ReadState, TakeSnapshot
 
 Run = Callable[..., Any]

@@ -14,6 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from world_rig import TWO_LINES
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.session import load, session_of
 from steptwin.files.world import World
@@ -26,7 +27,6 @@ from steptwin.live.pace import Pace
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.running import LiveWorld, PlacePort, up
 from steptwin.live.world_control import WorldControl
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.subject.commands import read_command
 from steptwin.wire.crc import with_crc
 
@@ -83,7 +83,7 @@ class Rig:
 
 
 def told(events: list[dict[str, Any]]) -> list[tuple[str, str]]:
-    return [(event["machine"], event["text"]) for event in events]
+    return [(event["controller"], event["text"]) for event in events]
 
 
 def feeder() -> World:
@@ -154,7 +154,7 @@ def test_a_world_stands_while_it_is_paused_and_goes_on_from_there(run: Run) -> N
         }
         await asyncio.sleep(100)
         assert rig.do("pause")["time_ns"] == 3 * SECOND
-        assert rig.do("state", machine="table")["time_s"] == 3.0
+        assert rig.do("state", controller="table")["time_s"] == 3.0
         assert rig.do("resume")["paused"] is False
         await asyncio.sleep(1)
         assert rig.do("resume", speed=10) == {**rig.do("resume"), "time_s": 5.0, "speed": 10.0}
@@ -417,8 +417,8 @@ def test_going_back_leaves_programs_connected_and_the_session_whole(run: Run) ->
 
     async def scene() -> World:
         rig = Rig(World.from_toml(dedent(ONE_ON_EACH)))
-        rig.do("enable", machine="m", axis=1)
-        rig.do("jog", machine="m", axis=1, velocity=40.0)
+        rig.do("enable", controller="m", axis=1)
+        rig.do("jog", controller="m", axis=1, velocity=40.0)
         rig.do("step", for_ns=3 * SECOND)
         bus, chips = PlacePort(rig.live, "bus", "tcp-1", "tcp"), PlacePort(rig.live, "chips", "tcp-1", "raw")
         read = bytes.fromhex("0001 0000 0006") + READ_POSITION[:-2]

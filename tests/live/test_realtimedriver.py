@@ -6,12 +6,12 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.live.realtimedriver import LONGEST_DELAY_NS, LONGEST_WAIT_S, RealTimeDriver
 from steptwin.m1486.check import check
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.eeprom import image_of
 from steptwin.m1486.variants import variant
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.status import AxisStatus
 from steptwin.simulation.scheduler.scheduler import Scheduler
@@ -132,7 +132,7 @@ def held_up(
     return run(scene())
 
 
-def test_held_up_time_does_not_pass_for_the_machines(run: Run, make_realtime: Make) -> None:
+def test_held_up_time_does_not_pass_for_the_controllers(run: Run, make_realtime: Make) -> None:
     lags, now, status = held_up(run, make_realtime, 3600.0, RealTimeDriver.enter)
     assert lags == [3599 * SECOND]
     assert (now, status) == (MOVE_NS, AxisStatus.REACHED)

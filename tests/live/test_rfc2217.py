@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from steptwin.controller import sends_by_itself
 from steptwin.live.rfc2217 import MOST_HELD, Rfc2217Port, Telnet, TwinLine, escaped, over_network
-from steptwin.machine import sends_by_itself
 
 WILL_COM_PORT, DO_COM_PORT = bytes((255, 251, 44)), bytes((255, 253, 44))
 

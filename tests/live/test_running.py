@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.errors import LineFailure, Misuse
 from steptwin.files.export.tracefile import TraceFile
 from steptwin.files.session import load, session_of
@@ -23,7 +24,6 @@ from steptwin.live.pace import Pace
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.running import LiveWorld, PlacePort, up
 from steptwin.live.world_control import WorldControl
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.simulation.script import steps as do
 from steptwin.subject.following import filter_of
 from steptwin.wire.crc import with_crc

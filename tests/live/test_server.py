@@ -139,7 +139,7 @@ def test_everything_is_closed_though_one_link_fails_to(run: Run, make_realtime: 
     assert list(tmp_path.iterdir()) == []
 
 
-def test_machines_that_cannot_go_on_end_the_server(run: Run, make_realtime: Make) -> None:
+def test_controllers_that_cannot_go_on_end_the_server(run: Run, make_realtime: Make) -> None:
     async def play(server: Server, told: list[str]) -> None:
         def loop_of_wires() -> None:
             raise Runaway("signals did not settle")

@@ -6,10 +6,10 @@ import asyncio
 from collections.abc import Callable
 from typing import Any
 
+from steptwin.controller import Nanos
 from steptwin.live.batches import batches
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.sharedreads import share_reads
-from steptwin.machine import Nanos
 from steptwin.mic488.device import Mic488Device
 
 Run = Callable[..., Any]

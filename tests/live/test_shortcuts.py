@@ -12,6 +12,7 @@ from unittest.mock import patch
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from steptwin.controller import MILLISECOND
 from steptwin.files.session import session_of
 from steptwin.files.world import World
 from steptwin.live.batches import batches
@@ -19,7 +20,6 @@ from steptwin.live.clock import Clock
 from steptwin.live.links import Feed
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.world import LiveWorld, PlacePort
-from steptwin.machine import MILLISECOND
 from steptwin.simulation.kinds.mic488.line import ModbusBus
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.world.inputs import Bytes
@@ -152,7 +152,7 @@ def played(given_batches: list[Batch], *, shortcuts: bool, records: bool) -> See
         feeds = [Feed(realtime, port, client) for port, client in zip(ports, clients, strict=True)]
         realtime.start()
         world.trace.watchers.append(
-            lambda one: found.edges.append((one.time, one.machine, one.subject, one.value)) if one.kind == "edge" else None
+            lambda one: found.edges.append((one.time, one.controller, one.subject, one.value)) if one.kind == "edge" else None
         )
         there: dict[str, Callable[[], None]] = {}
         for number, batch in enumerate(given_batches):
@@ -179,7 +179,7 @@ def played(given_batches: list[Batch], *, shortcuts: bool, records: bool) -> See
         world.settle_all()
         if records:
             assert session_of(world).replay().trace.digest() == world.trace.digest()
-        state = repr([world.kind(name).state(machine, world.now) for name, machine in world.machines.items()])
+        state = repr([world.kind(name).state(controller, world.now) for name, controller in world.controllers.items()])
         return found._replace(answers=tuple(client.heard for client in clients), state=state)
 
     with ExitStack() as stack:

@@ -13,13 +13,13 @@ from typing import Any
 
 import pytest
 
+from steptwin.controller import Nanos
 from steptwin.errors import LineFailure
 from steptwin.live.clients import RETRY_S, Clients
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.tcp import LISTENER, Listener, TcpLink
 from steptwin.live.tcp_asyncio import AsyncioListener
 from steptwin.live.tcp_epoll import EpollListener
-from steptwin.machine import Nanos
 from steptwin.mic488.device import Mic488Device
 from steptwin.simulation.toml.addresses import Address
 from steptwin.wire.slave import RtuSlavePort, TcpSlavePort

@@ -17,6 +17,7 @@ from tests.conftest import until
 from tls_files import Authority
 
 from steptwin.access.roles import Role
+from steptwin.controller import SECOND
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.exchange import Job
 from steptwin.drivers.mic488.driver import AsyncMic488
@@ -27,7 +28,6 @@ from steptwin.files.certificate import make_certificate
 from steptwin.live.clients import Clients
 from steptwin.live.rfc2217 import TwinLine
 from steptwin.live.transports import TRANSPORTS, LinkArguments
-from steptwin.machine import SECOND
 from steptwin.mic488.device import Mic488Device
 from steptwin.simulation.kinds.links import TlsFiles
 from steptwin.wire.pdu import ReadRequest

@@ -8,6 +8,7 @@ from typing import Any
 
 from rich.console import Console, Group
 
+from steptwin.controller import SECOND
 from steptwin.files.world import World
 from steptwin.live.clock import Clock
 from steptwin.live.display import banner
@@ -16,7 +17,6 @@ from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.server import EndPoint
 from steptwin.live.view import LiveView, page
 from steptwin.live.world import LiveWorld, PlacePort
-from steptwin.machine import SECOND
 from steptwin.simulation.describe.small import LINE, Whole
 from steptwin.simulation.describe.small_m1486 import m1486_world
 from steptwin.simulation.describe.small_mic488 import mic488_world

@@ -8,10 +8,10 @@ from functools import partial
 import pytest
 from mic488_rig import loaded
 
+from steptwin.controller import MILLISECOND, Port
 from steptwin.controllerstate import ProgramActivity, StateProgram
 from steptwin.files.world import World
 from steptwin.live.world import LiveWorld, PlacePort, VisionPort
-from steptwin.machine import MILLISECOND, Port
 from steptwin.mic488.present import state_of
 from steptwin.mic488.vision import uses_vision
 from steptwin.simulation.describe.small import LINE, Whole

@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse
 from steptwin.live.remote import RemoteSubject
 from steptwin.live.watching import TwinWatch
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.simulation.script import steps as do
 from steptwin.subject import commands as command
 
@@ -135,7 +135,7 @@ def test_a_chip_that_moves_is_watched_without_a_command(serve_m1486: Callable[..
     paths = ("position", "velocity", "counter", "variable")
     with RemoteSubject("m1486") as twin, RemoteSubject("m1486") as watching:
         twin.do(command.Pause())
-        (chip,) = (part.name for part in twin.description.machines)
+        (chip,) = (part.name for part in twin.description.controllers)
         watch = TwinWatch(watching, chip, paths, lambda: 0)
         twin.do(command.Move(chip, 1, by=64_000))
         seen = set()

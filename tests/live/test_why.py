@@ -137,8 +137,8 @@ def test_what_was_before_the_past_that_is_kept_is_not_known(run: Run) -> None:
 def test_a_moving_axis_began_to_move_before(run: Run) -> None:
     async def scene() -> None:
         rig = Asked()
-        rig.do("enable", machine="cell", axis=1)
-        rig.do("jog", machine="cell", axis=1, velocity=5)
+        rig.do("enable", controller="cell", axis=1)
+        rig.do("jog", controller="cell", axis=1, velocity=5)
         await asyncio.sleep(1)
         rig.keep_past()
         await asyncio.sleep(1)

@@ -10,6 +10,7 @@ from types import FrameType
 
 import pytest
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse
 from steptwin.files.session import session_of
 from steptwin.files.world import World
@@ -20,7 +21,6 @@ from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.sharedreads import share_reads
 from steptwin.live.world import LiveWorld, PlacePort, VisionPort
 from steptwin.live.world_frames import follow_frames
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.simulation.faults import Faults, FaultyPort

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse
 from steptwin.files.session import session_of
 from steptwin.files.world import World
@@ -17,7 +18,6 @@ from steptwin.live.pace import Pace
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_control import WorldControl
-from steptwin.machine import SECOND
 from steptwin.simulation.faults import read as read_fault
 from steptwin.simulation.script import steps as do
 from steptwin.subject import commands as command
@@ -105,8 +105,8 @@ def test_who_follows_is_told_how_time_goes(run: Run) -> None:
 @pytest.mark.parametrize(
     ("wanted", "message"),
     [
-        (command.ReadState("drumm"), r"no machine is called 'drumm' \(did you mean 'drum'\?\); there are table, drum"),
-        (do.SetFault(read_fault("stuck machine=table pin=table.IN3")), r"name the machine as machine=NAME, and the pin alone"),
+        (command.ReadState("drumm"), r"no controller is called 'drumm' \(did you mean 'drum'\?\); there are table, drum"),
+        (do.SetFault(read_fault("stuck machine=table pin=table.IN3")), r"name the controller as machine=NAME, and the pin alone"),
         (do.SetFault(read_fault("stall machine=table axis=9")), "axis = 9: permitted are 1 to 4"),
         (do.Press("strat"), "no button is called 'strat'"),
         (command.Encoders("drum"), "'drum' is an M1486, which has no encoder"),

@@ -58,7 +58,7 @@ def position(text: str, mark: str, part: str) -> lsp.Position:
 
 
 @pytest.fixture
-def machine(tmp_path: Path) -> str:
+def controller(tmp_path: Path) -> str:
     """The address of a program with its table and configuration on the disk."""
     (tmp_path / "machine.csv").write_text(TABLE)
     (tmp_path / "machine.cfg").write_bytes(CONFIG.encode("utf-16"))
@@ -86,17 +86,17 @@ async def test_very_many_findings_are_not_sent(client: LanguageClient, tmp_path:
 
 
 @pytest.mark.asyncio
-async def test_diagnostics_follow_what_is_typed(client: LanguageClient, machine: str) -> None:
-    open_text(client, machine, PROGRAM)
-    assert await diagnostics(client, machine) == []
+async def test_diagnostics_follow_what_is_typed(client: LanguageClient, controller: str) -> None:
+    open_text(client, controller, PROGRAM)
+    assert await diagnostics(client, controller) == []
     place = position(PROGRAM, "JUMP PICK", "PICK")
     change = lsp.TextDocumentContentChangePartial(lsp.Range(place, lsp.Position(place.line, place.character + 4)), "PIKC")
-    identifier = lsp.VersionedTextDocumentIdentifier(2, machine)
+    identifier = lsp.VersionedTextDocumentIdentifier(2, controller)
     client.text_document_did_change(lsp.DidChangeTextDocumentParams(identifier, [change]))
-    assert "W110" in await diagnostics(client, machine)
+    assert "W110" in await diagnostics(client, controller)
     found = await client.text_document_code_action_async(
         lsp.CodeActionParams(
-            lsp.TextDocumentIdentifier(machine),
+            lsp.TextDocumentIdentifier(controller),
             lsp.Range(place, place),
             lsp.CodeActionContext([], only=[lsp.CodeActionKind.QuickFix]),
         )
@@ -106,17 +106,17 @@ async def test_diagnostics_follow_what_is_typed(client: LanguageClient, machine:
     assert isinstance(action, lsp.CodeAction)
     assert action.edit is not None
     assert action.edit.changes is not None
-    (edit,) = action.edit.changes[machine]
+    (edit,) = action.edit.changes[controller]
     assert edit.new_text == "PICK"
     assert edit.range == change.range
-    client.text_document_did_close(lsp.DidCloseTextDocumentParams(lsp.TextDocumentIdentifier(machine)))
-    assert await diagnostics(client, machine) == []
+    client.text_document_did_close(lsp.DidCloseTextDocumentParams(lsp.TextDocumentIdentifier(controller)))
+    assert await diagnostics(client, controller) == []
 
 
 @pytest.mark.asyncio
-async def test_questions_about_places(client: LanguageClient, machine: str) -> None:
-    open_text(client, machine, PROGRAM)
-    text = lsp.TextDocumentIdentifier(machine)
+async def test_questions_about_places(client: LanguageClient, controller: str) -> None:
+    open_text(client, controller, PROGRAM)
+    text = lsp.TextDocumentIdentifier(controller)
     hover = await client.text_document_hover_async(lsp.HoverParams(text, position(PROGRAM, "HOME M1 speed", "speed")))
     assert hover is not None
     assert isinstance(hover.contents, lsp.MarkupContent)
@@ -131,7 +131,7 @@ async def test_questions_about_places(client: LanguageClient, machine: str) -> N
     assert (signature.signatures[0].label, signature.active_parameter) == ("PREL Mx distance", 1)
     found = await client.text_document_definition_async(lsp.DefinitionParams(text, position(PROGRAM, "MOVEPTP @above", "above")))
     assert isinstance(found, list)
-    assert [location.uri for location in found if isinstance(location, lsp.Location)] == [machine.replace(".prg", ".csv")]
+    assert [location.uri for location in found if isinstance(location, lsp.Location)] == [controller.replace(".prg", ".csv")]
     place = position(PROGRAM, "count = count", "count")
     references = await client.text_document_references_async(lsp.ReferenceParams(lsp.ReferenceContext(True), text, place))
     assert references is not None
@@ -145,15 +145,15 @@ async def test_questions_about_places(client: LanguageClient, machine: str) -> N
     renamed = await client.text_document_rename_async(lsp.RenameParams(text, place, "parts"))
     assert renamed is not None
     assert renamed.changes is not None
-    assert len(renamed.changes[machine]) == 4
+    assert len(renamed.changes[controller]) == 4
     with pytest.raises(JsonRpcInvalidParams, match="PosM1 is a register already"):
         await client.text_document_rename_async(lsp.RenameParams(text, place, "PosM1"))
 
 
 @pytest.mark.asyncio
-async def test_questions_about_texts(client: LanguageClient, machine: str) -> None:
-    open_text(client, machine, PROGRAM.replace("x = sin", "x  =  sin"))
-    text = lsp.TextDocumentIdentifier(machine)
+async def test_questions_about_texts(client: LanguageClient, controller: str) -> None:
+    open_text(client, controller, PROGRAM.replace("x = sin", "x  =  sin"))
+    text = lsp.TextDocumentIdentifier(controller)
     outline = await client.text_document_document_symbol_async(lsp.DocumentSymbolParams(text))
     assert outline is not None
     assert [section.name for section in outline][:4] == ["speed", "gripper", "ready", "MAIN"]
@@ -183,9 +183,9 @@ async def test_questions_about_texts(client: LanguageClient, machine: str) -> No
 
 
 @pytest.mark.asyncio
-async def test_call_hierarchy(client: LanguageClient, machine: str) -> None:
-    open_text(client, machine, PROGRAM)
-    params = lsp.CallHierarchyPrepareParams(lsp.TextDocumentIdentifier(machine), position(PROGRAM, "JUMP PICK", "PICK"))
+async def test_call_hierarchy(client: LanguageClient, controller: str) -> None:
+    open_text(client, controller, PROGRAM)
+    params = lsp.CallHierarchyPrepareParams(lsp.TextDocumentIdentifier(controller), position(PROGRAM, "JUMP PICK", "PICK"))
     items = await client.text_document_prepare_call_hierarchy_async(params)
     assert items is not None
     (item,) = items
@@ -276,22 +276,22 @@ def test_what_is_refused_leaves_nothing_on_standard_error(tmp_path: Path) -> Non
 
 
 @pytest.mark.asyncio
-async def test_a_change_of_a_file_outside_is_seen(client: LanguageClient, machine: str, tmp_path: Path) -> None:
-    open_text(client, machine, PROGRAM)
-    assert await diagnostics(client, machine) == []
+async def test_a_change_of_a_file_outside_is_seen(client: LanguageClient, controller: str, tmp_path: Path) -> None:
+    open_text(client, controller, PROGRAM)
+    assert await diagnostics(client, controller) == []
     (tmp_path / "machine.csv").write_text("other;1;2;x;x\n")
-    event = lsp.FileEvent(machine.replace(".prg", ".csv"), lsp.FileChangeType.Changed)
+    event = lsp.FileEvent(controller.replace(".prg", ".csv"), lsp.FileChangeType.Changed)
     client.workspace_did_change_watched_files(lsp.DidChangeWatchedFilesParams([event]))
-    assert await diagnostics(client, machine) == ["W126"]
+    assert await diagnostics(client, controller) == ["W126"]
 
 
 @pytest.mark.asyncio
-async def test_a_change_of_a_text_that_is_not_open_is_no_end(client: LanguageClient, machine: str) -> None:
+async def test_a_change_of_a_text_that_is_not_open_is_no_end(client: LanguageClient, controller: str) -> None:
     change = lsp.TextDocumentContentChangePartial(lsp.Range(lsp.Position(0, 0), lsp.Position(0, 0)), "x")
     identifier = lsp.VersionedTextDocumentIdentifier(2, "file:///nowhere.prg")
     client.text_document_did_change(lsp.DidChangeTextDocumentParams(identifier, [change]))
-    open_text(client, machine, PROGRAM)
-    assert await diagnostics(client, machine) == []
+    open_text(client, controller, PROGRAM)
+    assert await diagnostics(client, controller) == []
 
 
 class Wire:

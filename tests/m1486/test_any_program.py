@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from m1486_rig import Bench
 
+from steptwin.controller import SECOND
 from steptwin.m1486.commands import When, memory_bits, when
 from steptwin.m1486.lines import INTERFACES
 from steptwin.m1486.syntax import format_program
 from steptwin.m1486.variants import Variant, variant
-from steptwin.machine import SECOND
 
 if TYPE_CHECKING:
     from m1486_programs import Programs

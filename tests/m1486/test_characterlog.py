@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from steptwin.controller import SECOND
 from steptwin.m1486.characterlog import CharacterLog, LineSplitter
 from steptwin.m1486.variants import variant
-from steptwin.machine import SECOND
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
 

@@ -9,13 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from m1486_rig import Bench
 
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import SHUTDOWN_RESET_NS, M1486Chip
 from steptwin.m1486.eeprom import image_of
 from steptwin.m1486.lines import DUAL_DAC, STEP_DIRECTION, TWO_DACS, Interface
 from steptwin.m1486.syntax import parse
 from steptwin.m1486.variants import VARIANTS, Variant, variant
-from steptwin.machine import SECOND
 
 
 def image(kind: str, *lines: str) -> bytes:

@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from m1486_rig import Bench
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos, PinEdge
 from steptwin.errors import TimeReversal
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.events import EVENTS, M1486Event
 from steptwin.m1486.variants import variant
-from steptwin.machine import MILLISECOND, SECOND, Nanos, PinEdge
 
 PROGRAM = (b":3\r", b"[\r@1\rl3\r+5\ri1l2\re\rc2\rf1280\rr\rt2\ru4\rw20\r@2\rz3\ro3\r(2\rj1\r]\r", b"k\r", b"u1\ru4\r", b"c75\r")
 

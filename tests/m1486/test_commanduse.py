@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from steptwin.controller import SECOND
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.commands import TABLE, ArgType, CommandSpec, When, find, takes_variable, use_of
 from steptwin.m1486.commanduse import NOTHING, ChipState, Control, Motion, NextMove, Setting, Wait
@@ -28,7 +29,6 @@ from steptwin.m1486.program import WaitReason
 from steptwin.m1486.registers import GENERAL
 from steptwin.m1486.syntax import ChipCommand, JumpCondition
 from steptwin.m1486.variants import variant
-from steptwin.machine import SECOND
 from steptwin.tables import complete
 
 S = ChipState

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from m1486_rig import Bench
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.line import SerialChain
 from steptwin.m1486.variants import variant
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.wires import PinName, Wire
 

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 import pytest
 from m1486_rig import Bench
 
+from steptwin.controller import MILLISECOND
 from steptwin.m1486.commands import TABLE, ArgType, CommandSpec, When, find, memory_bits, takes_variable
 from steptwin.m1486.commanduse import Control, Wait
 from steptwin.m1486.encoding import decode
 from steptwin.m1486.syntax import ChipCommand, JumpCondition
 from steptwin.m1486.variants import VARIANTS, Variant
-from steptwin.machine import MILLISECOND
 
 QUEUED = [spec for spec in TABLE if spec.when is When.QUEUED]
 

@@ -6,12 +6,12 @@ import itertools
 
 import pytest
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.line import SerialChain
 from steptwin.m1486.uart import MOST_WAITING
 from steptwin.m1486.variants import variant
-from steptwin.machine import MILLISECOND, SECOND
 
 
 def chain(*addresses: int, kind: str = "B", baud: int = 4800, is_timed: bool = False) -> SerialChain:

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from m1486_rig import Bench, moving, speed
 
+from steptwin.controller import SECOND
 from steptwin.m1486.drive import MotionMode
 from steptwin.m1486.lines import DUAL_DAC, STEP_DIRECTION, TWO_DACS
-from steptwin.machine import SECOND
 from steptwin.motion.pulses import step_times
 
 STEP = 64

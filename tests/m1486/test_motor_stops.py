@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from m1486_rig import Bench, moving, speed
 
+from steptwin.controller import SECOND
 from steptwin.m1486.lines import SEEK_ENDS_LOW, TWO_DACS
-from steptwin.machine import SECOND
 
 STEP = 64
 

@@ -7,9 +7,9 @@ from itertools import islice
 import pytest
 from m1486_rig import Bench
 
+from steptwin.controller import SECOND
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.points import POINTS, live_point
-from steptwin.machine import SECOND
 from steptwin.points import LivePoint
 
 

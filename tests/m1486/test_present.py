@@ -7,10 +7,10 @@ from collections.abc import Callable
 import pytest
 from m1486_rig import Bench
 
+from steptwin.controller import SECOND
 from steptwin.controllerstate import ControllerState, ProgramActivity, StatusLevel
 from steptwin.m1486.lines import DUAL_DAC, TWO_DACS
 from steptwin.m1486.present import state_of
-from steptwin.machine import SECOND
 
 WARNING = StatusLevel.WARNING
 

@@ -8,11 +8,11 @@ import pytest
 from held import held
 from m1486_rig import Bench, seconds
 
+from steptwin.controller import MILLISECOND
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.encoding import decode
 from steptwin.m1486.program import BURST, BURST_NS
 from steptwin.m1486.variants import variant
-from steptwin.machine import MILLISECOND
 
 
 def sends(*lines: str, kind: str = "B", **options: Any) -> bytes:

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from m1486_rig import Bench
 
+from steptwin.controller import SECOND
 from steptwin.m1486.lines import DUAL_DAC, TWO_DACS
 from steptwin.m1486.signals import DATA_VALID_NS, STEP_PULSE_NS, data_level, phase_level, step_pulses, strobes
-from steptwin.machine import SECOND
 from steptwin.motion.waveforms import CHARACTERISTICS, currents
 
 

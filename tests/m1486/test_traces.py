@@ -21,8 +21,8 @@ from typing import Any
 import pytest
 from m1486_rig import Bench
 
+from steptwin.controller import SECOND
 from steptwin.m1486.lines import INTERFACES
-from steptwin.machine import SECOND
 
 GOLDEN = Path(__file__).parent / "golden" / "traces.txt"
 CASE = "=== "

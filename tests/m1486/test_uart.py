@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from steptwin.controller import SECOND
 from steptwin.m1486.uart import MOST_WAITING, Uart
-from steptwin.machine import SECOND
 
 
 def test_characters_follow_each_other_without_pause() -> None:

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mic488_rig import EN, STOP, Rig, controller, real_words
 
-from steptwin.machine import SECOND
+from steptwin.controller import SECOND
 from steptwin.mic488.config import AxisConfig
 from steptwin.motion import Profile
 from steptwin.motion.pulses import pulse_runs

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mic488_rig import Rig, coil_pdu, encoder_rig, real_words, turn, word_pdu
 
-from steptwin.machine import SECOND
+from steptwin.controller import SECOND
 
 # ---------------------------------------------------------------------- jog
 

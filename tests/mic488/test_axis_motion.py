@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from mic488_rig import Rig
 
-from steptwin.machine import SECOND
+from steptwin.controller import SECOND
 
 # ---------------------------------------------------------------------- position
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mic488_rig import Rig, controller
 
-from steptwin.machine import SECOND
+from steptwin.controller import SECOND
 
 
 def test_trigger_example_of_the_manual() -> None:

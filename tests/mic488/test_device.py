@@ -21,8 +21,8 @@ from mic488_rig import (
     words_pdu,
 )
 
+from steptwin.controller import SECOND, PinEdge
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, PinEdge
 from steptwin.mic488.config import AxisConfig, ControllerConfig, InputConfig, ProgramConfig
 from steptwin.mic488.device import Mic488Device, pause_observer
 from steptwin.mic488.encoder import Coupling

@@ -25,8 +25,8 @@ from mic488_rig import (
     word_pdu,
 )
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.errors import Misuse, Runaway, TimeReversal
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.config import AxisConfig, ControllerConfig, InputConfig
 from steptwin.mic488.device import ControllerSnapshot, Mic488Device
 from steptwin.mic488.encoder import Coupling

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from mic488_rig import Rig, controller
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.config import AxisConfig
 from steptwin.mic488.encoder import Coupling, Encoder
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 from mic488_rig import Rig, controller, programmed
 
-from steptwin.machine import MILLISECOND, SECOND
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.mic488.config import AxisConfig
 from steptwin.mic488.core import Mic488Event
 from steptwin.mic488.encoder import Coupling

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from mic488_rig import Rig, controller
 
-from steptwin.machine import SECOND
+from steptwin.controller import SECOND
 from steptwin.mic488.config import AxisConfig, InputConfig
 from steptwin.mic488.encoder import Coupling
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 from mic488_rig import OUT, Rig, controller
 
+from steptwin.controller import MILLISECOND, PinEdge
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, PinEdge
 from steptwin.mic488.config import AnalogConfig, ControllerConfig, InputConfig
 from steptwin.mic488.inputs import Inputs
 

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mic488_rig import VALUES, Rig, controller, real_words, word_pdu, words_pdu
 
-from steptwin.machine import SECOND
+from steptwin.controller import SECOND
 from steptwin.mic488.config import AxisConfig, InputConfig
 
 OFF, ON, VELOCITY, POSITION, REACHED, LIMIT_L, LIMIT_R = 0, 1, 2, 3, 4, 9, 10

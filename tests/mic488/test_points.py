@@ -8,9 +8,9 @@ from functools import partial
 import pytest
 from mic488_rig import Rig, controller, programmed
 
+from steptwin.controller import SECOND
 from steptwin.datasheet import Access
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND
 from steptwin.mic488.config import AxisConfig
 from steptwin.mic488.points import live_point, marks, points
 from steptwin.points import LivePoint

@@ -8,8 +8,8 @@ from __future__ import annotations
 import pytest
 from mic488_rig import EN, Rig, controller, couple, encoder_rig, turn
 
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND
 from steptwin.mic488.config import AxisConfig
 from steptwin.mic488.encoder import Coupling
 

@@ -9,9 +9,9 @@ from functools import partial
 import pytest
 from mic488_rig import PAUSED, RUNNING, STOPPED, Rig, controller, loaded, programmed, started
 
+from steptwin.controller import MILLISECOND, SECOND, PinEdge
 from steptwin.diagnostics import Span
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, SECOND, PinEdge
 from steptwin.mic488.axis import MAX_SPEED_P
 from steptwin.mic488.config import AxisConfig, ControllerConfig, ProgramConfig
 from steptwin.mic488.device import Mic488Device

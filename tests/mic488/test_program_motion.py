@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mic488_rig import RUNNING, STOPPED, Rig, controller, programmed
 
-from steptwin.machine import SECOND
+from steptwin.controller import SECOND
 from steptwin.mic488.config import AxisConfig
 from steptwin.mic488.encoder import Coupling
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from mic488_rig import MM, RUNNING, STOPPED, controller, dint_words, programmed, started
 
-from steptwin.machine import MILLISECOND, SECOND
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.mic488.config import AxisConfig
 from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.program_registers import ACCESS, position_p

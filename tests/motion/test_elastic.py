@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from steptwin.machine import SECOND
+from steptwin.controller import SECOND
 from steptwin.motion.elastic import SETTLED_P, DriveStretch, Response, Spring
 
 Drive = Callable[[float], tuple[float, float]]

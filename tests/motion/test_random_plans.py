@@ -11,8 +11,8 @@ from math import inf
 import pytest
 from chance import Chance
 
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND
 from steptwin.motion.divisions import Microstepping, StepTrain, forced_stop, step_train
 from steptwin.motion.paths import Arc, Circular, Straight, arc_between, circle
 from steptwin.motion.planner import MotionState, plan_position, plan_stop, plan_velocity

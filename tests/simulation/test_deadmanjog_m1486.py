@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from deadmanjog_rig import TIMED, Rig, chip
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse, Refusal
 from steptwin.m1486.drive import speed_curve
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.motion.ramps import plan_distance
 from steptwin.simulation.kinds.m1486.deadmanjog import M1486DeadManJog
 from steptwin.simulation.script import steps as do

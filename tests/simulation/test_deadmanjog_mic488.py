@@ -9,9 +9,9 @@ import pytest
 from deadmanjog_rig import MIC, TIMED, Rig, chip, mic
 from mic488_rig import loaded
 
+from steptwin.controller import MILLISECOND
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND
 from steptwin.mic488.registers import AXIS_STATUS_TEXTS
 from steptwin.mic488.status import AxisStatus
 from steptwin.simulation.kinds.m1486.deadmanjog import M1486DeadManJog
@@ -124,7 +124,7 @@ def test_a_jog_uses_relative_moves_and_nothing_without_end() -> None:
 
 
 def _address(rig: Rig, name: str) -> Any:
-    return rig.subject.description.machines[0].datasheet.point(name).addresses[0].place
+    return rig.subject.description.controllers[0].datasheet.point(name).addresses[0].place
 
 
 def test_a_jog_whose_first_request_is_still_on_its_way_is_extended() -> None:

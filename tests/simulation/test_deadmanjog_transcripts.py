@@ -14,7 +14,7 @@ from deadmanjog_rig import CHIPS, MIC, TIMED, Rig
 from mic488_rig import loaded
 from transcripts import Bench, Case, cases, regenerate
 
-from steptwin.machine import MILLISECOND
+from steptwin.controller import MILLISECOND
 from steptwin.motion.divisions import profile_of
 from steptwin.simulation.kinds.m1486.deadmanjog import M1486DeadManJog
 from steptwin.simulation.kinds.mic488.deadmanjog import Mic488DeadManJog

@@ -188,7 +188,7 @@ name = "other"
         (TABLE + '[mic488.M1]\nhome_mode = "HOME9"\n', "permitted: HOME0 (0), HOME1 (1), HOME2 (2), HOME3 (3), HOME4 (4)"),
         (
             TABLE + '[[wire]]\nfrom = "table"\nto = "table.IN1"\n',
-            "w.toml:4:1: error D003: [wire]: from: 'table': expected MACHINE.PIN",
+            "w.toml:4:1: error D003: [wire]: from: 'table': expected CONTROLLER.PIN",
         ),
         (
             TABLE + '[[wire]]\nfrom = "tabel.OUT1"\nto = "table.IN1"\n',
@@ -261,8 +261,11 @@ name = "other"
         (TABLE + '[[source]]\nto = "table.IN3"\n', "table.IN3 is not an analog input: analog inputs of 'table' are AIN1, AIN2"),
         (CHIP + '[[source]]\nto = "chip.B1"\n', "chip.B1 is not an analog input: analog inputs of 'chip' are none"),
         (CHIP + '[[wire]]\nfrom = "chip.JOG"\nto = "chip.B2"\n', "chip.JOG is not an output: outputs of 'chip' are B1, B2"),
-        (BUS + '[[wire]]\nfrom = "bus.OUT1"\nto = "table.IN1"\n', "w.toml:6:1: error D009: 'bus' is a line; machines are table"),
-        (BUS + '[[axis]]\nname = "x"\ndrive = "bus.M1"\n', "w.toml:6:1: error D009: 'bus' is a line; machines are table"),
+        (
+            BUS + '[[wire]]\nfrom = "bus.OUT1"\nto = "table.IN1"\n',
+            "w.toml:6:1: error D009: 'bus' is a line; controllers are table",
+        ),
+        (BUS + '[[axis]]\nname = "x"\ndrive = "bus.M1"\n', "w.toml:6:1: error D009: 'bus' is a line; controllers are table"),
         (
             TABLE + '[[source]]\nto = "table.AIN1"\nvalue = 12\n',
             "w.toml:3:1: error D009: source of table.AIN1: 12 V: an analog input",

@@ -10,9 +10,9 @@ from math import asin, cos, pi, sin
 
 import pytest
 
+from steptwin.controller import SECOND
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 from steptwin.simulation.mechanics.wells import Wells
 from steptwin.simulation.toml.reader import WorldError
 

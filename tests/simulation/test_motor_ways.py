@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from motor_rig import INERTIA, LINEAR, at_speed, motor
 
-from steptwin.machine import SECOND
+from steptwin.controller import SECOND
 from steptwin.motion import MotionState, Profile, Segment, plan_position, plan_velocity
 from steptwin.motion.paths import Circular
 from steptwin.simulation.mechanics.course import Build, Course, MechanicalState

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.files.world import World
-from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.state import Plain
 
@@ -76,10 +76,10 @@ def missed(scheduler: Scheduler) -> list[object]:
         part.update(scheduler.now)
         if scheduler.stale or repr(part.copy_state()) != before:
             found.append(part)
-    dues = [one.deadline() for one in (*scheduler.machines.values(), *scheduler.parts)]
+    dues = [one.deadline() for one in (*scheduler.controllers.values(), *scheduler.parts)]
     if scheduler.deadline() != min((due for due in dues if due is not None), default=None):
         found.append(dues)
-    return [*found, *(edge for machine in scheduler.machines.values() for edge in machine.take_edges())]
+    return [*found, *(edge for controller in scheduler.controllers.values() for edge in controller.take_edges())]
 
 
 @pytest.mark.parametrize("name", ["pick_and_place/pick_and_place.toml", "feeder.toml", "handwheel.toml", "lift.toml", ""])

@@ -7,8 +7,8 @@ from unittest.mock import patch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from steptwin.controller import MICROSECOND, MILLISECOND, Nanos
 from steptwin.files.world import World
-from steptwin.machine import MICROSECOND, MILLISECOND, Nanos
 from steptwin.mic488.core import ControllerCore
 from steptwin.subject.time import next_due
 

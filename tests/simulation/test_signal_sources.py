@@ -96,7 +96,7 @@ OF_ELEMENTS = {
 
 
 class Layout:
-    """A random world without scripts. Its machines are connected by wires."""
+    """A random world without scripts. Its controllers are connected by wires."""
 
     def __init__(self, random: Random) -> None:
         self.random = random
@@ -105,9 +105,9 @@ class Layout:
         self.faults = list(FAULTS)
         self.outputs = [f"{name}.OUT{n}" for name in self.mics for n in (1, 2, 3)]
         self.inputs = [f"{name}.IN{n}" for name in self.mics for n in (4, 5, 6, 7, 8)]
-        self.text = "".join(self._machines()) + "".join(self._elements()) + "".join(self._wires()) + self._transducer()
+        self.text = "".join(self._controllers()) + "".join(self._elements()) + "".join(self._wires()) + self._transducer()
 
-    def _machines(self) -> Iterator[str]:
+    def _controllers(self) -> Iterator[str]:
         if on_line := self.random.random() < 0.5:
             yield '[[line]]\nname = "bus"\ntiming = "real"\n'
         if self.chips:
@@ -152,10 +152,10 @@ class Layout:
         world = World.from_toml(self.text, {"p.prg": PROGRAM})
         parts = world.parts
         found = ["idle"]
-        for name, machine in parts.machines.items():
-            points = [f"{name}.{point.path}" for point in parts.kind_of[name].datasheet(machine).points]
+        for name, controller in parts.controllers.items():
+            points = [f"{name}.{point.path}" for point in parts.kind_of[name].datasheet(controller).points]
             found += self.random.sample(points, min(len(points), 20))
-            found += [f"{name}.{pin}" for pin in machine.pins()]
+            found += [f"{name}.{pin}" for pin in controller.pins()]
             found += [path for path in points if path.endswith((".position", ".velocity", ".status", ".moving"))] * 3
         for name in parts.element_names:
             found += [f"{name}.{signal}" for signal in parts.element_signals(name) or {}] * 5

@@ -12,8 +12,8 @@ from pathlib import Path
 from toy import lamp
 from whole_world import everything
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.logic.signal import SignalOf
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.simulation.describe.small import InputChange, Whole
 from steptwin.simulation.describe.small_m1486 import m1486_world
 from steptwin.simulation.describe.small_mic488 import AxisSwitches, mic488_world

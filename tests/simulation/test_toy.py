@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from toy import Toy, ToyBody, ToyLine
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.errors import Misuse, TimeReversal
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.simulation.faults import Faults, read, rig
@@ -27,7 +27,7 @@ ARRIVAL: Nanos = 632_455_533
 
 
 def told(records: list[TraceRecord], *kinds: str) -> list[tuple[Nanos, str, str, object]]:
-    return [(r.time, r.machine, r.subject, r.value) for r in records if r.kind in kinds]
+    return [(r.time, r.controller, r.subject, r.value) for r in records if r.kind in kinds]
 
 
 # ---------------------------------------------------------------------- time
@@ -148,7 +148,7 @@ def test_its_input_sticks_and_bounces() -> None:
     assert toy.execute(GO, MILLISECOND) == b"E\x0a"
     scheduler.advance(2 * SECOND)
     assert toy.pins()["STOP"] == 0.0
-    scheduler.machines["toy"].set_pin("STOP", 1.0, 2 * SECOND)
+    scheduler.controllers["toy"].set_pin("STOP", 1.0, 2 * SECOND)
     scheduler.advance(3 * SECOND)
     assert [value for *_, value in told(seen, "edge")] == [1.0, 0.0, 0.0, 1.0]
     assert [text for *_, text in told(seen, "fault")] == ["STOP is stuck at 1", "STOP is free", "STOP bounces 1 times in 2 ms"]
@@ -205,7 +205,7 @@ def test_a_snapshot_from_before_it_could_fail_is_restored() -> None:
     scheduler.advance(SECOND)
     there.clear(SECOND)
     scheduler.restore(before)
-    assert toy.snapshot() == before.machines[0]
+    assert toy.snapshot() == before.controllers[0]
 
 
 # ---------------------------------------------------------------------- a line

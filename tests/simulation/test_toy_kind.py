@@ -139,7 +139,7 @@ def test_its_trace_is_exported_and_read_back(tmp_path: Path) -> None:
 
 def test_a_subject_describes_it_and_shows_its_state() -> None:
     subject = WorldSubject(World.from_toml(TEXT))
-    (part,) = subject.description.machines
+    (part,) = subject.description.controllers
     assert (part.datasheet.kind, part.line, part.points) == ("toy", "bus", ("t.STOP", "t.BUSY", "t.position"))
     assert subject.do(Describe()).value["datasheets"][0]["axes"][0]["unit"] == "pulse"
     state = subject.do(ReadState("t")).value
@@ -159,7 +159,7 @@ def test_a_subject_reads_and_commands_it() -> None:
 
 def test_its_data_sheet_is_json() -> None:
     world = World.from_toml(TEXT)
-    sheet = plain(world.kind("t").datasheet(world.machines["t"]))
+    sheet = plain(world.kind("t").datasheet(world.controllers["t"]))
     assert json.loads(json.dumps(sheet))["points"][0]["path"] == "position"
 
 

@@ -54,7 +54,7 @@ def trace(name: str, description: str, *, restores: bool = False) -> Iterator[st
 
 
 def _line(record: TraceRecord) -> str:
-    return f"{_ms(record.time)} {record.machine} {record.kind} {record.subject} {_shown(record.value)}".rstrip()
+    return f"{_ms(record.time)} {record.controller} {record.kind} {record.subject} {_shown(record.value)}".rstrip()
 
 
 def _shown(value: object) -> str:

@@ -8,7 +8,7 @@ from itertools import pairwise
 from burst_reader import GAP, UNIT, BurstReader, checksum
 from soak import scaled
 
-from steptwin.machine import MILLISECOND, SECOND
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.wire.slave import RtuSlavePort
 
 SHORT_PAUSES = [0, 0, 0, MILLISECOND, 10 * MILLISECOND, GAP - 1]

@@ -47,9 +47,9 @@ Begin = Callable[[LiveWorld, RealTimeDriver], Callable[[bytes], None]]
 def fill(live: LiveWorld) -> None:
     """Fill the stores whose size is bounded by a number, whatever requests have put there."""
     chips = [view.chip for view in live.world.m1486.values()]
-    for machine in (*chips, *(view.device for view in live.world.mic488.values())):
+    for controller in (*chips, *(view.device for view in live.world.mic488.values())):
         for _ in range(EVENTS_KEPT):
-            machine.event("power-on", "an event", machine.now)
+            controller.event("power-on", "an event", controller.now)
 
 
 def small(text: str, files: dict[str, bytes] | None = None, *, watched: bool) -> LiveWorld:

@@ -96,11 +96,11 @@ def test_a_long_session_takes_no_more_memory_than_a_short_one() -> None:
     for one in (tab, silent):
         one.ok("follow", id=1, bound=100)
         one.ok("watch", points=["table.M1.position", "time"], rate=30)
-    tab.ok("enable", machine="table", axis=1)
+    tab.ok("enable", controller="table", axis=1)
 
     def busy(times: int) -> None:
         for n in range(times):
-            tab.ok("move", machine="table", axis=1, to=n % 50)
+            tab.ok("move", controller="table", axis=1, to=n % 50)
             watch = tab.ok("watch", points=[f"table.M{n % 4 + 1}.position"])["watch"]
             tab.ok("follow", id="x", kinds=["edge"])
             studio.run(40)  # fewer requests than are permitted

@@ -10,8 +10,8 @@ from host_rig import Wire, driver, thread_line
 from soak import factor, scaled
 from suspension import Suspension
 
+from steptwin.controller import MILLISECOND
 from steptwin.drivers import Mic488
-from steptwin.machine import MILLISECOND
 
 
 @pytest.mark.parametrize("tasks", [False, True], ids=["threads", "tasks"])

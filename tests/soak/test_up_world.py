@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 from soak import scaled
 
+from steptwin.controller import MILLISECOND
 from steptwin.errors import Misuse
 from steptwin.files.session import load, save
 from steptwin.files.world import World
 from steptwin.live import world as live_world_module
 from steptwin.live.world import LiveWorld, PlacePort
-from steptwin.machine import MILLISECOND
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.kinds.mic488.line import ModbusBus
 from steptwin.simulation.script import steps as do

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from soak import scaled
 
+from steptwin.controller import SECOND
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 from steptwin.simulation.script import steps as do
 
 FEEDER = (Path(__file__).parents[2] / "examples" / "worlds" / "feeder.toml").read_text()

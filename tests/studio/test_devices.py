@@ -143,38 +143,38 @@ def stands(master: Master) -> bool:
 def test_devices_are_described_sampled_and_moved(twin: Twin, master: Master, start_studio: Callable[..., Process]) -> None:
     viewer = Viewer(start_studio("--itself", "--device", twin.bus, "--device", twin.chips))
     hello = viewer.newest("hello")
-    assert [(one["name"], one["real"]) for one in hello["description"]["machines"]] == [("mic488", True), ("m1486-7", True)]
+    assert [(one["name"], one["real"]) for one in hello["description"]["controllers"]] == [("mic488", True), ("m1486-7", True)]
     assert hello["virtual"] is False
     assert not {"pause", "fault", "set"} & set(hello["description"]["commands"])
     viewer.ok("follow", kinds=["sample"])
     viewer.ok("watch", points=["mic488.M1.position"], rate=10)
-    viewer.ok("enable", machine="mic488", axis=1)
-    viewer.ok("move", machine="mic488", axis=1, to=20)
+    viewer.ok("enable", controller="mic488", axis=1)
+    viewer.ok("move", controller="mic488", axis=1, to=20)
     until(lambda: position(master) == 20.0, "the master sees the axis there")
     viewer.wait_for(lambda one: one.place() == 20.0, "the last sample is there")
     viewer.wait_for(lambda one: one.newest("values") == {"1": [[0, 20.0]]}, "the value is there")
-    form = viewer.ok("configuration", machine="mic488")  # what registers show, and nothing else
+    form = viewer.ok("configuration", controller="mic488")  # what registers show, and nothing else
     shown = {f"{part['name']}.{one['name']}": one["text"] for part in form["sections"] for one in part["settings"] if one["text"]}
     ramps = {f"Axis{axis}.{key}": "1000" for axis in range(1, 4) for key in ("Acc", "Dec", "Vel")}
     assert shown == {"Axis0.Acc": "400", "Axis0.Dec": "400", "Axis0.Vel": "40"} | ramps
     assert (form["is_file"], form["diagnostics"]) == (False, [])
-    edited = viewer.ok("edit_configuration", machine="mic488", text="", changes={"Axis1.Acc": "5"})
+    edited = viewer.ok("edit_configuration", controller="mic488", text="", changes={"Axis1.Acc": "5"})
     assert (edited["points"], edited["diagnostics"]) == ({"M2_ACC": 5.0}, [])
-    viewer.ok("move", machine="m1486-7", axis=1, by=100)
+    viewer.ok("move", controller="m1486-7", axis=1, by=100)
     viewer.wait_for(lambda one: one.events("sample")[-1]["position"] == 100.0, "the chip has moved")
-    assert None in [one["position"] for one in viewer.events("sample") if one["machine"] == "m1486-7"]
+    assert None in [one["position"] for one in viewer.events("sample") if one["controller"] == "m1486-7"]
     assert viewer.ask("set", levels={"mic488.IN1": 1})["error"]["code"] == "refusal"
-    assert viewer.ok("stop_all") == {"machines": ["mic488", "m1486-7"], "scripts": []}
+    assert viewer.ok("stop_all") == {"controllers": ["mic488", "m1486-7"], "scripts": []}
 
 
 def test_a_jog_ends_with_its_lease_and_with_the_studio(twin: Twin, master: Master, start_studio: Callable[..., Process]) -> None:
     process = start_studio("--itself", "--device", twin.bus)
     viewer = Viewer(process)
-    viewer.ok("enable", machine="mic488", axis=1)
-    lease = viewer.ok("jog", machine="mic488", axis=1, velocity=10.0)["lease"]
+    viewer.ok("enable", controller="mic488", axis=1)
+    lease = viewer.ok("jog", controller="mic488", axis=1, velocity=10.0)["lease"]
     viewer.renew(lease, lambda: position(master) > 5.0)
     until(lambda: stands(master), "nobody has renewed it, so it stands")
-    lease = viewer.ok("jog", machine="mic488", axis=1, velocity=10.0)["lease"]
+    lease = viewer.ok("jog", controller="mic488", axis=1, velocity=10.0)["lease"]
     begin = position(master)
     viewer.renew(lease, lambda: position(master) > begin + 3.0)
     process.process.send_signal(signal.SIGSTOP)
@@ -192,7 +192,7 @@ def test_a_jog_ends_with_its_lease_and_with_the_studio(twin: Twin, master: Maste
 def test_a_chip_is_jogged_by_short_moves(twin: Twin, start_studio: Callable[..., Process]) -> None:
     viewer = Viewer(start_studio("--itself", "--device", twin.chips))
     viewer.ok("follow", kinds=["sample"])
-    lease = viewer.ok("jog", machine="m1486-7", axis=1, velocity=600.0)["lease"]
+    lease = viewer.ok("jog", controller="m1486-7", axis=1, velocity=600.0)["lease"]
     for _ in range(10):
         viewer.ok("renew", lease=lease)
         viewer._receive()
@@ -206,11 +206,11 @@ def test_a_chip_is_jogged_by_short_moves(twin: Twin, start_studio: Callable[...,
 def test_a_line_that_was_lost_is_connected_again_and_nothing_moves(twin: Twin, start_studio: Callable[..., Process]) -> None:
     viewer = Viewer(start_studio("--itself", "--device", twin.bus))
     viewer.ok("follow", kinds=["sample", "status"])
-    viewer.ok("enable", machine="mic488", axis=1)
+    viewer.ok("enable", controller="mic488", axis=1)
     viewer.wait_for(lambda one: one.place() == 0.0, "the axis is seen")
     twin.end()
     viewer.wait_for(lambda one: one.newest("lost") is not None and one.place() is None, "the loss is seen, and nothing is known")
-    refused = viewer.ask("move", machine="mic488", axis=1, to=20)["error"]
+    refused = viewer.ask("move", controller="mic488", axis=1, to=20)["error"]
     assert (refused["code"], "was not sent" in refused["message"]) == ("failure", True)
     twin.start()
     viewer.wait_for(lambda one: one.newest("lost") is None, "it is there again")
@@ -235,15 +235,17 @@ def test_settings_are_kept_before_the_first_write(
 def test_devices_come_and_go(twin: Twin, start_studio: Callable[..., Process]) -> None:
     viewer = Viewer(start_studio())
     viewer.ok("watch", points=["table.M1.position"])
-    assert viewer.ok("connect", address=twin.bus, name="real") == {"machine": "real"}
-    viewer.wait_for(lambda one: [m["name"] for m in one.newest("hello")["description"]["machines"]][-1] == "real", "it is shown")
+    assert viewer.ok("connect", address=twin.bus, name="real") == {"controller": "real"}
+    viewer.wait_for(
+        lambda one: [m["name"] for m in one.newest("hello")["description"]["controllers"]][-1] == "real", "it is shown"
+    )
     assert viewer.ask("connect", address=twin.bus, name="table")["error"]["code"] == "misuse"
     assert viewer.ok("read", points=["real.M1.position", "table.M1.position"])[0]["value"] == 0.0
-    viewer.ok("disconnect", machine="real")
+    viewer.ok("disconnect", controller="real")
     viewer.wait_for(
-        lambda one: "real" not in json.dumps(one.newest("hello")["description"]["machines"][-1]["name"]), "it has gone"
+        lambda one: "real" not in json.dumps(one.newest("hello")["description"]["controllers"][-1]["name"]), "it has gone"
     )
-    assert viewer.ask("disconnect", machine="table")["error"]["code"] == "misuse"
+    assert viewer.ask("disconnect", controller="table")["error"]["code"] == "misuse"
 
 
 @pytest.mark.parametrize("option", ["--seed=2", "--from=2s", "--speed=2", "--log-frames"])

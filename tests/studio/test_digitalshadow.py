@@ -38,7 +38,7 @@ class Rig:
         return answer["ok"]
 
     def state(self) -> Any:
-        return self.ok("digital_shadow_state", machine="mic488")
+        return self.ok("digital_shadow_state", controller="mic488")
 
     def samples(self) -> list[list[float | None]]:
         return self.state()["axes"][0]["samples"]
@@ -54,7 +54,7 @@ class Rig:
 def rig(start_studio: Callable[..., Process], serve: Callable[..., Any], tmp_path: Path) -> Iterator[Rig]:
     (tmp_path / "machine.cfg").write_text(CONFIG)
     twin = serve("--config", str(tmp_path / "machine.cfg"))
-    place = f"tcp://127.0.0.1:{twin.tcp_port},config={tmp_path / 'machine.cfg'}"
+    place = f"tcp://127.0.0.1:{twin.tcp_port},config={tmp_path / 'controller.cfg'}"
     found = Rig(start_studio("--itself", "--device", place), twin.tcp_port)
     yield found
     found.close()
@@ -62,16 +62,16 @@ def rig(start_studio: Callable[..., Process], serve: Callable[..., Any], tmp_pat
 
 def test_a_device_that_does_as_the_twin(rig: Rig) -> None:
     rig.master.reals(10040, 12.5)  # a setting that the configuration has not
-    rig.ok("enable", machine="mic488", axis=1)
-    rig.ok("digital_shadow", machine="mic488")
-    rig.ok("move", machine="mic488", axis=1, to=20)
+    rig.ok("enable", controller="mic488", axis=1)
+    rig.ok("digital_shadow", controller="mic488")
+    rig.ok("move", controller="mic488", axis=1, to=20)
     rig.until_at(20.0)
-    rig.ok("move", machine="mic488", axis=1, by=-3)
+    rig.ok("move", controller="mic488", axis=1, by=-3)
     rig.until_at(17.0)
     rig.ok("write", values={"mic488.M1_ACC": 200})
-    rig.ok("move", machine="mic488", axis=1, to=40)
+    rig.ok("move", controller="mic488", axis=1, to=40)
     until(lambda: rig.master.sample(1).position > 18, "it moves")
-    rig.ok("stop", machine="mic488", axis=1)
+    rig.ok("stop", controller="mic488", axis=1)
     until(lambda: rig.master.sample(1).velocity == 0, "it stands")
     stood = rig.master.sample(1).position
     until(
@@ -84,13 +84,13 @@ def test_a_device_that_does_as_the_twin(rig: Rig) -> None:
 
 
 def test_a_parameter_that_the_twin_has_not(rig: Rig) -> None:
-    rig.ok("enable", machine="mic488", axis=1)
-    rig.ok("digital_shadow", machine="mic488")
-    rig.ok("move", machine="mic488", axis=1, to=2)
+    rig.ok("enable", controller="mic488", axis=1)
+    rig.ok("digital_shadow", controller="mic488")
+    rig.ok("move", controller="mic488", axis=1, to=2)
     rig.until_at(2.0)
     before = rig.samples()[-1][0]
     rig.master.reals(M1_VMAX, 10.0)  # instead of 40 mm/s: nobody tells the twin
-    rig.ok("move", machine="mic488", axis=1, to=42)
+    rig.ok("move", controller="mic488", axis=1, to=42)
     until(lambda: rig.state()["first"] is not None, "the difference is seen")
     state = rig.state()
     first = state["first"]
@@ -104,7 +104,7 @@ def test_a_parameter_that_the_twin_has_not(rig: Rig) -> None:
         "the register",
     )
     assert rig.state()["axes"][0]["first"]["what"] == "M1"
-    rig.ok("digital_shadow", machine="mic488", on=False)
+    rig.ok("digital_shadow", controller="mic488", on=False)
     assert rig.state() is None
 
 
@@ -118,11 +118,11 @@ def test_a_jog_is_taken_over(rig: Rig) -> None:
             if answer.get("id") == 1:
                 return answer
 
-    rig.ok("enable", machine="mic488", axis=1)
-    rig.ok("digital_shadow", machine="mic488")
+    rig.ok("enable", controller="mic488", axis=1)
+    rig.ok("digital_shadow", controller="mic488")
     rig.ok("release_control")
     tell(do="hello")
-    lease = tell(do="jog", machine="mic488", axis=1, velocity=10)["ok"]["lease"]
+    lease = tell(do="jog", controller="mic488", axis=1, velocity=10)["ok"]["lease"]
     until(lambda: "ok" in tell(do="renew", lease=lease) and rig.master.sample(1).position > 2, "it is jogged")
     tell(do="let_go", lease=lease)
     until(lambda: rig.master.sample(1).velocity == 0, "it stands")
@@ -137,18 +137,18 @@ def test_a_jog_is_taken_over(rig: Rig) -> None:
 def test_where_there_is_no_twin(rig: Rig, serve: Callable[..., Any], serve_m1486: Callable[..., Any]) -> None:
     other = serve()
     rig.ok("connect", address=f"tcp://127.0.0.1:{other.tcp_port}", name="bare")
-    refused = rig.ask("digital_shadow", machine="bare")["error"]["message"]
+    refused = rig.ask("digital_shadow", controller="bare")["error"]["message"]
     assert refused.endswith("a twin needs the configuration of the controller: connect it with config=FILE")
     rig.ok("connect", address=f"tcp://127.0.0.1:{serve_m1486().tcp_port},kind=m1486", name="chip")
-    assert "no twin beside an M1486" in rig.ask("digital_shadow", machine="chip")["error"]["message"]
-    rig.ok("enable", machine="mic488", axis=1)
-    rig.ok("move", machine="mic488", axis=1, to=40)
-    assert "a twin can be made at rest: M1 runs" in rig.ask("digital_shadow", machine="mic488")["error"]["message"]
-    assert "no device is called 'mic'; there are mic488" in rig.ask("digital_shadow", machine="mic")["error"]["message"]
+    assert "no twin beside an M1486" in rig.ask("digital_shadow", controller="chip")["error"]["message"]
+    rig.ok("enable", controller="mic488", axis=1)
+    rig.ok("move", controller="mic488", axis=1, to=40)
+    assert "a twin can be made at rest: M1 runs" in rig.ask("digital_shadow", controller="mic488")["error"]["message"]
+    assert "no device is called 'mic'; there are mic488" in rig.ask("digital_shadow", controller="mic")["error"]["message"]
 
 
 def test_the_settings_as_a_text(rig: Rig) -> None:
-    text = rig.ok("settings", machine="mic488")["text"]
+    text = rig.ok("settings", controller="mic488")["text"]
     assert json.loads(text)["values"]["M1_VMAX"] == 40.0
 
 
@@ -164,9 +164,9 @@ def test_the_difference_is_drawn(rig: Rig, browser: Browser, tmp_path: Path) -> 
     region = page.get_by_role("region", name="Twin beside mic488")
     expect(region.get_by_role("status")).to_contain_text("no difference so far")
     rig.ok("take_control", over=True)
-    rig.ok("enable", machine="mic488", axis=1)
+    rig.ok("enable", controller="mic488", axis=1)
     rig.master.reals(M1_VMAX, 10.0)
-    rig.ok("move", machine="mic488", axis=1, to=20)
+    rig.ok("move", controller="mic488", axis=1, to=20)
     expect(region.get_by_role("status")).to_contain_text("first difference")
     expect(region.get_by_role("img", name="M1: device and twin")).to_be_visible()
     rig.until_at(20.0)

@@ -74,8 +74,8 @@ def test_texts_of_a_controller_know_each_other(start_studio: Start) -> None:
 def test_a_text_is_looked_at_with_the_type_of_its_controller(start_studio: Start) -> None:
     """The drum of the demo machine is an M1486B, which has 80 labels; an M1486A has 15."""
     editor = Editor(start_studio("--demo"))
-    for machine, severities in (("drum", []), ("other", [1, 1])):
-        uri = f"steptwin:///{machine}/program.m1486"
+    for controller, severities in (("drum", []), ("other", [1, 1])):
+        uri = f"steptwin:///{controller}/program.m1486"
         editor.open(uri, "m1486", "@20\nw1000\nj20\n")
         assert [one["severity"] for one in editor.diagnostics(uri, 1) if one["severity"] == 1] == severities
 

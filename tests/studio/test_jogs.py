@@ -9,9 +9,9 @@ from tests.support.studio_rig import Studio, Tab
 
 
 def jogging(studio: Studio, tab: Tab, velocity: float = 40.0, **where: object) -> dict[str, Any]:
-    tab.ok("enable", machine="table", axis=1)
+    tab.ok("enable", controller="table", axis=1)
     studio.run(100)
-    return tab.ok("jog", **{"machine": "table", "axis": 1, **where}, velocity=velocity)
+    return tab.ok("jog", **{"controller": "table", "axis": 1, **where}, velocity=velocity)
 
 
 def test_a_jog_goes_on_while_it_is_renewed_and_stands_in_time_afterwards() -> None:
@@ -37,12 +37,12 @@ def test_what_ends_a_jog(ends: str) -> None:
     lease = jogging(studio, tab)
     studio.run(80)
     other.read()
-    assert other.newest("leases") == [{"lease": 1, "viewer": 1, "machine": "table", "axis": 1, "velocity": 40.0}]
+    assert other.newest("leases") == [{"lease": 1, "viewer": 1, "controller": "table", "axis": 1, "velocity": 40.0}]
     match ends:
         case "close":
             tab.close()
         case "stop":
-            tab.ok("stop", machine="table", axis=1)
+            tab.ok("stop", controller="table", axis=1)
         case "stop_all" | "release_control":
             tab.ok(ends)
         case "let_go":
@@ -50,7 +50,7 @@ def test_what_ends_a_jog(ends: str) -> None:
         case "taken over":
             other.ok("take_control", over=True)
         case "stop of another":
-            other.ok("stop", machine="table")
+            other.ok("stop", controller="table")
     other.read()
     assert other.newest("leases") == []
     studio.run(300)
@@ -75,7 +75,7 @@ def test_a_second_jog_of_an_axis_replaces_the_first() -> None:
     tab = studio.open()
     first = jogging(studio, tab, 10.0)
     studio.run(80)
-    second = tab.ok("jog", machine="table", axis=1, velocity=-30.0)
+    second = tab.ok("jog", controller="table", axis=1, velocity=-30.0)
     assert tab.error("renew", lease=first["lease"])[0] == "refusal"
     for _ in range(10):
         studio.run(80)
@@ -103,13 +103,13 @@ def test_where_time_goes_too_fast_a_jog_is_refused() -> None:
     studio = Studio()
     tab = studio.open()
     studio.speed = 10.0
-    assert tab.error("jog", machine="table", axis=1, velocity=5)[1].startswith("time goes too fast for a jog (10 times)")
+    assert tab.error("jog", controller="table", axis=1, velocity=5)[1].startswith("time goes too fast for a jog (10 times)")
 
 
 def test_a_chip_is_jogged_too() -> None:
     studio = Studio()
     tab = studio.open()
-    lease = tab.ok("jog", machine="drum", axis=1, velocity=64 * 640)
+    lease = tab.ok("jog", controller="drum", axis=1, velocity=64 * 640)
     for _ in range(10):
         studio.run(50)
         tab.ok("renew", lease=lease["lease"])

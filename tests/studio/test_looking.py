@@ -8,9 +8,9 @@ from typing import Any, TypeVar
 import pytest
 from tests.support.studio_rig import OPERATOR, VIEWER, Studio, Tab
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.errors import Refusal
 from steptwin.later import Later
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.simulation.world.history import History, Past
 from steptwin.simulation.world.worldprograms import WorldPrograms
 from steptwin.studio import looking
@@ -96,8 +96,8 @@ def studio() -> Studio:
     made = Studio(lookback=Kept)
     tab = made.open()
     made.run(1000)
-    tab.ok("enable", machine="table", axis=1)
-    tab.ok("move", machine="table", axis=1, to=20)
+    tab.ok("enable", controller="table", axis=1)
+    tab.ok("move", controller="table", axis=1, to=20)
     made.run(4000)
     tab.close()
     return made
@@ -123,7 +123,7 @@ def test_the_past_is_shown_while_the_world_goes_on(studio: Studio) -> None:
     assert seen[2] == 1.2
     # The same over requests, and for what is watched from now on.
     assert tab.ok("read", points=["table.M1.position"])[0]["value"] == seen[0]
-    assert tab.ok("state", machine="table") == past["state"]["table"]
+    assert tab.ok("state", controller="table") == past["state"]["table"]
     tab.ok("watch", points=["time"])
     (message,) = tab.read()
     assert message["values"] == {"2": [[0, 1.2]]}
@@ -154,12 +154,12 @@ def test_who_looks_back_changes_nothing_but_may_stop(studio: Studio) -> None:
     may = tab.newest("past")["may"]
     assert {"read", "stop", "stop_all", "look", "go_back"} <= set(may)
     assert not {"move", "write", "pause", "set", "jog"} & set(may)
-    code, message = tab.error("move", machine="table", axis=1, to=3)
+    code, message = tab.error("move", controller="table", axis=1, to=3)
     assert (code, message) == ("refusal", "move: the past is looked at, which cannot be changed: look at the present first")
-    assert tab.ok("stop", machine="table") == {"program": "stopped"}
-    assert tab.ok("stop_all")["machines"]
+    assert tab.ok("stop", controller="table") == {"program": "stopped"}
+    assert tab.ok("stop_all")["controllers"]
     tab.ok("look")
-    tab.ok("move", machine="table", axis=1, to=3)
+    tab.ok("move", controller="table", axis=1, to=3)
 
 
 def test_a_debugger_steps_from_the_past_but_values_are_not_set_there(studio: Studio) -> None:
@@ -173,10 +173,10 @@ def test_a_debugger_steps_from_the_past_but_values_are_not_set_there(studio: Stu
     may = set(tab.newest("past")["may"])
     assert forwards <= may
     assert "set_value" not in may
-    tab.ok("step_program", machine="table", way="over")
+    tab.ok("step_program", controller="table", way="over")
     tab.ok("breakpoint", label="MAIN")
     assert asked == [StepProgram("table", "over"), SetBreakpoint(label="MAIN")]
-    assert tab.error("set_value", machine="table", name="n", expression="1")[1].startswith("set_value: the past is looked at")
+    assert tab.error("set_value", controller="table", name="n", expression="1")[1].startswith("set_value: the past is looked at")
     # It needs control, as what else changes the machine.
     assert other.error("run")[0] == "refusal"
     other.ok("take_control", over=True)

@@ -165,8 +165,8 @@ def test_positions_are_taught(studio: Studio) -> None:
     page = studio.page(panel="Program")
     begin(page)
     choose(page, "table/positions-0.csv")
-    assert httpx.post(f"{studio.process.url}/api/do/enable", json={"machine": "table", "axis": 1}).status_code == 200
-    move = {"machine": "table", "axis": 1, "to": 12.5}
+    assert httpx.post(f"{studio.process.url}/api/do/enable", json={"controller": "table", "axis": 1}).status_code == 200
+    move = {"controller": "table", "axis": 1, "to": 12.5}
     assert httpx.post(f"{studio.process.url}/api/do/move", json=move).status_code == 200
     until(lambda: studio.at(1) == 12.5 and studio.stands(1), "the axis is there")
     page.get_by_label("Row", exact=True).fill("PICK")
@@ -176,7 +176,7 @@ def test_positions_are_taught(studio: Studio) -> None:
     expect(text_of(page, "cell.csv")).to_contain_text("PICK;12.5;x;x;x")
     button(page, "Download cell.csv into table").click()
     expect(page.get_by_text("cell.csv is in table now.")).to_be_visible()
-    asked = {"machine": "table", "place": "positions 0"}
+    asked = {"controller": "table", "place": "positions 0"}
     answer = httpx.post(f"{studio.process.url}/api/do/program_text", json=asked).json()["ok"]
     assert answer["text"] == "HOME;1;x;x;x\nPICK;12.5;x;x;x\n"
 

@@ -24,8 +24,8 @@ listen = "127.0.0.1:0"
 database = "sqlite:///kept.db"
 """
 DONE = (
-    ("enable", {"machine": "table", "axis": 1}),
-    ("move", {"machine": "table", "axis": 7, "to": 1e9}),  # refused
+    ("enable", {"controller": "table", "axis": 1}),
+    ("move", {"controller": "table", "axis": 7, "to": 1e9}),  # refused
     ("save_recording", {"name": "a_recording_with_a_long_name"}),
 )
 

@@ -189,9 +189,9 @@ class Visitor:
 PUBLIC: dict[str, Callable[[Visitor], bool]] = {
     "page": lambda visitor: visitor.get("/"),
     "openapi": lambda visitor: visitor.get("/openapi.json"),
-    "POST stop": lambda visitor: visitor.post("stop", machine="table"),
+    "POST stop": lambda visitor: visitor.post("stop", controller="table"),
     "POST stop_all": lambda visitor: visitor.post("stop_all"),
-    "stop before hello": lambda visitor: visitor.stop_before_hello("stop", machine="table"),
+    "stop before hello": lambda visitor: visitor.stop_before_hello("stop", controller="table"),
     "stop_all before hello": lambda visitor: visitor.stop_before_hello("stop_all"),
 }
 """The same for everybody who has steptwin; and stops, which are always possible."""
@@ -244,7 +244,7 @@ def test_who_is_let_in_to_a_demo_before_and_after_a_device_is_connected(folder: 
     with started(tmp_path, "--itself", "--with-token") as studio:
         check_who_is_let_in(studio, {NOBODY, RIGHT})
         device = f"127.0.0.1:{folder.process.end_points['tcp']['port']}"
-        assert '"ok": {"machine": "real"}' in post(studio, "connect", studio.token, address=device, name="real")[1]
+        assert '"ok": {"controller": "real"}' in post(studio, "connect", studio.token, address=device, name="real")[1]
         check_who_is_let_in(studio, {RIGHT})
 
 

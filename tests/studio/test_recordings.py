@@ -33,8 +33,8 @@ def fetch(process: Process, file: str, token: str | None = None) -> httpx.Respon
 
 
 def move(process: Process) -> None:
-    ask(process, "enable", machine="table", axis=1)
-    ask(process, "move", machine="table", axis=1, to=5)
+    ask(process, "enable", controller="table", axis=1)
+    ask(process, "move", controller="table", axis=1, to=5)
     until(lambda: ask(process, "read", points=["table.M1.position"])["ok"][0]["value"] == 5, "the axis is there")
 
 

@@ -27,9 +27,9 @@ from tokens import tokens_file
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
 
+from steptwin.controller import MILLISECOND
 from steptwin.files.session import save, session_of
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND
 from steptwin.simulation.script.steps import Set
 from steptwin.subject.dispatch import LONGEST_REQUEST
 
@@ -89,8 +89,8 @@ def test_a_page_says_hello_watches_follows_and_moves(start_studio: Start) -> Non
     assert (whole["description"]["name"], whole["viewers"], whole["role"]) == ("hall", 2, "engineer")
     viewer.ok("watch", points=["table.M1.position"], rate=30)
     viewer.ok("follow", id=1, kinds=["plan"])
-    viewer.ok("enable", machine="table", axis=1)
-    viewer.ok("move", machine="table", axis=1, to=3)
+    viewer.ok("enable", controller="table", axis=1)
+    viewer.ok("move", controller="table", axis=1, to=3)
     assert viewer.wait_for("control") == {"viewer": whole["viewer"], "name": "Piotr"}
     viewer.wait_for("events", lambda events: events[-1]["plan"]["final"] == 300.0)
     viewer.wait_for("values", lambda values: values.get("1", [[0, None]])[0][1] == 3.0)
@@ -102,14 +102,14 @@ def test_it_moves_what_an_independent_master_sees(start_studio: Start) -> None:
     port = studio.end_points["tcp"]["port"]
     with ModbusTcpClient("127.0.0.1", port=port) as modbus, httpx.Client(base_url=studio.url) as client:
         master = Master(modbus, 1)
-        assert client.post("/api/do/enable", json={"machine": "table", "axis": 1}).json()["ok"] is None
-        assert client.post("/api/do/move", json={"machine": "table", "axis": 1, "to": 2.5}).status_code == 200
+        assert client.post("/api/do/enable", json={"controller": "table", "axis": 1}).json()["ok"] is None
+        assert client.post("/api/do/move", json={"controller": "table", "axis": 1, "to": 2.5}).status_code == 200
         assert master.follow(1, 3)[-1][2:] == (2.5, 0.0, 4)
         points = client.get("/api/points", params={"names": "table.M1.position,time"}).json()["ok"]
         assert [(one["point"], one["unit"]) for one in points] == [("table.M1.position", "mm"), ("time", "s")]
         assert points[0]["value"] == 2.5
         assert set(client.get("/api/state").json()["ok"]) == {"table", "drum"}
-        assert client.get("/api/state", params={"machine": "drum"}).json()["ok"]
+        assert client.get("/api/state", params={"controller": "drum"}).json()["ok"]
         assert client.get("/api/describe").json()["ok"]["name"] == "hall"
 
 
@@ -126,14 +126,14 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Any:
 @pytest.mark.parametrize(
     ("path", "body", "status", "message"),
     [
-        ("/api/do/move", b'{"machine": "table", "axis": 1, "to": "x"}', 400, "to: 'x': expected a number"),
+        ("/api/do/move", b'{"controller": "table", "axis": 1, "to": "x"}', 400, "to: 'x': expected a number"),
         ("/api/do/move", b"{", 400, "a body is an object of JSON"),
         ("/api/do/move", b"[1]", 400, "a body is an object of JSON"),
         ("/api/do/move", b"[" * 60_000, 400, "a body is an object of JSON"),
         ("/api/do/move", b'{"do": "stop"}', 400, "no field 'do'"),
         ("/api/do/move", b"x" * (LONGEST_REQUEST + 1), 413, f"a body has at most {LONGEST_REQUEST} bytes"),
-        ("/api/do/state", b'{"machine": "tabel"}', 400, "did you mean 'table'?"),
-        ("/api/do/jog", b'{"machine": "table", "axis": 2, "velocity": 1}', 409, "not enabled"),
+        ("/api/do/state", b'{"controller": "tabel"}', 400, "did you mean 'table'?"),
+        ("/api/do/jog", b'{"controller": "table", "axis": 2, "velocity": 1}', 409, "not enabled"),
         ("/api/do/resume", b'{"speed": "max"}', 400, "--speed max"),
     ],
 )
@@ -224,7 +224,7 @@ def tokens(directory: Path) -> dict[str, str]:
 def test_where_tokens_are_asked_for_they_give_roles(start_studio: Start, tmp_path: Path) -> None:
     token = tokens(tmp_path)
     studio = start_studio("--tokens", str(tmp_path / "tokens"), "--audit", str(tmp_path / "audit"))
-    move = {"machine": "table", "axis": 1, "on": True}
+    move = {"controller": "table", "axis": 1, "on": True}
 
     def post(name: str, role: str | None) -> int:
         headers = {} if role is None else {"authorization": f"Bearer {token.get(role, role)}"}
@@ -394,11 +394,11 @@ def ask(**message):
 
 
 def jog():
-    return ask(do="jog", machine="table", axis=1, velocity=20)
+    return ask(do="jog", controller="table", axis=1, velocity=20)
 
 
 ask(do="hello")
-ask(do="enable", machine="table", axis=1)
+ask(do="enable", controller="table", axis=1)
 lease = jog()
 import time
 while True:
@@ -412,7 +412,7 @@ while True:
 def test_an_axis_stands_in_time_when_the_page_is_gone(start_studio: Start, fate: str) -> None:
     studio = start_studio()
     watcher = page(studio)
-    watcher.ok("follow", id="plans", kinds=["plan"], machines=["table"], axes=["1"])
+    watcher.ok("follow", id="plans", kinds=["plan"], controllers=["table"], axes=["1"])
     cable = Cable(studio.end_points["http"]["port"])
     url = f"{studio.url.replace('http', 'ws', 1)}/ws"
     jogging = subprocess.Popen(
@@ -452,8 +452,8 @@ def test_the_time_of_the_world_stands_with_the_process_and_a_jog_ends_afterwards
     """A service that is stopped holds its world up with it."""
     studio = start_studio()
     viewer = page(studio)
-    viewer.ok("enable", machine="table", axis=1)
-    viewer.ok("jog", machine="table", axis=1, velocity=20)
+    viewer.ok("enable", controller="table", axis=1)
+    viewer.ok("jog", controller="table", axis=1, velocity=20)
     began = int(viewer.ask("time")["time_ns"])
     studio.process.send_signal(signal.SIGSTOP)
     time.sleep(1.2)
@@ -471,7 +471,7 @@ def test_the_demo_machine_is_shown_without_a_file(start_studio: Start) -> None:
                 pytest.skip(f"port {port} is in use here")
     studio = start_studio("--itself")
     described = httpx.get(f"{studio.url}/api/describe").json()["ok"]
-    assert [one["name"] for one in described["machines"]] == ["table", "drum", "feeder"]
+    assert [one["name"] for one in described["controllers"]] == ["table", "drum", "feeder"]
     assert studio.end_points["tcp"]["port"] in (5020, 5022)
     assert "Modbus TCP, bus    127.0.0.1:5020" in studio.output
     assert f"studio             {studio.url}/" in studio.output

@@ -83,8 +83,8 @@ def reader_of(record: str, port: int) -> Generator[None]:
 
 
 def move(process: Process, to: float) -> None:
-    ok(process, "enable", machine="table", axis=1)
-    ok(process, "move", machine="table", axis=1, to=to)
+    ok(process, "enable", controller="table", axis=1)
+    ok(process, "move", controller="table", axis=1, to=to)
     until(lambda: ok(process, "read", points=["table.M1.position"])[0]["value"] == to, "the axis is there")
 
 
@@ -138,7 +138,7 @@ def test_who_uses_the_gateways_and_what_has_been_kept(
     assert part["at_s"][-1] <= middle
     assert ok(studio, "compare_history", run=-1, other=-1) == []
     moves = [one for one in ok(studio, "history_writes") if one["what"].startswith("move ")]
-    assert [(one["machine"], one["what"], one["outcome"]) for one in moves] == [("table", "move axis = 1, to = 5", "done")]
+    assert [(one["controller"], one["what"], one["outcome"]) for one in moves] == [("table", "move axis = 1, to = 5", "done")]
     assert moves[0]["source"].endswith(" (engineer)")
     assert 0 < moves[0]["at_s"] < position["at_s"][-1]
     assert ok(studio, "history_writes", from_s=0, to_s=moves[0]["at_s"] / 2) == []
@@ -219,7 +219,7 @@ def test_the_page_has_them(start_studio: Callable[..., Process], browser: Browse
 
     show(page, "Audit log")
     log = page.get_by_role("table", name="Audit log")
-    expect(log.get_by_role("row").nth(1)).to_contain_text("machine table, axis 1, to 5")
+    expect(log.get_by_role("row").nth(1)).to_contain_text("controller table, axis 1, to 5")
     page.get_by_role("searchbox", name="Show only").fill("enable table")
     expect(log.get_by_role("row")).to_have_count(2)
     page.screenshot(path=PICTURES / "audit.png")

@@ -14,8 +14,8 @@ from tests.support.studio_rig import ENGINEER, OPERATOR, TOKENS, VIEWER, Studio,
 
 from steptwin.access.roles import Role
 from steptwin.access.tokens import AccessGate
+from steptwin.controller import MILLISECOND
 from steptwin.errors import Refusal
-from steptwin.machine import MILLISECOND
 from steptwin.studio import session as sessions
 from steptwin.studio.hub import MOST_VIEWERS
 from steptwin.studio.requests import ALL
@@ -37,10 +37,10 @@ def test_hello_is_answered_and_followed_by_the_whole_state() -> None:
     (hello,) = tab.read()
     whole = hello["hello"]
     assert (whole["viewer"], whole["viewers"], whole["control"], whole["virtual"]) == (1, 1, None, True)
-    assert [one["name"] for one in whole["description"]["machines"]] == ["table", "drum"]
+    assert [one["name"] for one in whole["description"]["controllers"]] == ["table", "drum"]
     assert set(whole["state"]) == {"table", "drum"}
     axes = [("table", "1"), ("table", "2"), ("table", "3"), ("table", "4"), ("drum", "1")]
-    assert [(plan["machine"], plan["axis"]) for plan in whole["plans"]] == axes
+    assert [(plan["controller"], plan["axis"]) for plan in whole["plans"]] == axes
     assert {"move", "jog", "save", "audit"} <= set(whole["may"])
     assert tab.read() == []
 
@@ -48,9 +48,9 @@ def test_hello_is_answered_and_followed_by_the_whole_state() -> None:
 def test_nothing_but_stops_is_done_before_hello() -> None:
     tab = Tab(Studio())
     assert tab.error("read", points=["time"]) == ("refusal", "read: the first request is hello")
-    assert tab.error("move", machine="table", axis=1, to=1)[0] == "refusal"
-    assert tab.ok("stop", machine="table") == {"program": "stopped"}
-    assert tab.ok("stop_all") == {"machines": ["table", "drum"], "scripts": []}
+    assert tab.error("move", controller="table", axis=1, to=1)[0] == "refusal"
+    assert tab.ok("stop", controller="table") == {"program": "stopped"}
+    assert tab.ok("stop_all") == {"controllers": ["table", "drum"], "scripts": []}
     tab.ok("hello")
     assert tab.error("hello")[0] == "misuse"
 
@@ -79,23 +79,23 @@ def test_who_has_no_token_is_asked_for_one_when_a_device_comes() -> None:
     assert {*asked} - {*stranger.newest("hello")["may"]} == {*asked}
     assert stranger.error("scan") == ("refusal", "scan needs the token of this studio, which is in its file of tokens")
     assert owner.error("scan") == ("misuse", "there are no lines here")
-    stranger.ok("enable", machine="table", axis=1)
+    stranger.ok("enable", controller="table", axis=1)
     has_device = True
     assert (stranger.session.is_refused, owner.session.is_refused) == (True, False)
-    assert stranger.error("move", machine="table", axis=1, to=1)[1].startswith("no token")
-    stranger.ok("stop", machine="table")
-    assert "no token" in str(script.receive('{"do": "state", "machine": "table"}', 0).result())
-    owner.ok("state", machine="table")
+    assert stranger.error("move", controller="table", axis=1, to=1)[1].startswith("no token")
+    stranger.ok("stop", controller="table")
+    assert "no token" in str(script.receive('{"do": "state", "controller": "table"}', 0).result())
+    owner.ok("state", controller="table")
     assert Tab(studio).error("hello", token="wrong-0123456789") == ("refusal", "wrong token")
     has_device = False
-    stranger.ok("move", machine="table", axis=1, to=1)
+    stranger.ok("move", controller="table", axis=1, to=1)
 
 
 def test_resync_gives_the_whole_state_and_counts_from_there() -> None:
     studio = Studio()
     tab = studio.open()
     tab.ok("watch", points=["table.M1.position"])
-    tab.ok("enable", machine="table", axis=1)
+    tab.ok("enable", controller="table", axis=1)
     studio.run(100)
     assert len(tab.read()) > 1
     tab.ok("resync")
@@ -120,10 +120,10 @@ def test_roles_may_what_their_tokens_say() -> None:
     studio = Studio(tokens=True)
     viewer, operator = studio.open(token=VIEWER), studio.open(token=OPERATOR)
     assert viewer.ok("read", points=["table.M1.position"])[0]["value"] == 0.0
-    code, message = viewer.error("enable", machine="table", axis=1)
+    code, message = viewer.error("enable", controller="table", axis=1)
     assert (code, message) == ("refusal", "enable is for the role operator; hall has the role viewer")
-    assert viewer.ok("stop", machine="table") == {"program": "stopped"}
-    operator.ok("enable", machine="table", axis=1)
+    assert viewer.ok("stop", controller="table") == {"program": "stopped"}
+    operator.ok("enable", controller="table", axis=1)
     assert operator.error("fault", fault="crc nth=3")[1] == "fault is for the role engineer; piotr has the role operator"
     assert operator.error("audit")[0] == "refusal"
     assert "fault" not in operator.messages[0]["hello"]["may"]
@@ -133,43 +133,43 @@ def test_roles_may_what_their_tokens_say() -> None:
 def test_two_viewers_see_the_same_and_hand_control_over() -> None:
     studio = Studio()
     anna, piotr = studio.open("Anna"), studio.open("Piotr")
-    anna.ok("enable", machine="table", axis=1)
+    anna.ok("enable", controller="table", axis=1)
     for tab in (anna, piotr):
         tab.read()
         assert tab.newest("control") == {"viewer": 1, "name": "Anna"}
         assert tab.newest("viewers") == 2 if tab is anna else True
-    code, message = piotr.error("move", machine="table", axis=1, to=5)
+    code, message = piotr.error("move", controller="table", axis=1, to=5)
     assert (code, message) == (
         "refusal",
         "move needs control, which Anna (viewer 1) holds: take it over first",
     )
     assert piotr.error("take_control")[0] == "refusal"
     piotr.ok("take_control", over=True)
-    piotr.ok("move", machine="table", axis=1, to=5)
-    assert anna.error("move", machine="table", axis=1, to=0)[0] == "refusal"
-    anna.ok("stop", machine="table", axis=1)
+    piotr.ok("move", controller="table", axis=1, to=5)
+    assert anna.error("move", controller="table", axis=1, to=0)[0] == "refusal"
+    anna.ok("stop", controller="table", axis=1)
     piotr.close()
     anna.read()
     assert anna.newest("control") is None
     assert anna.newest("viewers") == 1
-    anna.ok("move", machine="table", axis=1, to=0)
+    anna.ok("move", controller="table", axis=1, to=0)
 
 
 def test_a_refused_act_takes_no_control() -> None:
     studio = Studio()
     tab = studio.open()
-    assert tab.error("enable", machine="nowhere", axis=1)[0] == "misuse"
+    assert tab.error("enable", controller="nowhere", axis=1)[0] == "misuse"
     assert studio.hub.control.holder is None
 
 
 def test_the_audit_log_has_who_did_what_with_which_outcome() -> None:
     studio = Studio(tokens=True)
     anna, hall = studio.open(token=ENGINEER), studio.open(token=VIEWER)
-    anna.ok("enable", machine="table", axis=1)
-    anna.error("move", machine="table", axis=9, to=1)
+    anna.ok("enable", controller="table", axis=1)
+    anna.error("move", controller="table", axis=9, to=1)
     anna.ok("read", points=["time"])
-    hall.error("move", machine="table", axis=1, to=1)
-    hall.ok("stop", machine="table")
+    hall.error("move", controller="table", axis=1, to=1)
+    hall.ok("stop", controller="table")
     entries = [(one["viewer"], one["do"], one["outcome"]) for one in anna.ok("audit")]
     assert entries == [
         ("anna (viewer 1)", "enable", "done"),
@@ -191,8 +191,8 @@ def test_values_come_when_they_have_changed_and_not_more_often_than_asked() -> N
     assert first["values"] == {"1": [[0, 0.0], [1, 0.0], [2, 0.0]]}
     studio.run(1000)
     assert "values" not in kinds(tab.read())
-    tab.ok("enable", machine="table", axis=1)
-    tab.ok("move", machine="table", axis=1, to=100)
+    tab.ok("enable", controller="table", axis=1)
+    tab.ok("move", controller="table", axis=1, to=100)
     found = []
     for _ in range(100):
         studio.run(10)
@@ -270,9 +270,9 @@ def test_events_come_once_however_many_follows_want_them() -> None:
     studio = Studio()
     tab = studio.open()
     assert len(tab.ok("follow", id="a", kinds=["plan"])["plans"]) == 5
-    tab.ok("follow", id="b", kinds=["plan", "edge"], machines=["table"])
-    tab.ok("enable", machine="table", axis=1)
-    tab.ok("move", machine="table", axis=1, to=1)
+    tab.ok("follow", id="b", kinds=["plan", "edge"], controllers=["table"])
+    tab.ok("enable", controller="table", axis=1)
+    tab.ok("move", controller="table", axis=1, to=1)
     studio.run(100)
     (batch,) = [one for one in tab.read() if "events" in one]
     assert batch["missed"] == 0
@@ -282,7 +282,7 @@ def test_events_come_once_however_many_follows_want_them() -> None:
     tab.ok("unfollow", follow="b")
     tab.ok("set", levels={"table.IN3": 1})
     tab.ok("unfollow", follow="a")
-    tab.ok("move", machine="table", axis=1, to=0)
+    tab.ok("move", controller="table", axis=1, to=0)
     studio.run(100)
     assert "events" not in kinds(tab.read())
     assert tab.error("unfollow", follow="a")[0] == "misuse"
@@ -330,8 +330,8 @@ def test_two_streams_of_frames_and_plans_do_not_mix() -> None:
     frames, plans = studio.open(), studio.open()
     frames.ok("follow", id=1, kinds=["frame"])
     plans.ok("follow", id=1, kinds=["plan"])
-    plans.ok("enable", machine="table", axis=1)
-    plans.ok("move", machine="table", axis=1, to=1)
+    plans.ok("enable", controller="table", axis=1)
+    plans.ok("move", controller="table", axis=1, to=1)
     studio.run(100)
     assert {event["kind"] for one in frames.read() if "events" in one for event in one["events"]} == {"frame"}
     assert {event["kind"] for one in plans.read() if "events" in one for event in one["events"]} == {"plan"}
@@ -371,7 +371,7 @@ JSON = st.recursive(
     max_leaves=12,
 )
 STUDIO = Studio()
-FIELDS = st.sampled_from(["machine", "axis", "to", "points", "lease", "x"])
+FIELDS = st.sampled_from(["controller", "axis", "to", "points", "lease", "x"])
 
 
 @settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
@@ -415,7 +415,7 @@ def test_too_many_requests_are_refused_but_stops_are_done() -> None:
     outcomes = [tab.ask("time").get("error", {}).get("code", "ok") for _ in range(1100)]
     assert outcomes.count("ok") == int(sessions.BURST) - 1
     assert outcomes[-1] == "refusal"
-    assert tab.ok("stop", machine="table") == {"program": "stopped"}
+    assert tab.ok("stop", controller="table") == {"program": "stopped"}
     studio.run(1000)
     tab.ok("time")
 
@@ -430,7 +430,7 @@ def rest(session: ViewerSession, studio: Studio, name: str, **fields: object) ->
 def test_who_asks_over_rest_needs_no_hello_and_has_no_stream() -> None:
     studio = Studio()
     session = studio.rest()
-    assert rest(session, studio, "enable", machine="table", axis=1)["ok"] is None
+    assert rest(session, studio, "enable", controller="table", axis=1)["ok"] is None
     assert studio.hub.control.holder is None  # it acted while nobody held control, and holds none
     error = rest(session, studio, "watch", points=["time"])["error"]
     assert (error["code"], error["message"]) == ("refusal", "watch is about a connection: ask it over the WebSocket")
@@ -441,15 +441,15 @@ def test_control_taken_over_rest_passes_when_nothing_is_asked() -> None:
     studio = Studio()
     session, tab = studio.rest(), studio.open()
     rest(session, studio, "take_control")
-    assert tab.error("enable", machine="table", axis=1)[0] == "refusal"
+    assert tab.error("enable", controller="table", axis=1)[0] == "refusal"
     studio.run(59_000)
-    assert tab.error("enable", machine="table", axis=1)[0] == "refusal"
+    assert tab.error("enable", controller="table", axis=1)[0] == "refusal"
     studio.run(2_000)
-    tab.ok("enable", machine="table", axis=1)
+    tab.ok("enable", controller="table", axis=1)
 
 
 def test_a_role_holds_over_rest_too() -> None:
     studio = Studio()
-    assert rest(studio.rest(Role.VIEWER), studio, "enable", machine="table", axis=1)["error"]["code"] == "refusal"
+    assert rest(studio.rest(Role.VIEWER), studio, "enable", controller="table", axis=1)["error"]["code"] == "refusal"
     assert rest(studio.rest(Role.VIEWER), studio, "enable")["error"]["code"] == "misuse"
-    assert rest(studio.rest(Role.VIEWER), studio, "stop_all")["ok"]["machines"]
+    assert rest(studio.rest(Role.VIEWER), studio, "stop_all")["ok"]["controllers"]

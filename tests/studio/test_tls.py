@@ -115,7 +115,7 @@ def test_the_loopback_address_of_ipv6(start_studio: Start, require_peer: Callabl
     assert studio.url.startswith("http://[::1]:")
     code, text = curl(program, "-g", f"{studio.url}/api/points?names=time")
     assert (code, text[-4:]) == (0, "\n200")
-    body = ("-H", "content-type: application/json", "-d", '{"machine": "table", "axis": 1}')
+    body = ("-H", "content-type: application/json", "-d", '{"controller": "table", "axis": 1}')
     assert curl(program, "-g", *body, f"{studio.url}/api/do/enable")[1].endswith("\n200")
     assert curl(program, "-g", "-H", "host: evil.example", f"{studio.url}/api/describe")[1].endswith("\n403")
     with studio.connect(origin=studio.url) as opened:

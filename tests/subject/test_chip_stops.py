@@ -6,8 +6,8 @@ from textwrap import dedent
 
 import pytest
 
+from steptwin.controller import SECOND
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 from steptwin.simulation.faults import read as read_fault
 from steptwin.simulation.script.control import ControlProgram
 from steptwin.simulation.script.steps import SetFault

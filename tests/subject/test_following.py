@@ -10,8 +10,8 @@ from steptwin.subject.payloads import EdgePayload, FramePayload, NotePayload, Pl
 EDGE = EdgePayload("IN1", 1.0)
 
 
-def event(number: int, payload: object = EDGE, machine: str = "a") -> Event:
-    return Event(number, number, machine, payload)  # type: ignore[arg-type]
+def event(number: int, payload: object = EDGE, controller: str = "a") -> Event:
+    return Event(number, number, controller, payload)  # type: ignore[arg-type]
 
 
 def test_events_come_in_order_and_once() -> None:
@@ -46,7 +46,7 @@ def test_only_what_is_wanted_comes() -> None:
     followers = Followers()
     usual = followers.follow(filter_of(), 9)
     frames = followers.follow(filter_of(["frame"]), 9)
-    of_b = followers.follow(filter_of(machines=["b"]), 9)
+    of_b = followers.follow(filter_of(controllers=["b"]), 9)
     of_axis = followers.follow(filter_of(axes=["2"]), 9)
     one, two = PlanPayload("1", at_rest(0, 0)), PlanPayload("2", at_rest(0, 0))
     events = [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from steptwin import World
-from steptwin.machine import SECOND
+from steptwin.controller import SECOND
 from steptwin.simulation.script.steps import Note
 from steptwin.subject import commands as command
 from steptwin.subject.following import filter_of

@@ -18,11 +18,11 @@ from steptwin.subject.world import WorldSubject
 FEEDER = Path(__file__).parents[2] / "examples" / "worlds" / "feeder.toml"
 
 
-@pytest.mark.parametrize(("machine", "axis"), [("table", "M1."), ("drum", "")])
-def test_they_are_those_of_the_world(machine: str, axis: str) -> None:
+@pytest.mark.parametrize(("controller", "axis"), [("table", "M1."), ("drum", "")])
+def test_they_are_those_of_the_world(controller: str, axis: str) -> None:
     world = World.load(FEEDER)
     subject = WorldSubject(world)
-    part = next(part for part in subject.description.machines if part.name == machine)
+    part = next(part for part in subject.description.controllers if part.name == controller)
     what = filter_of(["plan", "coordinate"])
     motions = Motions(part, subject.plans(what))
     following = subject.follow(what, 10_000)
@@ -31,8 +31,8 @@ def test_they_are_those_of_the_world(machine: str, axis: str) -> None:
         world.run(for_=0.05)
         for event in following.take().events:
             motions.take(read_event(json.loads(json.dumps(event.plain()))))
-        assert motions.position("1", world.now) == pytest.approx(world.read(f"{machine}.{axis}position"), abs=1e-9)
-        assert motions.velocity("1", world.now) == pytest.approx(world.read(f"{machine}.{axis}velocity"), abs=1e-9)
+        assert motions.position("1", world.now) == pytest.approx(world.read(f"{controller}.{axis}position"), abs=1e-9)
+        assert motions.velocity("1", world.now) == pytest.approx(world.read(f"{controller}.{axis}velocity"), abs=1e-9)
         moved += motions.is_moving(world.now)
     assert moved > 5
 
@@ -43,7 +43,7 @@ def test_a_coordinate_begins_anew_as_that_of_the_controller() -> None:
     )
     subject = WorldSubject(world)
     what = filter_of(["plan", "coordinate"])
-    motions = Motions(subject.description.machines[0], subject.plans(what))
+    motions = Motions(subject.description.controllers[0], subject.plans(what))
     following = subject.follow(what, 100)
     subject.do(Enable("m", 1))
     subject.do(Write((("m", "M1_POS_ACT", 21_474_835.0),)))

@@ -41,7 +41,16 @@ def test_what_worlds_give_is_as_the_schema_says(path: Path) -> None:
 
 
 def test_a_member_too_many_is_noticed() -> None:
-    given = {"number": 1, "time_ns": "5", "machine": "a", "kind": "edge", "pin": "IN1", "level": 1.0, "cause": None, "text": "x"}
+    given = {
+        "number": 1,
+        "time_ns": "5",
+        "controller": "a",
+        "kind": "edge",
+        "pin": "IN1",
+        "level": 1.0,
+        "cause": None,
+        "text": "x",
+    }
     event = validator("(event)")
     assert event.is_valid(given)
     assert not event.is_valid({**given, "colour": "red"})

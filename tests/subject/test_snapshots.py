@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse
 from steptwin.files.session import session_of
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 from steptwin.simulation.script.steps import Note, Set
 from steptwin.subject.commands import (
     Advance,
@@ -60,7 +60,7 @@ def test_what_happened_since_is_undone_and_goes_on_alike() -> None:
 
 def test_followers_are_told_and_get_the_plans() -> None:
     subject = moving()
-    part = subject.description.machines[0]
+    part = subject.description.controllers[0]
     subject.do(TakeSnapshot("start"))
     subject.do(Advance(duration=100 * SECOND))
     following = subject.follow(filter_of(["restored", "plan"]), 100)

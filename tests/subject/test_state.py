@@ -55,7 +55,7 @@ def test_states_of_a_running_world_are_as_schema_and_data_sheet_say(path: Path) 
         subject = WorldSubject(world)
         for _ in range(20):
             world.run(for_=0.7)
-            for part in subject.description.machines:
+            for part in subject.description.controllers:
                 found, sheet = state(subject, part.name), part.datasheet
                 assert list(schema.iter_errors(found)) == []
                 assert json.loads(json.dumps(plain(read_state(found)))) == found

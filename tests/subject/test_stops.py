@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from world_rig import small
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.drivers.blocking import finish
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.registermap import DataType
 from steptwin.mic488.registers import register_map
 from steptwin.mic488.values import encoded, named
@@ -89,7 +89,7 @@ def test_a_hanging_load_is_held_and_the_program_goes_on_from_there(tmp_path: Pat
     subject = WorldSubject(world)
     world.run(until=1.0)
     before = world.read("z.position")
-    assert subject.do(command.StopAll()).value == {"machines": ["cell"], "scripts": []}
+    assert subject.do(command.StopAll()).value == {"controllers": ["cell"], "scripts": []}
     world.run(until=3.0)
     assert world.read("z.position") == pytest.approx(before, abs=5.0)
     assert moving(subject, "cell.M1.enabled", "z.lost", "z.stalled") == [1.0, 0.0, 0.0]
@@ -180,7 +180,7 @@ def test_scripts_end_and_held_buttons_are_released(tmp_path: Path) -> None:
     following = subject.follow(filter_of(["status", "input", "button"]), 99)
     subject.do(command.Enable("a", 2))
     world.run(until=1.2)
-    assert subject.do(command.StopAll()).value == {"machines": ["a"], "scripts": ["operator", "walk"]}
+    assert subject.do(command.StopAll()).value == {"controllers": ["a"], "scripts": ["operator", "walk"]}
     there = world.read("a.M2.position")
     assert there > 0.0
     world.run(until=5.0)
@@ -202,7 +202,7 @@ def test_a_raw_stop_is_an_input_of_each_controller_that_has_its_address() -> Non
     stop = encode_request(encoded(named(register_map("1.70"), "M1_STOP"), 1.0, DataType.REAL))
     for unit, stopped in ((1, ["a"]), (0, ["a", "b"]), (3, [])):
         subject.do(Request("bus", unit, stop, SECOND))
-        assert [event.machine for event in following.take().events if event.payload.text.startswith("stop")] == stopped
+        assert [event.controller for event in following.take().events if event.payload.text.startswith("stop")] == stopped
 
 
 def test_a_snapshot_before_a_stop_is_whole() -> None:

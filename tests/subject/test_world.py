@@ -11,12 +11,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from world_rig import small
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.datasheet import Limits
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.session import session_of
 from steptwin.files.world import World
 from steptwin.later import start
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.simulation.faults import read as read_fault
 from steptwin.simulation.faults.kinds import KINDS
 from steptwin.simulation.script import steps as do
@@ -95,13 +95,13 @@ def test_a_description_survives_json_and_names_points_that_can_be_read() -> None
     subject = of(feeder())
     description = subject.description
     assert read_description(json.loads(json.dumps(description.plain()))) == description
-    assert {part.name: part.controls for part in description.machines} == {
+    assert {part.name: part.controls for part in description.controllers} == {
         "table": ("enable", "move", "home", "jog", "stop", "program"),
         "drum": ("move", "jog", "stop", "program"),
     }
-    takes = {(one.command, part.name, one.axis): one.arguments for part in description.machines for one in part.takes}
+    takes = {(one.command, part.name, one.axis): one.arguments for part in description.controllers for one in part.takes}
     (velocity,) = takes["jog", "table", 2]
-    (axis,) = (axis for axis in description.machines[0].datasheet.axes if axis.number == 2)
+    (axis,) = (axis for axis in description.controllers[0].datasheet.axes if axis.number == 2)
     assert axis.pulses_per_unit is not None
     fastest = 64_000 / axis.pulses_per_unit
     assert (velocity.unit, velocity.limits) == (f"{axis.unit}/s", Limits(-fastest, fastest))
@@ -111,7 +111,7 @@ def test_a_description_survives_json_and_names_points_that_can_be_read() -> None
     assert takes["program", "table", None][0].values == ("start", "pause", "stop")
     assert (takes["stop", "table", None], takes["stop", "table", 4]) == ((), ())
     assert ("home", "drum", 1) not in takes
-    points = [point for part in (*description.machines, *description.axes) for point in part.points]
+    points = [point for part in (*description.controllers, *description.axes) for point in part.points]
     assert len(points) > 150
     found = {reading.point: reading for reading in subject.read(*(point for point in points if "USER_REGISTER" not in point))}
     for reading in found.values():
@@ -151,7 +151,7 @@ def test_every_kind_of_fault_says_what_it_takes() -> None:
 
 def test_what_is_not_there_is_misuse_and_changes_nothing() -> None:
     subject = of(small())
-    with pytest.raises(Misuse, match="no machine is called 'd'"):
+    with pytest.raises(Misuse, match="no controller is called 'd'"):
         subject.do(do.Set((("a", "IN1", 1.0), ("d", "IN1", 1.0))))
     assert subject.read("a.IN1")[0].value == 0.0
     with pytest.raises(Misuse, match="M9"):

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from world_rig import small
 
+from steptwin.controller import SECOND
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 from steptwin.motion.divisions import profile_of
 from steptwin.motion.plain import read_plan
 from steptwin.simulation.script import steps as do
@@ -111,27 +111,27 @@ def test_the_plans_of_a_run_give_every_position_the_controller_shows() -> None:
     """Who watches computes positions itself, from the plain numbers and nothing else."""
     world = feeder()
     subject = of(world)
-    plans = {(e.machine, e.axis): e for e in subject.plans(filter_of())}
+    plans = {(e.controller, e.axis): e for e in subject.plans(filter_of())}
     following = subject.follow(filter_of(["plan", "coordinate"]), 10_000)
-    axes = [(m.name, a) for m in subject.description.machines for a in m.datasheet.axes]
+    axes = [(m.name, a) for m in subject.description.controllers for a in m.datasheet.axes]
     scales = {(name, str(a.number)): a.pulses_per_unit for name, a in axes if a.pulses_per_unit is not None}
     origins: dict[tuple[str, str | None], int] = {}
     for _ in range(200):
         world.run(for_=0.05)
         for event in following.take().events:
             plain = json.loads(json.dumps(event.plain()))
-            key = event.machine, event.axis
+            key = event.controller, event.axis
             origins[key] = plain["origin"]
             if event.kind == "plan":
                 plans[key] = event
-        for (machine, axis), event in plans.items():
-            if machine != "table":
+        for (controller, axis), event in plans.items():
+            if controller != "table":
                 continue
             assert isinstance(event.payload, PlanPayload)
             plan = profile_of(read_plan(json.loads(json.dumps(event.plain()))["plan"]))
-            origin = origins.get((machine, axis), event.payload.origin or 0)
-            shown = (plan.count(world.now) + origin) / scales[machine, str(axis)]
-            assert shown == pytest.approx(world.read(f"{machine}.M{axis}.position"), abs=1e-9)
+            origin = origins.get((controller, axis), event.payload.origin or 0)
+            shown = (plan.count(world.now) + origin) / scales[controller, str(axis)]
+            assert shown == pytest.approx(world.read(f"{controller}.M{axis}.position"), abs=1e-9)
     assert len({event.number for event in plans.values()}) > 1
 
 

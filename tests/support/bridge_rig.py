@@ -12,6 +12,7 @@ from typing import Any
 from chip_rig import ChipWire, chip_task_line
 from mic488_rig import MM, controller, loaded
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.devices.composite import CompositeSubject
 from steptwin.devices.device import ConnectedDevice, DeviceSurroundings
 from steptwin.drivers.m1486 import AsyncM1486
@@ -24,7 +25,6 @@ from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart
 from steptwin.drivers.tasks import TaskLine
 from steptwin.live.bridge import _Devices, connections_of
 from steptwin.live.realtimedriver import RealTimeDriver
-from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program import ProgramState
 from steptwin.simulation.scheduler.scheduler import Scheduler

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from steptwin.machine import MICROSECOND, MILLISECOND, SECOND
+from steptwin.controller import MICROSECOND, MILLISECOND, SECOND
 
 UNIT = 1
 GAP = 20 * MILLISECOND

@@ -10,11 +10,11 @@ from typing import Any
 from chip_rig import ChipWire, chip_line, chip_task_line
 from line_rig import run_virtual
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.m1486 import AsyncM1486
 from steptwin.errors import SteptwinError
 from steptwin.files.world import World
-from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.script.control import Seek
 from steptwin.simulation.world.inputs import Download
 from steptwin.simulation.world.motions import ordered

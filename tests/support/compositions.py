@@ -16,10 +16,10 @@ from unittest.mock import patch
 from random_worlds import shown
 
 from steptwin.campaign.properties import read_property
+from steptwin.controller import SECOND, Nanos
 from steptwin.debug.debugger import Debugger
 from steptwin.debug.lookahead import Goal
 from steptwin.files.world import World
-from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.kinds.mic488.build import _loaded
 from steptwin.simulation.mechanics.course import Course
 from steptwin.simulation.scheduler.scheduler import Scheduler
@@ -404,8 +404,8 @@ def general_way() -> Generator[Callable[[World], World]]:
             scheduler.is_attentive = True
             mark = partial(Scheduler.mark, scheduler)
             scheduler.mark = lambda name=None, mark=mark: mark()  # type: ignore[method-assign]
-            for machine in scheduler.machines.values():
-                machine.changed = mark
+            for controller in scheduler.controllers.values():
+                controller.changed = mark
         for programs in world.programs.values():
             programs.execute_all(True, world.now)
         return world

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from textwrap import dedent
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.files.world import World
 from steptwin.later import start
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.motion.divisions import profile_of
 from steptwin.subject.commands import Enable, Jog
 from steptwin.subject.following import filter_of

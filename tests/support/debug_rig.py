@@ -11,10 +11,10 @@ from pathlib import Path
 
 from tests.conftest import until
 
+from steptwin.controller import MILLISECOND
 from steptwin.debug.debugger import Debugger
 from steptwin.debug.values import Stopped, StopReason
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND
 
 ENTRY = MILLISECOND - 1
 """When programs stop at their entry."""

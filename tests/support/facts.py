@@ -6,10 +6,10 @@ from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
+from steptwin.controller import ControllerEvent
 from steptwin.datasheet import EventDescription, FactType
 from steptwin.m1486 import events as m1486_events
 from steptwin.m1486.chip import M1486Chip
-from steptwin.machine import MachineEvent
 from steptwin.mic488 import events as mic488_events
 from steptwin.mic488.core import ControllerCore
 
@@ -23,7 +23,7 @@ TYPES: Mapping[FactType, tuple[type, ...]] = {
 }
 
 
-def check_facts(event: MachineEvent, events: Mapping[str, EventDescription]) -> None:
+def check_facts(event: ControllerEvent, events: Mapping[str, EventDescription]) -> None:
     known = {fact.name: fact for fact in events[event.code].facts}
     given = dict(event.facts)
     assert len(given) == len(event.facts), event

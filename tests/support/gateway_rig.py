@@ -50,7 +50,7 @@ class GatewayWorld:
 
     async def do(self, wanted: command.Command, /) -> Result:
         self.done.append(wanted)
-        if isinstance(wanted, command.ReadState) and wanted.machine in self.silent:
+        if isinstance(wanted, command.ReadState) and wanted.controller in self.silent:
             raise self.silence
         return self.inner.do(wanted)
 

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from mic488_rig import RUNNING, Rig, coil_pdu, controller, programmed, word_pdu
 
-from steptwin.machine import SECOND, PinEdge
+from steptwin.controller import SECOND, PinEdge
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.core import Mic488Event
 from steptwin.mic488.encoder import Coupling

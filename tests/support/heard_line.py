@@ -7,7 +7,7 @@ from typing import Any
 
 from line_rig import VirtualWire
 
-from steptwin.machine import MILLISECOND
+from steptwin.controller import MILLISECOND
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
 

@@ -11,13 +11,13 @@ from typing import Any, Literal
 
 from line_rig import LATENCY, MemoryChannel, MemoryEndpoint, MemoryTransport, VirtualWire, run_virtual
 
+from steptwin.controller import MILLISECOND
 from steptwin.drivers import AsyncMic488, Mic488
 from steptwin.drivers.exchange import Exchanger
 from steptwin.drivers.mic488.frames import FrameWords
 from steptwin.drivers.modbus import ModbusQuery, RtuMaster, TcpMaster
 from steptwin.drivers.tasks import TaskLine
 from steptwin.drivers.threads import ThreadLine
-from steptwin.machine import MILLISECOND
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.wire.slave import RtuSlavePort, TcpSlavePort

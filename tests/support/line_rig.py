@@ -15,13 +15,13 @@ from typing import Any, TypeVar
 import pytest
 from virtual_loop import VirtualLoop
 
+from steptwin.controller import MICROSECOND, SECOND
 from steptwin.drivers.exchange import LineLost
 from steptwin.drivers.m1486 import lines as m1486_lines
 from steptwin.drivers.mic488 import lines as mic488_lines
 from steptwin.drivers.place import LineAddress
 from steptwin.drivers.threads import ThreadLine
 from steptwin.errors import SteptwinError
-from steptwin.machine import MICROSECOND, SECOND
 
 T = TypeVar("T")
 LATENCY = 500 * MICROSECOND

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from steptwin.controller import MILLISECOND, SECOND, PinEdge
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.events import M1486Event
 from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.variants import variant
-from steptwin.machine import MILLISECOND, SECOND, PinEdge
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.pulses import step_times
 

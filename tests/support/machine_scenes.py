@@ -153,7 +153,7 @@ value = ⟨0..10⟩
 { expect = "two.volts < ⟨1..8⟩ and c.AIN1 - 1 > d.AIN2 * 0.5" }
 """,
     ),
-    "machines": Scene(
+    "controllers": Scene(
         f"""
 {controller("c", M1=IN_MM, M2=HOMED)}
 {controller("e")}

@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from steptwin.machine import SECOND, PinEdge
+from steptwin.controller import SECOND, PinEdge
 from steptwin.mic488.config import AxisConfig, ControllerConfig, read_config
 from steptwin.mic488.core import Mic488Event
 from steptwin.mic488.device import Mic488Device

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 from math import pi
 
-from steptwin.machine import SECOND
+from steptwin.controller import SECOND
 from steptwin.motion import MotionState, Profile, plan_position
 from steptwin.simulation.mechanics.course import Build, Course, MechanicalState
 from steptwin.simulation.mechanics.motor import StepperMotor

@@ -10,6 +10,7 @@ from gateway_rig import GatewayWorld
 from virtual_loop import run_virtually
 
 from steptwin.access.roles import Role
+from steptwin.controller import MILLISECOND
 from steptwin.errors import SteptwinError
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.epics.controller import EpicsController
@@ -17,7 +18,6 @@ from steptwin.gateways.epics.motorrecord import MotorRecord
 from steptwin.gateways.epics.records import FieldValue, Putter
 from steptwin.gateways.leases import JogLeases
 from steptwin.gateways.sampling import Sampler
-from steptwin.machine import MILLISECOND
 from steptwin.subject.commands import Advance
 
 ME = Putter("me", "here", ("127.0.0.1", 1))
@@ -57,7 +57,7 @@ LONGEST_S = 60.0
 
 def first_record(subject: GatewaySubject, leases: JogLeases, role: Role) -> tuple[EpicsController, MotorRecord]:
     """Of the first axis of the first controller."""
-    part = subject.description.machines[0]
+    part = subject.description.controllers[0]
     controller = EpicsController(part.name, subject, Sampler(subject.samples, {}), leases, role)
     record = MotorRecord("ST:x", part, part.datasheet.axes[0], controller)
     controller.records.append(record)

@@ -168,7 +168,7 @@ class Reader:
             assert f"{promised}\n" in printed, f"the program printed\n{printed}without\n{promised}"
 
     def _world(self, text: str) -> None:
-        """A description, or a part of one that is added to an example; ``machine.toml`` from then on."""
+        """A description, or a part of one that is added to an example; ``controller.toml`` from then on."""
         if "[[mic488]]" not in text:
             text = (self._cwd / "examples/worlds/feeder.toml").read_text() + text
         (self._cwd / "machine.toml").write_text(text)

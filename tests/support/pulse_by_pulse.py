@@ -3,7 +3,7 @@ closed form."""
 
 from __future__ import annotations
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.motion.divisions import Plan
 from steptwin.simulation.mechanics.course import Build, MechanicalState
 

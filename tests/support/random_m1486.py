@@ -7,6 +7,7 @@ from itertools import islice
 
 from chance import Chance
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse
 from steptwin.m1486.characterlog import CharacterLog, LineSplitter, changes_nothing
 from steptwin.m1486.chip import M1486Chip
@@ -18,7 +19,6 @@ from steptwin.m1486.present import state_of
 from steptwin.m1486.signals import strobes
 from steptwin.m1486.syntax import parse
 from steptwin.m1486.variants import Variant, variant
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.motion.divisions import StepTrain
 
 STEPS = 60

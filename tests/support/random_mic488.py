@@ -14,8 +14,8 @@ from chance import Chance
 from mic488_rig import EN, IN, JOG, OFFSETS, OUT, STOP, USER_REG_READ, VALUES, WORDS, coil_pdu, read_pdu, word_pdu, words_pdu
 from random_programs import program, rows, sound
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import AnalogConfig, AxisConfig, ControllerConfig, InputConfig, ProgramConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.encoder import Coupling

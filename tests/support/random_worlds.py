@@ -18,11 +18,11 @@ from machine_scenes import MACHINE_SCENES
 from plant_scenes import PLANT_SCENES
 from scenes import Scene
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.diagnostics import Severity
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.session import session_of
 from steptwin.files.world import World
-from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.describe.pieces import given_files
 from steptwin.simulation.describe.steptable import read_steps
 from steptwin.simulation.faults import read as read_fault
@@ -124,7 +124,7 @@ def check_past(history: History, moment: int) -> None:
         for _ in past.go(until):
             pass
     history.close()
-    assert seen_of_machines(past.world) == seen_of_machines(history.world)
+    assert seen_of_controllers(past.world) == seen_of_controllers(history.world)
 
 
 def go_on(world: World, steps: list[tuple[int, str]], end: int, files: Mapping[str, bytes]) -> None:
@@ -148,12 +148,12 @@ def do_from_outside(world: World, text: str, files: Mapping[str, bytes]) -> None
         return
     with suppress(Misuse, Refusal):
         match text[2:].split():
-            case ["see", machine, *numbers]:
-                world.apply_input(See(machine, *map(float, numbers)))
-            case ["variable", machine, variable, value]:
-                world.apply_input(SetVariable(machine, variable, float(value)))
-            case ["download", machine, place, file]:
-                world.apply_input(Download(machine, place.replace("_", " "), files[file].decode()))
+            case ["see", controller, *numbers]:
+                world.apply_input(See(controller, *map(float, numbers)))
+            case ["variable", controller, variable, value]:
+                world.apply_input(SetVariable(controller, variable, float(value)))
+            case ["download", controller, place, file]:
+                world.apply_input(Download(controller, place.replace("_", " "), files[file].decode()))
             case [line, "tcp", data]:
                 request = bytes.fromhex(data)
                 world.apply_input(Bytes(line, "host", "tcp", bytes((0, 1, 0, 0, 0, len(request))) + request))
@@ -165,10 +165,10 @@ def do_from_outside(world: World, text: str, files: Mapping[str, bytes]) -> None
 
 def shown(world: Simulation) -> list[str]:
     """What a viewer sees of it, and what scripts wait for."""
-    return [f"stopped: {world.stopped}", *seen_of_machines(world), *(repr(one) for one in waiting(world))]
+    return [f"stopped: {world.stopped}", *seen_of_controllers(world), *(repr(one) for one in waiting(world))]
 
 
-def seen_of_machines(world: Simulation) -> list[str]:
+def seen_of_controllers(world: Simulation) -> list[str]:
     """Signals of elements, controllers and axes."""
     found = [f"{world.now}"]
     for name in world.parts.element_names:
@@ -177,9 +177,9 @@ def seen_of_machines(world: Simulation) -> list[str]:
     for name, fitted in world.axes.items():
         axis = MechanicsView(world, fitted)
         found.append(f"{name} {axis.position:.9g} {axis.rotor:.9g} {axis.lost} {axis.stalled}")
-    for name in world.machines:
+    for name in world.controllers:
         world.touch(name)
-        found.append(repr(world.kind(name).state(world.machines[name], world.now)))
+        found.append(repr(world.kind(name).state(world.controllers[name], world.now)))
     for programs in world.programs.values():
         found.append(repr((programs.stack(world.now), dict(programs.variables(world.now)), programs.depth())))
     found.append(repr(WorldPrograms(world).list()))

@@ -14,11 +14,11 @@ from steptwin.access.audit import Audit
 from steptwin.access.control import Viewer
 from steptwin.access.roles import Role
 from steptwin.access.tokens import AccessGate, Token
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.devices.composite import CompositeSubject
 from steptwin.devices.worldpart import WorldPart
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.simulation.world.worldprograms import WorldPrograms, configuration_text
 from steptwin.studio.hub import Hub
 from steptwin.studio.looking import KeptPast
@@ -105,20 +105,20 @@ class NoConnections:
     async def connect(self, address: str, name: str | None) -> str:
         raise Refusal(f"no device is at {address}")
 
-    async def disconnect(self, machine: str) -> None:
-        raise Misuse(f"no device is called {machine!r}; there is none")
+    async def disconnect(self, controller: str) -> None:
+        raise Misuse(f"no device is called {controller!r}; there is none")
 
-    async def settings(self, machine: str) -> str:
-        raise Misuse(f"no device is called {machine!r}; there is none")
+    async def settings(self, controller: str) -> str:
+        raise Misuse(f"no device is called {controller!r}; there is none")
 
-    async def configuration(self, machine: str) -> None:
-        raise Misuse(f"no device is called {machine!r}; there is none")
+    async def configuration(self, controller: str) -> None:
+        raise Misuse(f"no device is called {controller!r}; there is none")
 
-    async def shadow(self, machine: str, *, on: bool) -> None:
-        raise Misuse(f"no device is called {machine!r}; there is none")
+    async def shadow(self, controller: str, *, on: bool) -> None:
+        raise Misuse(f"no device is called {controller!r}; there is none")
 
-    def shadow_of(self, machine: str, after: Nanos) -> None:
-        raise Misuse(f"no device is called {machine!r}; there is none")
+    def shadow_of(self, controller: str, after: Nanos) -> None:
+        raise Misuse(f"no device is called {controller!r}; there is none")
 
 
 class Studio:

@@ -10,9 +10,9 @@ from typing import Any, TypeVar
 
 from line_rig import MemoryChannel, MemoryEndpoint, MemoryTransport, VirtualWire, run_virtual
 
+from steptwin.controller import SECOND
 from steptwin.drivers.tasks import TaskLine
 from steptwin.drivers.threads import ThreadLine
-from steptwin.machine import SECOND
 
 T = TypeVar("T")
 AWAY_S = 1000.0

@@ -27,9 +27,9 @@ from typing import Any
 
 from line_rig import VirtualWire
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.drivers.blocking import finish
 from steptwin.errors import SteptwinError
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.simulation.script import steps as script
 from steptwin.subject import commands
 from steptwin.subject.following import filter_of

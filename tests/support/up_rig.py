@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
+from steptwin.controller import Nanos
 from steptwin.devices.composite import CompositeSubject
 from steptwin.devices.worldpart import WorldPart
 from steptwin.files.world import World
@@ -13,7 +14,6 @@ from steptwin.live.pace import Pace
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_control import WorldControl
-from steptwin.machine import Nanos
 from steptwin.motion.profile import Profile
 from steptwin.simulation.world.inputs import Download
 from steptwin.subject.following import filter_of

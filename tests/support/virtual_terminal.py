@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 from line_rig import VirtualWire
 
+from steptwin.controller import SECOND
 from steptwin.drivers.m1486 import conversation, terminal
 from steptwin.drivers.m1486.terminal import ChipTerminal
 from steptwin.drivers.tcp import Channel
 from steptwin.m1486.variants import Variant
-from steptwin.machine import SECOND
 
 
 class Turns:

@@ -9,11 +9,11 @@ from typing import NamedTuple
 
 from mic488_rig import EN, OFFSETS, OUT, STOP, VALUES, coil_pdu, real_words, words_pdu
 
+from steptwin.controller import Nanos
 from steptwin.files.export import AxisLane, axis_views
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
-from steptwin.machine import Nanos
 from steptwin.simulation.describe.small import LINE, Whole
 from steptwin.simulation.describe.small_m1486 import m1486_world
 from steptwin.simulation.describe.small_mic488 import mic488_world
@@ -114,7 +114,7 @@ def mic488_run() -> Run:
     """
     text = mic488_world(Whole(name="m", line={"tcp": "127.0.0.1:0"}), [None], {}, demo=True)
     world = World.from_toml(text.replace('"mic488', '"m').replace("above = 250.0", "above = 60.0"))
-    machine, line = world.mic488["m"], world.line[LINE]
+    controller, line = world.mic488["m"], world.line[LINE]
 
     def ask(pdu: bytes) -> None:
         world.apply_input(Bytes(LINE, "tcp-1", "tcp", b"\0\1\0\0" + (len(pdu) + 1).to_bytes(2, "big") + b"\1" + pdu))
@@ -137,13 +137,13 @@ def mic488_run() -> Run:
             put("VEL_ABS", 24.0, 3)
             put("VEL_ABS", -15.0, 4)
         for sample in range(14):
-            machine.set_pin("AIN1", round(5.0 + 4.5 * (sample % 7 - 3) / 3, 3))
+            controller.set_pin("AIN1", round(5.0 + 4.5 * (sample % 7 - 3) / 3, 3))
             world.run(for_=0.25)
         ask(coil_pdu(OUT + turn, False))
     ask(coil_pdu(STOP + 3, True))
-    machine.set_pin("IN20", 1.0)
+    controller.set_pin("IN20", 1.0)
     world.run(for_=0.4)
-    machine.set_pin("IN20", 0.0)
+    controller.set_pin("IN20", 0.0)
     world.run(for_=1.0)
     return _run_of(world)
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import LineFailure
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.commands import LETTERS
 from steptwin.m1486.line import SerialChain
 from steptwin.m1486.variants import VARIANTS, variant
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.registers import AXES, register_map
@@ -37,8 +37,8 @@ M1_ON = bytes.fromhex("05 07d0 ff00")
 class Line:
     """A port of machines in virtual time, for what checks send."""
 
-    def __init__(self, machine: Any, port: Any) -> None:
-        self.machine = machine
+    def __init__(self, controller: Any, port: Any) -> None:
+        self.controller = controller
         self.port = port
         self.now = SECOND
         self.sent: list[bytes] = []
@@ -68,7 +68,7 @@ class Line:
 
     def _advance(self, milliseconds: int) -> None:
         self.now += milliseconds * MILLISECOND
-        self.machine.advance(self.now)
+        self.controller.advance(self.now)
 
 
 def mic(firmware: str, *, tcp: bool = False, lenient: bool = False) -> Line:
@@ -111,7 +111,7 @@ def test_a_twin_confirms_every_check(firmware: str, tcp: bool) -> None:
     assert ids(results, CheckOutcome.REFUTED) == set()
     other_line = {"MIC-2", "MIC-15"} if tcp else {"MIC-23"}
     assert ids(results, CheckOutcome.NOT_CHECKED) == {*other_line, "MIC-10"}  # M1 is off
-    line.machine.execute(M1_ON, line.now)
+    line.controller.execute(M1_ON, line.now)
     results = verified(line, firmware, tcp=tcp)
     assert ids(results, CheckOutcome.REFUTED) == set()
     assert ids(results, CheckOutcome.NOT_CHECKED) == {*other_line, "MIC-8"}
@@ -121,9 +121,9 @@ def test_a_twin_confirms_every_check(firmware: str, tcp: bool) -> None:
 @pytest.mark.parametrize("firmware", ["1.23", "1.70"])
 def test_without_permission_nothing_is_changed(firmware: str) -> None:
     line = mic(firmware)
-    before = state_of(line.machine)
+    before = state_of(line.controller)
     results = verified(line, firmware, permitted=frozenset({CheckNeed.READ}))
-    assert state_of(line.machine) == before
+    assert state_of(line.controller) == before
     not_permitted = {check.id for check in OF_MIC488 if check.need is not CheckNeed.READ}
     assert ids(results, CheckOutcome.NOT_CHECKED) == not_permitted | {"MIC-23"}
     assert "--write" in results["MIC-4"].why
@@ -132,9 +132,9 @@ def test_without_permission_nothing_is_changed(firmware: str) -> None:
 
 def test_what_was_written_is_put_back() -> None:
     line = mic("1.70")
-    before = state_of(line.machine)
+    before = state_of(line.controller)
     verified(line, "1.70", permitted=frozenset({CheckNeed.READ, CheckNeed.WRITE}))
-    assert state_of(line.machine) == before
+    assert state_of(line.controller) == before
 
 
 @pytest.mark.parametrize(("gear", "acc", "vel"), [(100.0, 50.0, 40.0), (0.37, 10_000.0, 3.0), (12_800.0, 0.5, 0.01)])
@@ -213,7 +213,7 @@ def test_a_refused_half_that_changes_the_value_is_put_back_without_permission() 
 
 def test_a_lost_answer_does_not_leave_a_value_changed() -> None:
     line = mic("1.70")
-    before = state_of(line.machine)
+    before = state_of(line.controller)
     exchange, to_send = line.port.exchange, line.port.to_send
     lost: list[bytes] = []
 
@@ -227,7 +227,7 @@ def test_a_lost_answer_does_not_leave_a_value_changed() -> None:
     line.port = type("Lossy", (), {"exchange": lambda _, d, n: exchanged(d, n), "to_send": lambda _, n: to_send(n)})()
     assert ids(verified(line, "1.70"), CheckOutcome.REFUTED) == set()
     assert lost
-    assert state_of(line.machine) == before
+    assert state_of(line.controller) == before
 
 
 def test_a_silent_unit_is_a_failure() -> None:
@@ -254,7 +254,7 @@ def test_a_second_interrupt_names_what_is_not_put_back() -> None:
 
         def write(self, data: bytes) -> None:
             self.came = line.port.exchange(data, line.now)
-            if line.machine.data_type:
+            if line.controller.data_type:
                 raise KeyboardInterrupt
 
         def read(self, timeout_s: float) -> bytes:

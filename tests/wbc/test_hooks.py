@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 from mic488_rig import Rig, loaded, programmed
 
-from steptwin.machine import MICROSECOND, MILLISECOND
+from steptwin.controller import MICROSECOND, MILLISECOND
 
 Told = list[tuple[int, int]]
 

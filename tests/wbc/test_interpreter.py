@@ -8,8 +8,8 @@ from math import cos, radians, sin, sqrt
 import pytest
 from mic488_rig import RUNNING, STOPPED, programmed, run
 
+from steptwin.controller import MICROSECOND, MILLISECOND, SECOND
 from steptwin.errors import Misuse
-from steptwin.machine import MICROSECOND, MILLISECOND, SECOND
 from steptwin.wbc.registers import REAL_MAX
 
 

@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.config import AxisConfig, ControllerConfig, InputConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program_banks import LoadedProgram, load

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from mic488_rig import RUNNING, Rig, programmed
 
-from steptwin.machine import MILLISECOND
+from steptwin.controller import MILLISECOND
 from steptwin.mic488.config import ControllerConfig, InputConfig
 
 FILTER = 0.010

@@ -8,7 +8,7 @@ from __future__ import annotations
 import pytest
 from mic488_rig import Rig, programmed
 
-from steptwin.machine import MILLISECOND, SECOND
+from steptwin.controller import MILLISECOND, SECOND
 
 FROM_THE_SECOND_ROUND = "L:\nn = n + 1\nWHILE n = 2\nENDWHILE\nJUMP L\n"
 """The loop begins behind the place to which the program has jumped back before."""

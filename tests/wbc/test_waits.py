@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from mic488_rig import PAUSED, RUNNING, STOPPED, programmed, run
 
-from steptwin.machine import MILLISECOND, SECOND
+from steptwin.controller import MILLISECOND, SECOND
 
 # ---------------------------------------------------------------------- waits
 

@@ -6,8 +6,8 @@ import pytest
 from why_worlds import PROGRAM as WAITS_PROGRAM
 from why_worlds import WAITS
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.simulation.faults import read
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.history import History

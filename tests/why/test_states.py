@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 import pytest
 from why_worlds import PROGRAM, WAITS
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput

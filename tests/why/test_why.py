@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from why_worlds import CHIP, CHIP_PROGRAM, LINE, PROGRAM, WAITS
 
+from steptwin.controller import MILLISECOND
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND
 from steptwin.simulation.kinds.mic488.writes import encode_write
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.history import History

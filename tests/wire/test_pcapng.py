@@ -6,8 +6,8 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.files.export import write_trace
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 from steptwin.wire.pcapng import is_modbus_tcp
 

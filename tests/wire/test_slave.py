@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from steptwin.controller import Port
 from steptwin.errors import Misuse
-from steptwin.machine import Port
 from steptwin.wire import mbap, rtu
 from steptwin.wire.crc import is_intact, with_crc
 from steptwin.wire.line import SerialLine

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from steptwin.controller import MILLISECOND
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND
 from steptwin.wire import rtu
 from steptwin.wire.crc import with_crc
 from steptwin.wire.line import SerialLine

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from register_bank import RegisterBank
 
-from steptwin.machine import MICROSECOND
+from steptwin.controller import MICROSECOND
 from steptwin.wire import rtu
 from steptwin.wire.gateway import ModbusGateway, ScriptPort, TcpGatewayPort
 from steptwin.wire.line import SerialLine

@@ -5,7 +5,7 @@ import { readGroups, type Group, type Value } from "./groups";
 
 type Row = { group: Group } | { group: Group; value: Value };
 
-const keyOf = (group: Group, value: Value): string => `${group.machine}/${value.name}`;
+const keyOf = (group: Group, value: Value): string => `${group.controller}/${value.name}`;
 
 export class AxesAndPins implements vscode.TreeDataProvider<Row>, vscode.DebugAdapterTrackerFactory {
   private readonly changed = new vscode.EventEmitter<void>();
@@ -55,15 +55,15 @@ export class AxesAndPins implements vscode.TreeDataProvider<Row>, vscode.DebugAd
     const { group } = row;
     if (!("value" in row)) {
       const item = new vscode.TreeItem(group.name, vscode.TreeItemCollapsibleState.Expanded);
-      item.id = `${group.machine}/${group.name}`;
-      item.description = group.machine;
+      item.id = `${group.controller}/${group.name}`;
+      item.description = group.controller;
       return item;
     }
     const { value } = row;
     const item = new vscode.TreeItem(value.name);
     const before = this.before.get(keyOf(group, value));
     const hasChanged = before !== undefined && before !== value.text;
-    item.id = `${group.machine}/${group.name}/${value.name}`;
+    item.id = `${group.controller}/${group.name}/${value.name}`;
     item.description = value.text;
     item.tooltip = hasChanged ? `${value.text} (before: ${before})` : value.text;
     item.iconPath = new vscode.ThemeIcon(hasChanged ? "circle-filled" : "circle-outline");
@@ -75,7 +75,7 @@ export class AxesAndPins implements vscode.TreeDataProvider<Row>, vscode.DebugAd
     const session = this.session;
     if (session === undefined || !("value" in row)) return;
     const { name, text, reference } = row.value;
-    const wanted = await vscode.window.showInputBox({ title: `${name} of ${row.group.machine}`, value: text });
+    const wanted = await vscode.window.showInputBox({ title: `${name} of ${row.group.controller}`, value: text });
     if (wanted === undefined) return;
     try {
       await session.customRequest("setVariable", { variablesReference: reference, name, value: wanted });

@@ -14,7 +14,7 @@ export interface Value {
 }
 
 export interface Group {
-  readonly machine: string;
+  readonly controller: string;
   readonly name: string;
   readonly values: readonly Value[];
 }
@@ -39,7 +39,7 @@ async function readThread(request: Request, thread: DebugProtocol.Thread): Promi
   return Promise.all(shown.map((scope) => readScope(request, thread.name, scope)));
 }
 
-async function readScope(request: Request, machine: string, scope: DebugProtocol.Scope): Promise<Group> {
+async function readScope(request: Request, controller: string, scope: DebugProtocol.Scope): Promise<Group> {
   const reference = scope.variablesReference;
   const { variables } = (await request("variables", {
     variablesReference: reference,
@@ -50,5 +50,5 @@ async function readScope(request: Request, machine: string, scope: DebugProtocol
     settable: !one.presentationHint?.attributes?.includes("readOnly"),
     reference,
   }));
-  return { machine, name: scope.name, values };
+  return { controller, name: scope.name, values };
 }

@@ -70,7 +70,7 @@ test("the groups of the view of axes and pins", async () => {
   const stopped = client.assertStoppedLocation("breakpoint", { path: program, line: 9 });
   await Promise.all([client.hitBreakpoint({ world: join(FOLDER, "two.toml") }, { path: program, line: 9 }), stopped]);
   const groups = await readGroups(request);
-  const names = groups.map(({ machine, name }) => `${machine} ${name}`);
+  const names = groups.map(({ controller, name }) => `${controller} ${name}`);
   assert.deepEqual(names, ["m Axes", "m Pins", "c Axes", "c Pins"]);
   const value = (name) => groups[1].values.find((one) => one.name === name);
   assert.equal(value("OUT1").text, "1");

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from steptwin.access.roles import Role
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 
 MOST_ENTRIES = 10_000
 LONGEST_FIELDS = 1000

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable
 
 from steptwin.access.rate import RateLimits
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 
 AT_ONCE = 5
 EACH_S = 60.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from steptwin.machine import SECOND, Nanos
+from steptwin.controller import SECOND, Nanos
 
 
 class RateLimit:

@@ -26,13 +26,13 @@ from steptwin.campaign.search.exhaustive import ExhaustiveCases, without_faults
 from steptwin.campaign.search.guided import WAVE, GuidedSearch, distance
 from steptwin.campaign.summary import CampaignSummary
 from steptwin.campaign.workers import Workers, workers
+from steptwin.controller import SECOND
 from steptwin.coverage.counts import Coverage
 from steptwin.durations import duration
 from steptwin.errors import Misuse
 from steptwin.extras import libraries_of, missing
 from steptwin.files.textfiles import write_bytes
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 
 if TYPE_CHECKING:
     from collections.abc import Generator

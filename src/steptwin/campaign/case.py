@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from hashlib import blake2b
 from typing import Any, TypeAlias
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 
 VariedValue: TypeAlias = float | int | str | bool
 PickledCase: TypeAlias = "tuple[type, tuple[object, ...]]"

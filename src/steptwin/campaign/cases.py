@@ -13,9 +13,9 @@ from steptwin.campaign.case import Case, FaultAt, StepAt, VariedValue
 from steptwin.campaign.description import SALTELLI, SEARCHES, CampaignDescription, step_text
 from steptwin.campaign.designs import Design, design_of, saltelli_block
 from steptwin.campaign.variation import Choice
+from steptwin.controller import Nanos
 from steptwin.durations import duration
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.simulation.scheduler.chance import Chance
 
 _NAME = re.compile(r"\{([A-Za-z_][\w-]*)\}")

@@ -12,10 +12,10 @@ from steptwin.campaign.description import SALTELLI, Measure, NamedProperty, Vari
 from steptwin.campaign.properties import read_property
 from steptwin.campaign.runner import read_step
 from steptwin.campaign.variation import Between, Choice, Normal, Varied, VariedValue
+from steptwin.controller import SECOND
 from steptwin.durations import LONGEST_NS, duration
 from steptwin.errors import Misuse
 from steptwin.files.world import World, read_beside
-from steptwin.machine import SECOND
 from steptwin.simulation.describe.description import describe
 from steptwin.simulation.describe.overrides import override, place_of
 from steptwin.simulation.describe.pieces import FILE_KEYS, USE, given_files

@@ -11,9 +11,9 @@ from typing import Any
 from steptwin import __version__
 from steptwin.campaign.case import digest_of
 from steptwin.campaign.variation import MOST_LEVELS, Varied
+from steptwin.controller import SECOND, Nanos
 from steptwin.durations import duration
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.describe.blueprint import FileContents
 from steptwin.simulation.describe.spec import SEED
 from steptwin.simulation.logic.expression import parse_condition

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from steptwin.campaign.case import EXPECTATIONS, WAITS, CaseResult, Verdict
 from steptwin.campaign.description import MatrixRules
+from steptwin.controller import SECOND, Nanos
 from steptwin.files.world import World
-from steptwin.machine import SECOND, Nanos
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.profile import Profile
 from steptwin.simulation.scheduler.trace import TraceRecord
@@ -92,7 +92,7 @@ class FactsWatch:
 
 def _is_moving(world: World) -> bool:
     """Whether an axis moves at the end."""
-    last: dict[tuple[str, str], TraceRecord] = {(record.machine, record.subject): record for record in world.trace.plans()}
+    last: dict[tuple[str, str], TraceRecord] = {(record.controller, record.subject): record for record in world.trace.plans()}
     plans = (record.value.profile if isinstance(record.value, StepTrain) else record.value for record in last.values())
     return any(plan.moving(world.now) for plan in plans if isinstance(plan, Profile))
 

@@ -20,11 +20,11 @@ from steptwin.campaign.runner import CaseRunner
 from steptwin.campaign.search.exhaustive import without_faults
 from steptwin.campaign.shrink import ADDED
 from steptwin.campaign.workers import workers
+from steptwin.controller import SECOND
 from steptwin.coverage.counts import Coverage
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.files import session as sessions
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 
 LASTING = frozenset({"no-answer"})
 """Kinds that would happen now and then, but are tried from a phase on without end: a line that is broken."""
@@ -213,7 +213,7 @@ def function_of(world: World, possible: PossibleFault) -> str:
     """The function that fails: the faulty thing, and what drives the input."""
     place = possible.place
     name, _, pin = place.partition(".")
-    path = next((path for one, path in world.parts.driven.items() if one.machine == name and one.pin == pin), None)
+    path = next((path for one, path in world.parts.driven.items() if one.controller == name and one.pin == pin), None)
     if path is None or possible.fault.kind.parameter("pin") is None:
         return place
     table: Any = world.spec.text.data

@@ -123,7 +123,7 @@ def _places(world: Simulation, kind: FaultKind) -> Iterator[tuple[dict[str, Faul
     if kind.layer is Layer.ELEMENT:
         yield from _elements(world, kind)
     elif kind.layer is Layer.PHYSICS:
-        yield from _machines(world, kind)
+        yield from _controllers(world, kind)
     else:
         yield from _lines(world, kind)
 
@@ -147,33 +147,33 @@ def _sources(world: Simulation) -> list[tuple[str, str]]:
 
 def _contacted(world: Simulation) -> list[tuple[str, str]]:
     """The inputs of elements with contacts: one that a wire drives is stuck where the output is."""
-    return [tuple(pin) for pin in world.parts.circuits if pin.machine in world.parts.terminals]
+    return [tuple(pin) for pin in world.parts.circuits if pin.controller in world.parts.terminals]
 
 
-def _machines(world: Simulation, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue], str]]:
-    for name, machine in world.machines.items():
+def _controllers(world: Simulation, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue], str]]:
+    for name, controller in world.controllers.items():
         where: dict[str, FaultValue] = {"machine": name}
         if kind.parameter("pin") is not None:
             for pin in _inputs(world, name):
                 yield {**where, "pin": pin}, f"{name}.{pin}"
         elif kind.parameter("axis") is not None:
-            for number in _axes(world, name, len(machine.axes)):
+            for number in _axes(world, name, len(controller.axes)):
                 yield {**where, "axis": number}, f"{name}.M{number}"
         else:
             yield where, name
 
 
-def _axes(world: Simulation, machine: str, count: int) -> list[int]:
+def _axes(world: Simulation, controller: str, count: int) -> list[int]:
     """The axes that move something; all where the world has no elements."""
-    moving = {axis.mechanism.number for axis in world.axes.values() if axis.spec.drive[0] == machine}
+    moving = {axis.mechanism.number for axis in world.axes.values() if axis.spec.drive[0] == controller}
     return sorted(moving) if any(world.parts.elements.values()) else list(range(1, count + 1))
 
 
-def _inputs(world: Simulation, machine: str) -> list[str]:
+def _inputs(world: Simulation, controller: str) -> list[str]:
     """The inputs that a wire, a switch or a script changes, in the order of the pins."""
-    led = {pin.pin for pin in (*world.parts.driven, *world.parts.circuits) if pin.machine == machine}
-    led |= {pin.upper() for script in world.spec.scripts for name, pin in _set_by(script.steps) if name == machine}
-    return [pin for pin in world.machines[machine].pins() if pin in led]
+    led = {pin.pin for pin in (*world.parts.driven, *world.parts.circuits) if pin.controller == controller}
+    led |= {pin.upper() for script in world.spec.scripts for name, pin in _set_by(script.steps) if name == controller}
+    return [pin for pin in world.controllers[controller].pins() if pin in led]
 
 
 def _set_by(steps: Iterable[Step]) -> Iterator[tuple[str, str]]:
@@ -192,10 +192,10 @@ def _lines(world: Simulation, kind: FaultKind) -> Iterator[tuple[dict[str, Fault
             where["link"] = SCRIPTS
         for direction in directions:
             yield where | ({"direction": direction} if direction else {}), spec.name
-    for name, machine_kind in world.parts.kind_of.items():
-        if machine_kind.registers is not None and name not in world.parts.line_of and kind.layer is not Layer.BYTES:
+    for name, controller_kind in world.parts.kind_of.items():
+        if controller_kind.registers is not None and name not in world.parts.line_of and kind.layer is not Layer.BYTES:
             yield {}, name
-            return  # requests to machines without a line do not say to which
+            return  # requests to controllers without a line do not say to which
 
 
 # ---------------------------------------------------------------------- occasions and moments

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from operator import itemgetter
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.datasheet import PinDirection
-from steptwin.machine import SECOND, Nanos
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.profile import Profile
 from steptwin.simulation.components.button import BUTTON
@@ -68,8 +68,8 @@ def cycle_phases(world: Simulation, begin: Nanos = 0, most: int = MOST_PHASES) -
 def _acting(world: Simulation) -> frozenset[str]:
     """The outputs that tell phases apart, as records call them; inputs follow from them."""
     found = {f"{name}.{output.lower()}" for name, one in world.parts.terminals.items() for output in one.outputs}
-    for name, machine in world.machines.items():
-        sheet = world.kind(name).datasheet(machine)
+    for name, controller in world.controllers.items():
+        sheet = world.kind(name).datasheet(controller)
         found |= {f"{name}.{pin.name}" for pin in sheet.pins if pin.direction is not PinDirection.INPUT}
     return frozenset(found | set(world.parts.built(BUTTON)))
 
@@ -80,13 +80,13 @@ def _changes(trace: Iterable[TraceRecord], acting: Collection[str], end: Nanos) 
     plans: dict[str, list[tuple[Nanos, Nanos]]] = {}
     for record in trace:
         if record.kind == "edge":
-            name = record.subject if record.subject in acting else f"{record.machine}.{record.subject}"
+            name = record.subject if record.subject in acting else f"{record.controller}.{record.subject}"
             if name in acting:
                 found.append((record.time, name, bool(record.value)))
         elif record.kind == "plan":
             plan = record.value.profile if isinstance(record.value, StepTrain) else record.value
             if isinstance(plan, Profile):
-                plans.setdefault(f"{record.machine}.M{record.subject} moving", []).append((record.time, _rests_at(plan, end)))
+                plans.setdefault(f"{record.controller}.M{record.subject} moving", []).append((record.time, _rests_at(plan, end)))
     for name, moves in plans.items():
         for (at, rest), (then, _) in pairwise([*moves, (end + 1, 0)]):
             found.append((at, name, rest > at))

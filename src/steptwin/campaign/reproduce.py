@@ -17,12 +17,12 @@ from steptwin.campaign.description import CampaignDescription
 from steptwin.campaign.reading import load_campaign
 from steptwin.campaign.runner import CaseRunner
 from steptwin.campaign.variation import Choice
+from steptwin.controller import SECOND
 from steptwin.durations import duration_text
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.files import session as sessions
 from steptwin.files.export import axis_views, write_trace
 from steptwin.files.textfiles import write_bytes
-from steptwin.machine import SECOND
 
 WIDTH = 120
 LONGEST_NAME = 60

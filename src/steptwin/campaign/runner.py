@@ -13,11 +13,11 @@ from typing import Any
 from steptwin.campaign.case import EXPECTATIONS, WAITS, Case, CaseResult, Verdict
 from steptwin.campaign.description import CampaignDescription, Measure
 from steptwin.campaign.properties import WatchState, read_property, watch_together
+from steptwin.controller import SECOND, Nanos
 from steptwin.coverage.counts import Coverage
 from steptwin.coverage.watch import WorldCoverage
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.files.world import World
-from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.describe import steptable
 from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.description import read_world

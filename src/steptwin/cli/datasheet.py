@@ -51,7 +51,7 @@ def _of_twin(twin: str | None, variant: str | None) -> Datasheet:
         raise Misuse("--variant is for a KIND: a controller of a twin has one already")
     with selected(twin) as there:
         name = there.one()
-        return next(part.datasheet for part in there.subject.description.machines if part.name == name)
+        return next(part.datasheet for part in there.subject.description.controllers if part.name == name)
 
 
 def _sections(sheet: Datasheet) -> Iterator[str]:

@@ -34,10 +34,10 @@ def command(
     from steptwin.subject.commands import Encoders
 
     with selected(twin) as there:
-        machine = there.one()
+        controller = there.one()
         for axis, change in wanted.items():
-            there.do(Turn(machine, axis, change) if isinstance(change, int) else Couple(machine, axis, change))
-        shafts = there.do(Encoders(machine))
+            there.do(Turn(controller, axis, change) if isinstance(change, int) else Couple(controller, axis, change))
+        shafts = there.do(Encoders(controller))
     if json:
         print_data(shafts)
     else:

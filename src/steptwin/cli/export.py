@@ -40,7 +40,9 @@ def command(
             metavar="TIME", help="Where to end. Default: the end of the run; of pictures, shortly after the last change."
         ),
     ] = None,
-    machine: Annotated[list[str] | None, typer.Option(help="Only this machine; may be given more than once.")] = None,
+    controller: Annotated[
+        list[str] | None, typer.Option("--machine", help="Only this controller; may be given more than once.")
+    ] = None,
     texts: Annotated[
         bool, typer.Option("--texts/--no-texts", help="Signals of type string (vcd): GTKWave shows them, sigrok refuses them.")
     ] = True,
@@ -71,7 +73,7 @@ def command(
             formats=(formats or None) if output is not None else [formats[i]],
             begin=begin_ns,
             until=until_ns,
-            machines=machine or None,
+            controllers=controller or None,
             period=period_ns,
             texts=texts,
             watch=bar,

@@ -83,7 +83,7 @@ def sections() -> list[PageSection]:
             (
                 kind.name,
                 kind.meaning,
-                ", ".join(failing(kind) or (line.value for line in kind.lines)) or "machines",
+                ", ".join(failing(kind) or (line.value for line in kind.lines)) or "controllers",
                 kind.occasion.value,
                 " ".join(described(parameter) for parameter in kind.own),
             )

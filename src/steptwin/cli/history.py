@@ -117,9 +117,9 @@ def _check_output(path: Path, points: Sequence[str]) -> None:
 
 class _Shown:
     def __init__(self, past: Any, options: HistoryOptions, out: Callable[[str], object]) -> None:
+        from steptwin.controller import SECOND
         from steptwin.durations import duration
         from steptwin.history.stretches import read_stretch
-        from steptwin.machine import SECOND
 
         self._past = past
         self._options = options
@@ -173,7 +173,7 @@ class _Shown:
     # ------------------------------------------------------------------ as text
 
     def _overview(self) -> None:
-        from steptwin.machine import SECOND
+        from steptwin.controller import SECOND
 
         runs, points = self._past.runs(), self._past.points()
         if self._options.as_json:
@@ -204,7 +204,7 @@ class _Shown:
             self._out(f"  {name}: {', '.join(units)}")
 
     def _events(self, kinds: Sequence[str] | None) -> None:
-        from steptwin.machine import SECOND
+        from steptwin.controller import SECOND
 
         stretch = self._stretch
         assert stretch is not None  # noqa: S101

@@ -14,5 +14,5 @@ def command(twin: Twin = None) -> None:
     from steptwin.simulation.script.steps import PowerCycle
 
     with selected(twin) as there:
-        for machine in there.shown:
-            there.do(PowerCycle(machine))
+        for controller in there.shown:
+            there.do(PowerCycle(controller))

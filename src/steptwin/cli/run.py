@@ -21,8 +21,8 @@ from steptwin.files.worldoptions import Coverage, ShownOptions, WorldRunOptions
 from steptwin.options import Option, OptionGroup, option_of
 
 if TYPE_CHECKING:
+    from steptwin.controller import Nanos
     from steptwin.files.timedinputs import TimedInput
-    from steptwin.machine import Nanos
 
 WORLDS = (".toml", ".json")
 """Suffixes of worlds and sessions; all other files are programs (`steptwin.languages`)."""

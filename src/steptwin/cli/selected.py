@@ -22,7 +22,7 @@ class Selected:
     def __init__(self, subject: RemoteSubject, controller: str | None) -> None:
         self.subject = subject
         self._controller = controller
-        self.controllers = tuple(machine.name for machine in subject.description.machines)
+        self.controllers = tuple(controller.name for controller in subject.description.controllers)
 
     def do(self, command: Command) -> Any:
         return self.subject.do(command).value
@@ -42,7 +42,7 @@ class Selected:
 
     def sheet(self, name: str) -> Datasheet:
         """The data sheet of the controller called ``name``."""
-        return next(part.datasheet for part in self.subject.description.machines if part.name == name)
+        return next(part.datasheet for part in self.subject.description.controllers if part.name == name)
 
     def called(self, name: str) -> str:
         """The controller called ``name``; case does not matter. Raises `Misuse`."""
@@ -75,7 +75,7 @@ def levels_of(there: Selected) -> dict[str, float]:
     """The selected pins, as CONTROLLER.PIN."""
     from steptwin.subject.commands import ReadPins
 
-    return {name: level for machine in there.shown for name, level in there.do(ReadPins(machine)).items()}
+    return {name: level for controller in there.shown for name, level in there.do(ReadPins(controller)).items()}
 
 
 def print_data(value: object) -> None:

@@ -97,11 +97,11 @@ def serve_mic488(served: Served, controllers: Mic488Options) -> None:
 
 def describe_mic488(served: Served, controllers: Mic488Options, named: Named = str) -> str:
     """The description of the world to serve. Raises `Misuse` for invalid options."""
+    from steptwin.controller import MILLISECOND
     from steptwin.durations import duration_text
     from steptwin.files.programbanks import parse_banks
     from steptwin.files.timedinputs import parse_duration
     from steptwin.live.serving import check_line_timing
-    from steptwin.machine import MILLISECOND
     from steptwin.mic488.config import BAUDS
     from steptwin.mic488.registers import firmware as known_firmware
     from steptwin.simulation.describe.small_mic488 import mic488_world

@@ -77,8 +77,8 @@ def _decoding(protocol: str, variants: Mapping[str, str | None]) -> Decoding:
 
 
 def _print(frame: FrameLine) -> None:
+    from steptwin.controller import SECOND
     from steptwin.live.sniff import ARROWS
-    from steptwin.machine import SECOND
 
     arrow = ARROWS[frame.direction] if frame.raw else "?"
     raw = f"{frame.raw.hex(' ')}  " if frame.raw else ""
@@ -88,7 +88,7 @@ def _print(frame: FrameLine) -> None:
 def _print_json(frame: FrameLine) -> None:
     import json
 
-    from steptwin.machine import SECOND
+    from steptwin.controller import SECOND
 
     data = {
         "time_s": frame.time / SECOND,

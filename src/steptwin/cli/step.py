@@ -40,7 +40,7 @@ def command(
     selection = ALL
     if shown.given():
         world = read_description(ask_twin(twin, Describe()))
-        parts = (*world.machines, *world.axes, *world.elements, *world.lines)
+        parts = (*world.controllers, *world.axes, *world.elements, *world.lines)
         selection = read_selection(shown.of, shown.show, (*(part.name for part in parts), *world.buttons), sorted(STEP_KINDS))
     wanted = Advance(None if duration is None else parse_duration(duration, "step"), until=until)
     events: list[dict[str, Any]] = []
@@ -51,7 +51,7 @@ def command(
         else:
             for event in there["events"]:
                 found = read_event(event)
-                if selection.takes(found.kind, (found.machine, *named_in(found.payload))):
+                if selection.takes(found.kind, (found.controller, *named_in(found.payload))):
                     typer.echo(str(found))
             if there["missed"]:
                 typer.echo(f"... and {there['missed']} more", err=True)

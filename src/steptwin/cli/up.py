@@ -12,10 +12,10 @@ import typer
 
 from steptwin.cli.optiongroups import grouped
 from steptwin.cli.pages import PageFormat, PageSection, show
+from steptwin.controller import MILLISECOND
 from steptwin.errors import Misuse
 from steptwin.files.worldoptions import Coverage, ShownOptions, WorldRunOptions
 from steptwin.live.options import AuditInto, LiveOptions, LogOptions, ReadyFile, UpOptions
-from steptwin.machine import MILLISECOND
 
 if TYPE_CHECKING:
     from steptwin.simulation.toml.reader import Key

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
+from steptwin.controller import Nanos
 from steptwin.coverage.counts import END, Coverage, TextCoverage, Way
 from steptwin.diagnostics import SourceText
-from steptwin.machine import Nanos
 from steptwin.simulation.kinds.programs import Place, Programs
 from steptwin.simulation.world.simulation import Simulation
 

@@ -10,6 +10,7 @@ from contextlib import suppress
 from functools import partial
 from typing import TypeAlias
 
+from steptwin.controller import SECOND
 from steptwin.dap.attach import AttachedTwin
 from steptwin.dap.breakpoints import EditorBreakpoints
 from steptwin.dap.capabilities import CAPABILITIES
@@ -23,7 +24,6 @@ from steptwin.debug.values import Location, Stopped, StopReason
 from steptwin.durations import duration
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 from steptwin.subject.debugcommands import SCOPES
 from steptwin.why.answer import Answer
 
@@ -126,7 +126,7 @@ class Adapter:
         except SteptwinError:
             world.close()
             raise
-        debugger.on_log = lambda logged: self._log(logged.time, logged.text, debugger.location(logged.machine, logged.place))
+        debugger.on_log = lambda logged: self._log(logged.time, logged.text, debugger.location(logged.controller, logged.place))
         self._world, self._launch, self._debugged.target, self._debugged.sources = world, asked, debugger, sources
         self._stops_on_entry, self._breakpoints.is_off = asked.stop_on_entry, asked.no_debug
         return {}
@@ -181,14 +181,14 @@ class Adapter:
 
     def _starting(self, arguments: Arguments, *, name: str) -> ResponseBody:
         debugger = self._debugged.stopped()
-        machine = self._debugged.machine(arguments["threadId"])
+        controller = self._debugged.controller(arguments["threadId"])
         travels: Mapping[str, Callable[[], DebugTravel]] = {
             "continue": debugger.running,
             "reverseContinue": debugger.running_back,
-            "next": lambda: debugger.stepping_over(machine),
-            "stepIn": lambda: debugger.stepping_in(machine),
-            "stepOut": lambda: debugger.stepping_out(machine),
-            "stepBack": lambda: debugger.stepping_back(machine),
+            "next": lambda: debugger.stepping_over(controller),
+            "stepIn": lambda: debugger.stepping_in(controller),
+            "stepOut": lambda: debugger.stepping_out(controller),
+            "stepBack": lambda: debugger.stepping_back(controller),
         }
         self._run(travels[name]())
         return {"allThreadsContinued": True} if name == "continue" else {}
@@ -241,7 +241,7 @@ class Adapter:
         body: dict[str, object] = {
             "reason": _REASONS.get(stop.reason, "pause"),
             "description": f"{stop.reason.value} at {_seconds(stop.time)}{where}",
-            "threadId": threads.index(stop.machine) + 1 if stop.machine in threads else 1,
+            "threadId": threads.index(stop.controller) + 1 if stop.controller in threads else 1,
             "allThreadsStopped": True,
         }
         if stop.text:
@@ -257,8 +257,8 @@ class Adapter:
         if arguments.get("context") == "repl":
             word, _, rest = text.partition(" ")
             if word == "why":
-                machine = self._debugged.machine_of_frame(arguments.get("frameId"))
-                return {"result": _why(debugger, machine, rest.strip()).text(), "variablesReference": 0}
+                controller = self._debugged.controller_of_frame(arguments.get("frameId"))
+                return {"result": _why(debugger, controller, rest.strip()).text(), "variablesReference": 0}
             if word == "help":
                 return {"result": _HELP, "variablesReference": 0}
             if word == "branch" and not rest:
@@ -267,16 +267,16 @@ class Adapter:
             if word == "go" and rest:
                 self._report(debugger.go(duration(rest)))
                 return {"result": f"at {_seconds(debugger.now)}", "variablesReference": 0}
-        value = debugger.evaluate(self._debugged.machine_of_frame(arguments.get("frameId")), text)
+        value = debugger.evaluate(self._debugged.controller_of_frame(arguments.get("frameId")), text)
         return {"result": value.text, "variablesReference": 0}
 
     def _set_variable(self, arguments: Arguments) -> ResponseBody:
-        machine = self._debugged.machine_of_scope(arguments["variablesReference"])
-        return {"value": self._debugged.stopped().set_value(machine, arguments["name"], arguments["value"]).text}
+        controller = self._debugged.controller_of_scope(arguments["variablesReference"])
+        return {"value": self._debugged.stopped().set_value(controller, arguments["name"], arguments["value"]).text}
 
     def _set_expression(self, arguments: Arguments) -> ResponseBody:
-        machine = self._debugged.machine_of_frame(arguments.get("frameId"))
-        return {"value": self._debugged.stopped().set_value(machine, arguments["expression"].strip(), arguments["value"]).text}
+        controller = self._debugged.controller_of_frame(arguments.get("frameId"))
+        return {"value": self._debugged.stopped().set_value(controller, arguments["expression"].strip(), arguments["value"]).text}
 
     # ------------------------------------------------------------------ the console
 
@@ -286,20 +286,20 @@ class Adapter:
     def _log(self, time: int, text: str, location: Location) -> None:
         self._send("output", {"category": "console", "output": f"{_seconds(time)}  {text}\n", **self._debugged.placed(location)})
 
-    def _log_of_twin(self, time: int, machine: str, text: str, program: str, line: int) -> None:
-        self._log(time, text, Location(machine, program, "", line, 1, line, 1))
+    def _log_of_twin(self, time: int, controller: str, text: str, program: str, line: int) -> None:
+        self._log(time, text, Location(controller, program, "", line, 1, line, 1))
 
 
-def _why(debugger: Target, machine: str, question: str) -> Answer:
+def _why(debugger: Target, controller: str, question: str) -> Answer:
     """A name alone is first one of the controller that is shown. Raises `Misuse`."""
     if not question.isidentifier() or question in debugger.threads:
-        return debugger.why(question or machine)
+        return debugger.why(question or controller)
     try:
-        return debugger.why(f"{machine}.{question}")
+        return debugger.why(f"{controller}.{question}")
     except (Misuse, Refusal):
-        if any(value.name.lower() == question.lower() for value in debugger.scope(machine, SCOPES[0]).values):
+        if any(value.name.lower() == question.lower() for value in debugger.scope(controller, SCOPES[0]).values):
             hint = "a data breakpoint stops where it changes"
-            raise Misuse(f"{question} is a variable of {machine}, of which no past is noted: {hint}") from None
+            raise Misuse(f"{question} is a variable of {controller}, of which no past is noted: {hint}") from None
         return debugger.why(question)
 
 

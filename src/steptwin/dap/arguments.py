@@ -19,7 +19,7 @@ def line_points(given: Mapping[str, Any], first_line: int, texts: Sequence[Text]
     """One in each of the texts. Raises `Misuse`, and `KeyError` and `TypeError` for a line that is missing or none."""
     more = _texts_in(given, _OF_LINES)
     line = given["line"] - first_line + 1
-    return [LinePoint(machine=text.machine, text=text.text, line=line, **more) for text in texts]
+    return [LinePoint(controller=text.controller, text=text.text, line=line, **more) for text in texts]
 
 
 def label_point(given: Mapping[str, Any]) -> LabelPoint:
@@ -29,8 +29,8 @@ def label_point(given: Mapping[str, Any]) -> LabelPoint:
 
 def data_point(given: Mapping[str, Any]) -> DataPoint:
     """Raises `Misuse`, and `KeyError` for an id that is missing."""
-    machine, _, name = _text(given, "dataId").partition("/")
-    return DataPoint(machine=machine, name=name, **_texts_in(given, _OF_VALUES))
+    controller, _, name = _text(given, "dataId").partition("/")
+    return DataPoint(controller=controller, name=name, **_texts_in(given, _OF_VALUES))
 
 
 def _texts_in(given: Mapping[str, Any], names: Mapping[str, str]) -> dict[str, str]:

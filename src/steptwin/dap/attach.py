@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from steptwin.controller import Nanos
 from steptwin.debug.breakpoints import AnyPoint
 from steptwin.debug.debugger import DebugTravel
 from steptwin.debug.values import (
@@ -25,7 +26,6 @@ from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.live.remote import RemoteSubject
 from steptwin.live.twins import find_controller
-from steptwin.machine import Nanos
 from steptwin.subject import debugcommands as command
 from steptwin.subject.commands import Command, EndPoints, Pause, Resume, Time
 from steptwin.subject.events import Event
@@ -57,7 +57,7 @@ class AttachedTwin:
             self._following = self._subject.follow(filter_of(["stopped", "log", "pace"]), MOST_EVENTS)
             self._found = self._ask(command.Debug())
             self._events_before: list[str] = self._ask(command.ListBreakpoints())["stop_on"]
-            self._texts = {one["name"]: self._sources(one) for one in self._found["machines"]}
+            self._texts = {one["name"]: self._sources(one) for one in self._found["controllers"]}
             file = self._ask(EndPoints()).get("file")
         except BaseException:
             self._subject.close()
@@ -70,8 +70,8 @@ class AttachedTwin:
     def _ask(self, wanted: Command) -> Any:
         return self._subject.do(wanted).value
 
-    def _sources(self, machine: Mapping[str, Any]) -> dict[str, SourceText]:
-        found = [self._ask(command.ProgramSource(machine["name"], one["program"])) for one in machine["programs"]]
+    def _sources(self, controller: Mapping[str, Any]) -> dict[str, SourceText]:
+        found = [self._ask(command.ProgramSource(controller["name"], one["program"])) for one in controller["programs"]]
         return {one["program"]: SourceText(one["source"], one["text"]) for one in found}
 
     def close(self) -> None:
@@ -115,19 +115,19 @@ class AttachedTwin:
     def threads(self) -> Sequence[str]:
         return list(self._texts)
 
-    def texts(self, machine: str) -> Mapping[str, SourceText]:
-        return self._texts[machine]
+    def texts(self, controller: str) -> Mapping[str, SourceText]:
+        return self._texts[controller]
 
-    def statement_lines(self, machine: str, text: str) -> Sequence[int]:
-        programs = next(one["programs"] for one in self._found["machines"] if one["name"] == machine)
+    def statement_lines(self, controller: str, text: str) -> Sequence[int]:
+        programs = next(one["programs"] for one in self._found["controllers"] if one["name"] == controller)
         return next(one["lines"] for one in programs if one["program"] == text)
 
-    def stack(self, machine: str) -> Sequence[StackFrame]:
+    def stack(self, controller: str) -> Sequence[StackFrame]:
         return [
             StackFrame(
                 one["name"],
                 Location(
-                    machine,
+                    controller,
                     one["program"],
                     one["source"],
                     one["line"],
@@ -136,19 +136,19 @@ class AttachedTwin:
                     one["end_column"],
                 ),
             )
-            for one in self._ask(command.Stack(machine))
+            for one in self._ask(command.Stack(controller))
         ]
 
     # ------------------------------------------------------------------ values
 
-    def scope(self, machine: str, name: str) -> Scope:
-        return Scope(name, [_value(one) for one in self._ask(command.Values(machine, name))])
+    def scope(self, controller: str, name: str) -> Scope:
+        return Scope(name, [_value(one) for one in self._ask(command.Values(controller, name))])
 
-    def evaluate(self, machine: str, text: str) -> ShownValue:
-        return _value(self._ask(command.Evaluate(machine, text)))
+    def evaluate(self, controller: str, text: str) -> ShownValue:
+        return _value(self._ask(command.Evaluate(controller, text)))
 
-    def set_value(self, machine: str, name: str, text: str) -> ShownValue:
-        return _value(self._ask(command.SetValue(machine, name, text)))
+    def set_value(self, controller: str, name: str, text: str) -> ShownValue:
+        return _value(self._ask(command.SetValue(controller, name, text)))
 
     def why(self, question: str) -> Answer:
         return read_answer(self._ask(command.AskWhy(question, self.now)))
@@ -190,17 +190,17 @@ class AttachedTwin:
     def running_back(self) -> DebugTravel:
         return self._after(command.RunProgram(command.BACKWARDS))
 
-    def stepping_in(self, machine: str) -> DebugTravel:
-        return self._after(command.StepProgram(machine, "in"))
+    def stepping_in(self, controller: str) -> DebugTravel:
+        return self._after(command.StepProgram(controller, "in"))
 
-    def stepping_over(self, machine: str) -> DebugTravel:
-        return self._after(command.StepProgram(machine, "over"))
+    def stepping_over(self, controller: str) -> DebugTravel:
+        return self._after(command.StepProgram(controller, "over"))
 
-    def stepping_out(self, machine: str) -> DebugTravel:
-        return self._after(command.StepProgram(machine, "out"))
+    def stepping_out(self, controller: str) -> DebugTravel:
+        return self._after(command.StepProgram(controller, "out"))
 
-    def stepping_back(self, machine: str) -> DebugTravel:
-        return self._after(command.StepProgram(machine, "back"))
+    def stepping_back(self, controller: str) -> DebugTravel:
+        return self._after(command.StepProgram(controller, "back"))
 
     def go(self, moment: Nanos) -> Stopped:
         self._drop()
@@ -263,13 +263,13 @@ class AttachedTwin:
             (event,) = self._following.take(1).events
             if isinstance(event.payload, LogPayload):
                 said = event.payload
-                self._log(event.time, event.machine, said.words, said.program, said.line)
+                self._log(event.time, event.controller, said.words, said.program, said.line)
             else:
                 yield event
 
     def _stop(self, event: Event, stopped: StoppedPayload) -> Stopped:
-        machine = event.machine if event.machine in self._texts else None
-        return Stopped(StopReason(stopped.reason), event.time, machine, stopped.what, stopped.breakpoints)
+        controller = event.controller if event.controller in self._texts else None
+        return Stopped(StopReason(stopped.reason), event.time, controller, stopped.what, stopped.breakpoints)
 
 
 def _value(found: Mapping[str, Any]) -> ShownValue:
@@ -280,7 +280,7 @@ def _wanted(point: AnyPoint) -> command.SetBreakpoint:
     match point:
         case LinePoint():
             return command.SetBreakpoint(
-                machine=point.machine,
+                controller=point.controller,
                 program=point.text,
                 line=point.line,
                 condition=point.condition,
@@ -290,4 +290,4 @@ def _wanted(point: AnyPoint) -> command.SetBreakpoint:
         case LabelPoint():
             return command.SetBreakpoint(label=point.label, condition=point.condition, hits=point.hits)
         case DataPoint():
-            return command.SetBreakpoint(machine=point.machine, value=point.name, condition=point.condition)
+            return command.SetBreakpoint(controller=point.controller, value=point.name, condition=point.condition)

@@ -58,15 +58,17 @@ class EditorBreakpoints:
     def _data_info(self, arguments: Arguments) -> ResponseBody:
         debugger = self._debugged.stopped()
         reference = arguments.get("variablesReference") or 0
-        machine = (
-            self._debugged.machine_of_scope(reference) if reference else self._debugged.machine_of_frame(arguments.get("frameId"))
+        controller = (
+            self._debugged.controller_of_scope(reference)
+            if reference
+            else self._debugged.controller_of_frame(arguments.get("frameId"))
         )
         name = arguments["name"]
         try:
-            debugger.evaluate(machine, name)
+            debugger.evaluate(controller, name)
         except Misuse as error:
             return {"dataId": None, "description": str(error)}
-        return {"dataId": f"{machine}/{name}", "description": f"{name} of {machine}", "accessTypes": [DATA_ACCESS]}
+        return {"dataId": f"{controller}/{name}", "description": f"{name} of {controller}", "accessTypes": [DATA_ACCESS]}
 
     def _set_data(self, arguments: Arguments) -> ResponseBody:
         wanted = [(data_point(one), one.get("accessType") or DATA_ACCESS) for one in arguments["breakpoints"]]
@@ -117,7 +119,7 @@ class EditorBreakpoints:
         last = arguments.get("endLine", arguments["line"]) - self._debugged.first_line + 1
         if not texts:
             return {"breakpoints": []}
-        lines = self._debugged.started().statement_lines(texts[0].machine, texts[0].text)
+        lines = self._debugged.started().statement_lines(texts[0].controller, texts[0].text)
         return {
             "breakpoints": [
                 {"line": line - 1 + self._debugged.first_line} for line in sorted(set(lines)) if first <= line <= last

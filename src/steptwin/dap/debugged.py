@@ -42,32 +42,32 @@ class Debugged:
             raise Misuse("nothing was launched, and no twin was attached to")
         return self.target
 
-    def machine(self, thread: object) -> str:
+    def controller(self, thread: object) -> str:
         """The controller that a thread is, by its number. Raises `Misuse`."""
         threads = self.started().threads
         if not isinstance(thread, int) or not 1 <= thread <= len(threads):
             raise Misuse(f"threadId = {thread!r}: permitted are 1 to {len(threads)}")
         return threads[thread - 1]
 
-    def machine_of_frame(self, frame: object) -> str:
+    def controller_of_frame(self, frame: object) -> str:
         """Controller of a frame; the first controller where no frame is named."""
-        return self.machine(1) if frame is None else self.machine_of(frame, "frameId")
+        return self.controller(1) if frame is None else self.controller_of(frame, "frameId")
 
-    def machine_of(self, reference: object, name: str) -> str:
+    def controller_of(self, reference: object, name: str) -> str:
         """Controller of a frame or scope by its number; ``name`` is that of the argument that has it. Raises `Misuse`."""
         threads = self.started().threads
         if not isinstance(reference, int) or not 1 <= reference // FRAMES <= len(threads):
             raise Misuse(f"{name} = {reference!r}: nothing that is shown has this number")
         return threads[reference // FRAMES - 1]
 
-    def machine_of_scope(self, reference: int) -> str:
-        return self.machine_of(reference, "variablesReference")
+    def controller_of_scope(self, reference: int) -> str:
+        return self.controller_of(reference, "variablesReference")
 
     def placed(self, location: Location) -> ResponseBody:
         """A location as the protocol has it."""
         line, column = self.first_line - 1, self.first_column - 1
         return {
-            "source": self.sources.plain(location.machine, location.text),
+            "source": self.sources.plain(location.controller, location.text),
             "line": location.line + line,
             "column": location.column + column,
             "endLine": location.end_line + line,

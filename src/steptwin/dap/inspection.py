@@ -34,7 +34,7 @@ class Inspection:
 
     def _stack(self, arguments: Arguments) -> ResponseBody:
         thread = arguments["threadId"]
-        frames = self._debugged.stopped().stack(self._debugged.machine(thread))
+        frames = self._debugged.stopped().stack(self._debugged.controller(thread))
         first = arguments.get("startFrame") or 0
         count = arguments.get("levels") or len(frames)
         shown = [
@@ -51,7 +51,7 @@ class Inspection:
 
     def _scopes(self, arguments: Arguments) -> ResponseBody:
         frame = arguments["frameId"]
-        self._debugged.machine_of(frame, "frameId")
+        self._debugged.controller_of(frame, "frameId")
         thread = frame // FRAMES
         return {
             "scopes": [
@@ -62,7 +62,7 @@ class Inspection:
 
     def _variables(self, arguments: Arguments) -> ResponseBody:
         reference = arguments["variablesReference"]
-        found = self._debugged.stopped().scope(self._debugged.machine_of_scope(reference), _scope_of(reference)).values
+        found = self._debugged.stopped().scope(self._debugged.controller_of_scope(reference), _scope_of(reference)).values
         first = arguments.get("start") or 0
         count = arguments.get("count") or len(found)
         return {"variables": [_variable(value) for value in found[first : first + count]]}

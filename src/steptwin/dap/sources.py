@@ -14,7 +14,7 @@ from steptwin.errors import Misuse
 class Text(NamedTuple):
     """A text of a controller, and its file, if that is there."""
 
-    machine: str
+    controller: str
     text: str
     path: Path
     source: SourceText
@@ -23,9 +23,9 @@ class Text(NamedTuple):
 def texts_of(target: Target, folder: Path) -> Sequence[Text]:
     """The texts of all controllers; their files are in a folder."""
     return [
-        Text(machine, text, (folder / source.name).resolve(), source)
-        for machine in target.threads
-        for text, source in target.texts(machine).items()
+        Text(controller, text, (folder / source.name).resolve(), source)
+        for controller in target.threads
+        for text, source in target.texts(controller).items()
     ]
 
 
@@ -59,13 +59,13 @@ class Sources:
             raise Misuse(f"sourceReference = {reference!r}: permitted are 1 to {len(self._texts)}")
         return self._texts[reference - 1]
 
-    def plain(self, machine: str, text: str) -> Mapping[str, object]:
+    def plain(self, controller: str, text: str) -> Mapping[str, object]:
         """A source as the protocol has it."""
-        number, found = next((i, t) for i, t in enumerate(self._texts, start=1) if (t.machine, t.text) == (machine, text))
+        number, found = next((i, t) for i, t in enumerate(self._texts, start=1) if (t.controller, t.text) == (controller, text))
         if found.path.is_file():
             return {"name": found.path.name, "path": str(found.path)}
-        return {"name": f"{machine}, {found.path.name}", "sourceReference": number}
+        return {"name": f"{controller}, {found.path.name}", "sourceReference": number}
 
     def all(self) -> Sequence[Mapping[str, object]]:
-        found = {text.path: self.plain(text.machine, text.text) for text in self._texts}
+        found = {text.path: self.plain(text.controller, text.text) for text in self._texts}
         return list(found.values())

@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import TypeAlias
 
+from steptwin.controller import Nanos
 from steptwin.debug.calculation import HitCount, LogText, ResolvedExpression
 from steptwin.debug.values import DataPoint, LabelPoint, LinePoint, SetPoint
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import NONE, Message, text_of
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.kinds.programs import Place, Programs
@@ -36,35 +36,35 @@ class Breakpoint:
         self.places = places
         """By controller."""
         condition = asked.condition
-        self._conditions = {} if condition is None else {machine: calculate(machine, condition) for machine in places}
+        self._conditions = {} if condition is None else {controller: calculate(controller, condition) for controller in places}
         self._counts = None if asked.hits is None else HitCount(asked.hits)
         self.log: LogText | None = None
         if isinstance(asked, LinePoint) and asked.log is not None:
-            self.log = LogText(asked.log, partial(calculate, asked.machine))
+            self.log = LogText(asked.log, partial(calculate, asked.controller))
         self._times: array[int] = array("q")
         """When the condition held, as far as hits are counted: the latest of them."""
         self._dropped = 0
         """Number of hits before those."""
 
-    def reads_others(self, machine: str) -> bool:
+    def reads_others(self, controller: str) -> bool:
         """Whether the condition depends on what has no connection to the controller."""
-        condition = self._conditions.get(machine)
+        condition = self._conditions.get(controller)
         return condition is not None and condition.reads_others
 
-    def is_known(self, machine: str, now: Nanos) -> bool:
+    def is_known(self, controller: str, now: Nanos) -> bool:
         """Whether `holds_at_statement` can be asked."""
-        condition = self._conditions.get(machine)
+        condition = self._conditions.get(controller)
         return condition is None or condition.is_known_before_statement(now)
 
-    def holds_at_statement(self, machine: str, now: Nanos) -> bool:
+    def holds_at_statement(self, controller: str, now: Nanos) -> bool:
         """Whether the condition holds for a statement of a controller that is about to be executed. One that cannot be calculated
         does: it must not be overlooked."""
-        condition = self._conditions.get(machine)
+        condition = self._conditions.get(controller)
         return condition is None or _holds(condition.value_at_statement, now)
 
-    def holds(self, machine: str, now: Nanos) -> bool:
+    def holds(self, controller: str, now: Nanos) -> bool:
         """The same for the world as it stands at ``now``."""
-        condition = self._conditions.get(machine)
+        condition = self._conditions.get(controller)
         return condition is None or _holds(condition.value, now)
 
     def counts(self, time: Nanos) -> bool:
@@ -95,11 +95,11 @@ class Watch:
 
     def __init__(self, number: int, asked: DataPoint, calculate: ResolveExpression) -> None:
         self.number = number
-        self.machine = asked.machine
+        self.controller = asked.controller
         self.name = asked.name
         text = asked.name if asked.condition is None else with_left_side(asked.name, asked.condition)
         self.has_condition = asked.condition is not None
-        self._calculation = calculate(asked.machine, text)
+        self._calculation = calculate(asked.controller, text)
         self._calculation.check_names()
         self.text = text
 
@@ -129,25 +129,25 @@ def with_left_side(name: str, condition: str) -> str:
     return f"{name} {condition}" if condition.lstrip()[:1] in "<>=!" else condition
 
 
-HAS_NO_PROGRAM = Message("debug.has-no-program", "{machine!r} has no program: {names} has one")
+HAS_NO_PROGRAM = Message("debug.has-no-program", "{controller!r} has no program: {names} has one")
 NO_CONTROLLER = Message("debug.no-controller", "no controller")
 
 
-def _programs_of(programs: Mapping[str, Programs], machine: str) -> Programs:
-    if machine not in programs:
-        raise Misuse(HAS_NO_PROGRAM(machine=machine, names=list(programs) or NO_CONTROLLER()))
-    return programs[machine]
+def _programs_of(programs: Mapping[str, Programs], controller: str) -> Programs:
+    if controller not in programs:
+        raise Misuse(HAS_NO_PROGRAM(controller=controller, names=list(programs) or NO_CONTROLLER()))
+    return programs[controller]
 
 
-UNKNOWN_TEXT = Message("debug.unknown-text", "{machine} has no text {text!r}: texts are {names}")
+UNKNOWN_TEXT = Message("debug.unknown-text", "{controller} has no text {text!r}: texts are {names}")
 NO_STATEMENT_IN_LINE = Message("debug.no-statement-in-line", "no statement is in line {line} of {name} or after it")
 
 
 def places_of_line(programs: Mapping[str, Programs], asked: LinePoint) -> tuple[Place, int]:
     """The first statement in a line or after it, and its line. Raises `Misuse`."""
-    own = _programs_of(programs, asked.machine)
+    own = _programs_of(programs, asked.controller)
     if asked.text not in own.texts:
-        raise Misuse(UNKNOWN_TEXT(machine=asked.machine, text=asked.text, names=list(own.texts)))
+        raise Misuse(UNKNOWN_TEXT(controller=asked.controller, text=asked.text, names=list(own.texts)))
     for number, statement in enumerate(own.statements(asked.text)):
         if statement.line >= asked.line and statement.start < statement.end:
             return Place(asked.text, number), statement.line
@@ -161,9 +161,9 @@ def places_of_label(programs: Mapping[str, Programs], label: str) -> dict[str, l
     """The statements at a label, by controller. Raises `Misuse` with the labels there are."""
     found: dict[str, list[Place]] = {}
     wanted = label.strip().lstrip("@").upper()
-    for machine, text, name, number in _labels(programs):
+    for controller, text, name, number in _labels(programs):
         if name.upper() in (wanted, f"LABEL {wanted}"):
-            found.setdefault(machine, []).append(Place(text, number))
+            found.setdefault(controller, []).append(Place(text, number))
     if not found:
         known = list(dict.fromkeys(name for _, _, name, _ in _labels(programs)))
         raise Misuse(UNKNOWN_LABEL(label=label, hint=NearMiss().hint(wanted, known), names=list(known) or NONE()))
@@ -171,18 +171,18 @@ def places_of_label(programs: Mapping[str, Programs], label: str) -> dict[str, l
 
 
 def _labels(programs: Mapping[str, Programs]) -> Iterator[tuple[str, str, str, int]]:
-    for machine, own in programs.items():
+    for controller, own in programs.items():
         for text in own.texts:
             for name, number in own.labels(text).items():
-                yield machine, text, name, number
+                yield controller, text, name, number
 
 
-def _why_not_reached(programs: Programs, place: Place, standing: Simulation | None, machine: str) -> str:
+def _why_not_reached(programs: Programs, place: Place, standing: Simulation | None, controller: str) -> str:
     """Why a program will not come to a statement; empty where it can."""
     line = programs.statements(place.text)[place.number].line
     if place.number not in programs.reached(place.text, (0,)):
         return f"no way of the program leads to line {line}"
-    stack = () if standing is None else standing.programs_of(machine).stack(standing.now)
+    stack = () if standing is None else standing.programs_of(controller).stack(standing.now)
     here = [frame.place.number for frame in stack if frame.place.text == place.text]
     if here and place.number not in programs.reached(place.text, here):
         return f"from where it is, the program comes to line {line} only if it is started again"
@@ -214,7 +214,7 @@ class Breakpoints:
         self._next += before is None
         try:
             if isinstance(asked, DataPoint):
-                _programs_of(self._programs, asked.machine)
+                _programs_of(self._programs, asked.controller)
                 self.watches.append(Watch(number, asked, self._calculate))
                 return SetPoint(number)
             line: int | None = None
@@ -222,23 +222,23 @@ class Breakpoints:
                 places = places_of_label(self._programs, asked.label)
             else:
                 place, line = places_of_line(self._programs, asked)
-                places = {asked.machine: [place]}
+                places = {asked.controller: [place]}
             point = Breakpoint(number, asked, places, self._calculate)
         except Misuse as error:
             return SetPoint(number, problem=text_of(error))
         if before is not None:
             point.take_hits(before)
         self._all.append(point)
-        for machine, its_places in places.items():
+        for controller, its_places in places.items():
             for place in its_places:
-                self.at.setdefault(machine, {}).setdefault(place, []).append(point)
-        found = [(machine, place) for machine, its in places.items() for place in its]
-        notes = [_why_not_reached(self._programs[machine], place, standing, machine) for machine, place in found]
+                self.at.setdefault(controller, {}).setdefault(place, []).append(point)
+        found = [(controller, place) for controller, its in places.items() for place in its]
+        notes = [_why_not_reached(self._programs[controller], place, standing, controller) for controller, place in found]
         return SetPoint(number, [place for _, place in found], line, note="" if "" in notes else notes[0])
 
     def reading_others(self) -> list[str]:
         """The controllers with conditions that depend on what has no connection to them."""
-        return [machine for machine in self.at if any(point.reads_others(machine) for point in self._all)]
+        return [controller for controller in self.at if any(point.reads_others(controller) for point in self._all)]
 
     def forget_after(self, time: Nanos) -> None:
         for point in self._all:

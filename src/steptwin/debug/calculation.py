@@ -12,8 +12,8 @@ from math import isfinite
 from operator import eq, ge, gt, le, lt
 from sys import float_info
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import NONE, Message
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.components.signals import Idle
@@ -31,13 +31,13 @@ _COUNTS: Mapping[str, Callable[[int, int], bool]] = {"=": eq, "==": eq, "<": lt,
 class ResolvedExpression:
     """An expression whose names are resolved for a controller of a world."""
 
-    def __init__(self, world: Simulation, machine: str, text: str) -> None:
+    def __init__(self, world: Simulation, controller: str, text: str) -> None:
         """Raises `Misuse` for what is no expression, and for unknown signals; names of a program may get their meaning later."""
         node = parse_expression(text)
         names = dict.fromkeys(node.names())
-        signals = {name: found for name in names if (found := _signal(world, machine, name)) is not None}
-        reads = {name: signals[name].value if name in signals else _read_by_program(world, machine, name) for name in names}
-        self._world, self._machine, self._programs = world, machine, world.programs_of(machine)
+        signals = {name: found for name in names if (found := _signal(world, controller, name)) is not None}
+        reads = {name: signals[name].value if name in signals else _read_by_program(world, controller, name) for name in names}
+        self._world, self._controller, self._programs = world, controller, world.programs_of(controller)
         self._by_program = [name for name in names if name not in signals]
         self.is_local = not signals
         """Whether it has names of the program only."""
@@ -46,7 +46,7 @@ class ResolvedExpression:
             return signals[name].unit if name in signals else ""
 
         self._value = value_of(node.in_unit(unit_of_all(node, unit_of), unit_of), reads, _checked)
-        self._own = world.parts.scheduler_of[machine]
+        self._own = world.parts.scheduler_of[controller]
         schedulers = {source.scheduler: None for signal in signals.values() for source in signal.bring(world.now)}
         self._others = [scheduler for scheduler in schedulers if scheduler is not self._own]
 
@@ -54,7 +54,7 @@ class ResolvedExpression:
         """Raises `Misuse` for a name that means nothing to the controller, and in none of its programs as they are now."""
         for name in self._by_program:
             if not self._programs.has_name(name):
-                _own_signal(self._world, self._machine, name)
+                _own_signal(self._world, self._controller, name)
 
     @property
     def reads_others(self) -> bool:
@@ -84,41 +84,41 @@ class ResolvedExpression:
 WRITE_ONLY = Message("debug.write-only", "{name} can only be written")
 
 
-def _signal(world: Simulation, machine: str, name: str) -> SignalOf | Idle | None:
+def _signal(world: Simulation, controller: str, name: str) -> SignalOf | Idle | None:
     """The signal that a name means; None for a name of the program. Raises `Misuse`."""
     owner, dot, _ = name.partition(".")
     if not dot:
-        return world.signal(name) if name == "time" and name not in world.programs_of(machine).variables(world.now) else None
-    is_full = owner in world.machines or owner in world.parts.element_names
-    found = world.signal(name) if is_full else _own_signal(world, machine, name)
+        return world.signal(name) if name == "time" and name not in world.programs_of(controller).variables(world.now) else None
+    is_full = owner in world.controllers or owner in world.parts.element_names
+    found = world.signal(name) if is_full else _own_signal(world, controller, name)
     if not found.is_readable:
         raise Misuse(WRITE_ONLY(name=name))
     return found
 
 
-UNKNOWN_VARIABLE = Message("debug.unknown-variable", "{name!r} means nothing to {machine}{hint}: its variables are {names}")
+UNKNOWN_VARIABLE = Message("debug.unknown-variable", "{name!r} means nothing to {controller}{hint}: its variables are {names}")
 
 
-def _own_signal(world: Simulation, machine: str, name: str) -> SignalOf | Idle:
+def _own_signal(world: Simulation, controller: str, name: str) -> SignalOf | Idle:
     try:
-        return world.signal(f"{machine}.{name}")
+        return world.signal(f"{controller}.{name}")
     except Misuse:
-        variables = list(world.programs_of(machine).variables(world.now))
-        hint = NearMiss().hint(name, [*variables, *world.machine(machine).pins(), *_paths(world, machine)])
-        raise Misuse(UNKNOWN_VARIABLE(name=name, machine=machine, hint=hint, names=list(variables) or NONE())) from None
+        variables = list(world.programs_of(controller).variables(world.now))
+        hint = NearMiss().hint(name, [*variables, *world.controller(controller).pins(), *_paths(world, controller)])
+        raise Misuse(UNKNOWN_VARIABLE(name=name, controller=controller, hint=hint, names=list(variables) or NONE())) from None
 
 
-def _paths(world: Simulation, machine: str) -> list[str]:
-    return [point.path for point in world.kind(machine).datasheet(world.machine(machine)).points]
+def _paths(world: Simulation, controller: str) -> list[str]:
+    return [point.path for point in world.kind(controller).datasheet(world.controller(controller)).points]
 
 
-def _read_by_program(world: Simulation, machine: str, name: str) -> ReadAt:
+def _read_by_program(world: Simulation, controller: str, name: str) -> ReadAt:
     """Meaning of a name for the statement of a moment, or else for the controller."""
-    programs = world.programs_of(machine)
+    programs = world.programs_of(controller)
 
     def read(now: Nanos) -> float:
         value = programs.read(name, now)
-        return float(_own_signal(world, machine, name).value(now)) if value is None else value
+        return float(_own_signal(world, controller, name).value(now)) if value is None else value
 
     return read
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from typing import TypeAlias, TypeVar
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.debug import scopes
 from steptwin.debug.breakpoints import AnyPoint
 from steptwin.debug.calculation import number_text
@@ -19,7 +20,6 @@ from steptwin.debug.observer import Logged
 from steptwin.debug.values import Events, Location, Scope, SetPoint, ShownValue, StackFrame, Stopped, StopReason
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.simulation.kinds.programs import Place, Programs
 from steptwin.simulation.world.history import History, outside_past
@@ -143,28 +143,28 @@ class Debugger:
         """The controllers with programs."""
         return [name for name, programs in self._world.programs.items() if programs.texts]
 
-    def texts(self, machine: str) -> Mapping[str, SourceText]:
-        return self._programs(machine).texts
+    def texts(self, controller: str) -> Mapping[str, SourceText]:
+        return self._programs(controller).texts
 
-    def statement_lines(self, machine: str, text: str) -> Sequence[int]:
+    def statement_lines(self, controller: str, text: str) -> Sequence[int]:
         """The lines in which breakpoints can be."""
-        statements = self._programs(machine).statements(text)
+        statements = self._programs(controller).statements(text)
         return [statement.line for statement in statements if statement.start < statement.end]
 
-    def _programs(self, machine: str) -> Programs:
-        return self.view.programs_of(machine)
+    def _programs(self, controller: str) -> Programs:
+        return self.view.programs_of(controller)
 
-    def stack(self, machine: str) -> Sequence[StackFrame]:
+    def stack(self, controller: str) -> Sequence[StackFrame]:
         """The statement that is executed, or comes next, then those to which it returns; empty where no program runs."""
-        frames = self._programs(machine).stack(self.now)
-        return [StackFrame(frame.name, self.location(machine, frame.place)) for frame in frames]
+        frames = self._programs(controller).stack(self.now)
+        return [StackFrame(frame.name, self.location(controller, frame.place)) for frame in frames]
 
-    def location(self, machine: str, place: Place) -> Location:
-        programs = self._programs(machine)
+    def location(self, controller: str, place: Place) -> Location:
+        programs = self._programs(controller)
         statement, source = programs.statements(place.text)[place.number], programs.texts[place.text]
         line, column = source.position(statement.start)
         end_line, end_column = source.position(statement.end)
-        return Location(machine, place.text, source.name, line, column, end_line, end_column)
+        return Location(controller, place.text, source.name, line, column, end_line, end_column)
 
     # ------------------------------------------------------------------ values
 
@@ -172,21 +172,21 @@ class Debugger:
         """Why something is as it is where the debugger stands (`steptwin.why`). Raises `Misuse`."""
         return _finished(self._why.asking(question, self.now))
 
-    def scope(self, machine: str, name: str) -> Scope:
+    def scope(self, controller: str, name: str) -> Scope:
         """A group of values, one of `steptwin.debug.scopes.SCOPES`. Raises `Misuse`."""
-        return scopes.scope(self.view, machine, name)
+        return scopes.scope(self.view, controller, name)
 
-    def evaluate(self, machine: str, text: str) -> ShownValue:
+    def evaluate(self, controller: str, text: str) -> ShownValue:
         """An expression (`steptwin.debug.calculation`). Raises `Misuse`."""
-        return scopes.evaluate(self.view, machine, text)
+        return scopes.evaluate(self.view, controller, text)
 
-    def set_value(self, machine: str, name: str, text: str) -> ShownValue:
+    def set_value(self, controller: str, name: str, text: str) -> ShownValue:
         """Give a variable, an input or a register the value of an expression. Raises `Misuse`, in the past in any case."""
         if self._is_past:
             ago = (self.present - self.now) / SECOND
             raise Misuse(NOT_IN_THE_PAST(name=name, ago=ago))
-        value = scopes.evaluate(self._world, machine, text).number or 0.0
-        self._apply_input(scopes.setting(self._world, machine, name, value))
+        value = scopes.evaluate(self._world, controller, text).number or 0.0
+        self._apply_input(scopes.setting(self._world, controller, name, value))
         self._lookahead.changed(self.now)
         return ShownValue(name, number_text(value), value, is_settable=True)
 
@@ -218,21 +218,21 @@ class Debugger:
 
     # ------------------------------------------------------------------ what steps look for
 
-    def into(self, machine: str) -> Goal:
+    def into(self, controller: str) -> Goal:
         """The next statement of a controller."""
-        self._programs(machine)
-        return Goal((machine,))
+        self._programs(controller)
+        return Goal((controller,))
 
-    def over(self, machine: str) -> Goal:
+    def over(self, controller: str) -> Goal:
         """The next statement that is not in a call or interrupt which begins here."""
-        programs = self._programs(machine)
+        programs = self._programs(controller)
         stack = programs.stack(self.now)
         comes_back = not stack or programs.comes_back(stack[0].place)
-        return Goal((machine,), programs.depth() if comes_back else None)
+        return Goal((controller,), programs.depth() if comes_back else None)
 
-    def out(self, machine: str) -> Goal:
+    def out(self, controller: str) -> Goal:
         """The statement after the call in which the program is."""
-        return Goal((machine,), self._programs(machine).depth() - 1)
+        return Goal((controller,), self._programs(controller).depth() - 1)
 
     # ------------------------------------------------------------------ forwards
 
@@ -240,17 +240,17 @@ class Debugger:
         """Go on to the next breakpoint or event, at most to a moment."""
         return _finished(self.running(until))
 
-    def step_in(self, machine: str) -> Stopped:
+    def step_in(self, controller: str) -> Stopped:
         """To the next statement of a controller."""
-        return _finished(self.stepping_in(machine))
+        return _finished(self.stepping_in(controller))
 
-    def step_over(self, machine: str) -> Stopped:
+    def step_over(self, controller: str) -> Stopped:
         """To the next statement that is not in a call or interrupt which begins here."""
-        return _finished(self.stepping_over(machine))
+        return _finished(self.stepping_over(controller))
 
-    def step_out(self, machine: str) -> Stopped:
+    def step_out(self, controller: str) -> Stopped:
         """To the statement after the call in which the program is."""
-        return _finished(self.stepping_out(machine))
+        return _finished(self.stepping_out(controller))
 
     def run_to_entry(self) -> Stopped:
         """Before the first statement of any program."""
@@ -259,14 +259,14 @@ class Debugger:
     def running(self, until: Nanos | None = None) -> DebugTravel:
         return self.forwards(Goal(), until)
 
-    def stepping_in(self, machine: str) -> DebugTravel:
-        return self.forwards(self.into(machine))
+    def stepping_in(self, controller: str) -> DebugTravel:
+        return self.forwards(self.into(controller))
 
-    def stepping_over(self, machine: str) -> DebugTravel:
-        return self.forwards(self.over(machine))
+    def stepping_over(self, controller: str) -> DebugTravel:
+        return self.forwards(self.over(controller))
 
-    def stepping_out(self, machine: str) -> DebugTravel:
-        return self.forwards(self.out(machine))
+    def stepping_out(self, controller: str) -> DebugTravel:
+        return self.forwards(self.out(controller))
 
     def running_to_entry(self) -> DebugTravel:
         return self.forwards(Goal(self.threads, None, StopReason.ENTRY))
@@ -296,7 +296,7 @@ class Debugger:
 
     def _slices(self, goal: Goal) -> Iterator[Nanos]:
         """The lengths of slices, one after the other."""
-        most = MOST_OBSERVED_AT_ONCE if goal.machines else MOST_STATEMENTS_AT_ONCE
+        most = MOST_OBSERVED_AT_ONCE if goal.controllers else MOST_STATEMENTS_AT_ONCE
         count = STATEMENTS_AT_ONCE
         while True:
             yield min(LONGEST_SLICE_NS, count * self._statement)
@@ -338,9 +338,9 @@ class Debugger:
 
     # ------------------------------------------------------------------ backwards
 
-    def step_back(self, machine: str) -> Stopped:
+    def step_back(self, controller: str) -> Stopped:
         """To the statement before, or to the beginning of the one in progress."""
-        return _finished(self.stepping_back(machine))
+        return _finished(self.stepping_back(controller))
 
     def run_back(self) -> Stopped:
         """To the last breakpoint or event before this moment, or to the oldest moment that is kept."""
@@ -350,8 +350,8 @@ class Debugger:
         """To a moment between `begin` and `present`. Raises `Misuse` for another one."""
         return _finished(self.going(moment))
 
-    def stepping_back(self, machine: str) -> DebugTravel:
-        return self._backwards(self.into(machine))
+    def stepping_back(self, controller: str) -> DebugTravel:
+        return self._backwards(self.into(controller))
 
     def running_back(self) -> DebugTravel:
         return self._backwards(Goal())

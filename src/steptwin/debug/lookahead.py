@@ -11,11 +11,11 @@ from functools import partial
 from operator import attrgetter
 from typing import NamedTuple, TypeAlias
 
+from steptwin.controller import Nanos
 from steptwin.debug.breakpoints import Breakpoints
 from steptwin.debug.calculation import ResolvedExpression
 from steptwin.debug.observer import Begun, Logged, Observer
 from steptwin.debug.values import LabelPoint, Stopped, StopReason
-from steptwin.machine import Nanos
 from steptwin.simulation.world.history import History, Past
 from steptwin.subject.time import next_due
 
@@ -27,12 +27,12 @@ Finding: TypeAlias = Generator[None, None, "Stopped | None"]
 class Goal(NamedTuple):
     """Target of a step: a statement of one of these controllers, at most ``depth`` deep in calls where that is given."""
 
-    machines: Collection[str] = ()
+    controllers: Collection[str] = ()
     depth: int | None = None
     reason: StopReason = StopReason.STEP
 
     def reached(self, begun: Begun) -> bool:
-        return begun.machine in self.machines and (self.depth is None or begun.depth <= self.depth)
+        return begun.controller in self.controllers and (self.depth is None or begun.depth <= self.depth)
 
 
 class Candidate(NamedTuple):
@@ -78,7 +78,7 @@ class LookAheadRun:
 
     def looks_for(self, goal: Goal) -> bool:
         """Whether there is anything at which it would stop."""
-        return bool(goal.machines or self.points.at or self.points.watches or self._observer.codes)
+        return bool(goal.controllers or self.points.at or self.points.watches or self._observer.codes)
 
     def stopped(self) -> None:
         """The world stops before it: there is no use any more for where it has gone ahead."""
@@ -106,7 +106,7 @@ class LookAheadRun:
 
     def find(self, end: Nanos, goal: Goal, after: Nanos) -> Finding:
         """Go on to a moment; the first reason to stop after another one. Where there is none, it is at ``end`` then."""
-        self._observer.observe(goal.machines)
+        self._observer.observe(goal.controllers)
         self._observer.clear()
         found = yield from self._go_ahead(end)
         stop = yield from self._first_stop([one for one in self._candidates(goal) if one.stop.time > after])
@@ -118,7 +118,7 @@ class LookAheadRun:
     def find_back(self, lower: Nanos, upper: Nanos, goal: Goal, begin: Nanos, before: Nanos) -> Finding:
         """The last reason to stop between two moments, from ``begin`` on and before another moment."""
         yield from self.look_at(lower)
-        self._observer.observe(goal.machines)
+        self._observer.observe(goal.controllers)
         self._observer.clear()
         found: Stopped | None = None
         while (hit := (yield from self._go_ahead(upper))) is not None and hit.time < before:
@@ -137,7 +137,7 @@ class LookAheadRun:
             yield from self.look_at(present)
         if not self._past.lacks_inputs:
             return None
-        self._observer.observe(goal.machines)
+        self._observer.observe(goal.controllers)
         self._observer.clear()
         found = yield from self._go_ahead(present)
         for logged in self._observer.logged:
@@ -186,7 +186,7 @@ class LookAheadRun:
         for watch, old, new in zip(watches, before, after, strict=True):
             if watch.is_hit(old, new):
                 text = watch.text if watch.has_condition else f"{watch.name}: {old:.9g} → {new:.9g}"
-                return Stopped(StopReason.DATA, self.now, watch.machine, text, (watch.number,))
+                return Stopped(StopReason.DATA, self.now, watch.controller, text, (watch.number,))
         return None
 
     # ------------------------------------------------------------------ reasons to stop
@@ -195,12 +195,12 @@ class LookAheadRun:
         """Observations, each with the stop that it is a reason for, in the order of time."""
         found = [Candidate(_stop_at(begun), begun) for begun in self._observer.begun if begun.hit or begun.undecided]
         found += [
-            Candidate(Stopped(goal.reason, begun.stand, begun.machine))
+            Candidate(Stopped(goal.reason, begun.stand, begun.controller))
             for begun in self._observer.begun
             if goal.reached(begun) and not begun.hit
         ]
         events = self._observer.happened
-        found += [Candidate(Stopped(StopReason.EXCEPTION, event.time, event.machine, event.text)) for event in events]
+        found += [Candidate(Stopped(StopReason.EXCEPTION, event.time, event.controller, event.text)) for event in events]
         return sorted(found, key=lambda candidate: candidate.stop.time)
 
     def _first_stop(self, candidates: list[Candidate]) -> Finding:
@@ -221,8 +221,8 @@ class LookAheadRun:
             return candidate.stop
         was, watched = self.now, self._watched
         yield from self.look_at(begun.stand)
-        held = [point for point in begun.undecided if point.holds(begun.machine, begun.stand) and point.counts(begun.time)]
-        hit = tuple(point for point in held if not self._observer.log(begun.time, begun.machine, begun.place, point))
+        held = [point for point in begun.undecided if point.holds(begun.controller, begun.stand) and point.counts(begun.time)]
+        hit = tuple(point for point in held if not self._observer.log(begun.time, begun.controller, begun.place, point))
         yield from self.look_at(was)
         self._watched = watched
         return None if not hit else _stop_at(begun._replace(hit=hit))
@@ -239,4 +239,4 @@ def _stop_at(begun: Begun) -> Stopped:
     points = begun.hit or begun.undecided
     is_label = all(isinstance(point.asked, LabelPoint) for point in points)
     reason = StopReason.FUNCTION if is_label else StopReason.BREAKPOINT
-    return Stopped(reason, begun.stand, begun.machine, points=tuple(point.number for point in begun.hit))
+    return Stopped(reason, begun.stand, begun.controller, points=tuple(point.number for point in begun.hit))

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import NamedTuple
 
+from steptwin.controller import Nanos
 from steptwin.debug.breakpoints import Breakpoint, Breakpoints
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.simulation.kinds.programs import Place, Programs
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.world.simulation import Simulation
@@ -21,7 +21,7 @@ class Begun(NamedTuple):
     """
 
     time: Nanos
-    machine: str
+    controller: str
     place: Place
     depth: int
     hit: tuple[Breakpoint, ...]
@@ -35,7 +35,7 @@ class Begun(NamedTuple):
 
 class Logged(NamedTuple):
     time: Nanos
-    machine: str
+    controller: str
     place: Place
     text: str
 
@@ -44,7 +44,7 @@ class ObservedEvent(NamedTuple):
     """An event of a controller."""
 
     time: Nanos
-    machine: str
+    controller: str
     code: str
     text: str
 
@@ -65,7 +65,7 @@ class Observer:
         self.begun: list[Begun] = []
         self.logged: list[Logged] = []
         self.happened: list[ObservedEvent] = []
-        self._hooks = {machine: self._hook(machine, programs) for machine, programs in world.programs.items()}
+        self._hooks = {controller: self._hook(controller, programs) for controller, programs in world.programs.items()}
         self._hooked: dict[str, frozenset[Place] | None] = {}
         """The places before which hooks are called, by controller; None: all."""
         world.trace.watchers.append(self._recorded)
@@ -81,50 +81,50 @@ class Observer:
         Between those programs run at full speed.
         """
         self.stepping = stepping
-        for machine, programs in self.world.programs.items():
-            places = None if machine in stepping else frozenset(self.points.at.get(machine, ()))
-            if places == self._hooked.get(machine, frozenset()):
+        for controller, programs in self.world.programs.items():
+            places = None if controller in stepping else frozenset(self.points.at.get(controller, ()))
+            if places == self._hooked.get(controller, frozenset()):
                 continue
-            if machine in self._hooked:
-                programs.unhook(self._hooks[machine])
-                del self._hooked[machine]
+            if controller in self._hooked:
+                programs.unhook(self._hooks[controller])
+                del self._hooked[controller]
             if places != frozenset():
-                programs.hook(self._hooks[machine], places)
-                self._hooked[machine] = places
+                programs.hook(self._hooks[controller], places)
+                self._hooked[controller] = places
         scheduler_of = self.world.parts.scheduler_of
-        self.world.settled_first = [scheduler_of[machine] for machine in self.points.reading_others()]
+        self.world.settled_first = [scheduler_of[controller] for controller in self.points.reading_others()]
 
     def release(self) -> None:
         """Have no hooks: breakpoints or texts may be others by the next `observe`."""
-        for machine in self._hooked:
-            self.world.programs[machine].unhook(self._hooks[machine])
+        for controller in self._hooked:
+            self.world.programs[controller].unhook(self._hooks[controller])
         self._hooked.clear()
 
-    def _hook(self, machine: str, programs: Programs) -> StatementHook:
+    def _hook(self, controller: str, programs: Programs) -> StatementHook:
         def hook(now: Nanos, number: int) -> None:
-            points = self.points.at.get(machine)
-            if not self.is_on or (not points and machine not in self.stepping):
+            points = self.points.at.get(controller)
+            if not self.is_on or (not points and controller not in self.stepping):
                 return
             place = programs.place(number)
             if place is not None:
                 at = points.get(place, ()) if points else ()
-                if at or machine in self.stepping:
-                    self._begins(now, machine, programs, place, at)
+                if at or controller in self.stepping:
+                    self._begins(now, controller, programs, place, at)
 
         return hook
 
-    def _begins(self, now: Nanos, machine: str, programs: Programs, place: Place, points: Collection[Breakpoint]) -> None:
+    def _begins(self, now: Nanos, controller: str, programs: Programs, place: Place, points: Collection[Breakpoint]) -> None:
         hit: list[Breakpoint] = []
         undecided: list[Breakpoint] = []
         for point in points:
-            if not point.is_known(machine, now):
+            if not point.is_known(controller, now):
                 undecided.append(point)
-            elif point.holds_at_statement(machine, now) and point.counts(now) and not self.log(now, machine, place, point):
+            elif point.holds_at_statement(controller, now) and point.counts(now) and not self.log(now, controller, place, point):
                 hit.append(point)
-        if hit or undecided or machine in self.stepping:
-            self.begun.append(Begun(now, machine, place, programs.depth(), tuple(hit), tuple(undecided)))
+        if hit or undecided or controller in self.stepping:
+            self.begun.append(Begun(now, controller, place, programs.depth(), tuple(hit), tuple(undecided)))
 
-    def log(self, now: Nanos, machine: str, place: Place, point: Breakpoint) -> bool:
+    def log(self, now: Nanos, controller: str, place: Place, point: Breakpoint) -> bool:
         """Log what a breakpoint that is hit has to log. False where it has nothing: then it stops."""
         if point.log is None:
             return False
@@ -132,9 +132,9 @@ class Observer:
             text = point.log.shown(now)
         except Misuse as error:
             text = f"log: {error}"
-        self.logged.append(Logged(now, machine, place, text))
+        self.logged.append(Logged(now, controller, place, text))
         return True
 
     def _recorded(self, record: TraceRecord) -> None:
         if self.is_on and record.kind == "event" and record.subject in self.codes:
-            self.happened.append(ObservedEvent(record.time, record.machine, record.subject, str(record.value)))
+            self.happened.append(ObservedEvent(record.time, record.controller, record.subject, str(record.value)))

@@ -25,32 +25,34 @@ VARIABLES, AXES, PINS, CONTROLLER, REGISTERS, PARTS = SCOPES
 UNKNOWN_GROUP = Message("debug.unknown-group", "no group of values is called {name!r}: there are {names}")
 
 
-def scope(world: Simulation, machine: str, name: str) -> Scope:
+def scope(world: Simulation, controller: str, name: str) -> Scope:
     """One of `SCOPES` of a controller, at the present moment of its world. Raises `Misuse`."""
-    world.touch(machine)
+    world.touch(controller)
     if name not in SCOPES:
         raise Misuse(UNKNOWN_GROUP(name=name, names=list(SCOPES)))
-    return Scope(name, [value._replace(expression=_expression(world, machine, value)) for value in _VALUES[name](world, machine)])
+    return Scope(
+        name, [value._replace(expression=_expression(world, controller, value)) for value in _VALUES[name](world, controller)]
+    )
 
 
-def _expression(world: Simulation, machine: str, value: ShownValue) -> str:
+def _expression(world: Simulation, controller: str, value: ShownValue) -> str:
     """Expression of a value: its name, or what follows the name of the axis where a controller has but one."""
     _, _, last = value.name.partition(".")
     for text in (value.name, last):
         with suppress(Misuse):
-            found = ResolvedExpression(world, machine, text).value(world.now)
+            found = ResolvedExpression(world, controller, text).value(world.now)
             if value.number is None or found == value.number:
                 return text
     return ""
 
 
-def _variables(world: Simulation, machine: str) -> Iterator[ShownValue]:
-    for name, value in world.programs_of(machine).variables(world.now).items():
+def _variables(world: Simulation, controller: str) -> Iterator[ShownValue]:
+    for name, value in world.programs_of(controller).variables(world.now).items():
         yield ShownValue(name, number_text(value), value, is_settable=True)
 
 
-def _axes(world: Simulation, machine: str) -> Iterator[ShownValue]:
-    for axis in world.kind(machine).state(world.machine(machine), world.now).axes:
+def _axes(world: Simulation, controller: str) -> Iterator[ShownValue]:
+    for axis in world.kind(controller).state(world.controller(controller), world.now).axes:
         yield from _axis(axis)
 
 
@@ -69,16 +71,16 @@ def _measured(name: str, value: float | None, unit: str) -> ShownValue:
     return ShownValue(name, "not known") if value is None else ShownValue(name, f"{number_text(value)} {unit}".rstrip(), value)
 
 
-def _pins(world: Simulation, machine: str) -> Iterator[ShownValue]:
-    kind, device = world.kind(machine), world.machine(machine)
+def _pins(world: Simulation, controller: str) -> Iterator[ShownValue]:
+    kind, device = world.kind(controller), world.controller(controller)
     units = {name: pin.unit for name, pin in kind.pins(device).items()}
     inputs = {*kind.terminals.digital_inputs, *kind.terminals.analog_inputs}
     for name, level in kind.state.pins(device, world.now).items():
         yield ShownValue(name, f"{number_text(level)} {units.get(name, '')}".rstrip(), level, is_settable=name in inputs)
 
 
-def _controller(world: Simulation, machine: str) -> Iterator[ShownValue]:
-    state = world.kind(machine).state(world.machine(machine), world.now)
+def _controller(world: Simulation, controller: str) -> Iterator[ShownValue]:
+    state = world.kind(controller).state(world.controller(controller), world.now)
     yield ShownValue("time", f"{world.now / 1e9:.9f} s", world.now / 1e9)
     yield _status("status", state.status)
     yield ShownValue("program", state.program.text)
@@ -86,8 +88,8 @@ def _controller(world: Simulation, machine: str) -> Iterator[ShownValue]:
         yield ShownValue(name, detail_text(detail))
 
 
-def _registers(world: Simulation, machine: str) -> Iterator[ShownValue]:
-    kind, device = world.kind(machine), world.machine(machine)
+def _registers(world: Simulation, controller: str) -> Iterator[ShownValue]:
+    kind, device = world.kind(controller), world.controller(controller)
     for point in kind.datasheet(device).points:
         live = _live(kind, device, point.path)
         if live is not None and live.read is not None:
@@ -104,7 +106,7 @@ def _live(kind: AnyKind, device: MotionController, path: str) -> LivePoint | Non
         return None
 
 
-def _parts(world: Simulation, machine: str) -> Iterator[ShownValue]:
+def _parts(world: Simulation, controller: str) -> Iterator[ShownValue]:
     """Mechanics, by axis."""
     for axis in world.axes:
         name = f"{axis}.position"
@@ -116,11 +118,11 @@ _VALUES = {
 }  # fmt: skip
 
 
-def evaluate(world: Simulation, machine: str, text: str) -> ShownValue:
+def evaluate(world: Simulation, controller: str, text: str) -> ShownValue:
     """The value of an expression. Raises `Misuse`."""
-    world.touch(machine)
+    world.touch(controller)
     name = text.strip()
-    number = ResolvedExpression(world, machine, name).value(world.now)
+    number = ResolvedExpression(world, controller, name).value(world.now)
     return ShownValue(name, number_text(number), number, is_settable=False)
 
 
@@ -130,15 +132,15 @@ CANNOT_BE_SET = Message(
 )
 
 
-def setting(world: Simulation, machine: str, name: str, value: float) -> ExternalInput:
+def setting(world: Simulation, controller: str, name: str, value: float) -> ExternalInput:
     """Input that gives a variable, an input or a register another value. Raises `Misuse` for what cannot be set."""
-    own = world.programs_of(machine)
+    own = world.programs_of(controller)
     variables = {known.upper(): known for known in own.variables(world.now)}
     if name.upper() in variables:
-        return SetVariable(machine, variables[name.upper()], value)
+        return SetVariable(controller, variables[name.upper()], value)
     owner, dot, rest = name.partition(".")
-    target, path = (owner, rest) if dot and owner in world.machines else (machine, name)
-    kind, device = world.kind(target), world.machine(target)
+    target, path = (owner, rest) if dot and owner in world.controllers else (controller, name)
+    kind, device = world.kind(target), world.controller(target)
     path = world.programs_of(target).point(path) or path if target in world.programs else path
     if path.upper() in device.pins():
         return Set(((target, kind.input_pin(path, value), value),))

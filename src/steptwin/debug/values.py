@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.simulation.kinds.programs import Place
 
 
@@ -34,11 +34,11 @@ class StopReason(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Stopped:
-    """Where a run came to a stand: at ``time``, before whatever happens next. ``machine``: the controller because of which."""
+    """Where a run came to a stand: at ``time``, before whatever happens next. ``controller``: the controller because of which."""
 
     reason: StopReason
     time: Nanos
-    machine: str | None = None
+    controller: str | None = None
     text: str = ""
     points: tuple[int, ...] = ()
     """The breakpoints that were hit."""
@@ -52,7 +52,7 @@ class LinePoint:
     the text with the values of what is in braces.
     """
 
-    machine: str
+    controller: str
     text: str
     line: int
     condition: str | None = None
@@ -71,9 +71,9 @@ class LabelPoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DataPoint:
-    """A stop when a value changes, or when ``condition`` comes true. ``name`` is one in an expression of ``machine``."""
+    """A stop when a value changes, or when ``condition`` comes true. ``name`` is one in an expression of ``controller``."""
 
-    machine: str
+    controller: str
     name: str
     condition: str | None = None
 
@@ -111,7 +111,7 @@ class SetPoint(NamedTuple):
 class Location(NamedTuple):
     """A statement in a text: lines and columns from 1, the end is exclusive."""
 
-    machine: str
+    controller: str
     text: str
     source: str
     """The name of the text's file."""

@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Protocol
 
+from steptwin.controller import Nanos
 from steptwin.devices.worldpart import WorldPart
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 from steptwin.later import start
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.script import steps
@@ -46,10 +46,10 @@ class SubjectPart(Protocol):
     async def begin_jog(self, wanted: command.Jog) -> ExtendableJog: ...
 
 
-UNKNOWN_MACHINE = Message("devices.unknown-machine", "no machine is called {machine!r}{hint}; {known}")
+UNKNOWN_CONTROLLER = Message("devices.unknown-controller", "no controller is called {controller!r}{hint}; {known}")
 THERE_ARE = Message("devices.there-are", "there are {names}")
 NONE_IS_CONNECTED = Message("devices.none-is-connected", "no device is connected")
-NAME_THE_MACHINE = Message("devices.name-the-machine", "{command}: name the machine")
+NAME_THE_CONTROLLER = Message("devices.name-the-controller", "{command}: name the controller")
 NOT_POSSIBLE = Message("devices.not-possible", "{command} is not possible here; possible are {names}")
 NOT_STOPPED = Message("devices.not-stopped", "not stopped: {problems}{also}")
 ALSO_STOPPED = Message("devices.also-stopped", "; stopped: {names}")
@@ -65,7 +65,7 @@ NEEDS_AN_ADDRESS = Message(
 class CompositeSubject:
     """Satisfies `steptwin.studio.surroundings.Served` and `steptwin.subject.jogs.Jogs`.
 
-    A command goes to the part whose machine or line it names; one that names none to ``world``, or to the only device.
+    A command goes to the part whose controller or line it names; one that names none to ``world``, or to the only device.
 
     ``clock`` and ``numbering`` are those of the world where there is one; all devices use them.
     """
@@ -77,7 +77,7 @@ class CompositeSubject:
         self.numbering = numbering
         self._followings: list[Following] = []
         self._gone: set[str] = set()
-        """Machines that were removed: values of them are unknown to viewers that still watch them."""
+        """Controllers that were removed: values of them are unknown to viewers that still watch them."""
         self._describe()
 
     # ------------------------------------------------------------------ parts
@@ -92,7 +92,7 @@ class CompositeSubject:
         self._parts.remove(part)
         for following in self._followings:
             part.followers.remove(following)
-        self._gone |= {machine.name for machine in part.description.machines}
+        self._gone |= {controller.name for controller in part.description.controllers}
         self._describe()
 
     @property
@@ -101,30 +101,35 @@ class CompositeSubject:
 
     def _describe(self) -> None:
         all_of = [part.description for part in self._parts]
-        self._of_machine = {machine.name: part for part in self._parts for machine in part.description.machines}
+        self._of_controller = {controller.name: part for part in self._parts for controller in part.description.controllers}
         self._of_unit = {
-            (machine.line, machine.unit): part for part in self._parts for machine in part.description.machines if machine.is_real
+            (controller.line, controller.unit): part
+            for part in self._parts
+            for controller in part.description.controllers
+            if controller.is_real
         }
         self._of_line = {line.name: part for part in reversed(self._parts) for line in part.description.lines}
         self._several = {name for name, count in Counter(line for line, _ in self._of_unit).items() if count > 1}
         """Lines with several devices."""
         can = {name for one in all_of for name in one.commands}
-        machines = tuple(machine for one in all_of for machine in one.machines)
-        base = all_of[0] if self._world is not None else Description(", ".join(one.name for one in machines) or "no device", ())
+        controllers = tuple(controller for one in all_of for controller in one.controllers)
+        base = (
+            all_of[0] if self._world is not None else Description(", ".join(one.name for one in controllers) or "no device", ())
+        )
         self.description = replace(
             base,
-            machines=machines,
+            controllers=controllers,
             lines=tuple({line.name: line for one in all_of for line in one.lines}.values()),
             commands=tuple(name for name in COMMANDS if name in can),
         )
 
-    def _part_called(self, machine: str) -> SubjectPart:
+    def _part_called(self, controller: str) -> SubjectPart:
         """Raises `Misuse`."""
-        part = self._of_machine.get(machine) or self._world
+        part = self._of_controller.get(controller) or self._world
         if part is None:
-            names = self._of_machine
+            names = self._of_controller
             known = THERE_ARE(names=list(names)) if names else NONE_IS_CONNECTED()
-            raise Misuse(UNKNOWN_MACHINE(machine=machine, hint=NearMiss().hint(machine, names), known=known))
+            raise Misuse(UNKNOWN_CONTROLLER(controller=controller, hint=NearMiss().hint(controller, names), known=known))
         return part
 
     def _part_of(self, wanted: Command) -> SubjectPart:
@@ -138,12 +143,12 @@ class CompositeSubject:
             return self._addressed(wanted)
         for field in type_of(wanted).fields:
             value: Any = getattr(wanted, field.key)
-            if field.name == "machine" and value is not None:
+            if field.name == "controller" and value is not None:
                 found.append(self._part_called(value))
             elif field.name == "line" and value in self._of_line:
                 found.append(self._of_line[value])
             elif field.name == "values" and value is not None:
-                found += [self._part_called(machine) for machine, _, _ in value]
+                found += [self._part_called(controller) for controller, _, _ in value]
         if len(set(map(id, found))) > 1:
             raise Misuse(ONE_CONTROLLER_AT_A_TIME(command=type_of(wanted).name))
         if found:
@@ -153,7 +158,7 @@ class CompositeSubject:
         if self._world is None and len(self._parts) > 1:
             can = self.description.commands
             name = type_of(wanted).name
-            raise Refusal(NAME_THE_MACHINE(command=name) if name in can else NOT_POSSIBLE(command=name, names=list(can)))
+            raise Refusal(NAME_THE_CONTROLLER(command=name) if name in can else NOT_POSSIBLE(command=name, names=list(can)))
         return self._parts[0]
 
     def _addressed(self, wanted: steps.Send) -> SubjectPart:
@@ -179,11 +184,11 @@ class CompositeSubject:
         return self._in_order(points, found)
 
     def _by_part(self, points: Iterable[str]) -> list[tuple[SubjectPart, list[str]]]:
-        """Raises `Misuse`. Points of machines that are gone, and the time, are left out."""
+        """Raises `Misuse`. Points of controllers that are gone, and the time, are left out."""
         groups: dict[int, tuple[SubjectPart, list[str]]] = {}
         for point in points:
             owner = point.partition(".")[0]
-            if point != TIME and (owner not in self._gone or owner in self._of_machine):
+            if point != TIME and (owner not in self._gone or owner in self._of_controller):
                 part = self._part_called(owner)
                 groups.setdefault(id(part), (part, []))[1].append(point)
         return list(groups.values())
@@ -206,7 +211,7 @@ class CompositeSubject:
                 read = [(await part.do(command.ReadPoints(tuple(own)))).value for part, own in self._by_part(wanted.points)]
                 found = {one["point"]: Reading(**one) for own in read for one in own}
                 return self.result_of([one._asdict() for one in self._in_order(wanted.points, found)])
-            case command.ReadPins() if wanted.machine is None and len(self._parts) > 1:
+            case command.ReadPins() if wanted.controller is None and len(self._parts) > 1:
                 levels = [(await part.do(wanted)).value for part in self._parts]
                 return self.result_of({pin: level for own in levels for pin, level in own.items()})
             case _:
@@ -215,22 +220,22 @@ class CompositeSubject:
     async def _stop_all(self) -> object:
         """Stop all parts at the same time; a failure of one does not affect the others.
 
-        Raises `LineFailure` with the machines that could not be stopped.
+        Raises `LineFailure` with the controllers that could not be stopped.
         """
         stopping = [(part, start(part.do(command.StopAll()))) for part in self._parts]
-        done: dict[str, list[str]] = {"machines": [], "scripts": []}
+        done: dict[str, list[str]] = {"controllers": [], "scripts": []}
         failed: list[str] = []
         for part, later in stopping:
-            names = [machine.name for machine in part.description.machines]
+            names = [controller.name for controller in part.description.controllers]
             try:
                 stopped: Any = (await later).value
             except SteptwinError as error:
                 failed.append(f"{', '.join(names)} ({error})")
             else:
-                done["machines"] += names
+                done["controllers"] += names
                 done["scripts"] += stopped["scripts"] if part is self._world else []
         if failed:
-            also = ALSO_STOPPED(names=done["machines"]) if done["machines"] else ""
+            also = ALSO_STOPPED(names=done["controllers"]) if done["controllers"] else ""
             raise LineFailure(NOT_STOPPED(problems="; ".join(failed), also=also))
         return done
 
@@ -263,4 +268,4 @@ class CompositeSubject:
     # ------------------------------------------------------------------ as `Jogs`
 
     async def begin_jog(self, wanted: command.Jog) -> ExtendableJog:
-        return await self._part_called(wanted.machine).begin_jog(wanted)
+        return await self._part_called(wanted.controller).begin_jog(wanted)

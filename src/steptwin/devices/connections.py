@@ -1,4 +1,4 @@
-"""Connections to devices: drivers by address, lines that several devices share, machines of the subject that come and go."""
+"""Connections to devices: drivers by address, lines that several devices share, controllers of the subject that come and go."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from steptwin.controller import Nanos
 from steptwin.devices.composite import THERE_ARE, CompositeSubject
 from steptwin.devices.device import ConnectedDevice, DeviceSurroundings
 from steptwin.diagnostics import SourceText
@@ -18,7 +19,6 @@ from steptwin.drivers.line import DriverLine
 from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart
 from steptwin.errors import LineFailure, Misuse
 from steptwin.eventloop import later
-from steptwin.machine import Nanos
 from steptwin.messages import Message, text_of
 from steptwin.nearmiss import NearMiss
 
@@ -49,11 +49,11 @@ class _Connected:
     key: tuple[str, str, int]
 
 
-UNKNOWN_DEVICE = Message("devices.unknown-device", "no device is called {machine!r}{hint}; {known}")
+UNKNOWN_DEVICE = Message("devices.unknown-device", "no device is called {controller!r}{hint}; {known}")
 THERE_IS_NONE = Message("devices.there-is-none", "there is none")
 TOO_MANY_DEVICES = Message("devices.too-many-devices", "{most} devices are connected already, which is the most")
 WRONG_NAME = Message("devices.wrong-name", "name = {name!r}: permitted are {form}")
-NAME_IN_USE = Message("devices.name-in-use", "name = {name!r}: a machine is called that already")
+NAME_IN_USE = Message("devices.name-in-use", "name = {name!r}: a controller is called that already")
 
 
 class DeviceConnections:
@@ -86,35 +86,35 @@ class DeviceConnections:
     async def connect(self, address: str, name: str | None) -> str:
         return await later(self.open(address, name))
 
-    async def disconnect(self, machine: str) -> None:
-        await later(self._close(machine))
+    async def disconnect(self, controller: str) -> None:
+        await later(self._close(controller))
 
-    async def settings(self, machine: str) -> str:
-        return await later(self._connected(machine).device.settings())
+    async def settings(self, controller: str) -> str:
+        return await later(self._connected(controller).device.settings())
 
-    async def configuration(self, machine: str) -> SourceText | None:
-        return await later(asyncio.to_thread(self._connected(machine).device.configuration))
+    async def configuration(self, controller: str) -> SourceText | None:
+        return await later(asyncio.to_thread(self._connected(controller).device.configuration))
 
-    async def shadow(self, machine: str, *, on: bool) -> None:
-        device = self._connected(machine).device
+    async def shadow(self, controller: str, *, on: bool) -> None:
+        device = self._connected(controller).device
         if on:
             await later(device.begin_shadow())
         else:
             device.end_shadow()
 
-    def shadow_of(self, machine: str, after: Nanos) -> Mapping[str, object] | None:
-        return self._connected(machine).device.shadow_state(after)
+    def shadow_of(self, controller: str, after: Nanos) -> Mapping[str, object] | None:
+        return self._connected(controller).device.shadow_state(after)
 
     def traffic(self) -> dict[str, ExchangeCounts]:
         """Traffic on the line of each device, by the name of the device."""
         return {name: self._lines[one.key].line.counts for name, one in self._devices.items()}
 
-    def _connected(self, machine: str) -> _Connected:
+    def _connected(self, controller: str) -> _Connected:
         """Raises `Misuse`."""
-        if machine not in self._devices:
+        if controller not in self._devices:
             known = THERE_ARE(names=list(self._devices)) if self._devices else THERE_IS_NONE()
-            raise Misuse(UNKNOWN_DEVICE(machine=machine, hint=NearMiss().hint(machine, self._devices), known=known))
-        return self._devices[machine]
+            raise Misuse(UNKNOWN_DEVICE(controller=controller, hint=NearMiss().hint(controller, self._devices), known=known))
+        return self._devices[controller]
 
     async def open(self, text: str, name: str | None = None) -> str:
         """As `connect`, in the event loop."""
@@ -140,7 +140,7 @@ class DeviceConnections:
         return name
 
     def _free_name(self, address: DeviceAddress, name: str | None) -> str:
-        taken = [machine.name for machine in self._subject.description.machines]
+        taken = [controller.name for controller in self._subject.description.controllers]
         if name is not None:
             if not NAME.fullmatch(name):
                 raise Misuse(WRONG_NAME(name=name, form=NAME_FORM))
@@ -154,10 +154,10 @@ class DeviceConnections:
             number += 1
         return found
 
-    async def _close(self, machine: str) -> None:
+    async def _close(self, controller: str) -> None:
         async with self._turn:
-            connected = self._connected(machine)
-            del self._devices[machine]
+            connected = self._connected(controller)
+            del self._devices[controller]
             await connected.device.close()
             self._subject.remove(connected.device)
             line = self._lines[connected.key]
@@ -168,8 +168,8 @@ class DeviceConnections:
 
     async def close(self) -> None:
         """All of them. Jogs end; other motions and programs of devices go on."""
-        for machine in list(self._devices):
-            await self._close(machine)
+        for controller in list(self._devices):
+            await self._close(controller)
 
 
 NO_ANSWER = Message("devices.no-answer", "{problem}{others}")

@@ -12,13 +12,13 @@ import contextlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.devices.digitalshadow import DigitalShadow, Known
 from steptwin.devices.jog import LeasedJog
 from steptwin.diagnostics import SourceText
 from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart, RawEffect
 from steptwin.errors import LineFailure, Refusal, SteptwinError
 from steptwin.eventloop import later
-from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message, text_of
 from steptwin.simulation.script import steps
 from steptwin.simulation.script.control import Halt, ended
@@ -55,7 +55,7 @@ class DeviceSurroundings:
     clock: Callable[[], Nanos]
     """The wall clock, which never goes back."""
     keep: Callable[[str, str], str]
-    """Keeps the settings of a machine, a text of JSON; where they are. Raises `SteptwinError`."""
+    """Keeps the settings of a controller, a text of JSON; where they are. Raises `SteptwinError`."""
     on_internal: Callable[[Exception], object]
 
 
@@ -189,7 +189,7 @@ class ConnectedDevice:
 
     async def _do(self, wanted: Command) -> Result:
         name = type_of(wanted).name
-        with span(f"device {name}", {"command": name, "machine": self.name}, is_part=True):
+        with span(f"device {name}", {"command": name, "controller": self.name}, is_part=True):
             return await self._done(wanted)
 
     async def _done(self, wanted: Command) -> Result:
@@ -329,7 +329,7 @@ class ConnectedDevice:
                 raise Refusal(AXIS_IS_JOGGED(name=self.name))
             twin = await self._device.twin(self.name)
             now = self._around.clock()
-            self._shadow = DigitalShadow(self.name, self._subject.description.machines[0].datasheet, twin, now)
+            self._shadow = DigitalShadow(self.name, self._subject.description.controllers[0].datasheet, twin, now)
             self._registers_due = now + REGISTERS_NS
         self._wanted.set()
 

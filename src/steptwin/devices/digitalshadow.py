@@ -15,9 +15,9 @@ from dataclasses import dataclass, field, replace
 from math import isclose
 from typing import NamedTuple
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.datasheet import AxisDescription, Datasheet, PinDirection
 from steptwin.errors import SteptwinError
-from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.description import read_world
 from steptwin.simulation.script import steps
@@ -212,7 +212,7 @@ class DigitalShadow:
     def plain(self, after: Nanos) -> dict[str, object]:
         """With samples later than ``after``, from the beginning of the digital shadow."""
         return {
-            "machine": self.name,
+            "controller": self.name,
             "axes": [_plain(axis, after) for axis in self._axes.values()],
             "registers": [found.plain() for found in self._registers.values()],
             "compared": len(self._twin.compared),

@@ -6,9 +6,9 @@ import asyncio
 import contextlib
 from collections.abc import Callable
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.drivers.subject import DeviceJog
 from steptwin.errors import Refusal
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.messages import Message, text_of
 from steptwin.subject.jogs import JOG_HAS_ENDED
 

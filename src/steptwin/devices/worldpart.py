@@ -11,8 +11,8 @@ from steptwin.subject.jogs import Jogs
 
 
 def present_of(world: PlannedSubject) -> dict[str, Any]:
-    """``state`` by machine and ``faults``."""
-    states = {part.name: world.do(command.ReadState(part.name)).value for part in world.description.machines}
+    """``state`` by controller and ``faults``."""
+    states = {part.name: world.do(command.ReadState(part.name)).value for part in world.description.controllers}
     return {"state": states, "faults": world.do(command.ListFaults()).value}
 
 

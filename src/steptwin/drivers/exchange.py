@@ -15,9 +15,9 @@ from collections import deque
 from collections.abc import Callable, Hashable
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Refusal, SteptwinError
-from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message, text_of
 
 

@@ -14,10 +14,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
 
+from steptwin.controller import Nanos
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.subject import DevicePart
 from steptwin.errors import Misuse, Refusal
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.optionalmethods import OptionalMethods
 from steptwin.wire.frameline import FrameLine

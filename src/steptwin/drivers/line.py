@@ -9,9 +9,9 @@ from collections.abc import Callable, Hashable
 from contextlib import AbstractAsyncContextManager
 from typing import Any, Protocol
 
+from steptwin.controller import Nanos
 from steptwin.drivers.exchange import A, ExchangeCounts, Job, Q
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 
 LONGEST_WAIT_S = 1e6

@@ -6,9 +6,9 @@ import struct
 from collections.abc import Callable
 from typing import NamedTuple
 
+from steptwin.controller import MICROSECOND, MILLISECOND, SECOND, Nanos
 from steptwin.drivers.exchange import LineLost, SendNext
 from steptwin.errors import Misuse
-from steptwin.machine import MICROSECOND, MILLISECOND, SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.wire import mbap, pdu, rtu
 from steptwin.wire.crc import crc16

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from steptwin.machine import MILLISECOND, Nanos
+from steptwin.controller import MILLISECOND, Nanos
 
 HOLD_NS: Nanos = 400 * MILLISECOND
 """The usual hold time of a jog: so long after the last answer of the device that belongs to its motion nothing more is begun."""

@@ -16,6 +16,7 @@ from enum import Enum
 from types import TracebackType
 from typing import Any, Protocol, TypeAlias
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.controllerstate import ControllerState, parts_of
 from steptwin.datasheet import Datasheet
 from steptwin.diagnostics import SourceText
@@ -23,13 +24,12 @@ from steptwin.drivers.blocking import Blocking, blocking, finish
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.lineframes import FRAMES, LineFrames, SeenFrame
 from steptwin.errors import Misuse, Refusal
-from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.script import steps
 from steptwin.subject import commands as command
 from steptwin.subject.commands import COMMANDS, Command, type_of
-from steptwin.subject.contract import GOOD, UNKNOWN, Description, LinePart, MachinePart, Reading, Result
+from steptwin.subject.contract import GOOD, UNKNOWN, ControllerPart, Description, LinePart, Reading, Result
 from steptwin.subject.controls import controls_of
 from steptwin.subject.devicetwin import DeviceTwin
 from steptwin.subject.events import Event, Numbering
@@ -112,7 +112,7 @@ class DevicePart(Protocol):
         ...
 
     def actions(self) -> Mapping[type, DeviceAction]:
-        """The commands that the device can execute; names of machine and line have been checked."""
+        """The commands that the device can execute; names of controller and line have been checked."""
         ...
 
     async def look(self, kinds: frozenset[str]) -> list[Payload]:
@@ -220,9 +220,9 @@ class AsyncDeviceSubject:
         place = self._line.place
         sheet = self._device.datasheet
         controls, no_twin = controls_of(sheet, self._actions), self._device.no_twin
-        machine = MachinePart(self.name, sheet, place, self._device.address, controls, is_real=True, no_twin=no_twin)
+        controller = ControllerPart(self.name, sheet, place, self._device.address, controls, is_real=True, no_twin=no_twin)
         names = tuple(row.name for row in COMMANDS.values() if row.kind in self._actions)
-        return Description(self.name, (machine,), lines=(LinePart(place, self._device.line_kind, None),), commands=names)
+        return Description(self.name, (controller,), lines=(LinePart(place, self._device.line_kind, None),), commands=names)
 
     # ------------------------------------------------------------------ what a subject is
 
@@ -311,16 +311,16 @@ class AsyncDeviceSubject:
     # ------------------------------------------------------------------ commands
 
     def _check_names(self, wanted: Command) -> None:
-        """Check the names of machines and lines in a command."""
+        """Check the names of controllers and lines in a command."""
         for field in type_of(wanted).fields:
             value: Any = getattr(wanted, field.key)
-            if field.name == "machine":
-                self._check_name("machine", value, self.name)
+            if field.name == "controller":
+                self._check_name("controller", value, self.name)
             elif field.name == "line":
                 self._check_name("line", value, self._line.place)
             elif field.name == "values":
-                for machine, _, _ in value:
-                    self._check_name("machine", machine, self.name)
+                for controller, _, _ in value:
+                    self._check_name("controller", controller, self.name)
 
     def _check_name(self, what: str, name: str | None, there: str) -> None:
         if name is not None and name != there:

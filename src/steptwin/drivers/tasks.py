@@ -8,11 +8,11 @@ from contextlib import AbstractAsyncContextManager
 from types import TracebackType
 from typing import Any, Generic, Self, cast
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.drivers.exchange import A, ExchangeCounts, Exchanger, Job, LineLost, Q
 from steptwin.drivers.line import LINE_IS_CLOSED, LOCK_SLICE_S
 from steptwin.drivers.tcp import Endpoint
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.system import reason
 from steptwin.tracing import is_traced, span
 

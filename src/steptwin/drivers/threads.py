@@ -14,11 +14,11 @@ import time
 from collections.abc import Callable, Hashable, Mapping
 from typing import Any, Generic
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.drivers.exchange import A, ExchangeCounts, Exchanger, Job, LineLost, Q
 from steptwin.drivers.line import LINE_IS_CLOSED, LOCK_SLICE_S
 from steptwin.drivers.tcp import Channel, Endpoint
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 
 
 class ThreadLine(Generic[Q, A]):

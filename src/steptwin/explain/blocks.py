@@ -6,8 +6,8 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import NamedTuple
 
 from steptwin.controlflow import ControlFlow
+from steptwin.controller import Nanos
 from steptwin.explain.model import FlowBlock, FlowWay, Piece
-from steptwin.machine import Nanos
 
 
 class Timing(NamedTuple):

@@ -11,10 +11,10 @@ from collections.abc import Collection, Iterable, Sequence
 from typing import NamedTuple
 
 from steptwin.controlflow import ControlFlow
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.explain.blocks import Timing
 from steptwin.explain.model import FlowBlock
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.mic488.axis import MAX_SPEED_P, SLOWEST_RAMP_P
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.motion.planner import MotionState, plan_position

@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import pairwise
 
 from steptwin.controlflow import ControlFlow
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.diagnostics import Severity, SourceText
 from steptwin.errors import Misuse
 from steptwin.explain.blocks import Timing, blocks_of
@@ -24,7 +25,6 @@ from steptwin.m1486.structure import CommandStream, is_computed, stored_bits, st
 from steptwin.m1486.successors import flow_of
 from steptwin.m1486.syntax import ChipCommand, JumpCondition, parse
 from steptwin.m1486.variants import DEFAULT, Store, Variant
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.motion.ramps import plan_distance
 from steptwin.tables import complete
 

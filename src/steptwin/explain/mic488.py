@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 
 from steptwin.controlflow import ControlFlow
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.explain import mic488_interrupts as interrupts
@@ -13,7 +14,6 @@ from steptwin.explain import mic488_waits as waits
 from steptwin.explain.blocks import Timing, blocks_of
 from steptwin.explain.durations import Durations
 from steptwin.explain.model import EndlessLoop, ExplainedStatement, Explanation, MemoryPart, MemorySection, Usage
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.mic488.config import ControllerConfig
 from steptwin.wbc import steps as s
 from steptwin.wbc.check import CheckedProgram

@@ -6,9 +6,9 @@ import heapq
 from collections.abc import Collection, Iterator
 
 from steptwin.controlflow import ControlFlow
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.diagnostics import SourceText
 from steptwin.explain.model import LostInterrupt
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.wbc import steps as s
 from steptwin.wbc.events import BY_REGISTER, HARD_PREFIX, PREFIX
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from steptwin.controller import Nanos
 from steptwin.diagnostics import SourceText
-from steptwin.machine import Nanos
 
 
 class ExplainedStatement(NamedTuple):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from steptwin.columns import aligned
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.explain.model import Explanation, FlowBlock, FlowWay, Usage
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 
 
 def text(explained: Explanation) -> str:

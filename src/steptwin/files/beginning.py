@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
 from steptwin.files.textfiles import check_writable
 from steptwin.files.world import World
 from steptwin.files.writing import is_written_directly
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.describe.overrides import NO_OVERRIDES, Overrides
 from steptwin.simulation.faults import read as read_fault

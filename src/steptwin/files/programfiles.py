@@ -43,7 +43,7 @@ class CompanionFiles:
 
     @classmethod
     def of(cls, program: Path, positions: Path | None, config: Path | None) -> CompanionFiles:
-        """A machine has three files of one name, as in the vendor's tool: ``.prg``, ``.csv`` and ``.cfg``.
+        """A controller has three files of one name, as in the vendor's tool: ``.prg``, ``.csv`` and ``.cfg``.
 
         A compiled image has its positions in it.
         """

@@ -8,9 +8,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.files.beginning import SESSION_SUFFIX
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.system import reason
 

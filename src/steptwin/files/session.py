@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 from steptwin import __version__
+from steptwin.controller import SECOND, Nanos
 from steptwin.durations import LONGEST_NS
 from steptwin.errors import Misuse
 from steptwin.files.textfiles import write_bytes
 from steptwin.files.world import FailedSave, World
 from steptwin.inputfiles import read_recorded
-from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.plaintypes import fitting
 from steptwin.simulation.describe.blueprint import Blueprint
@@ -75,7 +75,7 @@ class Session:
         ran = _firmwares(world)
         for name, firmware in self.firmware.items():
             if ran.get(name) != firmware:
-                raise Misuse(f"{name} is {firmware} in the session, but its world has {ran.get(name, 'no such machine')}")
+                raise Misuse(f"{name} is {firmware} in the session, but its world has {ran.get(name, 'no such controller')}")
         return world
 
     def replay(self, until: Nanos | None = None, *, keep_trace: bool = True, keep_inputs: bool = True) -> World:
@@ -102,7 +102,7 @@ def _settle(world: World) -> None:
 
 def _firmwares(world: World) -> dict[str, str]:
     """The firmware, or type, of every controller that has one."""
-    sheets = {name: world.kind(name).datasheet(machine) for name, machine in world.machines.items()}
+    sheets = {name: world.kind(name).datasheet(controller) for name, controller in world.controllers.items()}
     return {name: sheet.variant for name, sheet in sheets.items() if sheet.variant}
 
 
@@ -147,7 +147,9 @@ def save(session: Session, path: Path | str) -> None:
         "digest": session.digest,
         "world": session.text,
         "files": {name: b64encode(content).decode() for name, content in session.files.items()},
-        "failed_saves": [{"time_ns": time, "machine": machine, "reason": text} for time, machine, text in session.failed_saves],
+        "failed_saves": [
+            {"time_ns": time, "machine": controller, "reason": text} for time, controller, text in session.failed_saves
+        ],
         "inputs": [
             {"time_ns": time, "settled": settled, "do": type(what).__name__, **_plain(what)}
             for time, what, settled in session.inputs
@@ -225,10 +227,16 @@ def _failed(item: object) -> FailedSave:
     )
 
 
+KEYS = {"controller": "machine"}
+"""Keys of recorded inputs that differ from their attributes, so that older recordings can be read."""
+ATTRIBUTES = {key: name for name, key in KEYS.items()}
+
+
 def _plain(what: ExternalInput) -> dict[str, Any]:
     if isinstance(what, tuple):
-        return {name: _value(value) for name, value in what._asdict().items()}
-    return {field.name: _value(getattr(what, field.name)) for field in fields(what)} if is_dataclass(what) else {}
+        return {KEYS.get(name, name): _value(value) for name, value in what._asdict().items()}
+    named = fields(what) if is_dataclass(what) else ()
+    return {KEYS.get(field.name, field.name): _value(getattr(what, field.name)) for field in named}
 
 
 def _value(value: Any) -> Any:
@@ -243,7 +251,7 @@ def _value(value: Any) -> Any:
 
 def _input(item: dict[str, Any]) -> RecordedInput:
     kind = _STEPS[item["do"]]
-    values = {key: _back(value) for key, value in item.items() if key not in ("time_ns", "settled", "do")}
+    values = {ATTRIBUTES.get(key, key): _back(value) for key, value in item.items() if key not in ("time_ns", "settled", "do")}
     if kind is do.SetFault:
         item_fault = fitting("fault of SetFault", item["fault"], dict)
         fault = {key: tuple(value) if isinstance(value, list) else value for key, value in item_fault.items()}

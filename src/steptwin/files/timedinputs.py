@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from typing import NamedTuple
 
+from steptwin.controller import Nanos
 from steptwin.durations import duration
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 
 _INPUT = re.compile(r"([\w.&]+) *= *(-?\d+(?:\.\d+)?) *@ *(.+)\Z", re.ASCII)
 _NUMBER = re.compile(r"\d+(\.\d+)?", re.ASCII)

@@ -14,6 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self, TypeAlias
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.durations import duration
 from steptwin.errors import Misuse
 from steptwin.files.export.progress import TimeProgress, silent
@@ -21,7 +22,6 @@ from steptwin.files.loading import DescriptionKey, keep_blueprint, known_bluepri
 from steptwin.files.memory import StateDirectory, StateFailure
 from steptwin.files.textfiles import read_text
 from steptwin.inputfiles import MOST_DESCRIPTION_BYTES, read_bytes, shown
-from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.describe.blueprint import Blueprint, memory_file
 from steptwin.simulation.describe.description import describe, read_world
 from steptwin.simulation.describe.overrides import NO_OVERRIDES, Overrides
@@ -51,10 +51,10 @@ LONGEST_SLICE_NS: Nanos = 10 * SECOND
 
 
 class FailedSave(NamedTuple):
-    """A failed save of the non-volatile memory of a machine, for example on a full disk."""
+    """A failed save of the non-volatile memory of a controller, for example on a full disk."""
 
     time: Nanos
-    machine: str
+    controller: str
     reason: str
 
 
@@ -82,7 +82,7 @@ class World(Simulation):
     ) -> None:
         """``failing``: saves of memory that fail, as they did in the run that is replayed. ``at``: as for `Simulation`."""
         self._state = state
-        self._failing = {(failed.time, failed.machine): failed.reason for failed in failing}
+        self._failing = {(failed.time, failed.controller): failed.reason for failed in failing}
         self.failed_saves: list[FailedSave] = []
         """Failed saves so far, if inputs are kept: a replay repeats them."""
         keep = None if state is None and not self._failing else self._save
@@ -111,7 +111,7 @@ class World(Simulation):
     def views(self, kind: ControllerKind[S, M, V]) -> Views[V]:
         """The controllers of a kind by name."""
         view: Callable[[Simulation, str, Any], V] = kind.view
-        there = {name: view(self, name, machine) for name, machine in self.machines.items() if self.kind(name) is kind}
+        there = {name: view(self, name, controller) for name, controller in self.controllers.items() if self.kind(name) is kind}
         return Views(self, kind.model, there)
 
     # ------------------------------------------------------------------ making one
@@ -166,16 +166,16 @@ class World(Simulation):
             keep_blueprint(loaded, world.blueprint)
         return world
 
-    def _save(self, machine: str, data: bytes, now: Nanos) -> None:
+    def _save(self, controller: str, data: bytes, now: Nanos) -> None:
         """Raises `StateFailure` if it could not be stored."""
         try:
-            if (now, machine) in self._failing:
-                raise StateFailure(self._failing[now, machine])
+            if (now, controller) in self._failing:
+                raise StateFailure(self._failing[now, controller])
             if self._state is not None:
-                self._state.save(machine, data)
+                self._state.save(controller, data)
         except StateFailure as error:
             if self.keeps_inputs:
-                self.failed_saves.append(FailedSave(now, machine, str(error)))
+                self.failed_saves.append(FailedSave(now, controller, str(error)))
             raise
 
     @classmethod
@@ -187,10 +187,10 @@ class World(Simulation):
             return cls(Blueprint(spec, files), keep_trace=keep_trace, keep_inputs=keep_inputs)
         with ExitStack() as opened:
             state = opened.enter_context(StateDirectory(where))
-            for controller in spec.controllers:
-                image = state.load(controller.name)
+            for described in spec.controllers:
+                image = state.load(described.name)
                 if image is not None:
-                    files[memory_file(controller.name)] = image
+                    files[memory_file(described.name)] = image
             world = cls(Blueprint(spec, files), keep_trace=keep_trace, keep_inputs=keep_inputs, state=state)
             opened.pop_all()
             return world

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, TypeAlias
 from steptwin.options import Option, OptionGroup
 
 if TYPE_CHECKING:
-    from steptwin.machine import Nanos
+    from steptwin.controller import Nanos
     from steptwin.simulation.describe.overrides import Overrides
 
 Faults: TypeAlias = Annotated[

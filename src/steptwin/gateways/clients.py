@@ -15,7 +15,7 @@ from steptwin.errors import Refusal, SteptwinError
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.simulation.script.steps import Request, Write
 from steptwin.subject.commands import Command, Home, Move, ReadState, StopAxes, plain_command, type_of
-from steptwin.subject.contract import MachinePart, Result
+from steptwin.subject.contract import ControllerPart, Result
 from steptwin.subject.dispatch import code_of
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Following
@@ -113,14 +113,14 @@ async def _done(subject: GatewaySubject, wanted: Command) -> Result:
     if not isinstance(wanted, MOVING):
         return await subject.do(wanted)
     axes = frozenset({str(wanted.axis)}) if isinstance(wanted, Move | Home) else None
-    following = subject.follow(Filter(frozenset({"status", "input"}), _machines(subject, wanted), axes), MOST_EVENTS)
+    following = subject.follow(Filter(frozenset({"status", "input"}), _controllers(subject, wanted), axes), MOST_EVENTS)
     try:
         if isinstance(wanted, Move | Home):
             await _check_drive(subject, wanted, following)
         result = await subject.do(wanted)
         event = await _drive_off(subject, wanted, following, result.number)
         if event is not None:
-            ignored = Ignored(f"{event.machine}: {event.text}: switch its drive on first")
+            ignored = Ignored(f"{event.controller}: {event.text}: switch its drive on first")
             ignored.result = result
             raise ignored
         return result
@@ -128,15 +128,15 @@ async def _done(subject: GatewaySubject, wanted: Command) -> Result:
         following.close()
 
 
-def _machines(subject: GatewaySubject, wanted: Move | Home | Write | Request) -> frozenset[str]:
+def _controllers(subject: GatewaySubject, wanted: Move | Home | Write | Request) -> frozenset[str]:
     match wanted:
         case Write(values=values):
             return frozenset(one[0] for one in values)
         case Request(line=line, unit=unit):
-            parts = subject.description.machines
+            parts = subject.description.controllers
             return frozenset(part.name for part in parts if part.line == line and unit in (part.unit, BROADCAST))
         case Move() | Home():
-            return frozenset({wanted.machine})
+            return frozenset({wanted.controller})
 
 
 async def _drive_off(subject: GatewaySubject, wanted: Command, following: Following, number: int) -> Event | None:
@@ -155,7 +155,7 @@ async def _drive_off(subject: GatewaySubject, wanted: Command, following: Follow
 
 async def _is_under_way(subject: GatewaySubject, wanted: Write) -> bool:
     """Whether a twin on a line, which may take its time, is sent a motion of an axis whose drive is off."""
-    for part in subject.description.machines:
+    for part in subject.description.controllers:
         axes = set() if part.is_real or part.line is None else _moved(part, wanted)
         if axes:
             state: Any = (await subject.do(ReadState(part.name))).value
@@ -164,20 +164,20 @@ async def _is_under_way(subject: GatewaySubject, wanted: Write) -> bool:
     return False
 
 
-def _moved(part: MachinePart, wanted: Write) -> set[int]:
+def _moved(part: ControllerPart, wanted: Write) -> set[int]:
     """The axes of a controller to whose registers motions are written; a switch that is written 0 moves nothing."""
     found: set[int] = set()
     moving = {point.path: point for point in part.datasheet.points if point.effect is PointEffect.MOVES}
-    for machine, register, value in wanted.values:
+    for controller, register, value in wanted.values:
         point = moving.get(register.upper())
-        if machine == part.name and point is not None and (value or point.type != "switch"):
+        if controller == part.name and point is not None and (value or point.type != "switch"):
             found.update(axis.number for axis in part.datasheet.axes if point.path.startswith(f"{axis.name}_"))
     return found
 
 
 async def _check_drive(subject: GatewaySubject, wanted: Move | Home, following: Following) -> None:
     """Raises `Ignored` for a twin on a line whose drive is off, because its answer may come later, and `Refusal` after a stop."""
-    part = next((one for one in subject.description.machines if one.name == wanted.machine), None)
+    part = next((one for one in subject.description.controllers if one.name == wanted.controller), None)
     if part is None or part.is_real or part.line is None:
         return
     if not any(one.command == "enable" and one.axis == wanted.axis for one in part.takes):

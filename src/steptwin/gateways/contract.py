@@ -35,7 +35,7 @@ class PastValues(Protocol):
     """The values that a history has kept."""
 
     async def values(self, point: str, begin: datetime | None, end: datetime | None, most: int | None) -> list[PastValue]:
-        """Values of ``MACHINE.POINT``, oldest first: the one at ``begin``, the others up to ``end``; at most ``most``.
+        """Values of ``CONTROLLER.POINT``, oldest first: the one at ``begin``, the others up to ``end``; at most ``most``.
 
         Raises `Misuse` for what has not been kept, `LineFailure`.
         """

@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.controllerstate import PARTS
 from steptwin.gateways.points import State
-from steptwin.machine import SECOND, Nanos
-from steptwin.subject.contract import MachinePart
+from steptwin.subject.contract import ControllerPart
 from steptwin.subject.events import Event
 from steptwin.subject.payloads import (
     ButtonPayload,
@@ -43,7 +43,7 @@ class HeldState:
 
     __slots__ = ("_active", "_also", "_axes", "_levels", "_moved", "_others", "_stale", "_unsettled", "state")
 
-    def __init__(self, part: MachinePart) -> None:
+    def __init__(self, part: ControllerPart) -> None:
         axes = part.datasheet.axes
         names = [axis.name for axis in axes]
         self._axes = {str(axis.number): axis.name for axis in axes}

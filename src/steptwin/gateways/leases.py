@@ -13,10 +13,10 @@ import asyncio
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.contract import GatewaySubject
-from steptwin.machine import SECOND
 from steptwin.subject.commands import Jog, StopAxes
 from steptwin.subject.jogs import ExtendableJog
 
@@ -60,7 +60,7 @@ class JogLeases:
 
         Raises `Misuse`, `Refusal`, `LineFailure`.
         """
-        lease = self._leases.get((wanted.machine, wanted.axis))
+        lease = self._leases.get((wanted.controller, wanted.axis))
         is_new = lease is None or not lease.is_of(owner, wanted)
         with client.noted(self._subject, wanted) if is_new else nullcontext():
             client.check(wanted)
@@ -70,9 +70,9 @@ class JogLeases:
         if not LEASE_S[0] <= lease_s <= LEASE_S[1]:
             raise Misuse(f"lease = {lease_s:g} s: permitted are {LEASE_S[0]:g} to {LEASE_S[1]:g} s")
         until = asyncio.get_running_loop().time() + lease_s
-        lease = self._leases.get((wanted.machine, wanted.axis))
+        lease = self._leases.get((wanted.controller, wanted.axis))
         if lease is not None:
-            axis = f"{wanted.machine} axis {wanted.axis}"
+            axis = f"{wanted.controller} axis {wanted.axis}"
             if lease.over is None and lease.owner is not owner:
                 raise Refusal(f"{axis} is jogged by another client")
             if lease.held is None:
@@ -86,7 +86,7 @@ class JogLeases:
         await self._begin(_Lease(owner, wanted, until))
 
     async def _begin(self, lease: _Lease) -> None:
-        place = lease.wanted.machine, lease.wanted.axis
+        place = lease.wanted.controller, lease.wanted.axis
         self._leases[place] = lease
         try:
             held = await self._subject.begin_jog(lease.wanted)
@@ -113,20 +113,20 @@ class JogLeases:
 
     def extend(self, owner: object, wanted: Jog, lease_s: float) -> None:
         """Let a jog go on from now on. Raises `Refusal` if it has ended."""
-        lease = self._leases.get((wanted.machine, wanted.axis))
+        lease = self._leases.get((wanted.controller, wanted.axis))
         if lease is None or lease.owner is not owner or lease.wanted != wanted or lease.held is None or lease.over is not None:
-            raise Refusal(f"{wanted.machine} axis {wanted.axis}: the jog has ended")
+            raise Refusal(f"{wanted.controller} axis {wanted.axis}: the jog has ended")
         lease.until = asyncio.get_running_loop().time() + lease_s
 
-    def released(self, machine: str, axis: int) -> None:
+    def released(self, controller: str, axis: int) -> None:
         """The client has let go of a jog that had ended: it may be begun again."""
-        lease = self._leases.get((machine, axis))
+        lease = self._leases.get((controller, axis))
         if lease is not None and lease.over is not None:
             self._end(lease)
 
-    def replaced(self, machine: str, axis: int) -> None:
+    def replaced(self, controller: str, axis: int) -> None:
         """Another command has taken the axis."""
-        lease = self._leases.get((machine, axis))
+        lease = self._leases.get((controller, axis))
         if lease is None:
             return
         if lease.held is not None:
@@ -140,7 +140,7 @@ class JogLeases:
             return
         if lease.held.over is None:
             lease.held.release()
-        place = lease.wanted.machine, lease.wanted.axis
+        place = lease.wanted.controller, lease.wanted.axis
         if self._leases.get(place) is lease:
             del self._leases[place]
         if lease.task is not None and lease.task is not asyncio.current_task():
@@ -148,8 +148,8 @@ class JogLeases:
 
     def stopped(self, wanted: StopAxes) -> None:
         """Axes have been stopped by a command."""
-        for (machine, axis), lease in list(self._leases.items()):
-            if machine != wanted.machine or wanted.axis not in (None, axis):
+        for (controller, axis), lease in list(self._leases.items()):
+            if controller != wanted.controller or wanted.axis not in (None, axis):
                 continue
             if lease.held is not None:
                 lease.held.cut()

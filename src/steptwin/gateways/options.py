@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from steptwin.machine import MILLISECOND, Nanos
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.simulation.describe.servicetables import GATEWAY
 from steptwin.simulation.toml.table import TableSpec, key, table
 from steptwin.simulation.toml.values import address_value, positive_time, texts
@@ -47,4 +47,4 @@ def samples(meaning: str) -> Nanos:
 
 def shows() -> tuple[str, ...]:
     """The key ``registers``."""
-    return key(texts, "further points to show: MACHINE.POINT, such as table.USER_REGISTER[5]", default=())
+    return key(texts, "further points to show: CONTROLLER.POINT, such as table.USER_REGISTER[5]", default=())

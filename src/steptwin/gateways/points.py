@@ -18,7 +18,7 @@ from steptwin.errors import Misuse
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.script.steps import Set, Write
 from steptwin.subject.commands import Command
-from steptwin.subject.contract import Description, MachinePart
+from steptwin.subject.contract import ControllerPart, Description
 
 PointValue: TypeAlias = bool | int | float | str | None
 """None where it is not known."""
@@ -88,12 +88,12 @@ def values_of(points: Sequence[GatewayPoint]) -> Callable[[Any], tuple[PointValu
     return lambda part: tuple([read(part) for read in reads])
 
 
-def points_of(part: MachinePart, description: Description, registers: Iterable[str] = ()) -> tuple[GatewayPoint, ...]:
+def points_of(part: ControllerPart, description: Description, registers: Iterable[str] = ()) -> tuple[GatewayPoint, ...]:
     """Those of a controller, in the order in which they are shown. ``registers``: the names of further points to show."""
     return tuple(_points(part, description, registers))
 
 
-def _points(part: MachinePart, description: Description, registers: Iterable[str]) -> Iterator[GatewayPoint]:
+def _points(part: ControllerPart, description: Description, registers: Iterable[str]) -> Iterator[GatewayPoint]:
     yield from _CONTROLLER
     yield from _PROGRAM
     for index, axis in enumerate(part.datasheet.axes):
@@ -198,13 +198,13 @@ def _axis(index: int, axis: AxisDescription) -> Iterator[GatewayPoint]:
     yield point("status_level", f"How serious that is: {_LEVELS}.", text, _of_status("level"))
 
 
-def _pin(machine: str, pin: Pin, *, can_set: bool, is_writable: bool) -> GatewayPoint:
+def _pin(controller: str, pin: Pin, *, can_set: bool, is_writable: bool) -> GatewayPoint:
     """Inputs of a twin take levels; outputs are written where the controller has a register for them."""
     write: Callable[[float], Command] | None = None
     if is_writable:
-        write = lambda level: Write(((machine, pin.name, level),))  # noqa: E731
+        write = lambda level: Write(((controller, pin.name, level),))  # noqa: E731
     elif can_set and pin.direction is not PinDirection.OUTPUT:
-        write = lambda level: Set(((machine, pin.name, level),))  # noqa: E731
+        write = lambda level: Set(((controller, pin.name, level),))  # noqa: E731
     return GatewayPoint(
         path=("pins", pin.name),
         meaning=f"Level of an {pin.direction.value}.",
@@ -264,10 +264,10 @@ CLOCK_POINTS = (
 # ---------------------------------------------------------------------- registers
 
 
-def _register(part: MachinePart, name: str) -> GatewayPoint:
+def _register(part: ControllerPart, name: str) -> GatewayPoint:
     """A point of the data sheet, or an element of one that is a list (``USER_REGISTER[5]``)."""
     point = part.datasheet.point(name.partition("[")[0])
-    machine = part.name
+    controller = part.name
     return GatewayPoint(
         path=("registers", name),
         meaning=f"{point.meaning.removesuffix('.')}.",
@@ -276,24 +276,24 @@ def _register(part: MachinePart, name: str) -> GatewayPoint:
         limits=point.limits,
         part=_REGISTERS,
         of=itemgetter(name),
-        write=None if point.access is Access.READ else lambda value: Write(((machine, name, value),)),
+        write=None if point.access is Access.READ else lambda value: Write(((controller, name, value),)),
     )
 
 
-def registers_by_machine(table: str, names: Iterable[str], description: Description) -> dict[str, list[str]]:
-    """``MACHINE.POINT`` by machine, from the key ``registers`` of a table. Raises `Misuse` for a name that is not there."""
-    parts = {part.name: part for part in description.machines}
+def registers_by_controller(table: str, names: Iterable[str], description: Description) -> dict[str, list[str]]:
+    """``CONTROLLER.POINT`` by controller, from the key ``registers`` of a table. Raises `Misuse` for a name that is not there."""
+    parts = {part.name: part for part in description.controllers}
     found: dict[str, list[str]] = {name: [] for name in parts}
     for name in names:
-        machine, _, point = name.partition(".")
-        if machine not in parts:
-            hint = NearMiss().hint(machine, parts)
-            raise Misuse(f"{table}: registers: no controller is called {machine!r}{hint}; expected MACHINE.POINT")
-        sheet = parts[machine].datasheet
+        controller, _, point = name.partition(".")
+        if controller not in parts:
+            hint = NearMiss().hint(controller, parts)
+            raise Misuse(f"{table}: registers: no controller is called {controller!r}{hint}; expected CONTROLLER.POINT")
+        sheet = parts[controller].datasheet
         try:
             sheet.point(point.partition("[")[0])
         except KeyError:
             hint = NearMiss().hint(point.partition("[")[0], [one.path for one in sheet.points])
             raise Misuse(f"{table}: registers: no point is called {name!r}{hint}") from None
-        found[machine].append(point)
+        found[controller].append(point)
     return found

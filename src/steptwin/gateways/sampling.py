@@ -17,10 +17,10 @@ from math import inf
 from typing import Any, cast
 from zlib import crc32
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import LineFailure, Refusal
 from steptwin.gateways.heldstate import HeldState, is_resting, merged, parts_only
 from steptwin.gateways.points import CLOCK, State
-from steptwin.machine import SECOND, Nanos
 from steptwin.subject import commands as command
 from steptwin.subject.contract import AsyncSubject
 from steptwin.subject.events import Event
@@ -49,7 +49,7 @@ class Sample:
     A part of a state in which nothing has changed is the same object as in the sample before (`GatewayPoint.part`).
     """
 
-    machine: str
+    controller: str
     state: State | None
     at: datetime
     time: Nanos = 0
@@ -80,7 +80,7 @@ class SharedSamples:
         if self._following is None:
             self._following = self.subject.follow(Filter(KINDS), MOST_EVENTS)
             self._following.on_event = self._wake
-            for part in self.subject.description.machines:
+            for part in self.subject.description.controllers:
                 if not part.is_real:
                     self._held[part.name] = HeldState(part)
                 if part.line is not None:
@@ -101,9 +101,9 @@ class SharedSamples:
     def _collect_registers(self) -> None:
         found: dict[str, dict[str, None]] = {}
         for sampler in self._samplers:
-            for machine, names in sampler.registers.items():
-                found.setdefault(machine, {}).update(dict.fromkeys(names))
-        registers = {machine: tuple(names) for machine, names in found.items()}
+            for controller, names in sampler.registers.items():
+                found.setdefault(controller, {}).update(dict.fromkeys(names))
+        registers = {controller: tuple(names) for controller, names in found.items()}
         self._past.update(name for name in registers if registers[name] != self._registers.get(name))
         self._registers = registers
 
@@ -125,7 +125,7 @@ class SharedSamples:
             return
         changed: dict[str, None] = {}
         for event in events:
-            for name in self._on_line.get(event.machine, (event.machine,)):
+            for name in self._on_line.get(event.controller, (event.controller,)):
                 if self._may_change(name, event):
                     changed[name] = None
         for sampler in self._samplers:
@@ -142,77 +142,77 @@ class SharedSamples:
 
     def is_resting(self, sample: Sample) -> bool:
         """Whether it does not change without events."""
-        if sample.machine == CLOCK or sample.state is None:
+        if sample.controller == CLOCK or sample.state is None:
             return False
-        held = self._held.get(sample.machine)
+        held = self._held.get(sample.controller)
         return is_resting(sample.state) if held is None else not held.is_active
 
-    async def recent(self, machine: str, since: float) -> Sample:
+    async def recent(self, controller: str, since: float) -> Sample:
         """One that was taken after ``since`` and everything that has happened, or a new one."""
-        known = self._latest.get(machine)
-        if known is None or machine in self._past:
-            return await self.take(machine)
+        known = self._latest.get(controller)
+        if known is None or controller in self._past:
+            return await self.take(controller)
         taken_at, sample = known
-        held = self._held.get(machine)
+        held = self._held.get(controller)
         if held is None or sample.state is None:
-            return sample if taken_at >= since else await self.take(machine)
-        if asyncio.get_running_loop().time() - self._whole.get(machine, -inf) > REST_S / 2:
-            return await self.take(machine)
+            return sample if taken_at >= since else await self.take(controller)
+        if asyncio.get_running_loop().time() - self._whole.get(controller, -inf) > REST_S / 2:
+            return await self.take(controller)
         is_due = taken_at < since
         if not is_due and not held.has_news:
             return sample
-        return await self._part(machine, held, sample, is_due=is_due)
+        return await self._part(controller, held, sample, is_due=is_due)
 
-    async def _part(self, machine: str, held: HeldState, before: Sample, *, is_due: bool) -> Sample:
+    async def _part(self, controller: str, held: HeldState, before: Sample, *, is_due: bool) -> Sample:
         """Read what events have named."""
         wanted = held.wanted(is_due=is_due)
         parts: dict[str, Any] = {}
         now: Nanos | None = None
         try:
             if wanted:
-                answer = await self.subject.do(command.ReadState(machine, wanted))
+                answer = await self.subject.do(command.ReadState(controller, wanted))
                 parts, now = answer.value, answer.time
-            if is_due and machine in self._registers:
-                parts = {**parts, "registers": await self._read(machine)}
+            if is_due and controller in self._registers:
+                parts = {**parts, "registers": await self._read(controller)}
         except (LineFailure, Refusal):
-            return self._keep(Sample(machine, None, datetime.now(UTC)))
+            return self._keep(Sample(controller, None, datetime.now(UTC)))
         state = held.put(parts, now)
         if state is before.state:
             return self._keep(before)
-        return self._keep(Sample(machine, state, datetime.now(UTC), before.time if now is None else now))
+        return self._keep(Sample(controller, state, datetime.now(UTC), before.time if now is None else now))
 
-    async def present(self, machine: str) -> Sample:
+    async def present(self, controller: str) -> Sample:
         """The present values of a controller; of a twin what may have changed is read."""
         self.see_events()
-        return await self.recent(machine, asyncio.get_running_loop().time())
+        return await self.recent(controller, asyncio.get_running_loop().time())
 
-    async def take(self, machine: str) -> Sample:
+    async def take(self, controller: str) -> Sample:
         """The present values of a controller, read as a whole, or of the `CLOCK`."""
-        if machine == CLOCK:
+        if controller == CLOCK:
             return Sample(CLOCK, cast("State", (await self.subject.do(command.Time())).value), datetime.now(UTC))
-        self._past.discard(machine)
+        self._past.discard(controller)
         try:
-            answer = await self.subject.do(command.ReadState(machine))
-            state = parts_only(cast("State", answer.value), await self._read(machine))
+            answer = await self.subject.do(command.ReadState(controller))
+            state = parts_only(cast("State", answer.value), await self._read(controller))
         except (LineFailure, Refusal):  # a device may refuse a register
-            return self._keep(Sample(machine, None, datetime.now(UTC)))
-        held, known = self._held.get(machine), self._latest.get(machine)
+            return self._keep(Sample(controller, None, datetime.now(UTC)))
+        held, known = self._held.get(controller), self._latest.get(controller)
         if held is not None:
             state = held.put_all(state, answer.time)
-            self._whole[machine] = asyncio.get_running_loop().time()
+            self._whole[controller] = asyncio.get_running_loop().time()
         elif known is not None and known[1].state is not None:
             state = merged(known[1].state, state)
-        return self._keep(Sample(machine, state, datetime.now(UTC), answer.time))
+        return self._keep(Sample(controller, state, datetime.now(UTC), answer.time))
 
     def _keep(self, sample: Sample) -> Sample:
-        self._latest[sample.machine] = asyncio.get_running_loop().time(), sample
+        self._latest[sample.controller] = asyncio.get_running_loop().time(), sample
         return sample
 
-    async def _read(self, machine: str) -> Mapping[str, float | None]:
-        names = self._registers.get(machine, ())
+    async def _read(self, controller: str) -> Mapping[str, float | None]:
+        names = self._registers.get(controller, ())
         if not names:
             return {}
-        points = tuple(f"{machine}.{name}" for name in names)
+        points = tuple(f"{controller}.{name}" for name in names)
         readings = cast("list[Mapping[str, Any]]", (await self.subject.do(command.ReadPoints(points))).value)
         return {name: reading["value"] for name, reading in zip(names, readings, strict=True)}
 
@@ -240,7 +240,7 @@ class Sampler:
         """Samples of devices, whose answers come later."""
         self._failed: BaseException | None = None
         """Error that has ended the reading of a device."""
-        self._real = frozenset(part.name for part in shared.subject.description.machines if part.is_real)
+        self._real = frozenset(part.name for part in shared.subject.description.controllers if part.is_real)
         self._shared.join(self)
 
     def close(self) -> None:
@@ -250,9 +250,9 @@ class Sampler:
 
     # ------------------------------------------------------------------ what is looked at
 
-    def watch(self, machines: Iterable[str]) -> None:
+    def watch(self, controllers: Iterable[str]) -> None:
         """Look at these from now on, and at no others."""
-        wanted = set(machines)
+        wanted = set(controllers)
         for name in self._last.keys() - wanted:
             del self._last[name]
             self._at.pop(name, None)
@@ -261,14 +261,14 @@ class Sampler:
             self._phases[name] = crc32(name.encode()) % _REST_SLOTS
             self._plan(name, self._now())
 
-    def hasten(self, machine: str) -> None:
+    def hasten(self, controller: str) -> None:
         """It may have changed, or will: look at it when the interval is over."""
-        if machine in self._last:
-            self._plan(machine, max(self._last[machine] + self._slots, self._now()))
+        if controller in self._last:
+            self._plan(controller, max(self._last[controller] + self._slots, self._now()))
 
-    def changed_by_events(self, machines: Iterable[str]) -> None:
+    def changed_by_events(self, controllers: Iterable[str]) -> None:
         now = self._now()
-        for name in machines:
+        for name in controllers:
             last = self._last.get(name)
             if last is not None:
                 self._plan(name, max(last + self._slots, now))
@@ -283,11 +283,11 @@ class Sampler:
     def _now(self) -> int:
         return int(asyncio.get_running_loop().time() / TICK_S + 1e-6)
 
-    def _plan(self, machine: str, slot: int) -> None:
-        planned = self._at.get(machine)
+    def _plan(self, controller: str, slot: int) -> None:
+        planned = self._at.get(controller)
         if planned is None or planned > slot:
-            self._at[machine] = slot
-            self._calendar.setdefault(slot, {})[machine] = None
+            self._at[controller] = slot
+            self._calendar.setdefault(slot, {})[controller] = None
 
     # ------------------------------------------------------------------ samples
 
@@ -328,7 +328,7 @@ class Sampler:
 
     def taken(self, sample: Sample) -> None:
         """This sample of a controller that was due has been taken."""
-        name = sample.machine
+        name = sample.controller
         last = self._last.get(name)
         if last is None:
             return
@@ -369,10 +369,10 @@ class Sampler:
             self._failed = task.exception()
             self.wake()
 
-    async def take(self, machine: str) -> Sample:
+    async def take(self, controller: str) -> Sample:
         """The present values of a controller, read as a whole, or of the `CLOCK`."""
-        return await self._shared.take(machine)
+        return await self._shared.take(controller)
 
-    async def present(self, machine: str) -> Sample:
+    async def present(self, controller: str) -> Sample:
         """The present values of a controller; of a twin only what may have changed is read."""
-        return await self._shared.present(machine)
+        return await self._shared.present(controller)

@@ -9,10 +9,11 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from steptwin.access.audit import Entry
+from steptwin.controller import SECOND
 from steptwin.errors import LineFailure, SteptwinError
 from steptwin.eventloop import endless
 from steptwin.gateways.contract import GatewayState, GatewaySubject
-from steptwin.gateways.points import registers_by_machine
+from steptwin.gateways.points import registers_by_controller
 from steptwin.history.database import read_url, shown
 from steptwin.history.options import HistorySpec
 from steptwin.history.past import KeptValues
@@ -20,7 +21,6 @@ from steptwin.history.recorder import Recorder, WallAndSteady
 from steptwin.history.rows import RowBatch, RunHead
 from steptwin.history.spool import Spool
 from steptwin.history.writer import HistoryWriter
-from steptwin.machine import SECOND
 from steptwin.messages import Message
 from steptwin.simulation.describe.servicetables import HISTORY
 from steptwin.system import reason
@@ -54,7 +54,7 @@ class HistoryKeeper:
     async def open(self, *, listen_any: bool, notice: Callable[[str], None]) -> Mapping[str, object]:
         """It listens nowhere, whatever is permitted."""
         self._notice = notice
-        registers = registers_by_machine(f"[{HISTORY}]", self._spec.registers, self._subject.description)
+        registers = registers_by_controller(f"[{HISTORY}]", self._spec.registers, self._subject.description)
         self._spool = Spool(self._folder)
         loop = asyncio.get_running_loop()
 

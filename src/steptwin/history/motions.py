@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import inf
 
-from steptwin.machine import MICROSECOND, SECOND, Nanos
+from steptwin.controller import MICROSECOND, SECOND, Nanos
 from steptwin.motion.divisions import Plan, profile_of
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from steptwin.machine import MILLISECOND, Nanos
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.simulation.describe.servicetables import HISTORY, ServiceTable
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import TableSpec, key, read_spec, table
@@ -17,7 +17,9 @@ class HistorySpec(TableSpec):
 
     database: str = key(text_value, "where it is kept: sqlite:///FILE or postgresql://HOST/NAME")
     interval: Nanos = key(positive_time, "how often values that come without events are looked at", default=100 * MILLISECOND)
-    registers: tuple[str, ...] = key(texts, "further points to keep: MACHINE.POINT, such as table.USER_REGISTER[5]", default=())
+    registers: tuple[str, ...] = key(
+        texts, "further points to keep: CONTROLLER.POINT, such as table.USER_REGISTER[5]", default=()
+    )
     dead_band: float = key(number(0.0), "changes of numbers up to this much, in their unit, are not kept", default=0.0)
     keep_days: int | None = key(
         whole(1, MOST_DAYS), "values older than this are removed, their summaries stay; default: none", default=None

@@ -23,12 +23,12 @@ from numpy.typing import NDArray
 from sqlalchemy import Column, Select, Table, func, select
 from sqlalchemy.exc import DBAPIError
 
+from steptwin.controller import MICROSECOND, SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.history.chores import MINUTE_US
 from steptwin.history.database import SQLITE, check_version, engine_of, failure, read_url, shown
 from steptwin.history.motions import KeptMotion
 from steptwin.history.schema import EVENT, PLAN, POINT, RUN, SAMPLE, SUMMARY, TEXT
-from steptwin.machine import MICROSECOND, SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.motion.plain import read_plan
 from steptwin.nearmiss import NearMiss

@@ -11,13 +11,13 @@ from operator import itemgetter
 from typing import NamedTuple
 
 from steptwin.access.audit import Entry
+from steptwin.controller import SECOND, Nanos
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.points import CLOCK, CLOCK_POINTS, GatewayPoint, PointType, PointValue, points_of, whole_state
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.history.rows import EventRow, KeptValue, PlanRow, PointRow, RowBatch, RunHead, SampleRow
-from steptwin.machine import SECOND, Nanos
 from steptwin.motion.plain import plain_plan
-from steptwin.subject.contract import MachinePart
+from steptwin.subject.contract import ControllerPart
 from steptwin.subject.events import Event
 from steptwin.subject.following import filter_of
 from steptwin.subject.payloads import SHOWN_KINDS, CoordinatePayload, EdgePayload, PlanPayload, RestoredPayload
@@ -92,16 +92,16 @@ class Recorder:
         self._clock = clock
         self._dead_band = dead_band
         self._sampler = Sampler(subject.samples, registers)
-        self._machines = {part.name: part for part in subject.description.machines}
-        self._has_devices = any(part.is_real for part in self._machines.values())
+        self._controllers = {part.name: part for part in subject.description.controllers}
+        self._has_devices = any(part.is_real for part in self._controllers.values())
         kinds = SHOWN_KINDS if self._has_devices else TWIN_KINDS
         self._following = subject.follow(filter_of(kinds), MOST_EVENTS)
         self._points: list[PointRow] = []
         self._sampled: dict[str, list[tuple[int, GatewayPoint]]] = {CLOCK: self._add(CLOCK, SHARED_CLOCK_POINTS)}
         self._axes: dict[tuple[str, str], _Axis] = {}
         self._pins: dict[tuple[str, str], int] = {}
-        for part in self._machines.values():
-            self._add_machine(part, registers.get(part.name, ()))
+        for part in self._controllers.values():
+            self._add_controller(part, registers.get(part.name, ()))
         self._traffic = {line: self._add(line, TRAFFIC_POINTS) for line in subject.traffic()}
         self._last: dict[int, _Last] = {}
         self._plans: dict[tuple[str, str], tuple[str, int]] = {}
@@ -116,7 +116,7 @@ class Recorder:
         """Rows that could not be kept, of which no batch tells yet."""
         self._note: _GapNote | None = None
 
-    def _add_machine(self, part: MachinePart, registers: Iterable[str]) -> None:
+    def _add_controller(self, part: ControllerPart, registers: Iterable[str]) -> None:
         points = [point for point in points_of(part, self._subject.description, registers) if point.name not in PASSING]
         if part.is_real:
             self._sampled[part.name] = self._add(part.name, points)
@@ -130,11 +130,11 @@ class Recorder:
         rest = [p for p in points if p.path[0] != "pins" and not (p.path[0] in axes and p.path[1] in FROM_PLANS)]
         self._sampled[part.name] = self._add(part.name, rest)
 
-    def _add(self, machine: str, points: Iterable[GatewayPoint]) -> list[tuple[int, GatewayPoint]]:
+    def _add(self, controller: str, points: Iterable[GatewayPoint]) -> list[tuple[int, GatewayPoint]]:
         found: list[tuple[int, GatewayPoint]] = []
         for point in points:
             found.append((len(self._points), point))
-            self._points.append(PointRow(f"{machine}.{point.name}", point.unit, point.type.value))
+            self._points.append(PointRow(f"{controller}.{point.name}", point.unit, point.type.value))
         return found
 
     def close(self) -> None:
@@ -146,7 +146,7 @@ class Recorder:
     async def begin(self) -> RunHead:
         """Begin a run at the present moment, with all values. Raises as commands do."""
         if self._has_devices:
-            self._sampler.watch(self._machines)
+            self._sampler.watch(self._controllers)
         clock = await self._sampler.take(CLOCK)
         now, wall = _time(clock), self._clock.wall_us()
         self._steady = self._clock.steady_us()
@@ -178,9 +178,9 @@ class Recorder:
             self._take_event(event, event.time, wall)
 
     async def _take_all(self, now: Nanos, wall: int) -> None:
-        """All values of all machines, also levels, of which events tell."""
+        """All values of all controllers, also levels, of which events tell."""
         self._take_traffic(now, wall)
-        for name in self._machines:
+        for name in self._controllers:
             sample = await self._sampler.take(name)
             self._take_sample(sample, now, wall)
             if sample.state is not None:
@@ -238,8 +238,8 @@ class Recorder:
         by = (wall - before) / 1e6
         text = f"the wall clock went {'forward' if by > 0 else 'back'} by {abs(by):.3f} s: it was set, or this computer slept"
         self._batch.events.append(EventRow(now, wall, 0, "", "clock", None, text, json.dumps({"by_s": by})))
-        for (machine, axis), (plan, origin) in self._plans.items():
-            there = self._axes[machine, axis]
+        for (controller, axis), (plan, origin) in self._plans.items():
+            there = self._axes[controller, axis]
             self._batch.plans.append(PlanRow(there.point, now, before, plan, origin, there.scale, there.round_p))
         await self._take_again(now, wall)
 
@@ -273,8 +273,8 @@ class Recorder:
     def note(self, entry: Entry) -> None:
         """Keep a command, with who gave it and what became of it."""
         content = json.dumps(entry.plain(), ensure_ascii=False, separators=(",", ":"))
-        machine = str(entry.fields.get("machine") or "")
-        self._batch.events.append(EventRow(entry.time, self._clock.wall_us(), 0, machine, COMMAND, None, str(entry), content))
+        controller = str(entry.fields.get("controller") or "")
+        self._batch.events.append(EventRow(entry.time, self._clock.wall_us(), 0, controller, COMMAND, None, str(entry), content))
 
     def lost(self, batches: Iterable[RowBatch]) -> None:
         """These could not be kept: a later one says so."""
@@ -298,8 +298,8 @@ class Recorder:
         """Twins to look at: with an event, or not looked at for a while."""
         if self._has_devices:
             return []
-        busy = {event.machine for event in events}
-        due = [name for name in self._machines if name in busy or not 0 <= now - self._looked.get(name, -REST_NS) < REST_NS]
+        busy = {event.controller for event in events}
+        due = [name for name in self._controllers if name in busy or not 0 <= now - self._looked.get(name, -REST_NS) < REST_NS]
         self._looked |= dict.fromkeys(due, now)
         return due
 
@@ -324,36 +324,40 @@ class Recorder:
     def _take_event(self, event: Event, time: Nanos, at_us: int) -> None:
         match event.payload:
             case PlanPayload(axis, plan, origin):
-                known = self._plans.get((event.machine, axis), ("", 0))[1]
+                known = self._plans.get((event.controller, axis), ("", 0))[1]
                 text = json.dumps(plain_plan(plan), separators=(",", ":"))
-                self._keep_plan(event.machine, axis, time, at_us, text, known if origin is None else origin)
+                self._keep_plan(event.controller, axis, time, at_us, text, known if origin is None else origin)
             case CoordinatePayload(axis, origin):
-                plan_text = self._plans.get((event.machine, axis), ("", 0))[0]
+                plan_text = self._plans.get((event.controller, axis), ("", 0))[0]
                 if plan_text:
-                    self._keep_plan(event.machine, axis, time, at_us, plan_text, origin)
+                    self._keep_plan(event.controller, axis, time, at_us, plan_text, origin)
             case EdgePayload(pin, level):
-                if (event.machine, pin) in self._pins:
-                    self._keep(self._pins[event.machine, pin], time, at_us, level, is_stepwise=True)
+                if (event.controller, pin) in self._pins:
+                    self._keep(self._pins[event.controller, pin], time, at_us, level, is_stepwise=True)
             case payload if event.is_shown or event.kind == "write":
                 content = json.dumps(payload.plain(), separators=(",", ":"))
-                row = EventRow(time, at_us, event.number, event.machine, event.kind, event.cause, event.text, content)
+                row = EventRow(time, at_us, event.number, event.controller, event.kind, event.cause, event.text, content)
                 self._batch.events.append(row)
 
     def _note_loss(self, time: Nanos, wall: int, text: str) -> None:
         self._batch.events.append(EventRow(time, wall, 0, "", "gap", None, text, "{}"))
 
-    def _keep_plan(self, machine: str, axis: str, time: Nanos, at_us: int, plan: str, origin: int) -> None:
-        if self._plans.get((machine, axis)) == (plan, origin):
+    def _keep_plan(self, controller: str, axis: str, time: Nanos, at_us: int, plan: str, origin: int) -> None:
+        if self._plans.get((controller, axis)) == (plan, origin):
             return
-        self._plans[machine, axis] = plan, origin
-        there = self._axes[machine, axis]
+        self._plans[controller, axis] = plan, origin
+        there = self._axes[controller, axis]
         self._batch.plans.append(PlanRow(there.point, time, at_us, plan, origin, there.scale, there.round_p))
 
     def _take_sample(self, sample: Sample, now: Nanos, wall: int) -> None:
         moving = set()
-        if sample.state is not None and sample.machine in self._machines and not self._machines[sample.machine].is_real:
+        if (
+            sample.state is not None
+            and sample.controller in self._controllers
+            and not self._controllers[sample.controller].is_real
+        ):
             moving = {axis["name"] for axis in sample.state["axes"] if axis["moving"]}
-        for number, point in self._sampled[sample.machine]:
+        for number, point in self._sampled[sample.controller]:
             if point.path[-1] == "encoder" and point.path[0] in moving:
                 continue  # follows from the motion; it is kept when that is over
             value = None if sample.state is None else point.read(sample.state)

@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeAlias
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 
 KeptValue: TypeAlias = float | str | None
 """A number, a text; None: not known."""

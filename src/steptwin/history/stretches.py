@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from steptwin.controller import SECOND
 from steptwin.durations import duration
 from steptwin.errors import Misuse
 from steptwin.history.reading import HistoryDatabase, KeptRun, Moment, PointSeries
-from steptwin.machine import SECOND
 
 GRID = 1000
 """Moments at which two stretches are compared where nothing else was asked for."""

@@ -52,7 +52,7 @@ def placed_wires(chain: Chain) -> list[tuple[str, str]]:
 
 
 def _placed(end: PinName) -> str:
-    return f"{chip_name(int(end.machine, 16))}.{end.pin}"
+    return f"{chip_name(int(end.controller, 16))}.{end.pin}"
 
 
 def parse_addresses(text: str) -> list[int]:

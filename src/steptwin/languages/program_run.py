@@ -8,11 +8,11 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.files.coverage import CoverageReports
 from steptwin.files.export import axis_views, bar, write_trace
 from steptwin.files.timedinputs import TimedInput
 from steptwin.files.world import World
-from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.describe.overrides import NO_OVERRIDES, Overrides
 from steptwin.simulation.describe.small import InputChange
 from steptwin.wbc.real import real_text

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.diagnostics import Severity, SourceText, render
 from steptwin.errors import Misuse
 from steptwin.files.coverage import CoverageReports
@@ -46,7 +47,6 @@ from steptwin.m1486.pins import OPEN_ADDRESS, refuse_taken, settable_pin
 from steptwin.m1486.present import program_words, velocity
 from steptwin.m1486.unit import counter_text
 from steptwin.m1486.variants import DEFAULT, Store, Variant, variant
-from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.describe.small import InputChange, Whole
 from steptwin.simulation.describe.small_m1486 import chip_name, m1486_world
 from steptwin.simulation.kinds.lines import SCRIPTS
@@ -158,8 +158,8 @@ class Chips:
         world.trace.watchers.append(self._recorded)
 
     def _recorded(self, record: TraceRecord) -> None:
-        if record.kind == "event" and record.machine in self.chips:
-            self._happens(record.machine, M1486Event(record.time, record.subject, str(record.value)))
+        if record.kind == "event" and record.controller in self.chips:
+            self._happens(record.controller, M1486Event(record.time, record.subject, str(record.value)))
         elif record.kind == "event" and record.subject == NOTE and (change := self._changes.get(record.value)) is not None:
             chip, _, pin = change.pin.partition(".")
             self._happens(chip, M1486Event(record.time, "input", f"input {pin} {'high' if change.level else 'low'}"))

@@ -11,6 +11,7 @@ from math import inf
 from pathlib import Path
 from typing import NamedTuple
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.diagnostics import Severity, render, visible
 from steptwin.durations import duration_text
 from steptwin.errors import Misuse
@@ -34,7 +35,6 @@ from steptwin.languages.program_run import (
     write,
 )
 from steptwin.languages.travels import PlacedSwitches, SwitchTravel, place_switches
-from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.config import ConfigError, ControllerConfig, ProgramConfig, examine_config
 from steptwin.mic488.core import check_pin
@@ -195,7 +195,7 @@ class RunWatch(ProgramWatch):
         world.trace.watchers.append(self._recorded)
 
     def _recorded(self, record: TraceRecord) -> None:
-        if record.kind == "event" and record.machine == NAME:
+        if record.kind == "event" and record.controller == NAME:
             self._tell(record.time, record.subject, str(record.value), self._caused(record.time))
         elif record.kind == "event" and record.subject == NOTE:
             self._tell(record.time, "input", str(record.value))

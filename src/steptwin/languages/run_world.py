@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import steptwin.services  # noqa: F401  their tables are checked, too
 from steptwin.campaign.properties import Verdict, read_property, watch_together
+from steptwin.controller import SECOND, Nanos
 from steptwin.controllerstate import ControllerState
 from steptwin.durations import duration
 from steptwin.errors import Misuse
@@ -26,7 +27,6 @@ from steptwin.files.world import LONGEST_RUN_NS, World
 from steptwin.files.worldoptions import ShownOptions, WorldRunOptions
 from steptwin.languages.program_run import report_causes
 from steptwin.live.interrupts import FirstInterrupt
-from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.kinds.kind import ProgramAct, ProgramReport
 from steptwin.simulation.logic.condition import INSTEAD
 from steptwin.simulation.scheduler.trace import TraceRecord
@@ -104,7 +104,7 @@ def _run_and_report(world: World, options: WorldRun, reports: CoverageReports, o
     _check_until(options.until)
     began = world.now
     before = filter(is_shown, world.trace) if began else ()  # what happens at power-on is part of the run
-    known = Counter(record.machine for record in before)
+    known = Counter(record.controller for record in before)
     _arrange(world, options)
     properties = watch_together([read_property(text) for text in options.properties], world)
     selection = read_selection(options.shown.of, options.shown.show, named_in(world.parts))
@@ -144,8 +144,8 @@ def _run_and_report(world: World, options: WorldRun, reports: CoverageReports, o
 def _watched(world: World) -> dict[str, ProgramReport]:
     """Watches for the programs of all controllers that have any."""
     found = {
-        name: world.kind(name).watch_program(machine, world.parts.scheduler_of[name], name)
-        for name, machine in world.machines.items()
+        name: world.kind(name).watch_program(controller, world.parts.scheduler_of[name], name)
+        for name, controller in world.controllers.items()
     }
     return {name: watch for name, watch in found.items() if watch is not None}
 
@@ -172,7 +172,7 @@ class _Interrupted(Exception):
 class WorldRunResult(NamedTuple):
     """The end of a run. ``reason``: why it ended early; ``in_vain``: the condition that did not come true in time.
 
-    ``known``: the number of records of each machine at the moment it ``began``.
+    ``known``: the number of records of each controller at the moment it ``began``.
     """
 
     began: Nanos
@@ -191,13 +191,13 @@ def _arrange(world: World, options: WorldRun) -> None:
     """Apply the inputs and faults of the command line."""
     set_faults(world, options.run.fault)
     for given in options.inputs:
-        machine, dot, pin = given.pin.rpartition(".")
-        names = {name.upper(): name for name in world.machines}
+        controller, dot, pin = given.pin.rpartition(".")
+        names = {name.upper(): name for name in world.controllers}
         if not dot and len(names) == 1:
-            machine = next(iter(names))
-        if machine.upper() not in names:
-            raise Misuse(f"--input {given.pin}: expected MACHINE.PIN; machines are {', '.join(world.machines)}")
-        name = names[machine.upper()]
+            controller = next(iter(names))
+        if controller.upper() not in names:
+            raise Misuse(f"--input {given.pin}: expected CONTROLLER.PIN; controllers are {', '.join(world.controllers)}")
+        name = names[controller.upper()]
         step = do.Set(((name, pin.upper(), given.value),))
         try:
             check_step(world, step)
@@ -236,8 +236,8 @@ def _print_happened(
     """
     shown: list[tuple[Nanos, bool, str]] = []
     for record in filter(is_shown, world.trace):
-        if outcome.known[record.machine]:
-            outcome.known[record.machine] -= 1
+        if outcome.known[record.controller]:
+            outcome.known[record.controller] -= 1
         elif selection.shows(record):
             shown.append((record.time, True, describe(record)))
     for name, watch in watches.items():
@@ -306,7 +306,7 @@ def _verdict_text(verdict: Verdict) -> str:
 
 def _print_unfinished(world: World, began: Nanos, selection: Selection, out: Print) -> None:
     """Print what stands still: usually that is why something did not happen."""
-    waits = [one for one in waiting(world) if one.who not in world.machines or selection.takes_of(one.who)]
+    waits = [one for one in waiting(world) if one.who not in world.controllers or selection.takes_of(one.who)]
     for one in waits[:MOST_WAITS]:
         out(f"{one.who} waits for {one.what}")
     if len(waits) > MOST_WAITS:
@@ -319,7 +319,7 @@ def _print_unfinished(world: World, began: Nanos, selection: Selection, out: Pri
 
 
 def _states(world: World) -> dict[str, ControllerState]:
-    return {name: world.kind(name).state(machine, world.now) for name, machine in world.machines.items()}
+    return {name: world.kind(name).state(controller, world.now) for name, controller in world.controllers.items()}
 
 
 def _json(world: World, outcome: WorldRunResult, out: Print) -> None:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from steptwin.access.audit import Audit, CommandLog
+from steptwin.controller import Nanos
 from steptwin.devices.composite import CompositeSubject
 from steptwin.devices.connections import Computer, DeviceConnections
 from steptwin.devices.device import RECONNECT_S, DeviceSurroundings
@@ -26,7 +27,6 @@ from steptwin.live.options import LogOptions
 from steptwin.live.server import Server
 from steptwin.live.twins import find_device
 from steptwin.live.withoutworld import serve_without_world
-from steptwin.machine import Nanos
 from steptwin.simulation.kinds.lines import LineTraffic
 from steptwin.simulation.toml.addresses import check_addresses
 from steptwin.subject.commands import Command, Jog

@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable
 from math import inf
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message
 
 SPEED_IS_OUT_OF_RANGE = Message("live.speed-is-out-of-range", "speed = {speed:g}: must be finite and greater than 0")

@@ -293,7 +293,7 @@ class _Conversation(asyncio.Protocol):
             raise Misuse(FOLLOWED_ALREADY(name=identity))
         if len(self._following) >= MOST_FOLLOWED:
             raise Misuse(TOO_MANY_FOLLOWED(most=MOST_FOLLOWED))
-        what = filter_of(wanted.kinds, wanted.machines, wanted.axes)
+        what = filter_of(wanted.kinds, wanted.controllers, wanted.axes)
         plans = [plan.plain() for plan in self._subject.plans(what)]
         following = self._following[identity] = self._subject.follow(what, wanted.bound)
         following.on_event = self._events_came

@@ -13,6 +13,7 @@ from dataclasses import asdict, replace
 from time import perf_counter
 from typing import NamedTuple
 
+from steptwin.controller import Nanos
 from steptwin.debug.breakpoints import AnyPoint
 from steptwin.debug.debugger import Debugger, DebugTravel
 from steptwin.debug.lookahead import Goal
@@ -23,7 +24,6 @@ from steptwin.live.lookback import PART_S, Lookback, take_back
 from steptwin.live.pace import Pace
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.world import LiveWorld
-from steptwin.machine import Nanos
 from steptwin.messages import NONE, Message, text_of
 from steptwin.simulation.world.inputs import Download
 from steptwin.simulation.world.model import WORLD
@@ -49,7 +49,7 @@ STOPS_NEED_A_FOLLOWER = Message(
 TOO_MANY_BREAKPOINTS = Message("live.too-many-breakpoints", "{most} breakpoints are set, as many as may be")
 WRONG_BREAKPOINT = Message("live.wrong-breakpoint", "breakpoint: {problem}")
 UNKNOWN_BREAKPOINT = Message("live.unknown-breakpoint", "there is no breakpoint {number}; there are {names}")
-UNKNOWN_PROGRAM = Message("live.unknown-program", "{machine} has no program {program!r}; there are {names}")
+UNKNOWN_PROGRAM = Message("live.unknown-program", "{controller} has no program {program!r}; there are {names}")
 
 
 class Debugging:
@@ -179,9 +179,9 @@ class Debugging:
             command.RunProgram: lambda wanted: self._opened().run(wanted),
             command.LookAt: lambda wanted: self._opened().look_at(wanted.to),
             command.Branch: lambda _: self._opened().branch(),
-            command.Stack: lambda wanted: self._opened().stack(wanted.machine),
+            command.Stack: lambda wanted: self._opened().stack(wanted.controller),
             command.Values: self._values,
-            command.Evaluate: lambda wanted: _plain_value(self._looked_at().evaluate(wanted.machine, wanted.expression)),
+            command.Evaluate: lambda wanted: _plain_value(self._looked_at().evaluate(wanted.controller, wanted.expression)),
             command.SetValue: self._set_value,
             command.ProgramSource: self._source,
         }
@@ -190,15 +190,15 @@ class Debugging:
         return self._opened().looked_at
 
     def _values(self, wanted: command.Values) -> object:
-        return [_plain_value(value) for value in self._looked_at().scope(wanted.machine, wanted.scope).values]
+        return [_plain_value(value) for value in self._looked_at().scope(wanted.controller, wanted.scope).values]
 
     def _set_value(self, wanted: command.SetValue) -> object:
-        return _plain_value(self._looked_at().set_value(wanted.machine, wanted.name, wanted.expression))
+        return _plain_value(self._looked_at().set_value(wanted.controller, wanted.name, wanted.expression))
 
     def _source(self, wanted: command.ProgramSource) -> object:
-        texts = self._opened().debugger.texts(wanted.machine)
+        texts = self._opened().debugger.texts(wanted.controller)
         if wanted.program not in texts:
-            raise Misuse(UNKNOWN_PROGRAM(machine=wanted.machine, program=wanted.program, names=list(texts) or NONE()))
+            raise Misuse(UNKNOWN_PROGRAM(controller=wanted.controller, program=wanted.program, names=list(texts) or NONE()))
         source = texts[wanted.program]
         return {"program": wanted.program, "source": source.name, "text": source.text}
 
@@ -320,10 +320,10 @@ class _OpenDebugger:
     def step(self, wanted: command.StepProgram) -> object:
         debugger = self._standing
         if wanted.way == "back":
-            self._go(debugger.stepping_back(wanted.machine))
+            self._go(debugger.stepping_back(wanted.controller))
         else:
             goals = {"in": debugger.into, "over": debugger.over, "out": debugger.out}
-            self._forwards(goals[wanted.way](wanted.machine))
+            self._forwards(goals[wanted.way](wanted.controller))
         return self.place()
 
     def run(self, wanted: command.RunProgram) -> object:
@@ -418,23 +418,23 @@ class _OpenDebugger:
         }
 
     def describe(self) -> object:
-        machines = [{"name": name, "programs": self._programs(name)} for name in self.debugger.threads]
+        controllers = [{"name": name, "programs": self._programs(name)} for name in self.debugger.threads]
         events = [{"name": event.code, "title": event.title} for event in Events]
-        return {"machines": machines, "events": events, "scopes": list(command.SCOPES), **self.place()}
+        return {"controllers": controllers, "events": events, "scopes": list(command.SCOPES), **self.place()}
 
-    def _programs(self, machine: str) -> Sequence[dict[str, object]]:
-        debugger, programs = self.debugger, self._live.world.programs_of(machine)
+    def _programs(self, controller: str) -> Sequence[dict[str, object]]:
+        debugger, programs = self.debugger, self._live.world.programs_of(controller)
         return [
             {
                 "program": name,
                 "source": source.name,
-                "lines": sorted(set(debugger.statement_lines(machine, name))),
+                "lines": sorted(set(debugger.statement_lines(controller, name))),
                 "labels": list(programs.labels(name)),
             }
-            for name, source in debugger.texts(machine).items()
+            for name, source in debugger.texts(controller).items()
         ]
 
-    def stack(self, machine: str) -> object:
+    def stack(self, controller: str) -> object:
         return [
             {
                 "name": name,
@@ -445,12 +445,12 @@ class _OpenDebugger:
                 "end_line": at.end_line,
                 "end_column": at.end_column,
             }
-            for name, at in self.looked_at.stack(machine)
+            for name, at in self.looked_at.stack(controller)
         ]
 
     def _say(self, stop: Stopped) -> None:
         debugger = self.debugger
-        frames = () if stop.machine is None else debugger.stack(stop.machine)
+        frames = () if stop.controller is None else debugger.stack(stop.controller)
         at = frames[0].location if frames else None
         said = StoppedPayload(
             stop.reason.value,
@@ -460,24 +460,24 @@ class _OpenDebugger:
             None if at is None else at.line,
             debugger.is_past,
         )
-        machine = stop.machine or WORLD
-        self.stopped = {"time_ns": str(debugger.now), "machine": machine, **said.plain()}
-        self._live.subject.publish(debugger.now, machine, said)
+        controller = stop.controller or WORLD
+        self.stopped = {"time_ns": str(debugger.now), "controller": controller, **said.plain()}
+        self._live.subject.publish(debugger.now, controller, said)
 
     def _log(self, logged: Logged) -> None:
-        at = self.debugger.location(logged.machine, logged.place)
-        self._live.subject.publish(logged.time, logged.machine, LogPayload(logged.text, at.text, at.line))
+        at = self.debugger.location(logged.controller, logged.place)
+        self._live.subject.publish(logged.time, logged.controller, LogPayload(logged.text, at.text, at.line))
 
 
 def _point(wanted: command.SetBreakpoint) -> AnyPoint:
     condition, hits = wanted.condition, wanted.hits
     if wanted.label is not None:
         return LabelPoint(label=wanted.label, condition=condition, hits=hits)
-    machine = wanted.machine or ""
+    controller = wanted.controller or ""
     if wanted.value is not None:
-        return DataPoint(machine=machine, name=wanted.value, condition=condition)
+        return DataPoint(controller=controller, name=wanted.value, condition=condition)
     line, program = wanted.line or 0, wanted.program or ""
-    return LinePoint(machine=machine, text=program, line=line, condition=condition, hits=hits, log=wanted.log)
+    return LinePoint(controller=controller, text=program, line=line, condition=condition, hits=hits, log=wanted.log)
 
 
 def _plain_value(value: ShownValue) -> dict[str, object]:

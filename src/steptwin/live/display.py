@@ -84,7 +84,7 @@ def banner(world: World, end_points: Sequence[EndPoint], remarks: Sequence[str])
 
 def title_of(world: World) -> str:
     """The name of the world and its controllers, in a line."""
-    titles = {name: _titled(world, name) for name in world.machines}
+    titles = {name: _titled(world, name) for name in world.controllers}
     if len(titles) == 1:
         return f"{world.spec.name}: {next(iter(titles.values()))}"
     return "; ".join([world.spec.name, *(f"{name}: {title}" for name, title in titles.items())])
@@ -92,16 +92,16 @@ def title_of(world: World) -> str:
 
 def _titled(world: World, name: str) -> str:
     kind, on = world.kind(name), world.parts.line_of.get(name)
-    where = {} if on is None else kind.announced(world.machines[name], on[1])
+    where = {} if on is None else kind.announced(world.controllers[name], on[1])
     return ", ".join([kind.model, *(f"{key} {value}" for key, value in where.items() if key != "kind")])
 
 
 def remarks_on(world: World, *, listen_any: bool) -> list[str]:
     """Remarks about risks: open addresses, memory that is not kept."""
-    found = [remark for name, machine in world.machines.items() for remark in world.kind(name).remarks(name, machine)]
+    found = [remark for name, controller in world.controllers.items() for remark in world.kind(name).remarks(name, controller)]
     if listen_any:
         found.append("the lines have no authentication: any client that reaches these addresses can move the axes")
-    lasting = {name: world.kind(name).keeps_memory(machine) for name, machine in world.machines.items()}
+    lasting = {name: world.kind(name).keeps_memory(controller) for name, controller in world.controllers.items()}
     where = world.state
     if where is None and any(lasting.values()):
         found.append("non-volatile memory is lost at the end of this process (--state DIR keeps it)")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from steptwin.access.audit import Audit, CommandLog
+from steptwin.controller import Nanos
 from steptwin.extras import libraries_of, missing
 from steptwin.gateways.contract import GatewaySubject, OpenGateway, PastValues
 from steptwin.gateways.kinds import make_gateway
@@ -17,7 +18,6 @@ from steptwin.history.options import HistorySpec
 from steptwin.live.server import EndPoint, Server
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_control import WorldControl
-from steptwin.machine import Nanos
 from steptwin.services import Services
 from steptwin.simulation.describe.servicetables import HISTORY
 from steptwin.simulation.kinds.lines import LineTraffic

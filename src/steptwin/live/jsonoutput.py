@@ -17,7 +17,7 @@ class JsonOutput(Output):
     """Each line is an object: ``timestamp`` (ISO 8601, UTC), ``level``, ``event`` (a text for people) and ``kind``.
 
     Kinds: ``begin`` has what is served; ``message``, ``notice``; ``frame`` has ``link``, ``direction`` and ``data``; others are
-    kinds of events of a world (docs/control.md) with ``machine``, ``time_ns`` (virtual, as text) and ``data``.
+    kinds of events of a world (docs/control.md) with ``controller``, ``time_ns`` (virtual, as text) and ``data``.
     """
 
     def __init__(self, stream: TextIO | None) -> None:
@@ -45,7 +45,9 @@ class JsonOutput(Output):
 
     def record(self, record: TraceRecord) -> None:
         payload = payload_of(record)
-        self._log.info(payload.text, kind=payload.kind, machine=record.machine, time_ns=str(record.time), data=payload.plain())
+        self._log.info(
+            payload.text, kind=payload.kind, controller=record.controller, time_ns=str(record.time), data=payload.plain()
+        )
 
     def frame(self, frame: FrameLine) -> None:
         self._log.info(

@@ -20,18 +20,18 @@ def state_directory() -> Path:
 
 
 SETTINGS_ARE_NOT_KEPT = Message(
-    "live.settings-are-not-kept", "nothing was written: the settings of {machine} cannot be kept in {path}: {reason}"
+    "live.settings-are-not-kept", "nothing was written: the settings of {controller} cannot be kept in {path}: {reason}"
 )
 
 
-def keep_settings(machine: str, text: str) -> str:
-    """Write a new file with the settings of a machine; its path. Raises `Misuse` if that is not possible."""
+def keep_settings(controller: str, text: str) -> str:
+    """Write a new file with the settings of a controller; its path. Raises `Misuse` if that is not possible."""
     path = state_directory() / "settings"
     try:
         private_directory(path)
-        path /= f"{machine}-{datetime.now(UTC):%Y%m%d-%H%M%S-%f}.json"
+        path /= f"{controller}-{datetime.now(UTC):%Y%m%d-%H%M%S-%f}.json"
         with new_text(path) as file:
             file.write(text)
     except OSError as error:
-        raise Misuse(SETTINGS_ARE_NOT_KEPT(machine=machine, path=path, reason=reason(error))) from error
+        raise Misuse(SETTINGS_ARE_NOT_KEPT(controller=controller, path=path, reason=reason(error))) from error
     return str(path)

@@ -6,8 +6,8 @@ import asyncio
 from pathlib import Path
 from typing import Protocol
 
+from steptwin.controller import Nanos, Port, SendingPort, sends_by_itself
 from steptwin.live.realtimedriver import RealTimeDriver
-from steptwin.machine import Nanos, Port, SendingPort, sends_by_itself
 
 SLICE_BYTES = 2048
 """Bytes of one client that are served at once, so that others do not wait."""
@@ -53,7 +53,7 @@ class Feed:
         self._timer = self._loop.call_later(self._realtime.clock.wait_s(due), self._wake)
 
     def _fetch_soon(self) -> None:
-        # The port calls this while machines are being advanced.
+        # The port calls this while controllers are being advanced.
         if self._timer is not None:
             self._timer.cancel()
         self._timer = self._loop.call_soon(self._wake)

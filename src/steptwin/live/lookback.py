@@ -9,12 +9,12 @@ from functools import partial
 from time import perf_counter
 from typing import Any, TypeVar
 
+from steptwin.controller import Nanos
 from steptwin.errors import Refusal, SteptwinError
 from steptwin.later import Later
 from steptwin.live.pace import Pace
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.world import LiveWorld
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.world.history import History, Past
 from steptwin.simulation.world.snapshot import SimulationSnapshot

@@ -12,6 +12,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.fields import FASTEST, SLOWEST
 from steptwin.files import session as sessions
@@ -19,7 +20,6 @@ from steptwin.files.beginning import check_session_target, is_session
 from steptwin.files.export import axis_views, check_target, write_trace
 from steptwin.files.textfiles import check_folder
 from steptwin.live.realtimedriver import RealTimeDriver
-from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message, text_of
 from steptwin.numerals import read_number
 from steptwin.simulation.logic.condition import SignalCondition
@@ -276,7 +276,7 @@ class Pace:
     def _statements(self) -> dict[str, str]:
         """The current statements of running and paused programs, by controller."""
         world = self._live.world
-        found = {name: world.kind(name).statement(machine) for name, machine in world.machines.items()}
+        found = {name: world.kind(name).statement(controller) for name, controller in world.controllers.items()}
         return {name: text for name, text in found.items() if text is not None}
 
     def _save(self, wanted: command.Save) -> object:

@@ -10,11 +10,11 @@ import tty
 from collections.abc import Callable
 from pathlib import Path
 
+from steptwin.controller import Port
 from steptwin.errors import LineFailure, Misuse
 from steptwin.files.ownership import InUse, Ownership
 from steptwin.live.links import SLICE_BYTES, Feed
 from steptwin.live.realtimedriver import RealTimeDriver
-from steptwin.machine import Port
 from steptwin.system import HAS_EPOLL, reason
 
 DEVICES = ("/dev/pts/", "/dev/ttys")

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from steptwin.controller import Port
 from steptwin.errors import Misuse
 from steptwin.live.links import PlacedLink
 from steptwin.live.realtimedriver import RealTimeDriver
-from steptwin.machine import Port
 from steptwin.system import HAS_PTYS
 
 

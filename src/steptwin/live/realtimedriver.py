@@ -1,5 +1,5 @@
-"""A scheduler in real time: `RealTimeDriver.start` begins it, and an input for its machines comes between `RealTimeDriver.enter`
-and `RealTimeDriver.leave`."""
+"""A scheduler in real time: `RealTimeDriver.start` begins it, and an input for its controllers comes between
+`RealTimeDriver.enter` and `RealTimeDriver.leave`."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import asyncio
 from collections.abc import Callable
 from typing import Protocol
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.live.batches import batches
 from steptwin.live.clock import Clock
-from steptwin.machine import MILLISECOND, Nanos
 
 LONGEST_WAIT_S = 3600.0
 """Longest timer, s: event loops do not accept arbitrarily distant ones; longer waits are divided."""
@@ -31,7 +31,7 @@ class Advanceable(Protocol):
 
 
 class RealTimeDriver:
-    """Machines in real time, advanced together at their deadlines and when an input arrives.
+    """Controllers in real time, advanced together at their deadlines and when an input arrives.
 
     While the process does not run, virtual time stands still, so that there is no backlog; ``on_lag`` is called with the delay.
     """
@@ -45,19 +45,19 @@ class RealTimeDriver:
         self._loop = asyncio.get_running_loop()
         self._batches = batches()
         self._batch = 0
-        """The batch for which the machines were advanced to the present."""
+        """The batch for which the controllers were advanced to the present."""
         self.moments = 0
         """Counts the advances to the present: with each, time may have passed and signals have settled."""
         self._timer: asyncio.TimerHandle | None = None
         self._armed_for: Nanos | None = None
 
     def start(self) -> None:
-        """Follow the clock from now on: machines act at their deadlines, also without inputs."""
+        """Follow the clock from now on: controllers act at their deadlines, also without inputs."""
         self.enter()
         self._arm(self.scheduler.deadline())
 
     def enter(self) -> Nanos:
-        """Advance the machines to the present. Apply inputs at the moment returned, then call `leave`."""
+        """Advance the controllers to the present. Apply inputs at the moment returned, then call `leave`."""
         batch = self._batches.current
         if batch and batch == self._batch:
             return self.scheduler.now

@@ -148,7 +148,7 @@ class RemoteSubject:
         following = self._following[identity] = _RemoteFollowing(self, identity, what, bound)
         wanted = command.Follow(
             tuple(sorted(what.kinds)),
-            None if what.machines is None else tuple(sorted(what.machines)),
+            None if what.controllers is None else tuple(sorted(what.controllers)),
             None if what.axes is None else tuple(sorted(what.axes)),
             bound,
         )

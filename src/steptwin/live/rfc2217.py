@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from steptwin.machine import Nanos, Port, SendingPort, SourcedPort, sends_by_itself
+from steptwin.controller import Nanos, Port, SendingPort, SourcedPort, sends_by_itself
 
 IAC, DONT, DO, WONT, WILL, SB, SE = 255, 254, 253, 252, 251, 250, 240
 BINARY, SUPPRESS_GO_AHEAD, COM_PORT = 0, 3, 44

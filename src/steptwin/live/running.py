@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from steptwin.access.audit import Audit
+from steptwin.controller import Nanos, SendingPort
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
 from steptwin.files.auditfile import wall_clock
@@ -38,7 +39,6 @@ from steptwin.live.tracedport import TracedPort
 from steptwin.live.transports import TRANSPORTS, VISION
 from steptwin.live.world import LiveWorld, PlacePort, VisionPort, announced
 from steptwin.live.world_control import WorldControl
-from steptwin.machine import Nanos, SendingPort
 from steptwin.services import read_services
 from steptwin.simulation.kinds.kind import LinkKind
 from steptwin.simulation.kinds.lines import SCRIPTS

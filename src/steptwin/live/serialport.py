@@ -8,10 +8,10 @@ from typing import cast
 
 import serialx
 
+from steptwin.controller import Port
 from steptwin.errors import LineFailure
 from steptwin.live.links import Feed
 from steptwin.live.realtimedriver import RealTimeDriver
-from steptwin.machine import Port
 from steptwin.system import reason
 
 RETRY_S = 1.0

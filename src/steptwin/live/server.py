@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from steptwin.access.audit import CommandLog
+from steptwin.controller import SECOND, Nanos, Port
 from steptwin.errors import LineFailure, Misuse, SteptwinError
 from steptwin.files.writing import new_text
 from steptwin.inputfiles import read_bytes
@@ -26,7 +27,6 @@ from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.rfc2217 import TwinLine
 from steptwin.live.signals import on_end
 from steptwin.live.transports import LinkArguments, Transport
-from steptwin.machine import SECOND, Nanos, Port
 from steptwin.simulation.kinds.links import TlsFiles
 from steptwin.simulation.toml.addresses import Address
 from steptwin.subject.contract import PlannedSubject
@@ -206,7 +206,7 @@ class Server:
         self.notice(f"this process did not run for {by / SECOND:.1f} s; the time of the twin stood still meanwhile")
 
     def _trouble(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-        """Handle an error without a caller: end the server if machines cannot continue, else give a notice."""
+        """Handle an error without a caller: end the server if controllers cannot continue, else give a notice."""
         error = context.get("exception")
         if isinstance(error, SteptwinError):
             self.fail(str(error))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from steptwin.controller import Nanos
 from steptwin.live.realtimedriver import RealTimeDriver
-from steptwin.machine import Nanos
 from steptwin.wire.pdu import READS
 from steptwin.wire.slave import SlaveDevice
 

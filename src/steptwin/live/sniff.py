@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import cast
 
+from steptwin.controller import SECOND, Nanos, Port
 from steptwin.drivers.kind import Decoder
 from steptwin.drivers.place import LineAddress
 from steptwin.errors import LineFailure, Misuse
@@ -17,7 +18,6 @@ from steptwin.live.clock import Clock
 from steptwin.live.pty import PtyLink
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.tcp import TcpLink
-from steptwin.machine import SECOND, Nanos, Port
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.toml.addresses import Address
 from steptwin.wire.slave import FrameDirection

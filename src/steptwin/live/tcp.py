@@ -7,12 +7,12 @@ import socket
 from collections.abc import Callable
 from typing import Protocol
 
+from steptwin.controller import Port
 from steptwin.errors import LineFailure
 from steptwin.live.clients import Clients, listening
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.tcp_asyncio import AsyncioListener
 from steptwin.live.tcp_epoll import EpollListener
-from steptwin.machine import Port
 from steptwin.simulation.toml.addresses import Address
 from steptwin.system import HAS_EPOLL, reason
 

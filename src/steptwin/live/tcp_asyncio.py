@@ -9,10 +9,10 @@ from collections.abc import Callable
 from typing import cast
 from weakref import WeakSet
 
+from steptwin.controller import Port, SourcedPort
 from steptwin.live.clients import BACKLOG, Clients, set_up
 from steptwin.live.links import SLICE_BYTES, Feed
 from steptwin.live.realtimedriver import RealTimeDriver
-from steptwin.machine import Port, SourcedPort
 from steptwin.simulation.toml.addresses import Address
 
 

@@ -8,11 +8,11 @@ from collections.abc import Callable
 from typing import Any
 from weakref import WeakSet
 
+from steptwin.controller import Port, SourcedPort
 from steptwin.live.clients import RETRY_S, Clients
 from steptwin.live.descriptors import descriptors
 from steptwin.live.links import SLICE_BYTES, Feed
 from steptwin.live.realtimedriver import RealTimeDriver
-from steptwin.machine import Port, SourcedPort
 from steptwin.simulation.toml.addresses import Address
 from steptwin.system import reason
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from steptwin.machine import Nanos, SendingPort, SourcedPort
+from steptwin.controller import Nanos, SendingPort, SourcedPort
 from steptwin.tracing import span
 from steptwin.wire.pdu import REFUSED
 from steptwin.wire.slave import SlaveDevice
@@ -60,7 +60,7 @@ class _TracedDevice:
         self._name = name
 
     def execute(self, pdu: bytes, now: Nanos) -> bytes:
-        known = {"machine": self._name, "unit": self._unit, "function": pdu[0], "time_ns": now}
+        known = {"controller": self._name, "unit": self._unit, "function": pdu[0], "time_ns": now}
         with span(f"device {self._name}", known) as noted:
             answer = self._execute(pdu, now)
             noted.note("outcome", "refusal" if answer and answer[0] >= REFUSED else "done")

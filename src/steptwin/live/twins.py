@@ -4,8 +4,8 @@
 |---|---|
 | nothing | the controller of the only running twin |
 | ``mic488`` | the twin of this name |
-| ``machine.table`` | the controller ``table`` of the twin ``machine`` |
-| ``machine.toml`` | the twin that was started from this file |
+| ``controller.table`` | the controller ``table`` of the twin ``controller`` |
+| ``controller.toml`` | the twin that was started from this file |
 | ``127.0.0.1:5021``, ``/run/…/mic488`` | an address; at that of a running twin, its controllers are known |
 | ``/dev/ttyUSB0``, ``COM3``, ``tcp://host:502`` | an address of a device |
 

@@ -10,13 +10,13 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
+from steptwin.controller import SECOND
 from steptwin.live.output import Output
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.server import Server
 from steptwin.live.view_controller import controller_lines
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_frames import follow_frames
-from steptwin.machine import SECOND
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.world.records import ALL, Selection, describe
 from steptwin.wire.frameline import FrameLine
@@ -96,12 +96,12 @@ class LiveView:
         """The lines of each controller, then those of the axes of the world."""
         world = self._live.world
         world.settle_all()
-        return [*(self._controller(name, width) for name in world.machines), *self._axes()]
+        return [*(self._controller(name, width) for name in world.controllers), *self._axes()]
 
     def _controller(self, name: str, width: int) -> list[Text]:
         world = self._live.world
-        kind, machine = world.kind(name), world.machines[name]
-        return controller_lines(name, kind.state(machine, world.now), kind.datasheet(machine), width)
+        kind, controller = world.kind(name), world.controllers[name]
+        return controller_lines(name, kind.state(controller, world.now), kind.datasheet(controller), width)
 
     def _axes(self) -> list[list[Text]]:
         """The positions of loads that can differ from the counts of their drives."""

@@ -9,13 +9,13 @@ import time
 from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.datasheet import Point
 from steptwin.errors import Misuse
 from steptwin.live.remote import RemoteSubject
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.simulation.world.model import WORLD
 from steptwin.subject import commands as command
-from steptwin.subject.contract import MachinePart
+from steptwin.subject.contract import ControllerPart
 from steptwin.subject.events import Event
 from steptwin.subject.following import USUAL, filter_of
 from steptwin.subject.motion import Motions
@@ -28,17 +28,17 @@ TwinValue: TypeAlias = bool | int | float | None
 
 
 class TwinWatch:
-    """The points ``paths`` of the controller ``machine``. ``subject`` must not be used by others meanwhile."""
+    """The points ``paths`` of the controller ``controller``. ``subject`` must not be used by others meanwhile."""
 
     def __init__(
-        self, subject: RemoteSubject, machine: str, paths: Sequence[str], wall_ns: Callable[[], Nanos] = time.monotonic_ns
+        self, subject: RemoteSubject, controller: str, paths: Sequence[str], wall_ns: Callable[[], Nanos] = time.monotonic_ns
     ) -> None:
-        found = next((part for part in subject.description.machines if part.name == machine), None)
+        found = next((part for part in subject.description.controllers if part.name == controller), None)
         if found is None:
-            raise Misuse(f"{subject.name} has no controller {machine!r}")
+            raise Misuse(f"{subject.name} has no controller {controller!r}")
         self._subject = subject
         self._wall_ns = wall_ns
-        self._part: MachinePart = found
+        self._part: ControllerPart = found
         points = {point.path.upper(): point for point in found.datasheet.points}
         self._points = {path: points.get(path.upper()) for path in paths}
         self._computed = {path: at for path, point in self._points.items() if (at := _computed(point, found)) is not None}
@@ -126,7 +126,7 @@ def _velocity(motions: Motions, axis: str, now: Nanos) -> float:
 _COMPUTED = {"POS_ACT": _position, "POSITION": _position, "VEL_ACT": _velocity, "VELOCITY": _velocity}
 
 
-def _computed(point: Point | None, part: MachinePart) -> tuple[str, Callable[[Motions, str, Nanos], float]] | None:
+def _computed(point: Point | None, part: ControllerPart) -> tuple[str, Callable[[Motions, str, Nanos], float]] | None:
     """The axis of a point that is computed from a plan, and the function."""
     if point is None:
         return None

@@ -7,11 +7,11 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+from steptwin.controller import Nanos
 from steptwin.live.clock import Clock
 from steptwin.live.options import LogOptions
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.server import Server, clear_ready_file
-from steptwin.machine import Nanos
 
 
 class _Nothing:

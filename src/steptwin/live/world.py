@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse, Refusal
 from steptwin.files import session as sessions
 from steptwin.files.export.tracefile import Ring
@@ -14,7 +15,6 @@ from steptwin.files.world import World
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.sharedreads import share_reads
 from steptwin.live.tracedport import traced
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.kinds.lines import LineEndPoint
 from steptwin.simulation.kinds.registry import line_kinds
@@ -39,10 +39,10 @@ MOST_INPUT_BYTES = 16 << 20
 def announced(world: World) -> list[dict[str, object]]:
     """The announced controllers of a world: name, kind, line, present address, and the units of axes."""
     found: list[dict[str, object]] = []
-    for name, machine in world.machines.items():
+    for name, controller in world.controllers.items():
         kind, on = world.kind(name), world.parts.line_of.get(name)
-        where = {"line": None} if on is None else {"line": on[0].name, **kind.announced(machine, on[1])}
-        axes = [{"unit": axis.unit, "pulses_per_unit": axis.pulses_per_unit} for axis in kind.datasheet(machine).axes]
+        where = {"line": None} if on is None else {"line": on[0].name, **kind.announced(controller, on[1])}
+        axes = [{"unit": axis.unit, "pulses_per_unit": axis.pulses_per_unit} for axis in kind.datasheet(controller).axes]
         found.append({"name": name, "kind": kind.name, **where, "axes": axes})
     return found
 
@@ -327,14 +327,14 @@ class VisionPort:
 
     broken = None
 
-    def __init__(self, live: LiveWorld, machine: str) -> None:
+    def __init__(self, live: LiveWorld, controller: str) -> None:
         self._live = live
-        self._machine = machine
-        self._records = live.world.vision(machine).records()
+        self._controller = controller
+        self._records = live.world.vision(controller).records()
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
         for record in self._records(data):
-            self._live.apply_input(See(self._machine, *record))
+            self._live.apply_input(See(self._controller, *record))
             self._live.stale = True
         return b""
 
@@ -374,7 +374,7 @@ class PlacePort:
             self._connected()
 
     def used_by(self, source: str) -> None:
-        """See `steptwin.machine.SourcedPort`."""
+        """See `steptwin.controller.SourcedPort`."""
         self._live.subject.sources[self.line, self._name] = source
 
     def _connected(self) -> LineEndPoint:

@@ -27,5 +27,5 @@ def follow_frames(live: LiveWorld, sink: Callable[[FrameLine], None]) -> None:
 
 
 def _recorded(words: LineWords, members: Collection[str], record: TraceRecord) -> None:
-    if record.machine in members:
+    if record.controller in members:
         words.recorded(record)

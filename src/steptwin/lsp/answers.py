@@ -71,7 +71,7 @@ class Signature:
 
 
 SHARED = frozenset({SymbolKind.POSITION})
-"""Names that mean the same in all files of a machine."""
+"""Names that mean the same in all files of a controller."""
 
 
 @dataclass(frozen=True, slots=True)

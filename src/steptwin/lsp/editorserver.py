@@ -30,7 +30,7 @@ FIRST_DELAY_S = 0.004
 LONGEST_DELAY_S = 0.5
 """Between a change and its diagnostics."""
 OTHERS_DELAY_S = 0.3
-"""Delay before the other files of a machine are analysed again."""
+"""Delay before the other files of a controller are analysed again."""
 
 MOST_DIAGNOSTICS = 1000
 """Most findings of one text: editors become slow with more, and one mistake is often the reason of all."""
@@ -70,7 +70,7 @@ class EditorServer(LanguageServer):
     # -- diagnostics
 
     def changed(self, uri: str) -> None:
-        """Analyse a text soon, and later the open texts of its machine."""
+        """Analyse a text soon, and later the open texts of its controller."""
         first, *others = self.session.affected(uri)
         self._later(first, self._delays.get(first, FIRST_DELAY_S))
         for other in others:

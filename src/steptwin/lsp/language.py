@@ -14,7 +14,7 @@ from steptwin.optionalmethods import OptionalMethods
 T = TypeVar("T")
 
 
-class MachineFiles(Protocol):
+class ControllerFiles(Protocol):
     """A controller of a world, as far as its files go. Addresses are normal ones."""
 
     @property
@@ -23,7 +23,7 @@ class MachineFiles(Protocol):
         ...
 
 
-M = TypeVar("M", bound=MachineFiles)
+M = TypeVar("M", bound=ControllerFiles)
 
 
 class OtherTexts(Protocol):
@@ -41,8 +41,8 @@ class OtherTexts(Protocol):
         """The file of the same name with another ending."""
         ...
 
-    def machines(self, kind: type[M]) -> Iterable[M]:
-        """The controllers of all worlds that have been read as values of a type (`EditorLanguage.machines`)."""
+    def controllers(self, kind: type[M]) -> Iterable[M]:
+        """The controllers of all worlds that have been read as values of a type (`EditorLanguage.controllers`)."""
         ...
 
     def files_of(self, world: str) -> Iterable[str]:
@@ -80,7 +80,7 @@ class EditorLanguage(OptionalMethods, ABC):
         """Suffix of its files."""
 
     shares_name: bool = False
-    """Whether a machine has one of its files under the same name as its others."""
+    """Whether a controller has one of its files under the same name as its others."""
     most_characters: int = MOST_CHARACTERS
     """Longer texts are not analysed."""
 
@@ -95,7 +95,7 @@ class EditorLanguage(OptionalMethods, ABC):
     @abstractmethod
     def analyse(self, session: OtherTexts, uri: str, lines: LineIndex, /) -> Analysis: ...
 
-    def machines(self, uri: str, text: str, /) -> list[MachineFiles]:
+    def controllers(self, uri: str, text: str, /) -> list[ControllerFiles]:
         """The controllers that a text describes, by its address and itself, of a language that describes any. Raises `Misuse` for
         one that cannot be read."""
         return []

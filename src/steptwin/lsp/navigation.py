@@ -28,7 +28,7 @@ MOST_SYMBOLS = 500
 
 
 def _texts_with(session: EditorSession, uri: str, symbol: Symbol) -> Iterator[tuple[str, Analysis]]:
-    """The texts in which a name means the same: its own, and those of its machine for what a machine shares."""
+    """The texts in which a name means the same: its own, and those of its controller for what a controller shares."""
     own = session.analysis(uri)
     if own is not None:
         yield normal(uri), own
@@ -134,7 +134,7 @@ def _title(diagnostic: Diagnostic, old: str, new: str) -> MessageText:
 
 
 def workspace_symbols(session: EditorSession, query: str) -> list[tuple[str, OutlineItem]]:
-    """The names in the open texts and the files of their machines that contain the letters of the query in order."""
+    """The names in the open texts and the files of their controllers that contain the letters of the query in order."""
     wanted = query.lower()
     uris = dict.fromkeys(other for uri in session.open_uris for other in (uri, *session.related(uri)))
     found: list[tuple[str, OutlineItem]] = []

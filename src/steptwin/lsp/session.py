@@ -1,7 +1,7 @@
 """View of one client: the texts it has open, and their analyses. No input, no output but through `Files`.
 
 Texts go by normal addresses (`steptwin.lsp.files.normal`), whatever spelling the client uses. A change makes a new analysis of
-that text only; the others of its machine are made anew when they are next asked for and something they look at has changed.
+that text only; the others of its controller are made anew when they are next asked for and something they look at has changed.
 What a language needs of the session is `steptwin.lsp.language.OtherTexts`.
 
 A question may be interrupted at any place by an exception. So what is made of a text is stored when it is complete.
@@ -17,14 +17,14 @@ from steptwin.errors import Misuse
 from steptwin.lsp.analysis import Analysis
 from steptwin.lsp.documents import Document, TextChange
 from steptwin.lsp.files import Files, NoFiles, normal, with_suffix
-from steptwin.lsp.language import EditorLanguage, MachineFiles
+from steptwin.lsp.language import ControllerFiles, EditorLanguage
 from steptwin.lsp.languages import LANGUAGES, language_of
 from steptwin.lsp.positions import Encoding, LineIndex
 from steptwin.lsp.toolong import TooLong
 from steptwin.textcodec import decode
 
 T = TypeVar("T")
-M = TypeVar("M", bound=MachineFiles)
+M = TypeVar("M", bound=ControllerFiles)
 
 
 @dataclass
@@ -33,7 +33,7 @@ class _Derived:
 
     lines: LineIndex
     made: dict[tuple[object, ...], Any] = field(default_factory=dict)
-    machines: Sequence[MachineFiles] = ()
+    controllers: Sequence[ControllerFiles] = ()
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class EditorSession:
             return None
         found = self._derived.get(uri)
         if found is None or found.lines is not lines:
-            found = self._derived[uri] = _Derived(lines, machines=self._read_machines(uri, lines, found))
+            found = self._derived[uri] = _Derived(lines, controllers=self._read_controllers(uri, lines, found))
         return found
 
     def kept(self, uri: str, make: Callable[[], T]) -> T:
@@ -174,7 +174,7 @@ class EditorSession:
         """See `OtherTexts.in_folder`."""
         return [file for one in LANGUAGES.values() for file in self.files.beside(uri, one.suffix) if file != uri]
 
-    # -- the files of a machine
+    # -- the files of a controller
 
     def beside(self, uri: str, suffix: str) -> str | None:
         """The file of the same name with another ending, open or not."""
@@ -187,27 +187,27 @@ class EditorSession:
     def _exists(self, uri: str) -> bool:
         return uri in self._documents or self.files.stamp(uri) is not None
 
-    def machines(self, kind: type[M]) -> Iterator[M]:
-        """See `OtherTexts.machines`."""
-        return (machine for world in self.worlds() for machine in self._machines(world) if isinstance(machine, kind))
+    def controllers(self, kind: type[M]) -> Iterator[M]:
+        """See `OtherTexts.controllers`."""
+        return (controller for world in self.worlds() for controller in self._controllers(world) if isinstance(controller, kind))
 
     def files_of(self, world: str) -> Iterator[str]:
         """See `OtherTexts.files_of`."""
-        return (file for machine in self._machines(world) for file in machine.files)
+        return (file for controller in self._controllers(world) for file in controller.files)
 
-    def _machines(self, world: str) -> Sequence[MachineFiles]:
+    def _controllers(self, world: str) -> Sequence[ControllerFiles]:
         derived = self._of_present_text(world)
-        return () if derived is None else derived.machines
+        return () if derived is None else derived.controllers
 
-    def _read_machines(self, uri: str, lines: LineIndex, before: _Derived | None) -> Sequence[MachineFiles]:
+    def _read_controllers(self, uri: str, lines: LineIndex, before: _Derived | None) -> Sequence[ControllerFiles]:
         """Those that a text describes; while it cannot be read, during typing, the previous ones."""
         language = self._language(uri, lines)
         if language is None:
             return ()
         try:
-            return language.machines(uri, lines.text)
+            return language.controllers(uri, lines.text)
         except Misuse:
-            return () if before is None else before.machines
+            return () if before is None else before.controllers
 
     def _language(self, uri: str, lines: LineIndex) -> EditorLanguage | None:
         document = self._documents.get(uri)
@@ -218,7 +218,7 @@ class EditorSession:
         if self._worlds is None:
             found: dict[str, None] = {}
             for uri in self._documents:
-                for suffix in (one.suffix for one in LANGUAGES.values() if one.offers(EditorLanguage.machines)):
+                for suffix in (one.suffix for one in LANGUAGES.values() if one.offers(EditorLanguage.controllers)):
                     found.update(dict.fromkeys([uri] if uri.endswith(suffix) else []))
                     found.update(dict.fromkeys(self.files.beside(uri, suffix)))
             self._worlds = [uri for uri in found if self._is_world(uri)]
@@ -227,10 +227,10 @@ class EditorSession:
     def _is_world(self, uri: str) -> bool:
         lines = self.lines(uri)
         language = None if lines is None else self._language(uri, lines)
-        return language is not None and language.offers(EditorLanguage.machines)
+        return language is not None and language.offers(EditorLanguage.controllers)
 
     def related(self, uri: str) -> list[str]:
-        """The other files of the machines that a file belongs to, normal addresses."""
+        """The other files of the controllers that a file belongs to, normal addresses."""
         uri = normal(uri)
         found: dict[str, None] = {}
         for language in LANGUAGES.values():
@@ -238,8 +238,8 @@ class EditorSession:
             if other is not None:
                 found[other] = None
         for world in self.worlds():
-            for machine in self._machines(world):
-                files = [*machine.files]
+            for controller in self._controllers(world):
+                files = [*controller.files]
                 if uri in files or uri == world:
                     found.update(dict.fromkeys([world, *files]))
         found.pop(uri, None)

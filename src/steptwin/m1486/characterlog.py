@@ -6,12 +6,12 @@ import re
 from collections import deque
 from collections.abc import Callable
 
+from steptwin.controller import Nanos
 from steptwin.m1486.commands import UNITS, ArgType, find, grouped
 from steptwin.m1486.receiver import CR, EMPTY, NO_ROOM, THREE_FREE
 from steptwin.m1486.registers import UPLOADS
 from steptwin.m1486.syntax import ChipCommand, JumpCondition, parse_line
 from steptwin.m1486.variants import Variant
-from steptwin.machine import Nanos
 from steptwin.messages import Message, MessageText
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection

@@ -23,6 +23,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
+from steptwin.controller import MILLISECOND, Fact, Nanos, PinEdge
 from steptwin.errors import Misuse, TimeReversal
 from steptwin.m1486.drive import ChipDrive
 from steptwin.m1486.eeprom import pack, unpack
@@ -39,7 +40,6 @@ from steptwin.m1486.signals import data_level
 from steptwin.m1486.uart import Uart
 from steptwin.m1486.unit import NumericUnit
 from steptwin.m1486.variants import DEFAULT, Store, Variant
-from steptwin.machine import MILLISECOND, Fact, Nanos, PinEdge
 from steptwin.messages import Message, text_of
 from steptwin.state import Plain, Stateful
 

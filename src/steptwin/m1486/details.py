@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 
+from steptwin.controller import Nanos
 from steptwin.controllerstate import DetailRow, DetailValue
 from steptwin.datasheet import Detail, FactType
 from steptwin.m1486.chip import M1486Chip
@@ -15,7 +16,6 @@ from steptwin.m1486.functions import CARRY, FUNCTIONS, USER_FLAGS
 from steptwin.m1486.microsteps import UNIT
 from steptwin.m1486.registers import GENERAL
 from steptwin.m1486.syntax import ChipCommand
-from steptwin.machine import Nanos
 from steptwin.tables import complete
 
 

@@ -10,6 +10,7 @@ import enum
 from math import inf
 from typing import ClassVar
 
+from steptwin.controller import MICROSECOND, SECOND, Nanos
 from steptwin.m1486.lines import Interface
 from steptwin.m1486.microsteps import (
     DEFAULT_DISTANCE_U,
@@ -23,7 +24,6 @@ from steptwin.m1486.microsteps import (
 )
 from steptwin.m1486.unit import MASK
 from steptwin.m1486.variants import Variant
-from steptwin.machine import MICROSECOND, SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.motion import Profile, at_rest
 from steptwin.motion.divisions import Microstepping, StepTrain, forced_stop, step_train

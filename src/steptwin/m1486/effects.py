@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple, NoReturn, Protocol, TypeAlias
 
+from steptwin.controller import Fact, Nanos
 from steptwin.m1486.drive import ChipDrive
 from steptwin.m1486.lines import Interface
 from steptwin.m1486.memory import CommandMemory
@@ -15,7 +16,6 @@ from steptwin.m1486.pins import ChipPins
 from steptwin.m1486.uart import Uart
 from steptwin.m1486.unit import NumericUnit
 from steptwin.m1486.variants import Variant
-from steptwin.machine import Fact, Nanos
 
 
 class ProgramFlow(Protocol):

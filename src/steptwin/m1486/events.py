@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from steptwin.controller import Fact, Nanos
 from steptwin.datasheet import EventDescription, EventSeverity, FactDescription, FactType
 from steptwin.m1486.microsteps import UNIT
-from steptwin.machine import Fact, Nanos
 
 EVENTS_KEPT = 1000
 """Number of events of a chip that are kept."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from steptwin.controller import Nanos
 from steptwin.m1486 import flow_effects, io_effects, motion_effects, numeric_effects
 from steptwin.m1486.commands import TABLE, ArgType, When, find, takes_variable
 from steptwin.m1486.effects import CommandHost, Effect, Making, WrongData, refusing
 from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import ChipCommand, JumpCondition
-from steptwin.machine import Nanos
 from steptwin.messages import Message, text_of
 from steptwin.tables import complete
 

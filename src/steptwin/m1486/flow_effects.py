@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.m1486.effects import CommandHost, Effect, Makers, WrongData, refusing
 from steptwin.m1486.functions import CARRY, USER_FLAGS
 from steptwin.m1486.syntax import JumpCondition
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.messages import Message
 
 LOOP_LEVELS = 4

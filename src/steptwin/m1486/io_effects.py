@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from steptwin.controller import Nanos
 from steptwin.m1486.effects import CommandHost, Effect, Maker, Makers
 from steptwin.m1486.functions import REMAINDER, USER_FLAGS
 from steptwin.m1486.lines import LINES, line_group
 from steptwin.m1486.registers import UPLOADS
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 
 PRODUCTION_SERIES = 1

@@ -9,7 +9,7 @@ How a shell builds a line::
     port.exchange(b"x7\\rf12800\\rr\\r", now)
     port.to_send(later)  # [(moment, characters)], the same for every port
 
-Chips are machines of their own: a shell adds each to its `steptwin.simulation.scheduler.scheduler.Scheduler` and advances that
+Chips are controllers of their own: a shell adds each to its `steptwin.simulation.scheduler.scheduler.Scheduler` and advances that
 before it hands over characters. Its actions are reported by its hooks (`steptwin.m1486.chip.M1486Chip`).
 """
 
@@ -18,10 +18,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import ClassVar
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.uart import MOST_WAITING
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.state import Stateful
 
@@ -121,7 +121,7 @@ class SerialChain(Stateful):
 
 
 class LinePort:
-    """The port of one program; a `steptwin.machine.SendingPort`.
+    """The port of one program; a `steptwin.controller.SendingPort`.
 
     ``on_output`` is called for unsolicited output.
     """

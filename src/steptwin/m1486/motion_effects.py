@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from steptwin.controller import Nanos
 from steptwin.m1486.drive import ChipDrive
 from steptwin.m1486.effects import CommandHost, Effect, Maker, Makers, WrongData
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 
 MAKERS = Makers()

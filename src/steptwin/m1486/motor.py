@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Protocol
 
+from steptwin.controller import SECOND, Fact, Nanos
 from steptwin.m1486.drive import SEEK_LANDING_U, ChipDrive, MotionMode, WrongMove
 from steptwin.m1486.effects import WrongData
 from steptwin.m1486.functions import EDGE, FULLSTEP, FULLSTEPSS, LIMITOFF, RECOVER, RUNSIGN
@@ -11,7 +12,6 @@ from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.pins import JOG_DIRECTION_LINE, ChipPins, seek_ends
 from steptwin.m1486.unit import NumericUnit, counter_text
-from steptwin.machine import SECOND, Fact, Nanos
 from steptwin.messages import Message, text_of
 from steptwin.state import Stateful
 

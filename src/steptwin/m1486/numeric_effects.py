@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from steptwin.controller import Nanos
 from steptwin.m1486.commands import DIVIDEND_LIMIT, FREE_DIVISORS
 from steptwin.m1486.effects import CommandHost, Effect, Makers, WrongData
 from steptwin.m1486.lines import line_group
 from steptwin.m1486.registers import GENERAL, POSITION_REGISTER
 from steptwin.m1486.unit import FROM_LINES, MASK
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 
 MAKERS = Makers()

@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import ClassVar
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.m1486.lines import DUAL_DAC, LINES, RUNSIGN_LINE, SEEK_ENDS_LOW, STEP_DIRECTION, TWO_DACS, Interface
 from steptwin.m1486.variants import Variant
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.state import Stateful
 

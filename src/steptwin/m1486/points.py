@@ -7,12 +7,12 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import NamedTuple
 
+from steptwin.controller import Nanos
 from steptwin.datasheet import Access, Limits, Point, PointAddress, PointEffect
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.io_effects import UPLOADED
 from steptwin.m1486.microsteps import UNIT
 from steptwin.m1486.registers import POSITION_REGISTER, REGISTERS, REMAINDER_REGISTER, UPLOADS
-from steptwin.machine import Nanos
 from steptwin.motion import Profile
 from steptwin.points import LivePoint, TurningPoints, turns_of, turns_of_round
 

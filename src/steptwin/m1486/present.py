@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.controllerstate import (
     ProgramActivity,
     StateAxis,
@@ -18,7 +19,6 @@ from steptwin.m1486.drive import MotionMode
 from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.pins import LINE_PINS
 from steptwin.m1486.program import WaitReason
-from steptwin.machine import SECOND, Nanos
 
 _MOTIONS = {MotionMode.MOVE: "move", MotionMode.ENDLESS: "endless move", MotionMode.SEEK: "seek"}
 

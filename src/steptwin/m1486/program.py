@@ -11,10 +11,10 @@ import enum
 from collections.abc import Collection
 from typing import ClassVar, NamedTuple, NoReturn, Protocol
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.m1486.effects import CommandHost, Effect, WrongData
 from steptwin.m1486.encoding import LONGEST, decode
 from steptwin.m1486.execute import compile_command
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.messages import Message, text_of
 from steptwin.state import Plain, Stateful
 from steptwin.statements import HookedStatements, StatementHook, StatementHooks, hook_before, without

@@ -10,6 +10,7 @@ from collections import deque
 from functools import lru_cache
 from typing import ClassVar, Protocol
 
+from steptwin.controller import Fact, Nanos
 from steptwin.m1486.commands import CLEAR_KILL, When, find, permitted_text, when
 from steptwin.m1486.drive import ChipDrive
 from steptwin.m1486.encoding import SIZES, encode
@@ -19,7 +20,6 @@ from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import ChipCommand, parse_line
 from steptwin.m1486.unit import NumericUnit
 from steptwin.m1486.variants import Store, Variant
-from steptwin.machine import Fact, Nanos
 from steptwin.messages import Message, text_of
 from steptwin.state import Stateful
 

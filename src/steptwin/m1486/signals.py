@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.waveforms import currents
 

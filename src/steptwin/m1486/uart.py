@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from steptwin.machine import SECOND, Nanos
+from steptwin.controller import SECOND, Nanos
 from steptwin.state import Stateful
 from steptwin.wire.line import CharacterClock, SerialLine
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass, replace
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.messages import Message
 
 

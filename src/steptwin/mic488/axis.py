@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.messages import Message
 from steptwin.mic488.config import NO_INPUT, AxisConfig
 from steptwin.mic488.encoder import Coupling, Encoder

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.messages import Message
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.core import CoilAction, ControllerCore, RegisterAction

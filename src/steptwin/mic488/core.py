@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeAlias
 
+from steptwin.controller import Fact, Nanos, PinEdge
 from steptwin.errors import Misuse, Runaway, TimeReversal
-from steptwin.machine import Fact, Nanos, PinEdge
 from steptwin.messages import Message
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.config import ANALOG_INPUTS, ControllerConfig

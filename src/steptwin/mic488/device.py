@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.messages import Message
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.core import NO_BANKS, ControllerCore

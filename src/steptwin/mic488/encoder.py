@@ -9,7 +9,7 @@ from __future__ import annotations
 import enum
 from typing import Protocol
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.mic488.encoding import wrapped_dint
 from steptwin.state import Stateful
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.messages import Message, MessageText
 from steptwin.mic488.describe import AxisScale, Wording
 from steptwin.mic488.device import Mic488Device

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.mic488.config import NO_INPUT, AxisConfig
 from steptwin.mic488.inputs import index_input
 from steptwin.mic488.status import AxisStatus

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
-from steptwin.machine import MILLISECOND, Nanos
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.state import Stateful
 
 FILTER_NS: tuple[Nanos, ...] = tuple(ms * MILLISECOND for ms in (10, 50, 100, 250, 500))

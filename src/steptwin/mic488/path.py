@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.mic488.status import LIMIT, AxisStatus
 from steptwin.motion import MotionState, Profile, plan_position, plan_stop
 from steptwin.motion.paths import Circular, Straight

@@ -10,9 +10,9 @@ from functools import partial
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from steptwin.controller import Nanos
 from steptwin.datasheet import Access, Condition, Limits, Point, PointAddress, PointEffect
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.mic488 import registermap
 from steptwin.mic488.axis import Axis

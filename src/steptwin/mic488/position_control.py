@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from steptwin.machine import MILLISECOND, Nanos
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.mic488.config import AxisConfig
 from steptwin.mic488.encoder import Encoder
 from steptwin.mic488.status import AxisStatus

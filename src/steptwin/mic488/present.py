@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import NamedTuple
 
+from steptwin.controller import Nanos
 from steptwin.controllerstate import (
     ProgramActivity,
     StateAxis,
@@ -16,7 +17,6 @@ from steptwin.controllerstate import (
 )
 from steptwin.datasheet import AxisDescription, Datasheet
 from steptwin.diagnostics import visible
-from steptwin.machine import Nanos
 from steptwin.mic488.datasheet import datasheet
 from steptwin.mic488.details import DETAILS
 from steptwin.mic488.device import Mic488Device

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from steptwin.controller import Nanos
 from steptwin.diagnostics import Span
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import NONE, Message, text_of
 from steptwin.mic488 import program_motion as motion
 from steptwin.mic488.program_banks import LoadedProgram, ProgramBanks, row_values

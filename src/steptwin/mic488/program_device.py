@@ -6,7 +6,7 @@ from array import array
 from collections.abc import Sequence
 from typing import Protocol
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.inputs import Inputs

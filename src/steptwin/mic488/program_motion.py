@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import NamedTuple, TypeAlias
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import Message, text_of
 from steptwin.mic488 import path
 from steptwin.mic488.axis import MAX_SPEED_P, SLOWEST_RAMP_P, Axis

@@ -9,7 +9,7 @@ from math import inf, isnan
 from types import MappingProxyType
 from typing import Protocol, TypeAlias
 
-from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.mic488.axis import MAX_SPEED_P, Axis
 from steptwin.mic488.config import ControllerConfig

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from typing import NamedTuple, Protocol
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.mic488.program_banks import LoadedProgram
 from steptwin.state import Stateful
 from steptwin.wbc import steps as s
@@ -61,7 +61,7 @@ class SeeingDevice(Protocol):
 
 
 class Com1Port(Stateful):
-    """COM1 of one controller as a `steptwin.machine.Port`: Modbus RTU through ``modbus``, if it is given, and records."""
+    """COM1 of one controller as a `steptwin.controller.Port`: Modbus RTU through ``modbus``, if it is given, and records."""
 
     broken = None
 

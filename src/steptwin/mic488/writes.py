@@ -6,7 +6,7 @@ import struct
 from collections.abc import Callable
 from typing import Protocol, TypeAlias
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.mic488.behaviour import BEHAVIOUR, AxisAction
 from steptwin.mic488.core import ControllerCore, RegisterAction
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN, swap_bytes

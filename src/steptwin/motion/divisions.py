@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from math import inf
 from typing import NamedTuple, TypeAlias
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.motion.planner import MotionState
 from steptwin.motion.profile import Profile, at_rest
 from steptwin.motion.ramps import SpeedCurve, plan_forced_stop

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from math import ceil, sqrt
 from typing import NamedTuple
 
-from steptwin.machine import SECOND, Nanos
+from steptwin.controller import SECOND, Nanos
 from steptwin.motion.exponential import decay, logarithm
 from steptwin.motion.trig import PI, QUARTER, cosine, sine
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from math import ceil, floor, inf, sqrt
 from typing import Any, NamedTuple
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.motion.profile import NEAR_P, Profile, Segment
 from steptwin.motion.trig import QUARTER, arcsine_below_45, cosine, direction, length, sine

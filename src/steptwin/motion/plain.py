@@ -19,7 +19,7 @@ from collections.abc import Mapping, Sequence
 from math import inf
 from typing import Any
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.motion.divisions import Division, Microstepping, Plan, StepTrain
 from steptwin.motion.paths import ArcProfile, ArcSegment, Circular
 from steptwin.motion.profile import Profile, Segment

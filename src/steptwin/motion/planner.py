@@ -8,8 +8,8 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import NamedTuple
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.motion.profile import Profile, Segment, cruise, ramp
 

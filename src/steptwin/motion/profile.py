@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil, floor, inf, sqrt
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 
 NEAR_P = 1 / 128
 """Within this distance of a whole position the rounding error of a position (2^-49 of its distance from the base) could decide

@@ -1,4 +1,4 @@
-"""Projections of profiles with numpy: pulse times, positions and velocities as arrays. Never part of a machine's state.
+"""Projections of profiles with numpy: pulse times, positions and velocities as arrays. Never part of a controller's state.
 
 Every formula is the one of `steptwin.motion.profile`, operation by operation, so that arrays and single looks agree exactly.
 """
@@ -11,7 +11,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.paths import ArcSegment, Circular
 from steptwin.motion.profile import NEWTON_STEPS, Profile, Segment

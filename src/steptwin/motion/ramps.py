@@ -11,8 +11,8 @@ from __future__ import annotations
 from math import ceil, inf, sqrt
 from typing import NamedTuple
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.motion.planner import FARTHEST_P, MotionState, refuse_range
 from steptwin.motion.profile import Profile, Segment, at_rest, cruise

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Annotated, Protocol, TypeAlias
 
 from steptwin.access.roles import KEEP, LOOK
+from steptwin.controller import Nanos
 from steptwin.fields import TIME, Meaning, Schema, whole
-from steptwin.machine import Nanos
 from steptwin.studio.requesttype import request
 from steptwin.subject.shapes import MOMENT, TEXT, WHOLE, list_of, members
 

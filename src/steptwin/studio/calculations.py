@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from steptwin.calc import TIMES, Calculator, DriveMechanics, MoveQuantity, calculator_of, plain
 from steptwin.errors import Refusal
 from steptwin.messages import Message
-from steptwin.studio.machines import Sheets
+from steptwin.studio.controllers import Sheets
 
 NO_CALCULATOR = Message(
     "studio.no-calculator",
-    "there is no motion calculator for axis {axis} of {machine}: its kind has none, or the pulses in a unit are not known "
+    "there is no motion calculator for axis {axis} of {controller}: its kind has none, or the pulses in a unit are not known "
     "(config=FILE behind the address of a device)",
 )
 
@@ -20,23 +20,23 @@ class Calculations:
     def __init__(self, sheets: Sheets) -> None:
         self._sheets = sheets
 
-    def quantities(self, machine: str, axis: int) -> Mapping[str, object]:
+    def quantities(self, controller: str, axis: int) -> Mapping[str, object]:
         """Quantities of a move of an axis. Raises `Misuse` for another controller, `Refusal` where there is no calculator."""
-        calculator = self._calculator(machine, axis)
+        calculator = self._calculator(controller, axis)
         return {
             "title": calculator.model.title,
             "quantities": [_quantity(one) for one in calculator.model.quantities],
             "times": [_quantity(one) for one in TIMES],
         }
 
-    def calculate(self, machine: str, axis: int, given: Mapping[str, float], find: str | None) -> Mapping[str, object]:
+    def calculate(self, controller: str, axis: int, given: Mapping[str, float], find: str | None) -> Mapping[str, object]:
         """See `steptwin.calc.Calculator.calculate`."""
-        return plain(self._calculator(machine, axis).calculate(given, find))
+        return plain(self._calculator(controller, axis).calculate(given, find))
 
-    def _calculator(self, machine: str, axis: int) -> Calculator:
-        found = calculator_of(self._sheets.of(machine), axis)
+    def _calculator(self, controller: str, axis: int) -> Calculator:
+        found = calculator_of(self._sheets.of(controller), axis)
         if found is None:
-            raise Refusal(NO_CALCULATOR(axis=axis, machine=machine))
+            raise Refusal(NO_CALCULATOR(axis=axis, controller=controller))
         return found
 
 

@@ -11,11 +11,12 @@ from steptwin.errors import Refusal
 from steptwin.messages import Message
 from steptwin.simulation.kinds.registry import KINDS
 from steptwin.simulation.world.worldprograms import FINDING
-from steptwin.studio.machines import Sheets
+from steptwin.studio.controllers import Sheets
 from steptwin.subject.contract import Reading
 
 NO_CONFIGURATION_FILE = Message(
-    "studio.no-configuration-file", "{machine} is of the kind {kind}, which has no configuration file: it is set up by commands"
+    "studio.no-configuration-file",
+    "{controller} is of the kind {kind}, which has no configuration file: it is set up by commands",
 )
 
 
@@ -32,33 +33,33 @@ class Configurations:
         self._given = given
         self._present = present
 
-    async def read(self, machine: str) -> Mapping[str, object]:
+    async def read(self, controller: str) -> Mapping[str, object]:
         """Its file; without one, what its registers show. Raises `Misuse` for another name, `Refusal` for a kind without such a
         file, `LineFailure`."""
-        kind, sheet = self._kind(machine)
-        source = await self._given(machine)
+        kind, sheet = self._kind(controller)
+        source = await self._given(controller)
         if source is not None:
             return {**_plain(kind.form(source.text, source.name, sheet)), "is_file": True}
-        name = f"{machine}.cfg"
+        name = f"{controller}.cfg"
         paths = [
             setting.point for section in kind.form("", name, sheet).sections for setting in section.settings if setting.point
         ]
-        readings = await self._present([f"{machine}.{path}" for path in paths])
+        readings = await self._present([f"{controller}.{path}" for path in paths])
         values = {path: (reading.value, reading.unit) for path, reading in zip(paths, readings, strict=True)}
         text = kind.with_values("", name, kind.known(values, sheet))
         return {**_plain(kind.form(text, name, sheet)), "is_file": False}
 
-    def edit(self, machine: str, text: str, changes: Mapping[str, str]) -> Mapping[str, object]:
+    def edit(self, controller: str, text: str, changes: Mapping[str, str]) -> Mapping[str, object]:
         """A text with other values. Raises `Misuse`, also for settings that are not there, and `Refusal` as `read`."""
-        kind, sheet = self._kind(machine)
-        name = f"{machine}.cfg"
+        kind, sheet = self._kind(controller)
+        name = f"{controller}.cfg"
         return {**_plain(kind.form(kind.with_values(text, name, changes), name, sheet)), "is_file": True}
 
-    def _kind(self, machine: str) -> tuple[ConfigurationFormat, Datasheet]:
-        sheet = self._sheets.of(machine)
+    def _kind(self, controller: str) -> tuple[ConfigurationFormat, Datasheet]:
+        sheet = self._sheets.of(controller)
         kind = KINDS.get(sheet.kind)
         if kind is None or kind.configuration_format is None:
-            raise Refusal(NO_CONFIGURATION_FILE(machine=machine, kind=sheet.kind))
+            raise Refusal(NO_CONFIGURATION_FILE(controller=controller, kind=sheet.kind))
         return kind.configuration_format, sheet
 
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Annotated, TypeAlias
 
 from steptwin.access.roles import KEEP, LOOK
+from steptwin.controller import Nanos
 from steptwin.fields import TIME, Meaning, Schema
-from steptwin.machine import Nanos
 from steptwin.studio.requesttype import request
 from steptwin.subject.shapes import MOMENT, NUMBER, TEXT, WHOLE, list_of, members, or_null
 
@@ -29,7 +29,7 @@ _SAMPLE: Schema = {
 _AXIS = members({"axis": WHOLE, "name": TEXT, "unit": TEXT, "first": or_null(_DIFFERENCE), "samples": list_of(_SAMPLE)})
 _SHADOW = members(
     {
-        "machine": TEXT,
+        "controller": TEXT,
         "axes": list_of(_AXIS),
         "registers": {**list_of(_DIFFERENCE), "description": "Those that differ now."},
         "compared": {**WHOLE, "description": "Registers that are compared at rest."},
@@ -46,11 +46,11 @@ _Device: TypeAlias = Annotated[str, Meaning("Of a device.")]
     "settings",
     KEEP,
     "What can be read and written in a device, as the text that is kept before the first write.",
-    members({"machine": TEXT, "text": TEXT}),
+    members({"controller": TEXT, "text": TEXT}),
 )
 @dataclass(frozen=True, slots=True)
 class ReadSettings:
-    machine: _Device
+    controller: _Device
 
 
 @request(
@@ -61,14 +61,14 @@ class ReadSettings:
 )
 @dataclass(frozen=True, slots=True)
 class SetDigitalShadow:
-    machine: _Device
+    controller: _Device
     on: Annotated[bool, Meaning("Whether there is to be one.")] = True
 
 
 @request("digital_shadow_state", LOOK, "How a device and the twin beside it differ; null without one.", or_null(_SHADOW))
 @dataclass(frozen=True, slots=True)
 class ReadDigitalShadow:
-    machine: _Device
+    controller: _Device
     after: Annotated[
         Nanos,
         Meaning("Only samples later than this, from the beginning of the digital shadow.", TIME, unit="ns", name="after_ns"),

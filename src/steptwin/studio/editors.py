@@ -16,8 +16,8 @@ from typing import Protocol, TypeVar
 
 from steptwin.access.rate import RateLimit
 from steptwin.access.tokens import AccessGate
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse, Refusal, SteptwinError
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.studio.requests import REQUESTS
 from steptwin.studio.viewers import (

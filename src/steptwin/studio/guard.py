@@ -8,8 +8,8 @@ from typing import Any, TypeAlias
 
 from steptwin.access.origin import Origins
 from steptwin.access.rate import RateLimits
+from steptwin.controller import Nanos
 from steptwin.errors import Refusal
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.studio.session import TOO_MANY_REQUESTS
 from steptwin.studio.viewers import AsgiReceive, AsgiScope, AsgiSend

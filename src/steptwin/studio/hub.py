@@ -12,16 +12,16 @@ from itertools import count
 
 from steptwin.access.control import Control, Viewer
 from steptwin.access.roles import Role
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse, Refusal, SteptwinError
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.studio.branchrequests import Branches
 from steptwin.studio.calculations import Calculations
 from steptwin.studio.campaignrequests import Campaigns
 from steptwin.studio.configurations import Configurations
+from steptwin.studio.controllers import Sheets
 from steptwin.studio.drawingrequests import Arrangement
-from steptwin.studio.machines import Sheets
 from steptwin.studio.recordingrequests import Recordings
 from steptwin.studio.requests import (
     OF_BRANCHES,
@@ -64,7 +64,7 @@ class Lease:
     held: ExtendableJog
 
     def plain(self) -> dict[str, object]:
-        head = {"lease": self.number, "viewer": self.viewer.number, "machine": self.jog.machine, "axis": self.jog.axis}
+        head = {"lease": self.number, "viewer": self.viewer.number, "controller": self.jog.controller, "axis": self.jog.axis}
         return {**head, "velocity": self.jog.velocity}
 
 
@@ -149,7 +149,7 @@ class Hub:
 
     @property
     def is_virtual(self) -> bool:
-        return not any(part.is_real for part in self.subject.description.machines)
+        return not any(part.is_real for part in self.subject.description.controllers)
 
     @property
     def recordings(self) -> Recordings:
@@ -261,7 +261,7 @@ class Hub:
         speed = self.around.moment().speed
         if speed > FASTEST_JOG:
             raise Refusal(TOO_FAST_FOR_A_JOG(speed=speed, most=FASTEST_JOG))
-        own = [one for one in self._leases.values() if (one.jog.machine, one.jog.axis) == (wanted.machine, wanted.axis)]
+        own = [one for one in self._leases.values() if (one.jog.controller, one.jog.axis) == (wanted.controller, wanted.axis)]
         for lease in own:
             self._end(lease, lease.held.release)
         if len(self._leases) >= MOST_LEASES:
@@ -329,7 +329,7 @@ class Hub:
 
     def _cut(self, stopped: command.StopAxes) -> None:
         for lease in list(self._leases.values()):
-            if lease.jog.machine == stopped.machine and stopped.axis in (None, lease.jog.axis):
+            if lease.jog.controller == stopped.controller and stopped.axis in (None, lease.jog.axis):
                 self._end(lease, lease.held.cut)
 
     async def stop_all(self) -> Result:
@@ -355,9 +355,9 @@ class Hub:
         result = await self.subject.do(command.ReadPoints(tuple(points)))
         return [Reading(**one) for one in result.value]
 
-    async def _configuration(self, machine: str) -> SourceText | None:
-        given = self.around.configuration(machine)
-        return await self.around.connections.configuration(machine) if given is None else given
+    async def _configuration(self, controller: str) -> SourceText | None:
+        given = self.around.configuration(controller)
+        return await self.around.connections.configuration(controller) if given is None else given
 
     # ------------------------------------------------------------------ time
 

@@ -6,10 +6,10 @@ import json
 from collections.abc import Callable, Mapping
 from typing import Protocol, TypeVar
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.devices.worldpart import present_of
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.later import Later
-from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.studio.programs import ProgramTexts
 from steptwin.studio.watches import Watched

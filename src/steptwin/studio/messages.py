@@ -26,7 +26,7 @@ LEASES: Schema = {
         {
             "lease": WHOLE,
             "viewer": WHOLE,
-            "machine": TEXT,
+            "controller": TEXT,
             "axis": WHOLE,
             "velocity": {**NUMBER, "description": "[units of the data sheet/s]"},
         }
@@ -38,7 +38,7 @@ _PRESENT: Mapping[str, Schema] = {
     "state": {
         "type": "object",
         "additionalProperties": {"$ref": "#/$defs/(state)"},
-        "description": "By machine, as the answer to state; empty for a device.",
+        "description": "By controller, as the answer to state; empty for a device.",
     },
     "faults": {"type": "array", "items": {"type": "object"}, "description": "As the answer to faults."},
     "plans": {"type": "array", "items": {"$ref": "#/$defs/(event)"}, "description": "Present plans of all axes."},
@@ -82,7 +82,7 @@ _ROWS = (
                 "pace": members({"running": FLAG, "speed": SPEED}),
                 "virtual": {
                     "type": "boolean",
-                    "description": "Whether all machines are twins; a device gives samples, not plans.",
+                    "description": "Whether all controllers are twins; a device gives samples, not plans.",
                 },
                 "device_kinds": {
                     "type": "array",

@@ -11,11 +11,11 @@ class ProgramTexts(Protocol):
 
     def list(self) -> Sequence[Mapping[str, object]]: ...
 
-    def text(self, machine: str, place: str) -> Mapping[str, object]:
+    def text(self, controller: str, place: str) -> Mapping[str, object]:
         """Raises `Misuse` where there is none."""
         ...
 
-    def memory(self, machine: str, place: str, text: str) -> Sequence[Mapping[str, object]]:
+    def memory(self, controller: str, place: str, text: str) -> Sequence[Mapping[str, object]]:
         """Use of the memory at a place by a text; empty for one with errors. Raises `Misuse` where there is no place."""
         ...
 

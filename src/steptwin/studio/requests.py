@@ -12,9 +12,9 @@ from typing import Annotated, Any, TypeAlias, get_args
 
 from steptwin.access.commands import PERMITS
 from steptwin.access.roles import ACT, LOOK, ROLES, SERVICE, TAKE, Permit
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.fields import PROGRAM, TIME, Meaning, RequestType, Schema, choices, number, whole
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
@@ -42,13 +42,13 @@ LEASE: Schema = members({"lease": WHOLE, "lasts_ms": {**WHOLE, "description": "R
 """The answer to jog."""
 
 _PROGRAM: Mapping[str, object] = {
-    "machine": TEXT,
-    "place": {**TEXT, "description": "Unlike all others of the machine, such as program 0."},
+    "controller": TEXT,
+    "place": {**TEXT, "description": "Unlike all others of the controller, such as program 0."},
     "name": {**TEXT, "description": "Of the file."},
     "language": {"enum": [language.name for kind in CONTROLLERS.values() for language in kind.languages]},
     "suffix": {**TEXT, "description": "Of files in this language."},
     "has_statements": {**FLAG, "description": "Whether it is a program, in whose statements a debugger stops."},
-    "is_typed": {**FLAG, "description": "Whether a text is typed over the line of the machine, as at a terminal."},
+    "is_typed": {**FLAG, "description": "Whether a text is typed over the line of the controller, as at a terminal."},
     "address": {**TEXT, "description": "At the editor server."},
     "empty": {**FLAG, "description": "Whether nothing is there yet."},
     "running": FLAG,
@@ -213,7 +213,7 @@ class ListPrograms:
 )
 @dataclass(frozen=True, slots=True)
 class ReadProgram:
-    machine: Annotated[str, Meaning("Of a controller.")]
+    controller: Annotated[str, Meaning("Of a controller.")]
     place: Annotated[str, Meaning("As in the answer to programs.")]
 
 
@@ -225,7 +225,7 @@ class ReadProgram:
 )
 @dataclass(frozen=True, slots=True)
 class ReadMemory:
-    machine: Annotated[str, Meaning("Of a controller.")]
+    controller: Annotated[str, Meaning("Of a controller.")]
     place: Annotated[str, Meaning("As in the answer to programs.")]
     text: Annotated[str, Meaning("The text; it is not downloaded.", PROGRAM)]
 
@@ -244,19 +244,19 @@ class ListPorts:
 @request(
     "connect",
     SERVICE,
-    "A device becomes a machine here. Nothing moves by it, and no setting is changed.",
-    members({"machine": TEXT}),
+    "A device becomes a controller here. Nothing moves by it, and no setting is changed.",
+    members({"controller": TEXT}),
 )
 @dataclass(frozen=True, slots=True)
 class Connect:
     address: Annotated[str, Meaning("As after --device: /dev/ttyUSB0,unit=2, tcp://192.168.0.9,config=machine.cfg.")]
-    name: Annotated[str | None, Meaning("Of the machine; its kind without one.")] = None
+    name: Annotated[str | None, Meaning("Of the controller; its kind without one.")] = None
 
 
-@request("disconnect", SERVICE, "A device is no machine here any more: jogs end, other motions and its program go on.")
+@request("disconnect", SERVICE, "A device is no controller here any more: jogs end, other motions and its program go on.")
 @dataclass(frozen=True, slots=True)
 class Disconnect:
-    machine: Annotated[str, Meaning("Of a device.")]
+    controller: Annotated[str, Meaning("Of a device.")]
 
 
 @request(

@@ -16,10 +16,10 @@ from fastapi.responses import FileResponse
 from steptwin import __version__
 from steptwin.access.control import Viewer
 from steptwin.access.roles import Role
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.eventloop import result_of
 from steptwin.later import start
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.studio.hub import Hub
 from steptwin.studio.requests import ALL, OF_CONNECTION, permit_of
@@ -75,7 +75,7 @@ class Rest:
                 )
         reading = (
             _Reading("/api/describe", self._describe, "get_describe", "What there is."),
-            _Reading("/api/state", self._state, "get_state", "Everything about a machine, or about all.", MACHINE),
+            _Reading("/api/state", self._state, "get_state", "Everything about a controller, or about all.", CONTROLLER),
             _Reading("/api/points", self._points, "get_points", "The present values of points.", POINT_NAMES),
         )
         for one in reading:
@@ -103,11 +103,11 @@ class Rest:
         return await self._answer(request, "describe", {})
 
     async def _state(self, request: Request) -> Response:
-        machine = request.query_params.get("machine")
-        if machine is not None:
-            return await self._answer(request, "state", {"machine": machine})
-        names = [part.name for part in self._hub.subject.description.machines]
-        answers = {name: await self._ask(request, "state", {"machine": name}) for name in names}
+        controller = request.query_params.get("controller")
+        if controller is not None:
+            return await self._answer(request, "state", {"controller": controller})
+        names = [part.name for part in self._hub.subject.description.controllers]
+        answers = {name: await self._ask(request, "state", {"controller": name}) for name in names}
         for answer, status in answers.values():
             if status != DONE:
                 return _response(answer, status)
@@ -186,7 +186,7 @@ def _parameter(name: str, place: str, meaning: str | None = None, *, is_required
     return head if meaning is None else {**head, "description": meaning}
 
 
-MACHINE = _parameter("machine", "query", is_required=False)
+CONTROLLER = _parameter("controller", "query", is_required=False)
 POINT_NAMES = _parameter("names", "query", "Points with commas between them, such as table.M1.position,time.")
 SESSION_FILE = _parameter("file", "path", "NAME.json: a saved session; NAME.vcd and so on: what is made of it.")
 RESULT_FILE = _parameter(
@@ -236,7 +236,9 @@ def _bearer(request: Request) -> str | None:
     return given.strip() if scheme.lower() == "bearer" else None
 
 
-WRONG_BODY = Message("studio.wrong-body", 'a body is an object of JSON with the fields: {{"machine": "table", "axis": 1, ...}}')
+WRONG_BODY = Message(
+    "studio.wrong-body", 'a body is an object of JSON with the fields: {{"controller": "table", "axis": 1, ...}}'
+)
 FIELD_OF_THE_ADDRESS = Message("studio.field-of-the-address", "no field {name!r}: the address says which request it is")
 
 

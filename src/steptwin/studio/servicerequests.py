@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Annotated, Protocol, TypeAlias
 
 from steptwin.access.roles import LOOK
+from steptwin.controller import SECOND
 from steptwin.durations import LONGEST_NS
 from steptwin.fields import Meaning, Schema, number, whole
-from steptwin.machine import SECOND
 from steptwin.studio.requesttype import request
 from steptwin.subject.shapes import FLAG, NUMBER, TEXT, WHOLE, list_of, members, or_null
 
@@ -108,7 +108,7 @@ _WRITE = members(
             **TEXT,
             "description": "Who it was: an address, the owner of a certificate, a viewer, a client of a gateway, script.",
         },
-        "machine": {**TEXT, "description": "The controller, or the line; empty for what is about neither."},
+        "controller": {**TEXT, "description": "The controller, or the line; empty for what is about neither."},
         "what": {**TEXT, "description": "What was written or commanded, in words."},
         "outcome": {**TEXT, "description": "done, misuse, refusal, failure, internal; sent or empty where there is no answer."},
     }

@@ -16,9 +16,9 @@ from typing import Any, ClassVar, NamedTuple, TypeAlias
 from steptwin.access.control import Viewer, check
 from steptwin.access.rate import RateLimit
 from steptwin.access.roles import LOOK, Permit, Role
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.later import Later, start
-from steptwin.machine import SECOND, Nanos
 from steptwin.messages import NONE, Message
 from steptwin.studio import branchrequests as branch
 from steptwin.studio import campaignrequests as campaign
@@ -189,10 +189,10 @@ class ViewerSession:
         return await (self._hub.subject.do(wanted) if action is None else action(wanted, identity))
 
     async def _connect(self, wanted: ask.Connect) -> object:
-        return {"machine": await self._hub.around.connections.connect(wanted.address, wanted.name)}
+        return {"controller": await self._hub.around.connections.connect(wanted.address, wanted.name)}
 
     async def _read_settings(self, wanted: device.ReadSettings) -> object:
-        return {"machine": wanted.machine, "text": await self._hub.around.connections.settings(wanted.machine)}
+        return {"controller": wanted.controller, "text": await self._hub.around.connections.settings(wanted.controller)}
 
     async def _view_recording(self, wanted: recording.ViewRecording) -> object:
         return {"url": await self._hub.recordings.view(wanted.name)}
@@ -301,10 +301,10 @@ class ViewerSession:
         return (await self._programs()).list()
 
     async def _read_program(self, wanted: ask.ReadProgram) -> object:
-        return (await self._programs()).text(wanted.machine, wanted.place)
+        return (await self._programs()).text(wanted.controller, wanted.place)
 
     async def _read_memory(self, wanted: ask.ReadMemory) -> object:
-        return (await self._programs()).memory(wanted.machine, wanted.place, wanted.text)
+        return (await self._programs()).memory(wanted.controller, wanted.place, wanted.text)
 
     # ------------------------------------------------------------------ what it is sent
 
@@ -333,7 +333,7 @@ class ViewerSession:
             raise Misuse(FOLLOW_ID_IN_USE(id=identity))
         if len(self._follows) >= MOST_FOLLOWS:
             raise Misuse(TOO_MANY_FOLLOWS(most=MOST_FOLLOWS))
-        what = filter_of(wanted.kinds, wanted.machines, wanted.axes)
+        what = filter_of(wanted.kinds, wanted.controllers, wanted.axes)
         plans = [plan.plain() for plan in self._hub.subject.plans(what)]
         self._follows[identity] = what, wanted.bound
         self._move()
@@ -368,7 +368,7 @@ class ViewerSession:
             return []
         hub = self._hub
         found: list[str] = []
-        if self._needs_hello or self._descriptions != hub.descriptions:  # it was asked for, or there are other machines
+        if self._needs_hello or self._descriptions != hub.descriptions:  # it was asked for, or there are other controllers
             found.append(self._whole())
         if self._seen != hub.shared.changes:
             parts = hub.shared.since(self._seen)
@@ -467,18 +467,20 @@ class ViewerSession:
             ask.ReadMemory: _read_memory,
             ask.ListPorts: lambda self, _: self._hub.around.connections.ports(),
             ask.Connect: _connect,
-            ask.Disconnect: lambda self, wanted: self._hub.around.connections.disconnect(wanted.machine),
+            ask.Disconnect: lambda self, wanted: self._hub.around.connections.disconnect(wanted.controller),
             ask.ReadTraffic: lambda self, _: self._hub.traffic(),
             ask.ReadAudit: lambda self, wanted: [entry.plain() for entry in self._hub.around.audit.last(wanted.most)],
-            tool.ReadConfiguration: lambda self, wanted: self._hub.configurations.read(wanted.machine),
-            tool.EditConfiguration: lambda self, one: self._hub.configurations.edit(one.machine, one.text, one.changes),
-            tool.ReadQuantities: lambda self, wanted: self._hub.calculations.quantities(wanted.machine, wanted.axis),
-            tool.Calculate: lambda self, one: self._hub.calculations.calculate(one.machine, one.axis, one.given, one.find),
+            tool.ReadConfiguration: lambda self, wanted: self._hub.configurations.read(wanted.controller),
+            tool.EditConfiguration: lambda self, one: self._hub.configurations.edit(one.controller, one.text, one.changes),
+            tool.ReadQuantities: lambda self, wanted: self._hub.calculations.quantities(wanted.controller, wanted.axis),
+            tool.Calculate: lambda self, one: self._hub.calculations.calculate(one.controller, one.axis, one.given, one.find),
             tool.ConvertGear: lambda _, one: gear(one.motor_steps, one.microsteps, one.ratio, one.lead),
             tool.MakeCapture: lambda _, one: {"data": b64encode(b"".join(capture(one.frames))).decode("ascii")},
             device.ReadSettings: _read_settings,
-            device.ReadDigitalShadow: lambda self, wanted: self._hub.around.connections.shadow_of(wanted.machine, wanted.after),
-            device.SetDigitalShadow: lambda self, wanted: self._hub.around.connections.shadow(wanted.machine, on=wanted.on),
+            device.ReadDigitalShadow: lambda self, wanted: self._hub.around.connections.shadow_of(
+                wanted.controller, wanted.after
+            ),
+            device.SetDigitalShadow: lambda self, wanted: self._hub.around.connections.shadow(wanted.controller, on=wanted.on),
             recording.ReadRecordings: lambda self, _: self._hub.recordings.plain(),
             recording.SaveRecording: lambda self, wanted: self._hub.recordings.save(wanted.name),
             recording.ViewRecording: _view_recording,

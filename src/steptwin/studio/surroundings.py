@@ -9,8 +9,8 @@ from typing import Any, NamedTuple, Protocol
 
 from steptwin.access.audit import Audit
 from steptwin.access.tokens import AccessGate
+from steptwin.controller import Nanos
 from steptwin.diagnostics import SourceText
-from steptwin.machine import Nanos
 from steptwin.studio.branchrequests import Branches
 from steptwin.studio.campaignrequests import Campaigns
 from steptwin.studio.drawingrequests import Arrangement
@@ -45,7 +45,7 @@ class Served(AsyncSubject, Protocol):
         ...
 
     def present(self) -> dict[str, Any]:
-        """``state`` by machine and ``faults``, if known."""
+        """``state`` by controller and ``faults``, if known."""
         ...
 
 
@@ -63,26 +63,26 @@ class Connections(Protocol):
         ...
 
     async def connect(self, address: str, name: str | None) -> str:
-        """Connect a device; returns its machine name. Raises `Misuse`, `Refusal`, `LineFailure`."""
+        """Connect a device; returns its controller name. Raises `Misuse`, `Refusal`, `LineFailure`."""
         ...
 
-    async def disconnect(self, machine: str) -> None:
-        """Disconnect a device. Raises `Misuse` for a machine that is not a device."""
+    async def disconnect(self, controller: str) -> None:
+        """Disconnect a device. Raises `Misuse` for a controller that is not a device."""
         ...
 
-    async def settings(self, machine: str) -> str:
+    async def settings(self, controller: str) -> str:
         """As text. Raises as `disconnect`, `Refusal` and `LineFailure`."""
         ...
 
-    async def configuration(self, machine: str) -> SourceText | None:
+    async def configuration(self, controller: str) -> SourceText | None:
         """The configuration file with which a device was connected; None without one. Raises `Misuse`."""
         ...
 
-    async def shadow(self, machine: str, *, on: bool) -> None:
+    async def shadow(self, controller: str, *, on: bool) -> None:
         """Put a twin beside a device, or remove it. Raises as `settings`."""
         ...
 
-    def shadow_of(self, machine: str, after: Nanos) -> Mapping[str, object] | None:
+    def shadow_of(self, controller: str, after: Nanos) -> Mapping[str, object] | None:
         """See `steptwin.studio.devicerequests`. Raises `Misuse`."""
         ...
 
@@ -117,7 +117,7 @@ class Surroundings:
     programs: ProgramTexts
     connections: Connections
     work: LongWork
-    configuration: Callable[[str], SourceText | None] = lambda machine: None
+    configuration: Callable[[str], SourceText | None] = lambda controller: None
     """The configuration file of a twin by name; None without one."""
     lookback: KeptPast | None = None
     """The past, where one is kept."""

@@ -8,6 +8,7 @@ from typing import Annotated, Any, TypeAlias
 
 from steptwin.access.roles import LOOK
 from steptwin.calc import Formula, MovePart, RequiredSetting
+from steptwin.controller import Nanos
 from steptwin.diagnostics import Severity
 from steptwin.errors import Misuse
 from steptwin.fields import (
@@ -15,7 +16,7 @@ from steptwin.fields import (
     MOST_ITEMS,
     TIME,
     AxisNumber,
-    MachineName,
+    ControllerName,
     Meaning,
     Schema,
     ValueType,
@@ -25,7 +26,6 @@ from steptwin.fields import (
     read_fields,
     wrong,
 )
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.studio.requesttype import request
 from steptwin.subject.shapes import FLAG, NUMBER, TEXT, WHOLE, list_of, members, or_null, with_sentences
@@ -161,14 +161,14 @@ def _table(value: Any) -> Mapping[str, Any]:
 @dataclass(frozen=True, slots=True)
 class _Frame:
     time: Annotated[Nanos, Meaning("Virtual time.", TIME, name="time_ns")]
-    machine: Annotated[str, Meaning("The line.")]
+    controller: Annotated[str, Meaning("The line.")]
     client: Annotated[str, Meaning("The client of the line.")]
     direction: Annotated[str, Meaning("in: to the controller.", choice("in", "out"))]
     data: Annotated[bytes, Meaning("Its bytes, in hexadecimal.", HEX)]
 
     @property
     def captured(self) -> CapturedFrame:
-        return CapturedFrame(self.time, self.machine, self.client, self.direction == "in", self.data)
+        return CapturedFrame(self.time, self.controller, self.client, self.direction == "in", self.data)
 
 
 _OF_FRAME = fields_of(_Frame)
@@ -198,7 +198,7 @@ _RATIO = number(0.0, 1e6)
 )
 @dataclass(frozen=True, slots=True)
 class ReadQuantities:
-    machine: MachineName
+    controller: ControllerName
     axis: AxisNumber
 
 
@@ -210,7 +210,7 @@ class ReadQuantities:
 )
 @dataclass(frozen=True, slots=True)
 class Calculate:
-    machine: MachineName
+    controller: ControllerName
     axis: AxisNumber
     given: Annotated[Mapping[str, float], Meaning("Quantities by name, and a time at most.", _GIVEN)]
     find: Annotated[str | None, Meaning("What a time determines; the one that is left out without.")] = None
@@ -236,7 +236,7 @@ class ConvertGear:
 )
 @dataclass(frozen=True, slots=True)
 class ReadConfiguration:
-    machine: MachineName
+    controller: ControllerName
 
 
 @request(
@@ -254,7 +254,7 @@ class MakeCapture:
 @request("edit_configuration", LOOK, "The form of a text of such a file, with other values in it. Nothing is written.", _FORM)
 @dataclass(frozen=True, slots=True)
 class EditConfiguration:
-    machine: MachineName
+    controller: ControllerName
     text: Annotated[str, Meaning("The file.", _FILE)]
     changes: Annotated[Mapping[str, str], Meaning("Values by SECTION.KEY, such as Axis0.Gear.", _CHANGES)] = field(
         default_factory=dict

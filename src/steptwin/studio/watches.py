@@ -10,7 +10,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TypeAlias
 
-from steptwin.machine import SECOND, Nanos
+from steptwin.controller import SECOND, Nanos
 from steptwin.subject.contract import Reading
 
 Points: TypeAlias = tuple[str, ...]

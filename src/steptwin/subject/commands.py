@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, TypeAlias, get_args
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.fields import ID, SPEED, TIME, MachineName, Meaning, choices, whole
-from steptwin.machine import Nanos
+from steptwin.fields import ID, SPEED, TIME, ControllerName, Meaning, choices, whole
 from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
@@ -32,7 +32,7 @@ STEP_HAS_TWO_ENDS = Message("subject.step-has-two-ends", "step: for_ns and to_ns
 @command(
     "describe",
     "What there is.",
-    "version, name, machines with the numbers of their datasheets, axes, buttons, elements, connections, lines, commands",
+    "version, name, controllers with the numbers of their datasheets, axes, buttons, elements, connections, lines, commands",
 )
 @dataclass(frozen=True, slots=True)
 class Describe:
@@ -50,23 +50,23 @@ class ReadPoints:
     points: Annotated[tuple[str, ...], Meaning("Points, such as table.M1.position, table.IN3, x.position, time.")]
 
 
-@command("pins", "The levels of all pins: 0, 1, volts.", '{"MACHINE.PIN": LEVEL, ...}')
+@command("pins", "The levels of all pins: 0, 1, volts.", '{"CONTROLLER.PIN": LEVEL, ...}')
 @dataclass(frozen=True, slots=True)
 class ReadPins:
-    machine: Annotated[str | None, Meaning("The name of a machine; all of them without.")] = None
+    controller: Annotated[str | None, Meaning("The name of a controller; all of them without.")] = None
 
 
-@command("state", "The present state of a machine.", "the state, alike for all kinds")
+@command("state", "The present state of a controller.", "the state, alike for all kinds")
 @dataclass(frozen=True, slots=True)
 class ReadState:
-    machine: MachineName
+    controller: ControllerName
     parts: Annotated[tuple[str, ...] | None, Meaning("Only these parts: status, program, pins, details, names of axes.")] = None
 
 
-@command("encoders", "The encoders of a machine.", "a list of axis, counts, turned_by", is_list=True)
+@command("encoders", "The encoders of a controller.", "a list of axis, counts, turned_by", is_list=True)
 @dataclass(frozen=True, slots=True)
 class Encoders:
-    machine: MachineName
+    controller: ControllerName
 
 
 @command("faults", "The faults that are set.", "a list of name, fault, seen (occasions), happened (how often)", is_list=True)
@@ -112,7 +112,7 @@ class Follow:
     kinds: Annotated[
         tuple[str, ...] | None, Meaning("Kinds of events; all but frames without.", choices(KINDS, "kind of event"))
     ] = None
-    machines: Annotated[tuple[str, ...] | None, Meaning("Names of machines, lines, or 'world'; all without.")] = None
+    controllers: Annotated[tuple[str, ...] | None, Meaning("Names of controllers, lines, or 'world'; all without.")] = None
     axes: Annotated[tuple[str, ...] | None, Meaning("Numbers of axes as text; events of other axes are left out.")] = None
     bound: Annotated[
         int, Meaning("Events that wait to be sent; beyond it the oldest are dropped and counted.", whole(1, 100_000))
@@ -129,7 +129,7 @@ class Unfollow:
     "stop_all",
     "Stop everything: all axes and jogs, programs (paused where the controller can pause one, else ended), and scripts. "
     "Fails if a controller could not be stopped; the others are.",
-    "machines: the controllers that were stopped; scripts: those that were ended",
+    "controllers: the controllers that were stopped; scripts: those that were ended",
 )
 @dataclass(frozen=True, slots=True)
 class StopAll:

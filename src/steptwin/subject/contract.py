@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, NamedTuple, Protocol
 
+from steptwin.controller import Nanos
 from steptwin.datasheet import Datasheet, plain, read_argument, read_datasheet
-from steptwin.machine import Nanos
 from steptwin.messages import read_message_text, with_messages
 from steptwin.subject.commands import VERSION, Command
 from steptwin.subject.controls import ControlDescription
@@ -40,7 +40,7 @@ class Result(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class MachinePart:
+class ControllerPart:
     """A controller. The position of an axis is (pulses of its plan + origin) / ``pulses_per_unit`` of its data sheet."""
 
     name: str
@@ -88,7 +88,7 @@ class MechanicsPart:
     """The mechanics of an axis of a controller."""
 
     name: str
-    machine: str
+    controller: str
     axis: str
     unit: str
     points: tuple[str, ...]
@@ -178,7 +178,7 @@ class Description:
     """The constant description of a subject."""
 
     name: str
-    machines: tuple[MachinePart, ...]
+    controllers: tuple[ControllerPart, ...]
     axes: tuple[MechanicsPart, ...] = ()
     buttons: tuple[str, ...] = ()
     elements: tuple[ElementPart, ...] = ()
@@ -190,9 +190,9 @@ class Description:
 
     def plain(self) -> dict[str, object]:
         """As JSON. Data sheets are in a separate list, because controllers may share them."""
-        sheets = {id(part.datasheet): part.datasheet for part in self.machines}
+        sheets = {id(part.datasheet): part.datasheet for part in self.controllers}
         numbers = {key: number for number, key in enumerate(sheets)}
-        machines = [
+        controllers = [
             with_messages(
                 {
                     "name": part.name,
@@ -206,11 +206,11 @@ class Description:
                     "no_twin": part.no_twin,
                 }
             )
-            for part in self.machines
+            for part in self.controllers
         ]
         return {
             **{field.name: getattr(self, field.name) for field in fields(self)},
-            "machines": machines,
+            "controllers": controllers,
             "axes": [asdict(part) for part in self.axes],
             "elements": [asdict(part) for part in self.elements],
             "connections": [asdict(part) for part in self.connections],
@@ -222,8 +222,8 @@ class Description:
 def read_description(data: Mapping[str, Any]) -> Description:
     """The description in JSON. Raises `TypeError`, `ValueError` or `LookupError`."""
     sheets = [read_datasheet(sheet) for sheet in data["datasheets"]]
-    machines = tuple(
-        MachinePart(
+    controllers = tuple(
+        ControllerPart(
             one["name"],
             sheets[one["datasheet"]],
             one["line"],
@@ -233,12 +233,12 @@ def read_description(data: Mapping[str, Any]) -> Description:
             is_moved=one["moved"],
             no_twin=read_message_text(one, "no_twin"),
         )
-        for one in data["machines"]
+        for one in data["controllers"]
     )
     axes = tuple(
         MechanicsPart(
             one["name"],
-            one["machine"],
+            one["controller"],
             one["axis"],
             one["unit"],
             tuple(one["points"]),
@@ -264,7 +264,7 @@ def read_description(data: Mapping[str, Any]) -> Description:
     connections = tuple(ConnectionPart(**one) for one in data["connections"])
     lines = tuple(LinePart(**one) for one in data["lines"])
     buttons, commands = tuple(data["buttons"]), tuple(data["commands"])
-    return Description(data["name"], machines, axes, buttons, elements, connections, lines, commands, version=data["version"])
+    return Description(data["name"], controllers, axes, buttons, elements, connections, lines, commands, version=data["version"])
 
 
 def _read_drawing(data: Mapping[str, Any]) -> DrawingPart:

@@ -24,7 +24,7 @@ class ControlDescription:
     axis: int | None
     """For which axis; None: for the whole controller."""
     arguments: tuple[Argument, ...]
-    """Besides machine and axis, in the unit of the axis."""
+    """Besides controller and axis, in the unit of the axis."""
 
 
 def controls_of(sheet: Datasheet, kinds: Iterable[type[Command]]) -> tuple[ControlDescription, ...]:
@@ -34,7 +34,7 @@ def controls_of(sheet: Datasheet, kinds: Iterable[type[Command]]) -> tuple[Contr
     for row in COMMANDS.values():
         if row.kind not in wanted:
             continue
-        own = [field for field in row.fields if field.name not in ("machine", "axis")]
+        own = [field for field in row.fields if field.name not in ("controller", "axis")]
         axis = next((field for field in row.fields if field.name == "axis"), None)
         if axis is not None:
             found += [ControlDescription(row.name, each.number, _arguments(own, each, sheet)) for each in sheet.axes]

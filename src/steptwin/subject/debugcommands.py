@@ -10,9 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Annotated, TypeAlias
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.fields import TIME, MachineName, Meaning, choice, choices, whole
-from steptwin.machine import Nanos
+from steptwin.fields import TIME, ControllerName, Meaning, choice, choices, whole
 from steptwin.messages import NONE, Message
 from steptwin.simulation.script.command import command
 
@@ -23,9 +23,9 @@ SCOPES = ("Variables", "Axes", "Pins", "Controller", "Registers", "World")
 LONGEST_LINE_NUMBER = 1_000_000
 MOST_BREAKPOINTS = 1000
 _FIELDS_WITH: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
-    "line": (("machine", "program"), ("condition", "hits", "log")),
+    "line": (("controller", "program"), ("condition", "hits", "log")),
     "label": ((), ("condition", "hits")),
-    "value": (("machine",), ("condition",)),
+    "value": (("controller",), ("condition",)),
 }
 """Further needs and permitted values of a breakpoint."""
 
@@ -43,7 +43,7 @@ _BREAKPOINT = "number, problem (why it is nowhere; null), lines of the statement
 @command(
     "debug",
     "What can be debugged: controllers with their programs, the lines in which breakpoints can be, labels.",
-    f"machines, events, scopes, {_PLACE}",
+    f"controllers, events, scopes, {_PLACE}",
 )
 @dataclass(frozen=True, slots=True)
 class Debug:
@@ -57,7 +57,7 @@ class Debug:
 )
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetBreakpoint:
-    machine: Annotated[str | None, Meaning("The name of a machine.")] = None
+    controller: Annotated[str | None, Meaning("The name of a controller.")] = None
     program: Annotated[str | None, Meaning("A program of it, such as program 0 (MIC488, by bank), program (M1486).")] = None
     line: Annotated[int | None, Meaning("The first statement in this line or after it.", whole(1, LONGEST_LINE_NUMBER))] = None
     label: Annotated[str | None, Meaning("A label or interrupt: MAIN, INT_IN3, label 2.")] = None
@@ -112,7 +112,7 @@ class StopOn:
 )
 @dataclass(frozen=True, slots=True)
 class StepProgram:
-    machine: MachineName
+    controller: ControllerName
     way: Annotated[str, Meaning("Which step.", choice(*STEPS))]
 
 
@@ -150,27 +150,27 @@ class Branch:
 )
 @dataclass(frozen=True, slots=True)
 class Stack:
-    machine: MachineName
+    controller: ControllerName
 
 
 @command("values", "A group of values where the debugger stands.", f"a list of {_VALUE}", is_list=True)
 @dataclass(frozen=True, slots=True)
 class Values:
-    machine: MachineName
+    controller: ControllerName
     scope: Annotated[str, Meaning("Which group.", choice(*SCOPES))]
 
 
 @command("evaluate", "The value of an expression where the debugger stands.", _VALUE)
 @dataclass(frozen=True, slots=True)
 class Evaluate:
-    machine: MachineName
+    controller: ControllerName
     expression: Annotated[str, Meaning("Names of the program and signals of the world, as in docs/debugger.md.")]
 
 
 @command("set_value", "A variable, an input or a register takes a value, at the present only.", _VALUE)
 @dataclass(frozen=True, slots=True)
 class SetValue:
-    machine: MachineName
+    controller: ControllerName
     name: Annotated[str, Meaning("Which.")]
     expression: Annotated[str, Meaning("Its value.")]
 
@@ -178,7 +178,7 @@ class SetValue:
 @command("program_source", "The text of a program.", "program, source (the name of its file), text")
 @dataclass(frozen=True, slots=True)
 class ProgramSource:
-    machine: MachineName
+    controller: ControllerName
     program: Annotated[str, Meaning("Which, such as program 0.")]
 
 

@@ -14,11 +14,11 @@ from steptwin.simulation.world.wiring import connections, terminal_name
 from steptwin.subject.commands import COMMANDS
 from steptwin.subject.contract import (
     ConnectionPart,
+    ControllerPart,
     Description,
     DrawingPart,
     ElementPart,
     LinePart,
-    MachinePart,
     MechanicsPart,
     SignalPart,
     SwitchPart,
@@ -31,7 +31,7 @@ def describe(world: Simulation) -> Description:
     moved = set().union(*(axis.mechanism.may_turn for axis in world.axes.values()))
     return Description(
         world.spec.name,
-        tuple(_machine(world, name, is_moved=name in moved) for name in world.machines),
+        tuple(_controller(world, name, is_moved=name in moved) for name in world.controllers),
         tuple(_mechanics(world, name) for name in world.axes),
         tuple(world.parts.built(BUTTON)),
         tuple(_elements(world)),
@@ -41,17 +41,17 @@ def describe(world: Simulation) -> Description:
     )
 
 
-def _machine(world: Simulation, name: str, *, is_moved: bool) -> MachinePart:
+def _controller(world: Simulation, name: str, *, is_moved: bool) -> ControllerPart:
     on = world.parts.line_of.get(name)
     line, unit = (None, None) if on is None else (on[0].name, on[1])
     kind = world.kind(name)
-    sheet = kind.datasheet(world.machines[name])
-    return MachinePart(name, sheet, line, unit, controls_of(sheet, kind.commands), is_moved=is_moved)
+    sheet = kind.datasheet(world.controllers[name])
+    return ControllerPart(name, sheet, line, unit, controls_of(sheet, kind.commands), is_moved=is_moved)
 
 
 def _mechanics(world: Simulation, name: str) -> MechanicsPart:
     fitted = world.axes[name]
-    place = fitted.mechanism.machine, str(fitted.mechanism.number)
+    place = fitted.mechanism.controller, str(fitted.mechanism.number)
     points = tuple(f"{name}.{what}" for what in MECHANICS)
     spec = fitted.spec
     switches = tuple(_switch(one.zone) for one in spec.switches)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import count
 from typing import Any
 
-from steptwin.machine import SECOND, Nanos
+from steptwin.controller import SECOND, Nanos
 from steptwin.messages import read_message_text, with_messages
 from steptwin.motion.plain import read_plan
 from steptwin.simulation.scheduler.trace import KINDS as RECORDS
@@ -47,11 +47,11 @@ from steptwin.tables import complete
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened to a machine, to a line, or to the world."""
+    """Something that happened to a controller, to a line, or to the world."""
 
     number: int
     time: Nanos
-    machine: str
+    controller: str
     payload: Payload
     cause: int | None = None
 
@@ -75,20 +75,20 @@ class Event:
     @property
     def owner(self) -> str:
         """Who it is about, for people: the element, where one reports it."""
-        return _owner(self.machine, self.payload)
+        return _owner(self.controller, self.payload)
 
     def __str__(self) -> str:
         return line_of(self.time, self.owner, self.text)
 
     def plain(self) -> dict[str, object]:
         """As JSON. ``text`` describes it; it adds nothing to the rest."""
-        head = {"number": self.number, "time_ns": str(self.time), "machine": self.machine, "kind": self.kind}
+        head = {"number": self.number, "time_ns": str(self.time), "controller": self.controller, "kind": self.kind}
         return with_messages({**head, **self.payload.plain(), "cause": self.cause, "text": self.text})
 
 
-def line_of(time: Nanos, machine: str, text: str) -> str:
+def line_of(time: Nanos, controller: str, text: str) -> str:
     """Line that says what happened."""
-    return f"{time / SECOND:12.6f} s  {machine:<10} {text}".rstrip()
+    return f"{time / SECOND:12.6f} s  {controller:<10} {text}".rstrip()
 
 
 # ---------------------------------------------------------------------- from records
@@ -145,11 +145,11 @@ def payload_of(record: TraceRecord) -> Payload:
 def shown(record: TraceRecord) -> str:
     """A record in one line."""
     payload = payload_of(record)
-    return line_of(record.time, _owner(record.machine, payload), payload.text)
+    return line_of(record.time, _owner(record.controller, payload), payload.text)
 
 
-def _owner(machine: str, payload: Payload) -> str:
-    return owner_of(machine, payload.facts) if isinstance(payload, StatusPayload) else machine
+def _owner(controller: str, payload: Payload) -> str:
+    return owner_of(controller, payload.facts) if isinstance(payload, StatusPayload) else controller
 
 
 # ---------------------------------------------------------------------- from JSON
@@ -207,7 +207,7 @@ _READ: Mapping[str, Callable[[Mapping[str, Any]], Payload]] = complete(
 
 def read_event(data: Mapping[str, Any]) -> Event:
     """The event in JSON. Raises `TypeError`, `ValueError` or `LookupError` for what `Event.plain` does not give."""
-    return Event(data["number"], int(data["time_ns"]), data["machine"], _READ[data["kind"]](data), data["cause"])
+    return Event(data["number"], int(data["time_ns"]), data["controller"], _READ[data["kind"]](data), data["cause"])
 
 
 _CAUSES = (StatementPayload, ButtonPayload, InputPayload, FaultPayload)
@@ -215,9 +215,9 @@ _CAUSES = (StatementPayload, ButtonPayload, InputPayload, FaultPayload)
 
 
 class Numbering:
-    """Numbers commands and events, and finds causes: what came last to the same machine at the same moment and can be one.
+    """Numbers commands and events, and finds causes: what came last to the same controller at the same moment and can be one.
 
-    ``line_of`` gives the line of a machine: what arrives there can be the cause of what its machines do.
+    ``line_of`` gives the line of a controller: what arrives there can be the cause of what its controllers do.
     """
 
     __slots__ = ("_command", "_last", "_line_of", "_numbers")
@@ -247,16 +247,16 @@ class Numbering:
         if self._command is not None:
             self._command = now, self._command[1]
 
-    def event(self, time: Nanos, machine: str, payload: Payload) -> Event:
+    def event(self, time: Nanos, controller: str, payload: Payload) -> Event:
         number = next(self._numbers)
-        event = Event(number, time, machine, payload, self._cause(time, machine))
+        event = Event(number, time, controller, payload, self._cause(time, controller))
         if isinstance(payload, _CAUSES) or (isinstance(payload, FramePayload) and payload.direction == "in"):
-            self._last[machine] = time, number
+            self._last[controller] = time, number
         return event
 
-    def _cause(self, time: Nanos, machine: str) -> int | None:
+    def _cause(self, time: Nanos, controller: str) -> int | None:
         cause = 0
-        for found in (self._last.get(machine), self._last.get(self._line_of.get(machine, "")), self._command):
+        for found in (self._last.get(controller), self._last.get(self._line_of.get(controller, "")), self._command):
             if found is not None and found[0] == time and found[1] > cause:
                 cause = found[1]
         return cause or None

@@ -17,29 +17,29 @@ debugger is there for followers that name its events."""
 
 @dataclass(frozen=True, slots=True)
 class Filter:
-    """Selects events. ``machines`` None: all; ``axes`` None: all. Events without an axis always pass."""
+    """Selects events. ``controllers`` None: all; ``axes`` None: all. Events without an axis always pass."""
 
     kinds: frozenset[str] = USUAL
-    machines: frozenset[str] | None = None
+    controllers: frozenset[str] | None = None
     axes: frozenset[str] | None = None
 
     @property
     def is_of_kinds(self) -> bool:
         """Whether it selects by kinds alone."""
-        return self.machines is None and self.axes is None
+        return self.controllers is None and self.axes is None
 
     def wants(self, event: Event) -> bool:
-        if event.kind not in self.kinds or (self.machines is not None and event.machine not in self.machines):
+        if event.kind not in self.kinds or (self.controllers is not None and event.controller not in self.controllers):
             return False
         return self.axes is None or event.axis is None or event.axis in self.axes
 
 
 def filter_of(
-    kinds: Iterable[str] | None = None, machines: Iterable[str] | None = None, axes: Iterable[str] | None = None
+    kinds: Iterable[str] | None = None, controllers: Iterable[str] | None = None, axes: Iterable[str] | None = None
 ) -> Filter:
     return Filter(
         USUAL if kinds is None else frozenset(kinds),
-        None if machines is None else frozenset(machines),
+        None if controllers is None else frozenset(controllers),
         None if axes is None else frozenset(axes),
     )
 

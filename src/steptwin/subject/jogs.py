@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Protocol, TypeAlias
 
+from steptwin.controller import Nanos
 from steptwin.errors import Refusal
-from steptwin.machine import Nanos
 from steptwin.messages import Message, text_of
 from steptwin.simulation.script.deadmanjog import DeadManJog, Given
 from steptwin.subject.commands import Jog

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.motion.divisions import Plan, profile_of
-from steptwin.subject.contract import MachinePart
+from steptwin.subject.contract import ControllerPart
 from steptwin.subject.events import Event
 from steptwin.subject.payloads import CoordinatePayload, PlanPayload
 
@@ -14,17 +14,17 @@ from steptwin.subject.payloads import CoordinatePayload, PlanPayload
 class Motions:
     """The axes of a controller; ``plans`` are those that hold when following begins."""
 
-    def __init__(self, machine: MachinePart, plans: Iterable[Event]) -> None:
-        self._machine = machine.name
-        self._scales = {str(axis.number): axis.pulses_per_unit or 1.0 for axis in machine.datasheet.axes}
-        self._rounds = {str(axis.number): axis.round_p for axis in machine.datasheet.axes}
+    def __init__(self, controller: ControllerPart, plans: Iterable[Event]) -> None:
+        self._controller = controller.name
+        self._scales = {str(axis.number): axis.pulses_per_unit or 1.0 for axis in controller.datasheet.axes}
+        self._rounds = {str(axis.number): axis.round_p for axis in controller.datasheet.axes}
         self._plans: dict[str, Plan] = {}
         self._origins: dict[str, int] = {}
         for plan in plans:
             self.take(plan)
 
     def take(self, event: Event) -> None:
-        if event.machine != self._machine:
+        if event.controller != self._controller:
             return
         match event.payload:
             case PlanPayload(axis, plan, origin):

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, TypeAlias, get_args
 
-from steptwin.machine import Fact, Nanos
+from steptwin.controller import Fact, Nanos
 from steptwin.messages import Message, text_of
 from steptwin.motion.divisions import Plan as MotionPlan
 from steptwin.motion.divisions import profile_of
@@ -374,7 +374,7 @@ class StoppedPayload:
 
     ``reason``: ``entry``, ``step``, ``breakpoint``, ``function breakpoint`` (a label), ``data breakpoint``, ``exception`` (an
     event), ``pause``, ``begin`` (the oldest moment that is kept). ``breakpoints``: those that were hit. ``program`` and ``line``
-    of the statement that comes next, of the event's machine; None where no program is the reason.
+    of the statement that comes next, of the event's controller; None where no program is the reason.
     """
 
     kind: ClassVar[str] = "stopped"
@@ -471,7 +471,7 @@ def is_shown(payload: Payload) -> bool:
 
 
 def named_in(payload: Payload) -> Sequence[str]:
-    """The names of buttons, pins, signals and elements that it is about, besides its machine."""
+    """The names of buttons, pins, signals and elements that it is about, besides its controller."""
     match payload:
         case EdgePayload():
             return (payload.pin,)

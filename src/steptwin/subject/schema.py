@@ -98,7 +98,7 @@ _PAYLOADS: Mapping[str, Mapping[str, object]] = complete(
                 "items": members(
                     {
                         "number": WHOLE,
-                        "machine": _TEXT_OR_NULL,
+                        "controller": _TEXT_OR_NULL,
                         "program": _TEXT_OR_NULL,
                         "line": {"type": ["integer", "null"]},
                         **dict.fromkeys(("label", "value", "condition", "hits", "log", "problem"), _TEXT_OR_NULL),
@@ -182,7 +182,7 @@ def _event() -> dict[str, object]:
 
 
 def _event_of(kind: str, given: Mapping[str, object]) -> dict[str, object]:
-    head = {"number": _NUMBER_OF_EVENT, "time_ns": MOMENT, "machine": {"type": "string"}, "kind": {"const": kind}}
+    head = {"number": _NUMBER_OF_EVENT, "time_ns": MOMENT, "controller": {"type": "string"}, "kind": {"const": kind}}
     cause = {"type": ["integer", "null"], "minimum": 1, "description": "The command or the event that led to it."}
     text = {"type": "string", "description": "As text; it adds nothing to the rest."}
     shapes: Mapping[str, Any] = given
@@ -201,7 +201,7 @@ def _message() -> dict[str, object]:
 
 def _description() -> dict[str, object]:
     """As `Description.plain` writes it."""
-    machine = with_sentences(
+    controller = with_sentences(
         {
             "name": TEXT,
             "datasheet": {"type": "integer", "minimum": 0, "description": "Index of its data sheet."},
@@ -227,7 +227,7 @@ def _description() -> dict[str, object]:
         "no_twin",
     )
     own: Mapping[str, object] = {
-        "machines": {"type": "array", "items": machine},
+        "controllers": {"type": "array", "items": controller},
         "datasheets": {"type": "array", "items": shape(Datasheet)},
     }
     hints = get_type_hints(Description)

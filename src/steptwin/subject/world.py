@@ -7,8 +7,8 @@ from functools import partial
 from math import isfinite
 from typing import Any, get_args
 
+from steptwin.controller import Nanos
 from steptwin.errors import Refusal
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.registry import failing
 from steptwin.simulation.faults.kinds import rows
@@ -70,7 +70,7 @@ class WorldSubject:
         self._words: dict[str, LineWords] = {}
         self._writes: list[Callable[[], None]] = []
         """Functions that end the observation of writes; empty while they are not followed."""
-        self._machine_of = {(line.name, unit): name for name, (line, unit) in world.parts.line_of.items()}
+        self._controller_of = {(line.name, unit): name for name, (line, unit) in world.parts.line_of.items()}
         self._is_watching = False
         self._statements: StatementFollower | None = None
         self._jogs: list[tuple[Jog, DeadManJog]] = []
@@ -152,7 +152,7 @@ class WorldSubject:
     def _write(self, step: steps.Write) -> None:
         self._apply_input(step)
         world = self.world
-        for name, values in world.by_machine(step):
+        for name, values in world.by_controller(step):
             for pdu in world.requests(name, values):
                 self._publish_stops(name, pdu)
 
@@ -160,12 +160,12 @@ class WorldSubject:
         """A write that ends motions is a stop (docs/stopping.md)."""
         registers = self.world.kind(name).registers
         if registers is not None:
-            for halt in ended(name, registers.ended_by(self.world.machine(name), pdu)):
+            for halt in ended(name, registers.ended_by(self.world.controller(name), pdu)):
                 self.publish(self.world.now, name, InputPayload("stop", halt.scope))
 
     def _control(self, wanted: ControllerCommand) -> None:
         """Execute a command for a controller as its master does."""
-        world, name = self.world, wanted.machine
+        world, name = self.world, wanted.controller
         kind = world.kind(name)
         if type(wanted) not in kind.commands:
             known = ", ".join(declared(one).name for one in kind.commands)
@@ -180,12 +180,12 @@ class WorldSubject:
         They may be between two of their motions, where there was nothing to stop."""
         self._jogs = [(wanted, jog) for wanted, jog in self._jogs if jog.over is None]
         for wanted, jog in self._jogs:
-            if wanted.machine == halt.machine and halt.axis in (None, wanted.axis):
+            if wanted.controller == halt.controller and halt.axis in (None, wanted.axis):
                 jog.cut()
 
     def _stop(self, wanted: StopAxes) -> object:
         self._control(wanted)
-        state = self.world.kind(wanted.machine).state(self.world.machine(wanted.machine), self.world.now)
+        state = self.world.kind(wanted.controller).state(self.world.controller(wanted.controller), self.world.now)
         return {"program": None if state.program.state is None else state.program.state.value}
 
     def _stop_all(self) -> object:
@@ -193,19 +193,19 @@ class WorldSubject:
         world = self.world
         before = {script.name for script in world.scripts}
         self._apply_input(EndScripts())
-        for name in world.machines:
-            for halt in standstill(name, world.kind(name).datasheet(world.machine(name)).program_actions):
+        for name in world.controllers:
+            for halt in standstill(name, world.kind(name).datasheet(world.controller(name)).program_actions):
                 self._apply_input(halt)
                 self._cut_jogs(halt)
-        return {"machines": list(world.machines), "scripts": sorted(before - {script.name for script in world.scripts})}
+        return {"controllers": list(world.controllers), "scripts": sorted(before - {script.name for script in world.scripts})}
 
     def dead_man_jog(self, wanted: Jog) -> DeadManJog:
         """A jog that lasts only while it is extended; it has not started yet. Raises `Misuse` and `Refusal`."""
-        world, name = self.world, wanted.machine
-        kind, machine = world.kind(name), world.machine(name)
+        world, name = self.world, wanted.controller
+        kind, controller = world.kind(name), world.controller(name)
         world.touch(name)
         on = world.parts.line_of.get(name)
-        held = kind.dead_man_jog(machine, None if on is None else on[0].name, wanted)
+        held = kind.dead_man_jog(controller, None if on is None else on[0].name, wanted)
         self._jogs = [(one, jog) for one, jog in self._jogs if jog.over is None] + [(wanted, held)]
         return held
 
@@ -217,9 +217,9 @@ class WorldSubject:
             self._apply_input(step)
         finally:
             master.wanted -= {number}
-        machines = self._machine_of
-        units = [unit for line, unit in machines if line == step.line] if step.unit == BROADCAST else [step.unit]
-        for name in (machines[step.line, unit] for unit in units if (step.line, unit) in machines):
+        controllers = self._controller_of
+        units = [unit for line, unit in controllers if line == step.line] if step.unit == BROADCAST else [step.unit]
+        for name in (controllers[step.line, unit] for unit in units if (step.line, unit) in controllers):
             self._publish_stops(name, step.pdu)
         found = master.answers.pop(number, None)
         return {"pdu": found[1:-2].hex() if found else None}
@@ -235,26 +235,26 @@ class WorldSubject:
 
     def _pins(self, wanted: command.ReadPins) -> object:
         world = self.world
-        names = list(world.machines) if wanted.machine is None else [wanted.machine]
+        names = list(world.controllers) if wanted.controller is None else [wanted.controller]
         return {f"{name}.{pin}": level for name in names for pin, level in self._levels(name).items()}
 
     def _levels(self, name: str) -> Mapping[str, float]:
-        machine = self.world.machine(name)
+        controller = self.world.controller(name)
         self.world.touch(name)
-        return self.world.kind(name).state.pins(machine, self.world.now)
+        return self.world.kind(name).state.pins(controller, self.world.now)
 
     def _state(self, wanted: command.ReadState) -> object:
-        machine = self.world.machine(wanted.machine)
-        self.world.touch(wanted.machine)
-        reader = self.world.kind(wanted.machine).state
+        controller = self.world.controller(wanted.controller)
+        self.world.touch(wanted.controller)
+        reader = self.world.kind(wanted.controller).state
         if wanted.parts is not None:
-            return reader.parts(machine, self.world.now, wanted.parts)
-        return reader(machine, self.world.now).plain()
+            return reader.parts(controller, self.world.now, wanted.parts)
+        return reader(controller, self.world.now).plain()
 
     def _encoders(self, wanted: command.Encoders) -> object:
-        encoders = self.world.encoders(wanted.machine)
-        self.world.touch(wanted.machine)
-        return encoders.shown(self.world.machine(wanted.machine), self.world.now)
+        encoders = self.world.encoders(wanted.controller)
+        self.world.touch(wanted.controller)
+        return encoders.shown(self.world.controller(wanted.controller), self.world.now)
 
     def _advance(self, wanted: command.Advance) -> object:
         done = advance(self.world, self.follow, wanted)
@@ -270,7 +270,7 @@ class WorldSubject:
         self.numbering.moved(self.world.now)
         self.publish(self.world.now, WORLD, RestoredPayload(name))
         for plan in self.plans(filter_of(["plan"])):
-            self.publish(plan.time, plan.machine, plan.payload)
+            self.publish(plan.time, plan.controller, plan.payload)
 
     def _faults(self) -> object:
         return [
@@ -295,9 +295,9 @@ class WorldSubject:
         """The present plan of every axis that ``what`` selects, as events of now."""
         world = self.world
         found: list[Event] = []
-        for part in self.description.machines:
+        for part in self.description.controllers:
             world.touch(part.name)
-            for axis, drive in zip(part.datasheet.axes, world.machines[part.name].axes, strict=True):
+            for axis, drive in zip(part.datasheet.axes, world.controllers[part.name].axes, strict=True):
                 event = Event(0, world.now, part.name, PlanPayload(str(axis.number), drive.plan, drive.offset_p))
                 if what.wants(event):
                     found.append(event)
@@ -307,27 +307,27 @@ class WorldSubject:
         """Report that time was paused or resumed."""
         self.publish(self.world.now, WORLD, pace)
 
-    def publish(self, time: Nanos, machine: str, payload: Payload) -> None:
+    def publish(self, time: Nanos, controller: str, payload: Payload) -> None:
         if self.followers:
-            self.followers.publish(self.numbering.event(time, machine, payload))
+            self.followers.publish(self.numbering.event(time, controller, payload))
 
     def _recorded(self, record: TraceRecord) -> None:
         if record.kind == "frame":  # lines report frames themselves, recorded or not
             return
         if self._words:
-            line, _ = self.world.parts.line_of.get(record.machine, (None, 0))
+            line, _ = self.world.parts.line_of.get(record.controller, (None, 0))
             if line is not None:
                 self._words[line.name].recorded(record)
         payload = payload_of(record)
         if isinstance(payload, PlanPayload):
-            payload = self._with_origin(record.machine, payload)
-        self.publish(record.time, record.machine, payload)
+            payload = self._with_origin(record.controller, payload)
+        self.publish(record.time, record.controller, payload)
 
     def _executed(self, record: TraceRecord) -> None:
-        self.publish(record.time, record.machine, payload_of(record))
+        self.publish(record.time, record.controller, payload_of(record))
 
-    def _with_origin(self, machine: str, payload: PlanPayload) -> PlanPayload:
-        drive = self.world.machines[machine].axes[int(payload.axis) - 1]
+    def _with_origin(self, controller: str, payload: PlanPayload) -> PlanPayload:
+        drive = self.world.controllers[controller].axes[int(payload.axis) - 1]
         return PlanPayload(payload.axis, payload.plan, drive.offset_p)
 
     def _followed(self) -> None:
@@ -370,10 +370,10 @@ class WorldSubject:
                 self._writes.append(end)
 
     def _written(self, line: str, seen: LineWrite) -> None:
-        machines = [self._machine_of[line, unit] for unit in seen.units]
+        controllers = [self._controller_of[line, unit] for unit in seen.units]
         source = self.sources.get((line, seen.place), seen.place)
         payload = WritePayload(seen.place, source, seen.words, seen.outcome)
-        self.publish(seen.time, machines[0] if len(machines) == 1 else line, payload)
+        self.publish(seen.time, controllers[0] if len(controllers) == 1 else line, payload)
 
     def _framed(self, line: str, frame: FrameLine) -> None:
         self.publish(frame.time, line, FramePayload(frame.link, frame.direction.value, frame.raw, frame.meaning))

@@ -10,6 +10,7 @@ from typing import Literal, TypeVar
 
 import pytest
 
+from steptwin.controller import Nanos, Port
 from steptwin.drivers import m1486 as host
 from steptwin.drivers.address import parse_device
 from steptwin.drivers.place import parse_line_address
@@ -22,7 +23,6 @@ from steptwin.live.world import LiveWorld
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.pins import OPEN_ADDRESS
 from steptwin.m1486.variants import DEFAULT
-from steptwin.machine import Nanos, Port
 from steptwin.simulation.describe.small import Whole
 from steptwin.simulation.describe.small_m1486 import chip_name, m1486_world
 from steptwin.testing.realtime import RealTime, WallTime
@@ -92,7 +92,7 @@ class M1486Rig(LineRig):
             device,
             directory,
             live=live,
-            machine=self._name_there,
+            controller=self._name_there,
             twin_only=options.twin_only,
         )
 
@@ -177,7 +177,7 @@ class M1486Rig(LineRig):
     def call(self, act: Callable[[M1486Chip, Nanos], T]) -> T:
         """Do anything with the twin at the present moment; it is not to be kept. The twin's."""
         __tracebackhide__ = True
-        return self._on("the machine behind call()", lambda world: act(world.m1486[self._name_there].chip, world.now))
+        return self._on("the controller behind call()", lambda world: act(world.m1486[self._name_there].chip, world.now))
 
     def set_pin(self, pin: str, value: float) -> None:
         """Pull B1–B21, JOG, LIMIT, SD or RST low (0) or let it go high (1). Raises `Misuse`. The twin's."""

@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple, TypeVar
 
 import pytest
 
+from steptwin.controller import Nanos, Port
 from steptwin.drivers import Mic488, load_config
 from steptwin.drivers.address import parse_device
 from steptwin.errors import Misuse
@@ -17,7 +18,6 @@ from steptwin.files.beginning import set_faults
 from steptwin.files.world import World
 from steptwin.inputfiles import read_bytes
 from steptwin.live.world import LiveWorld
-from steptwin.machine import Nanos, Port
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.configtext import config_text
 from steptwin.mic488.core import check_pin
@@ -51,8 +51,8 @@ class Mic488Marker:
     firmware: str | None = None
     """Firmware of the twin (default 1.70); a device with another one skips the test."""
     config: str | Path | ControllerConfig | None = None
-    """The vendor tool's ``.cfg``. Without it the twin is the machine of ``serve mic488 --demo``: millimetres, 100 pulses per mm,
-    switches KL at −10 mm on IN1–IN4 and KR at 250 mm on IN5–IN8. With it inputs are the test's alone."""
+    """The vendor tool's ``.cfg``. Without it the twin is the controller of ``serve mic488 --demo``: millimetres, 100 pulses per
+    mm, switches KL at −10 mm on IN1–IN4 and KR at 250 mm on IN5–IN8. With it inputs are the test's alone."""
     program: str | Path | None = None
     """A WBC program for bank 0."""
     positions: str | Path | None = None
@@ -122,7 +122,7 @@ class Mic488Rig(LineRig):
             device,
             directory,
             live=live,
-            machine=NAME,
+            controller=NAME,
             twin_only=options.twin_only,
         )
 
@@ -202,7 +202,7 @@ class Mic488Rig(LineRig):
     def call(self, act: Callable[[Mic488Device, Nanos], T]) -> T:
         """Do anything with the twin at the present moment; it is not to be kept. The twin's."""
         __tracebackhide__ = True
-        return self._on("the machine behind call()", lambda world: act(world.mic488[NAME].device, world.now))
+        return self._on("the controller behind call()", lambda world: act(world.mic488[NAME].device, world.now))
 
     def set_pin(self, pin: str, value: float) -> None:
         """Set IN1–IN20 (0 or 1), AIN1 or AIN2 (0 to 10 V) from outside. Raises `Misuse`. The twin's.

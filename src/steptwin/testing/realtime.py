@@ -12,6 +12,7 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+from steptwin.controller import SECOND, Nanos, Port
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.live.clients import Clients
 from steptwin.live.clock import Clock
@@ -19,7 +20,6 @@ from steptwin.live.links import Link
 from steptwin.live.ptys import pty_link
 from steptwin.live.realtimedriver import Advanceable, RealTimeDriver
 from steptwin.live.tcp import TcpLink
-from steptwin.machine import SECOND, Nanos, Port
 from steptwin.simulation.toml.addresses import LOOPBACK, Address
 
 T = TypeVar("T")
@@ -33,15 +33,15 @@ SPEEDS = (0.001, 1000.0)
 
 
 class RealTime:
-    """Machines in real time, ``speed`` times as fast. Every method may be called from the test's thread.
+    """Controllers in real time, ``speed`` times as fast. Every method may be called from the test's thread.
 
     ``place`` names the twin in messages. Raises `Misuse` for a speed outside 0.001 to 1000.
     """
 
-    def __init__(self, machines: Advanceable, speed: float, place: str) -> None:
+    def __init__(self, controllers: Advanceable, speed: float, place: str) -> None:
         if not SPEEDS[0] <= speed <= SPEEDS[1]:
             raise Misuse(f"{place}: speed = {speed:g}: permitted are {SPEEDS[0]:g} to {SPEEDS[1]:g}")
-        self.machines = machines
+        self.controllers = controllers
         self.speed = speed
         self._place = place
         self._troubles: list[BaseException] = []
@@ -69,7 +69,7 @@ class RealTime:
         self._loop.set_exception_handler(self._trouble)
         self._ended = asyncio.Event()
         self._clock = Clock(self.speed)
-        self.realtime = RealTimeDriver(self.machines, self._clock)
+        self.realtime = RealTimeDriver(self.controllers, self._clock)
         self.realtime.start()
         self._ready.set()
         try:
@@ -110,7 +110,7 @@ class RealTime:
         return self._clock.now()
 
     def call(self, act: Callable[[Nanos], T]) -> T:
-        """Do something with the machines at the present moment, in their thread."""
+        """Do something with the controllers at the present moment, in their thread."""
         if threading.current_thread() is self._thread:
             return self._do(act)
 
@@ -123,7 +123,7 @@ class RealTime:
         try:
             return act(self.realtime.enter())
         finally:
-            self.machines.stale = True
+            self.controllers.stale = True
             self.realtime.leave()
 
     def later(self, seconds: float, act: Callable[[], object]) -> None:

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, TypeAlias, TypeVar
 
 import pytest
 
+from steptwin.controller import SECOND, Nanos, Port
 from steptwin.controllerstate import ControllerState, read_state
 from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.live.world_frames import follow_frames
-from steptwin.machine import SECOND, Nanos, Port
 from steptwin.simulation.describe.small import LINE
 from steptwin.simulation.faults import read as read_fault
 from steptwin.simulation.scheduler.trace import TraceRecord
@@ -161,7 +161,7 @@ class Rig(ABC):
 
 
 class LineRig(Rig):
-    """A rig of one controller on a line, alone in a world; ``live`` is None where it is a device. ``machine`` is its name."""
+    """A rig of one controller on a line, alone in a world; ``live`` is None where it is a device. ``controller`` is its name."""
 
     def __init__(
         self,
@@ -171,24 +171,24 @@ class LineRig(Rig):
         directory: Path,
         *,
         live: LiveWorld | None,
-        machine: str,
+        controller: str,
         twin_only: bool,
     ) -> None:
         super().__init__(name, time, device, directory)
         self._live = live
-        self._machine = machine
+        self._controller = controller
         self._is_twin_only = twin_only
         self._events: list[TwinEvent] = []
         self._places = count(1)
         if live is not None:
-            for record in live.world.trace.events(machine):  # what power-on had to say
+            for record in live.world.trace.events(controller):  # what power-on had to say
                 self._happened(record)
             live.world.stop_recording()
             follow_frames(live, self._log_frame)
             live.world.trace.watchers.append(self._happened)
 
     def _happened(self, record: TraceRecord) -> None:
-        if record.kind == "event" and record.machine == self._machine:
+        if record.kind == "event" and record.controller == self._controller:
             happened = TwinEvent(record.time / SECOND, record.subject, str(record.value))
             self._events.append(happened)
             self._shown.append(happened)
@@ -214,11 +214,11 @@ class LineRig(Rig):
         live = self._live or self.twin_only(what)
 
         def at(_: Nanos) -> T:
-            scheduler = live.world.touch(self._machine)
+            scheduler = live.world.touch(self._controller)
             try:
                 return act(live.world)
             finally:
-                scheduler.mark(self._machine)  # what acted on the machine itself has changed it behind the scheduler's back
+                scheduler.mark(self._controller)  # what acted on the controller itself has changed it behind the scheduler's back
                 live.stale = True
 
         return self._at_present(at)
@@ -248,18 +248,18 @@ class LineRig(Rig):
     def state(self) -> ControllerState:
         """Its status, program, axes, pins and details at present. The twin's."""
         __tracebackhide__ = True
-        return read_state(self._do("state", command.ReadState(self._machine)))
+        return read_state(self._do("state", command.ReadState(self._controller)))
 
     @property
     def pins(self) -> Mapping[str, float]:
         """The level of every pin: 0 or 1, analog ones in volts. The twin's."""
         __tracebackhide__ = True
-        levels: Mapping[str, float] = self._do("pins", command.ReadPins(self._machine))
+        levels: Mapping[str, float] = self._do("pins", command.ReadPins(self._controller))
         return {name.partition(".")[2]: level for name, level in levels.items()}
 
     def _set_pin(self, pin: str, level: float) -> None:
         __tracebackhide__ = True
-        self._do(f"set_pin({pin!r})", do.Set(((self._machine, pin, level),)))
+        self._do(f"set_pin({pin!r})", do.Set(((self._controller, pin, level),)))
 
     @property
     def events(self) -> list[TwinEvent]:
@@ -270,7 +270,7 @@ class LineRig(Rig):
     def power_cycle(self) -> None:
         """Switch it off and on again. Connections stay. The twin's."""
         __tracebackhide__ = True
-        self._do("power_cycle()", do.PowerCycle(self._machine))
+        self._do("power_cycle()", do.PowerCycle(self._controller))
 
     # ------------------------------------------------------------------ faults
 

@@ -8,6 +8,7 @@ from heapq import heappop, heappush
 from itertools import count
 from typing import TypeVar
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos, Port
 from steptwin.drivers import LineLost, Mic488
 from steptwin.drivers.m1486 import M1486
 from steptwin.drivers.m1486.lines import BAUD, talking
@@ -16,7 +17,6 @@ from steptwin.drivers.place import LineAddress
 from steptwin.drivers.tcp import Channel
 from steptwin.drivers.threads import ThreadLine
 from steptwin.live.realtimedriver import Advanceable
-from steptwin.machine import MILLISECOND, SECOND, Nanos, Port
 from steptwin.mic488.config import ControllerConfig
 
 T = TypeVar("T")
@@ -26,22 +26,22 @@ LOOK_NS: Nanos = 10 * MILLISECOND
 
 
 class VirtualTime:
-    """Machines that are advanced only while the test waits, so that it gives the same result each time."""
+    """Controllers that are advanced only while the test waits, so that it gives the same result each time."""
 
-    def __init__(self, machines: Advanceable) -> None:
-        self.machines = machines
+    def __init__(self, controllers: Advanceable) -> None:
+        self.controllers = controllers
         self._planned: list[tuple[Nanos, int, Callable[[], object]]] = []
         self._count = count()
 
     def now(self) -> Nanos:
-        return self.machines.now
+        return self.controllers.now
 
     def call(self, act: Callable[[Nanos], T]) -> T:
-        """Do something with the machines at the present moment."""
+        """Do something with the controllers at the present moment."""
         try:
             return act(self.now())
         finally:
-            self.machines.deadline()  # signals settle
+            self.controllers.deadline()  # signals settle
 
     def sleep(self, seconds: float) -> None:
         self.advance(self.now() + max(round(seconds * SECOND), 0))
@@ -49,13 +49,13 @@ class VirtualTime:
     def advance(self, moment: Nanos) -> None:
         while self._planned and self._planned[0][0] <= moment:
             at, _, act = heappop(self._planned)
-            self.machines.advance(at)
+            self.controllers.advance(at)
             act()
-        self.machines.advance(moment)
+        self.controllers.advance(moment)
 
     def deadline(self) -> Nanos | None:
         """When something happens next by itself, or was planned."""
-        due = self.machines.deadline()
+        due = self.controllers.deadline()
         planned = self._planned[0][0] if self._planned else None
         return due if planned is None or (due is not None and due < planned) else planned
 

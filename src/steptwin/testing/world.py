@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeVar
 
 import steptwin.services  # noqa: F401  their tables are checked, too
+from steptwin.controller import Nanos
 from steptwin.drivers import Mic488
 from steptwin.drivers.address import parse_device
 from steptwin.drivers.place import parse_line_address
@@ -20,7 +21,6 @@ from steptwin.files.textfiles import read_text
 from steptwin.files.world import World, read_beside
 from steptwin.inputfiles import MOST_DESCRIPTION_BYTES
 from steptwin.live.world import LiveWorld, PlacePort
-from steptwin.machine import Nanos
 from steptwin.simulation.describe.description import read_world
 from steptwin.simulation.describe.spec import WorldSpec
 from steptwin.simulation.faults import read
@@ -225,12 +225,12 @@ class WorldRig(Rig):
         return self.call(lambda world: world.read(signal))
 
     def set_pin(self, pin: str, value: float) -> None:
-        """Set an input ``MACHINE.PIN`` from outside: 0, 1, volts. Raises `Misuse`. The twin's."""
+        """Set an input ``CONTROLLER.PIN`` from outside: 0, 1, volts. Raises `Misuse`. The twin's."""
         __tracebackhide__ = True
-        machine, dot, name = pin.rpartition(".")
+        controller, dot, name = pin.rpartition(".")
         if not dot:
-            raise Misuse(f"{pin!r}: expected MACHINE.PIN, such as {next(iter(self._spec.controllers), self._spec).name}.IN1")
-        self.do(do.Set(((machine, name.upper(), float(value)),)))
+            raise Misuse(f"{pin!r}: expected CONTROLLER.PIN, such as {next(iter(self._spec.controllers), self._spec).name}.IN1")
+        self.do(do.Set(((controller, name.upper(), float(value)),)))
 
     def press(self, button: str, for_s: float | None = None) -> None:
         """Press a button of the world, until `release` or for so many seconds. Raises `Misuse`. The twin's."""

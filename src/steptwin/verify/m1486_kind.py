@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from steptwin.controller import SECOND
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.kind import DeviceAddress
 from steptwin.drivers.m1486.identify import SearchLine, scan_chips
@@ -9,7 +10,6 @@ from steptwin.drivers.m1486.lines import line_endpoint
 from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.m1486.variants import Store, Variant
 from steptwin.m1486.variants import variant as variant_named
-from steptwin.machine import SECOND
 from steptwin.verify.check import CheckNeed
 from steptwin.verify.kind import CheckedKind, ReadyChecks
 from steptwin.verify.m1486 import CHECKS, ChipTalk

@@ -1,7 +1,7 @@
 """The code of a program: what `steptwin.wbc.compile` makes and `steptwin.wbc.interpreter` executes.
 
 The function of a step takes the execution and its cells (variables, then constants) and returns the number of the step that
-follows; with all bits inverted (``~number``) if the machine must check for waits and interrupts before it continues.
+follows; with all bits inverted (``~number``) if the controller must check for waits and interrupts before it continues.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.wbc.controller import ProgramController, Tendency
 from steptwin.wbc.real import real
 

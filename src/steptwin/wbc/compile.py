@@ -6,7 +6,7 @@ from array import array
 from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 
-from steptwin.machine import MILLISECOND, Nanos
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.tables import complete
 from steptwin.wbc import steps as s
 from steptwin.wbc.code import Cells, Code, Execution, InterruptEntry, Seen, StepCode, WatchedValue

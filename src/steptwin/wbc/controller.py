@@ -1,4 +1,4 @@
-"""The interface of a controller for a running program. The language depends on no particular machine."""
+"""The interface of a controller for a running program. The language depends on no particular controller."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeAlias
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.tables import IncompleteTable, complete
 from steptwin.wbc.registers import RegisterRow
 

@@ -10,7 +10,7 @@ GENERATIONS = ("1.23", "1.40", "1.70")
 
 # WBC-12
 MAX_VARIABLES = 128
-# The image has room for 227 rows; the 1.74 manual speaks of 200, which no 227-row table of a running machine should fail.
+# The image has room for 227 rows; the 1.74 manual speaks of 200, which no 227-row table of a running controller should fail.
 MAX_POSITIONS = 227
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from steptwin.machine import MILLISECOND, Nanos
+from steptwin.controller import MILLISECOND, Nanos
 
 INPUT_LABELS = 31
 """``INT_IN1``…``INT_IN31`` are labels of the language; the controller has twenty inputs."""

@@ -16,8 +16,8 @@ from collections import deque
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 
+from steptwin.controller import MICROSECOND, MILLISECOND, SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import MICROSECOND, MILLISECOND, SECOND, Nanos
 from steptwin.state import Stateful
 from steptwin.statements import HookedStatements, StatementHook, StatementHooks, hook_before, without
 from steptwin.wbc.code import Cells, Code, Execution, StepCode
@@ -298,12 +298,12 @@ class Interpreter(Stateful):
         if hook is None:
             return own
 
-        def step(machine: Execution, cells: Cells) -> int:
+        def step(execution: Execution, cells: Cells) -> int:
             if self._repeated == number:
                 self._repeated = -1
             else:
-                hook(machine.now, number)
-            return own(machine, cells)
+                hook(execution.now, number)
+            return own(execution, cells)
 
         return step
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 
 Side = Callable[[Nanos], float]
 """The value at a moment. Within each stretch it only rises or only falls."""

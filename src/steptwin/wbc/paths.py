@@ -1,4 +1,4 @@
-"""Needs of MOVEPTP, lines, circles and arcs in a row of the position table. Checker and machine refuse for the same reasons."""
+"""Needs of MOVEPTP, lines, circles and arcs in a row of the position table. Checker and controller refuse alike."""
 
 from __future__ import annotations
 

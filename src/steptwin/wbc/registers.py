@@ -1,4 +1,4 @@
-"""The registers a WBC program sees, as a table. Checker, machine, image, hover texts and reference are projections of it."""
+"""The registers a WBC program sees, as a table. Checker, controller, image, hover texts and reference are projections of it."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ from array import array
 from functools import partial
 from typing import NamedTuple
 
-from steptwin.machine import SECOND, Nanos
+from steptwin.controller import SECOND, Nanos
 from steptwin.wbc.code import Cells, Code
 from steptwin.wbc.controller import ProgramController
 from steptwin.wbc.looks import first_change

@@ -1,5 +1,5 @@
 """Calculations that come one after the other: as lines of one function Python executes them faster than as calls, and between
-them a machine has nothing else to do. The lines have numbers and signs only, no text of the program."""
+them a controller has nothing else to do. The lines have numbers and signs only, no text of the program."""
 
 from __future__ import annotations
 

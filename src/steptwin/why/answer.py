@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from steptwin.machine import SECOND, Nanos
+from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message, MessageText, read_message_text, with_messages
 
 SINCE_BEFORE = Message("why.since-before", "since before {time:.6f} s")

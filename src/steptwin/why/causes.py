@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
 from typing import NamedTuple, TypeAlias
 
-from steptwin.machine import SECOND, Nanos
+from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message, MessageText, text_of
 from steptwin.motion.divisions import profile_of
 from steptwin.simulation.components.logic import BoardPart
@@ -113,7 +113,7 @@ class Causes:
             return fault
         if owner in self._parts:
             return self._of_element(owner, change)
-        if owner in self._world.machines:
+        if owner in self._world.controllers:
             return self._of_pin(PinName(owner, terminal), change)
         if owner in self._world.axes:
             drive = self._world.axes[owner].spec.drive
@@ -124,8 +124,12 @@ class Causes:
         """A fault that began or ended at a moment at a controller or element; one that names a terminal, if that is given."""
         for group in (self._log.group(owner), -1):
             for _, record in self._log.at(group, time):
-                if record.kind == "fault" and record.machine == owner and (named is None or named in str(record.value).split()):
-                    link = ChainLink(record.time, record.machine, FAULT(name=record.subject, what=record.value))
+                if (
+                    record.kind == "fault"
+                    and record.controller == owner
+                    and (named is None or named in str(record.value).split())
+                ):
+                    link = ChainLink(record.time, record.controller, FAULT(name=record.subject, what=record.value))
                     return Cause(link, partial(self._of_fault, record))
         return None
 
@@ -141,7 +145,7 @@ class Causes:
     def lasting(self, signals: Sequence[str], at: Nanos, first: FoundCause) -> FoundCause:
         """The fault that holds one of these signals at a moment, or the output to which a pin is wired, if it began to after the
         change ``first``, which is the next cause then."""
-        pins = [signal for signal in signals if signal.partition(".")[0] in self._world.machines]
+        pins = [signal for signal in signals if signal.partition(".")[0] in self._world.controllers]
         wired = [source for pin in pins for source in self.drivers(pin, at)]
         named = dict.fromkeys((*signals, *wired))
         holds = [(hold.time, signal, hold.held) for signal in named if (hold := self._log.hold(signal, at)) and hold.held]
@@ -190,17 +194,17 @@ class Causes:
         circuit = self._world.parts.circuits.get(target)
         if circuit is not None:
             yield from (contact.lane for contact in circuit.contacts if contact.lane)
-        for scheduler in (self._world.parts.scheduler_of[target.machine],):
+        for scheduler in (self._world.parts.scheduler_of[target.controller],):
             wire = scheduler.wire_to(target)
             if wire is not None:
                 yield self._name(wire.source)
 
     def _name(self, pin: PinName) -> str:
         """The signal of a pin or terminal."""
-        return str(pin) if pin.machine in self._world.machines else f"{pin.machine}.{pin.pin.lower()}"
+        return str(pin) if pin.controller in self._world.controllers else f"{pin.controller}.{pin.pin.lower()}"
 
     def _of_pin(self, pin: PinName, change: Change) -> FoundCause:
-        wire = self._world.parts.scheduler_of[pin.machine].wire_to(pin)
+        wire = self._world.parts.scheduler_of[pin.controller].wire_to(pin)
         if wire is not None:
             found = self._before(self._name(wire.source), change, change.time - wire.delay)
             if found is not None and found[0].time == change.time - wire.delay:
@@ -216,8 +220,8 @@ class Causes:
         path = self._world.parts.driven.get(pin)
         if path is not None:
             where = self._world.spec.text.where(path)
-            return Cause(ChainLink(change.time, pin.machine, DRIVES(kind=path[0], where=where, pin=str(pin))), nothing)
-        return self.in_machine(pin.machine, change, Resource(ResourceKind.PIN, pin.pin))
+            return Cause(ChainLink(change.time, pin.controller, DRIVES(kind=path[0], where=where, pin=str(pin))), nothing)
+        return self.in_controller(pin.controller, change, Resource(ResourceKind.PIN, pin.pin))
 
     def _operated(self, name: str, change: Change) -> FoundCause:
         """Who pressed a button."""
@@ -239,7 +243,7 @@ class Causes:
         part = self._parts.get(owner)
         if part is not None:
             return [source for name in _inputs(part) for source in self._held_or_sources(owner, name, at)]
-        return list(self._sources(PinName(owner, terminal))) if owner in self._world.machines else []
+        return list(self._sources(PinName(owner, terminal))) if owner in self._world.controllers else []
 
     def _held_or_sources(self, owner: str, terminal: str, at: Nanos) -> Iterator[str]:
         signal = f"{owner}.{terminal.lower()}"
@@ -250,98 +254,106 @@ class Causes:
 
     # ------------------------------------------------------------------ controllers
 
-    def at_moment(self, machine: str, time: Nanos, wanted: Resource | None) -> FoundCause:
+    def at_moment(self, controller: str, time: Nanos, wanted: Resource | None) -> FoundCause:
         """Cause of a change in a controller that no record shows."""
-        group = self._log.group(machine)
-        found = self.in_machine(machine, Change(time, 0.0, group, len(self._log.records[group])), wanted)
+        group = self._log.group(controller)
+        found = self.in_controller(controller, Change(time, 0.0, group, len(self._log.records[group])), wanted)
         if found is None and wanted is not None:
-            return self.motion(machine, wanted.name, time)
+            return self.motion(controller, wanted.name, time)
         return found
 
-    def in_machine(self, machine: str, change: Change, wanted: Resource | None) -> FoundCause:
+    def in_controller(self, controller: str, change: Change, wanted: Resource | None) -> FoundCause:
         """Cause of a change in a controller at a moment; ``wanted``: the resource, if it is known."""
-        index = self._statement_at(machine, change, wanted)
-        since = -1 if index is None else self._log.executed[machine][index].position
-        outside = self._from_outside(machine, change, since)
+        index = self._statement_at(controller, change, wanted)
+        since = -1 if index is None else self._log.executed[controller][index].position
+        outside = self._from_outside(controller, change, since)
         if outside is not None:
             return outside
         if index is not None:
-            return self.statement(machine, index)
-        act = next((act for act in self._log.acts_at(change.time) if _changes(act, machine)), None)
+            return self.statement(controller, index)
+        act = next((act for act in self._log.acts_at(change.time) if _changes(act, controller)), None)
         if act is not None:
             return _acted(act)
-        return self._asked_before(machine, change) or self._inside(machine, change, wanted)
+        return self._asked_before(controller, change) or self._inside(controller, change, wanted)
 
-    def _statement_at(self, machine: str, change: Change, wanted: Resource | None) -> int | None:
+    def _statement_at(self, controller: str, change: Change, wanted: Resource | None) -> int | None:
         """The number of the statement that was executed at the moment of a change, before it, and changes what is wanted."""
-        executed = self._log.executed[machine]
-        for index in range(self._log.last_executed(machine, change.time), -1, -1):
+        executed = self._log.executed[controller]
+        for index in range(self._log.last_executed(controller, change.time), -1, -1):
             if executed[index].time < change.time:
                 break
             if executed[index].position <= change.position:
-                return index if _matches(self.use(machine, index).writes, wanted) else None
+                return index if _matches(self.use(controller, index).writes, wanted) else None
         return None
 
-    def _from_outside(self, machine: str, change: Change, since: int) -> FoundCause:
+    def _from_outside(self, controller: str, change: Change, since: int) -> FoundCause:
         """A request or another action that reached a controller at the moment of a change, after the position ``since``."""
-        on = self._world.parts.line_of.get(machine)
+        on = self._world.parts.line_of.get(controller)
         for position, record in self._log.at(change.group, change.time):
             if position < since:
                 break
             if position >= change.position:
                 continue
-            if on is not None and record.kind == "frame" and record.machine == on[0].name and self._frames.reaches(record, on[1]):
+            if (
+                on is not None
+                and record.kind == "frame"
+                and record.controller == on[0].name
+                and self._frames.reaches(record, on[1])
+            ):
                 return self._frame(record)
-            if record.machine == machine and record.kind == "input":
+            if record.controller == controller and record.kind == "input":
                 return self._input(record)
         return None
 
-    def _inside(self, machine: str, change: Change, wanted: Resource | None) -> FoundCause:
+    def _inside(self, controller: str, change: Change, wanted: Resource | None) -> FoundCause:
         """Cause of an act of the controller itself: an input, or the end of what an earlier statement began."""
-        after: Callable[[], FoundCause] = partial(self._earlier, machine, change.time, wanted)
+        after: Callable[[], FoundCause] = partial(self._earlier, controller, change.time, wanted)
         event: TraceRecord | None = None
         for position, record in self._log.at(change.group, change.time):
-            if position >= change.position or record.machine != machine:
+            if position >= change.position or record.controller != controller:
                 continue
-            if record.kind == "edge" and self._is_input(PinName(machine, record.subject)):
-                edge = next(one for one in self._log.changes[f"{machine}.{record.subject}"] if one.position == position)
-                after = partial(self.change, f"{machine}.{record.subject}", edge)
+            if record.kind == "edge" and self._is_input(PinName(controller, record.subject)):
+                edge = next(one for one in self._log.changes[f"{controller}.{record.subject}"] if one.position == position)
+                after = partial(self.change, f"{controller}.{record.subject}", edge)
             elif record.kind == "event":
                 event = record
         if event is not None:
             return Cause(
-                ChainLink(change.time, machine, text_of(event.value if isinstance(event.value, str) else str(event.value))), after
+                ChainLink(change.time, controller, text_of(event.value if isinstance(event.value, str) else str(event.value))),
+                after,
             )
-        return self._fault(machine, change.time) or self._ended(machine, change.time, wanted) or after()
+        return self._fault(controller, change.time) or self._ended(controller, change.time, wanted) or after()
 
-    def _ended(self, machine: str, time: Nanos, wanted: Resource | None) -> FoundCause:
+    def _ended(self, controller: str, time: Nanos, wanted: Resource | None) -> FoundCause:
         """The motion of an axis that ended at a moment."""
         if wanted is None or wanted.kind is not ResourceKind.AXIS:
             return None
-        ended = (self._end(plan)[0] == time for plan in self._log.plans_in_force(machine, wanted.name, time) if plan.time < time)
-        return self.motion(machine, wanted.name, time) if any(ended) else None
+        ended = (
+            self._end(plan)[0] == time for plan in self._log.plans_in_force(controller, wanted.name, time) if plan.time < time
+        )
+        return self.motion(controller, wanted.name, time) if any(ended) else None
 
-    def _asked_before(self, machine: str, change: Change) -> FoundCause:
+    def _asked_before(self, controller: str, change: Change) -> FoundCause:
         """A request on a line with timing, which is answered later than it came."""
-        on = self._world.parts.line_of.get(machine)
+        on = self._world.parts.line_of.get(controller)
         if on is None or not on[0].is_timed:
             return None
         records = self._log.records[change.group]
         for position in range(change.position - 1, max(-1, change.position - MOST_LOOKED_BACK), -1):
             record = records[position]
-            if record.kind == "frame" and record.machine == on[0].name:
+            if record.kind == "frame" and record.controller == on[0].name:
                 return self._frame(record) if self._frames.reaches(record, on[1]) else None
         return None
 
-    def _earlier(self, machine: str, time: Nanos, wanted: Resource | None) -> FoundCause:
+    def _earlier(self, controller: str, time: Nanos, wanted: Resource | None) -> FoundCause:
         """The last statement before a moment that changes something: what it began has ended."""
         if wanted is None:
             return None
-        executed = self._log.executed[machine]
-        last = self._log.last_executed(machine, time)
+        executed = self._log.executed[controller]
+        last = self._log.last_executed(controller, time)
         for index in range(last, max(-1, last - MOST_LOOKED_BACK), -1):
-            if executed[index].time < time and _matches(self.use(machine, index).writes, wanted):
-                return self.statement(machine, index)
+            if executed[index].time < time and _matches(self.use(controller, index).writes, wanted):
+                return self.statement(controller, index)
         return None
 
     def _is_input(self, pin: PinName) -> bool:
@@ -351,14 +363,14 @@ class Causes:
         place = record.subject.rpartition("/")[0]
         meaning = self._frames.meaning(record)
         if place == SCRIPTS:
-            return Cause(ChainLink(record.time, record.machine, REQUEST(meaning=meaning)), partial(self._requested, record))
-        return Cause(ChainLink(record.time, record.machine, CLIENT(place=place, meaning=meaning)), nothing)
+            return Cause(ChainLink(record.time, record.controller, REQUEST(meaning=meaning)), partial(self._requested, record))
+        return Cause(ChainLink(record.time, record.controller, CLIENT(place=place, meaning=meaning)), nothing)
 
     def _requested(self, record: TraceRecord) -> FoundCause:
         """The step that made a request, which a line with timing carries later."""
-        members = {name for name, (line, _) in self._world.parts.line_of.items() if line.name == record.machine}
+        members = {name for name, (line, _) in self._world.parts.line_of.items() if line.name == record.controller}
         for act in self._log.acts_before(record.time, MOST_LOOKED_BACK):
-            if _requests(act, record.machine, members):
+            if _requests(act, record.controller, members):
                 return _acted(act)
         return None
 
@@ -366,31 +378,31 @@ class Causes:
         act = next(self._log.acts_at(record.time), None)
         if act is not None:
             return _acted(act)
-        return Cause(ChainLink(record.time, record.machine, FROM_OUTSIDE(what=f"{record.subject} {record.value}")), nothing)
+        return Cause(ChainLink(record.time, record.controller, FROM_OUTSIDE(what=f"{record.subject} {record.value}")), nothing)
 
     # ------------------------------------------------------------------ motions
 
-    def motion(self, machine: str, axis: str, until: Nanos, mechanics: str = "") -> FoundCause:
+    def motion(self, controller: str, axis: str, until: Nanos, mechanics: str = "") -> FoundCause:
         """The motion of an axis at a moment; of all axes the one that ends last, if ``axis`` is empty."""
-        plan = max(self._log.plans_in_force(machine, axis, until), key=self._end, default=None)
+        plan = max(self._log.plans_in_force(controller, axis, until), key=self._end, default=None)
         if plan is None:
             return None
         record = self._log.record(plan)
         profile = profile_of(record.plan())
-        name = f"{machine}.M{record.subject}"
+        name = f"{controller}.M{record.subject}"
         shown = f"{mechanics} ({name})" if mechanics else name
         is_before = not self._log.is_whole and plan.time == self._log.begin
         if is_before and profile.start < plan.time and profile.segments:
-            return Cause(ChainLink(profile.start, machine, BEGAN_TO_MOVE(axis=shown)), unknown)
+            return Cause(ChainLink(profile.start, controller, BEGAN_TO_MOVE(axis=shown)), unknown)
         if is_before and not profile.segments:
             return None
         if not profile.segments:
-            link = ChainLink(plan.time, machine, STOPPED(axis=shown))
+            link = ChainLink(plan.time, controller, STOPPED(axis=shown))
         elif profile.end is not None and profile.end <= until:
-            link = ChainLink(profile.end, machine, MOTION_ENDED(axis=shown, time=plan.time / SECOND))
+            link = ChainLink(profile.end, controller, MOTION_ENDED(axis=shown, time=plan.time / SECOND))
         else:
-            link = ChainLink(plan.time, machine, BEGAN_TO_MOVE(axis=shown))
-        return Cause(link, partial(self.in_machine, machine, plan, Resource(ResourceKind.AXIS, record.subject)))
+            link = ChainLink(plan.time, controller, BEGAN_TO_MOVE(axis=shown))
+        return Cause(link, partial(self.in_controller, controller, plan, Resource(ResourceKind.AXIS, record.subject)))
 
     def _end(self, plan: Change) -> tuple[float, Nanos]:
         """When the motion of a plan ends, which may be never; of several at once, the one planned last."""
@@ -401,73 +413,77 @@ class Causes:
 
     # ------------------------------------------------------------------ programs
 
-    def use(self, machine: str, index: int) -> StatementUse:
+    def use(self, controller: str, index: int) -> StatementUse:
         """Reads and changes of an executed statement; none if its text was replaced since."""
-        executed = self._log.executed[machine][index]
+        executed = self._log.executed[controller][index]
         if not self._log.is_of_present_text(executed):
             return StatementUse()
-        key = machine, executed.place
+        key = controller, executed.place
         found = self._uses.get(key)
         if found is None:
-            found = self._uses[key] = self._world.programs[machine].use(key[1])
+            found = self._uses[key] = self._world.programs[controller].use(key[1])
         return found
 
-    def statement(self, machine: str, index: int) -> Cause:
+    def statement(self, controller: str, index: int) -> Cause:
         """A statement was executed."""
-        executed = self._log.executed[machine][index]
+        executed = self._log.executed[controller][index]
         text = statement(self._log, executed)
         if self._log.is_in_progress(executed):
-            return Cause(ChainLink(executed.time, machine, WAS_IN_EXECUTION(statement=text)), unknown)
-        return Cause(ChainLink(executed.time, machine, WAS_EXECUTED(statement=text)), partial(self._of_statement, machine, index))
+            return Cause(ChainLink(executed.time, controller, WAS_IN_EXECUTION(statement=text)), unknown)
+        return Cause(
+            ChainLink(executed.time, controller, WAS_EXECUTED(statement=text)), partial(self._of_statement, controller, index)
+        )
 
-    def _of_statement(self, machine: str, index: int) -> FoundCause:
+    def _of_statement(self, controller: str, index: int) -> FoundCause:
         """The wait or condition that let a statement be executed."""
-        executed = self._log.executed[machine]
+        executed = self._log.executed[controller]
         number = executed[index].place.number
         for earlier in range(index - 1, max(-1, index - MOST_UNDECIDED), -1):
-            use = self.use(machine, earlier)
+            use = self.use(controller, earlier)
             if use.jumps is not None and executed[earlier + 1].place.number == use.jumps <= number:
                 number = executed[earlier].place.number
             ended = executed[earlier + 1].time
-            if use.waits and ended - executed[earlier].time > self._world.programs[machine].statement_time:
-                return self._decided(machine, earlier, ended, ENDED)
+            if use.waits and ended - executed[earlier].time > self._world.programs[controller].statement_time:
+                return self._decided(controller, earlier, ended, ENDED)
             if number in use.governs or (use.is_loop and executed[earlier + 1].place.number >= use.governs.stop):
-                return self._decided(machine, earlier, executed[earlier].time, DECIDED)
+                return self._decided(controller, earlier, executed[earlier].time, DECIDED)
         self.is_far = index >= MOST_UNDECIDED
-        return None if self.is_far else self._started(machine)
+        return None if self.is_far else self._started(controller)
 
-    def _decided(self, machine: str, index: int, time: Nanos, how: Message) -> Cause:
-        executed, use = self._log.executed[machine][index], self.use(machine, index)
+    def _decided(self, controller: str, index: int, time: Nanos, how: Message) -> Cause:
+        executed, use = self._log.executed[controller][index], self.use(controller, index)
         if use.is_loop:  # its condition is written where it begins
             executed = executed._replace(place=executed.place._replace(number=use.governs.start - 1))
-        link = ChainLink(time, machine, how(statement=statement(self._log, executed)))
-        return Cause(link, partial(self._of_decision, machine, index, time))
+        link = ChainLink(time, controller, how(statement=statement(self._log, executed)))
+        return Cause(link, partial(self._of_decision, controller, index, time))
 
-    def _of_decision(self, machine: str, index: int, time: Nanos) -> FoundCause:
-        found = [cause for resource in self.use(machine, index).reads if (cause := self.resource(machine, resource, time, index))]
-        return max(found, key=lambda cause: cause.link.time) if found else self._of_statement(machine, index)
+    def _of_decision(self, controller: str, index: int, time: Nanos) -> FoundCause:
+        found = [
+            cause for resource in self.use(controller, index).reads if (cause := self.resource(controller, resource, time, index))
+        ]
+        return max(found, key=lambda cause: cause.link.time) if found else self._of_statement(controller, index)
 
-    def resource(self, machine: str, resource: Resource, time: Nanos, index: int) -> FoundCause:
+    def resource(self, controller: str, resource: Resource, time: Nanos, index: int) -> FoundCause:
         """The last change of what a statement reads."""
         match resource.kind:
             case ResourceKind.PIN:
-                every = [name for name in self._log.changes if name.startswith(f"{machine}.")]
-                read = [f"{machine}.{resource.name}"] if resource.name else every
+                every = [name for name in self._log.changes if name.startswith(f"{controller}.")]
+                read = [f"{controller}.{resource.name}"] if resource.name else every
                 return self.lasting(read, time, self.last(read, time))
             case ResourceKind.AXIS:
-                return self.motion(machine, resource.name, time)
+                return self.motion(controller, resource.name, time)
             case ResourceKind.VALUE:
                 for earlier in range(index - 1, max(-1, index - MOST_LOOKED_BACK), -1):
-                    if resource in self.use(machine, earlier).writes:
-                        return self.statement(machine, earlier)
+                    if resource in self.use(controller, earlier).writes:
+                        return self.statement(controller, earlier)
         return None
 
-    def _started(self, machine: str) -> FoundCause:
+    def _started(self, controller: str) -> FoundCause:
         """The statement that was executed first."""
         if not self._log.is_whole:
             return None
-        executed = self._log.executed[machine]
-        return Cause(ChainLink(executed[0].time, machine, PROGRAM_STARTED()), nothing)
+        executed = self._log.executed[controller]
+        return Cause(ChainLink(executed[0].time, controller, PROGRAM_STARTED()), nothing)
 
 
 def _inputs(part: BoardPart) -> list[str]:
@@ -490,7 +506,7 @@ def _acted(act: Act) -> Cause:
 def _sets(act: Act, pin: PinName) -> bool:
     match act.what:
         case do.Set(levels):
-            return any(machine == pin.machine and name.upper() == pin.pin for machine, name, _ in levels)
+            return any(controller == pin.controller and name.upper() == pin.pin for controller, name, _ in levels)
     return False
 
 
@@ -498,16 +514,16 @@ def _requests(act: Act, line: str, members: Collection[str]) -> bool:
     """Whether an action sends something over a line."""
     match act.what:
         case do.Write(values):
-            return any(machine in members for machine, *_ in values)
+            return any(controller in members for controller, *_ in values)
         case do.Request() | do.Send() as what:
             return what.line == line
     return False
 
 
-def _changes(act: Act, machine: str) -> bool:
+def _changes(act: Act, controller: str) -> bool:
     match act.what:
         case do.PowerCycle() | do.Turn() | SetVariable() | Download() | See() | Halt() as what:
-            return what.machine == machine
+            return what.controller == controller
         case do.Write(values):
-            return any(name == machine for name, *_ in values)
+            return any(name == controller for name, *_ in values)
     return False

@@ -8,8 +8,8 @@ from functools import partial
 from itertools import takewhile
 from typing import NamedTuple, TypeAlias
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.simulation import Simulation

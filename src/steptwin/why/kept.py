@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Protocol
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.world.history import outside_past
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot

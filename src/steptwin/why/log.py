@@ -12,8 +12,8 @@ from collections.abc import Iterator, Sequence
 from itertools import takewhile
 from typing import NamedTuple
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.faults.active import HeldLevel
@@ -37,7 +37,7 @@ class Executed(NamedTuple):
     """A statement of a program. ``position``: how many records of its group were noted before it."""
 
     time: Nanos
-    machine: str
+    controller: str
     place: Place
     position: int
 
@@ -45,8 +45,8 @@ class Executed(NamedTuple):
 class ExecutedStatements:
     """Those of one controller, in their order; in columns, because there are many."""
 
-    def __init__(self, machine: str) -> None:
-        self._machine = machine
+    def __init__(self, controller: str) -> None:
+        self._controller = controller
         self.times, self.positions = array("q"), array("q")
         self.places: list[Place] = []
 
@@ -54,7 +54,7 @@ class ExecutedStatements:
         return len(self.times)
 
     def __getitem__(self, index: int) -> Executed:
-        return Executed(self.times[index], self._machine, self.places[index], self.positions[index])
+        return Executed(self.times[index], self._controller, self.places[index], self.positions[index])
 
     def last(self, until: Nanos) -> int:
         """The number of the last one by a moment; -1 if there is none."""
@@ -104,11 +104,11 @@ class CauseLog:
         parts = world.parts
         numbers = {id(scheduler): number for number, scheduler in enumerate(world.schedulers)}
         self._group_of = {name: numbers[id(scheduler)] for name, scheduler in parts.scheduler_of.items()}
-        self._pins = {name: frozenset(machine.pins()) for name, machine in world.machines.items()}
+        self._pins = {name: frozenset(controller.pins()) for name, controller in world.controllers.items()}
         self.first_levels = levels_of(world)
         self.records: dict[int, list[TraceRecord]] = defaultdict(list)
         self.changes: dict[str, list[Change]] = defaultdict(list)
-        self.executed = {name: ExecutedStatements(name) for name in world.machines}
+        self.executed = {name: ExecutedStatements(name) for name in world.controllers}
         self.plans: dict[tuple[str, str], list[Change]] = defaultdict(list)
         """Moments and positions of the plans of an axis, by controller and number."""
         self.acts: list[Act] = []
@@ -124,7 +124,7 @@ class CauseLog:
             self._take(record)
         world.trace.stop()  # it is noted here
         began = {fault.name: fault.begin for fault in parts.faults.active}
-        for owner in (*parts.faults.machines, *parts.faults.elements):
+        for owner in (*parts.faults.controllers, *parts.faults.elements):
             for signal, held in parts.faults.held(owner).items():
                 self._holds[signal].append(Hold(began.get(held.fault, self.begin), held))
         self._built = {group: len(records) for group, records in self.records.items()}
@@ -166,16 +166,16 @@ class CauseLog:
 
     def _take(self, record: TraceRecord) -> None:
         self._count()
-        group = self._group_of.get(record.machine, -1)
+        group = self._group_of.get(record.controller, -1)
         records = self.records[group]
         match record.kind:
             case "edge":
                 change = Change(record.time, record.level(), group, len(records))
                 self.changes[self.signal_of(record)].append(change)
             case "plan":
-                self.plans[record.machine, record.subject].append(Change(record.time, 0.0, group, len(records)))
+                self.plans[record.controller, record.subject].append(Change(record.time, 0.0, group, len(records)))
             case "fault":
-                self._note_holds(record.machine, record.time)
+                self._note_holds(record.controller, record.time)
         records.append(record)
 
     def _note_holds(self, owner: str, now: Nanos) -> None:
@@ -190,9 +190,9 @@ class CauseLog:
         self.world.settle_all()
         self.acts.append(Act(self.world.now, script, what))
         match what:
-            case Download(machine=machine):
-                self._replaced[machine] = self.world.now
-                self._keeping[machine].clear()
+            case Download(controller=controller):
+                self._replaced[controller] = self.world.now
+                self._keeping[controller].clear()
             case do.ClearFault(name):
                 for holds in self._holds.values():
                     if (held := holds[-1].held) is not None and held.fault == name:
@@ -232,8 +232,8 @@ class CauseLog:
 
     def signal_of(self, record: TraceRecord) -> str:
         """The name of what has an edge: ``table.OUT1``, ``valve.out``, or the lane of a contact."""
-        is_pin = record.subject in self._pins.get(record.machine, ())
-        return f"{record.machine}.{record.subject}" if is_pin else record.subject
+        is_pin = record.subject in self._pins.get(record.controller, ())
+        return f"{record.controller}.{record.subject}" if is_pin else record.subject
 
     def is_recorded(self, signal: str) -> bool:
         """Whether every change of a signal is noted."""
@@ -281,7 +281,7 @@ class CauseLog:
 
     def is_in_progress(self, executed: Executed) -> bool:
         """Whether a statement was in execution when the log began, after the beginning of the world."""
-        return not self.is_whole and executed == self.executed[executed.machine][0]
+        return not self.is_whole and executed == self.executed[executed.controller][0]
 
     def since(self, signal: str, until: Nanos) -> Nanos | None:
         """Since when a signal has the level of a moment; None: from the beginning."""
@@ -291,10 +291,10 @@ class CauseLog:
         last = self.last_change(signal, until)
         return None if last is None or self.is_first(signal, last) else last.time
 
-    def plans_in_force(self, machine: str, axis: str, at: Nanos) -> Iterator[Change]:
+    def plans_in_force(self, controller: str, axis: str, at: Nanos) -> Iterator[Change]:
         """The plan of an axis that is in force at a moment; of each axis, if ``axis`` is empty."""
         for (name, number), plans in self.plans.items():
-            if name == machine and axis in ("", number):
+            if name == controller and axis in ("", number):
                 index = bisect_right(plans, at, key=lambda plan: plan.time)
                 if index:
                     yield plans[index - 1]
@@ -325,12 +325,12 @@ class CauseLog:
 
     def is_of_present_text(self, executed: Executed) -> bool:
         """Whether the text of a statement is still in its controller."""
-        programs = self.world.programs[executed.machine]
-        return executed.time > self._replaced.get(executed.machine, -1) and executed.place.text in programs.texts
+        programs = self.world.programs[executed.controller]
+        return executed.time > self._replaced.get(executed.controller, -1) and executed.place.text in programs.texts
 
-    def last_executed(self, machine: str, until: Nanos) -> int:
+    def last_executed(self, controller: str, until: Nanos) -> int:
         """The number of the last statement of a controller by a moment; -1 if there is none."""
-        return self.executed[machine].last(until)
+        return self.executed[controller].last(until)
 
 
 def in_parts(world: Simulation, inputs: Sequence[RecordedInput], end: Nanos) -> Iterator[bool]:
@@ -341,7 +341,7 @@ def in_parts(world: Simulation, inputs: Sequence[RecordedInput], end: Nanos) -> 
 
 def levels_of(world: Simulation) -> dict[str, float]:
     """The present levels of all that has edges: pins, outputs of elements, contacts."""
-    found = {f"{name}.{pin}": level for name, machine in world.machines.items() for pin, level in machine.pins().items()}
+    found = {f"{name}.{pin}": level for name, controller in world.controllers.items() for pin, level in controller.pins().items()}
     for kind, parts in world.parts.elements.items():
         if ELEMENTS[kind].terminals is not None:
             for name, part in parts.items():
@@ -352,6 +352,6 @@ def levels_of(world: Simulation) -> dict[str, float]:
 
 def _plans(world: Simulation) -> Iterator[TraceRecord]:
     """The plans in force."""
-    for name, machine in world.machines.items():
-        for number, drive in enumerate(machine.axes, start=1):
+    for name, controller in world.controllers.items():
+        for number, drive in enumerate(controller.axes, start=1):
             yield TraceRecord(world.now, name, "plan", str(number), drive.plan)

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import TypeAlias
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.points import LivePoint, MemoryCells
 from steptwin.simulation.world.eventpoints import EventPoints, points_of, stays_between_events
 from steptwin.simulation.world.simulation import Simulation
@@ -29,7 +29,7 @@ class PointTurns:
 
     def __init__(self, world: Simulation) -> None:
         self._world = world
-        self._readers = {owner: _Reader(self, world, owner) for owner in world.machines}
+        self._readers = {owner: _Reader(self, world, owner) for owner in world.controllers}
         self._noted = self._looks = 0
         for owner, reader in self._readers.items():
             scheduler = world.parts.scheduler_of[owner]
@@ -171,7 +171,7 @@ def note_turn(turns: list[PointTurn], now: Nanos, value: float) -> None:
 def _point(world: Simulation, owner: str, path: str) -> LivePoint | None:
     """None also for a row of registers, of which one must be chosen."""
     with suppress(Misuse):
-        return world.kind(owner).point(world.machine(owner), path)
+        return world.kind(owner).point(world.controller(owner), path)
     return None
 
 

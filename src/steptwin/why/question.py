@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from functools import partial, reduce
 from typing import TypeAlias
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message, MessageText
 from steptwin.points import LivePoint
 from steptwin.simulation.kinds.programs import Resource, ResourceKind
@@ -89,8 +89,8 @@ IS_HELD = Message("why.is-held", "{signal} is {held} since {time:.6f} s")
 SINCE = Message("why.since", "since {time:.6f} s")
 DRIVEN_BY = Message("why.driven-by", ", driven by {names}")
 AND = Message("why.and", "{one} and {other}")
-WAITS = Message("why.waits", "{machine} waits at {statement}")
-DOES_NOT_WAIT = Message("why.does-not-wait", "{machine} does not wait: {statement}")
+WAITS = Message("why.waits", "{controller} waits at {statement}")
+DOES_NOT_WAIT = Message("why.does-not-wait", "{controller} does not wait: {statement}")
 WAITS_FOR_A_TIME = Message("why.waits-for-a-time", "it waits for a time only")
 DEPENDS_ON = Message("why.depends-on", "it depends on {name}")
 ANY_PIN = Message("why.any-pin", "any pin")
@@ -98,12 +98,12 @@ NO_AXIS_HAS_MOVED = Message("why.no-axis-has-moved", "no axis has moved until {t
 FORM_OF_A_QUESTION = Message(
     "why.form-of-a-question", "a question is a signal, a condition, or a controller: table.OUT3, 'table.OUT3 == 0', table"
 )
-AMBIGUOUS_NAME = Message("why.ambiguous-name", "{name} is of {machines}: ask with the controller, such as {example}")
+AMBIGUOUS_NAME = Message("why.ambiguous-name", "{name} is of {controllers}: ask with the controller, such as {example}")
 VARIABLE_OF_A_PROGRAM = Message(
-    "why.variable-of-a-program", "{name} is a variable of the program of {machine}: a question is about a signal or register"
+    "why.variable-of-a-program", "{name} is a variable of the program of {controller}: a question is about a signal or register"
 )
 NOTHING_EXECUTED_YET = Message(
-    "why.nothing-executed-yet", "{machine} has executed no statement until {at:g} s: ask about one of its signals"
+    "why.nothing-executed-yet", "{controller} has executed no statement until {at:g} s: ask about one of its signals"
 )
 
 
@@ -146,16 +146,16 @@ class Why:
             self._on_the_way.pass_by(self.log.inputs)
             yield
         self._causes = Causes(self.log)  # programs may be others by now
-        if text in self.log.world.machines:
+        if text in self.log.world.controllers:
             return (yield from self._wait(text, moment))
         return (yield from self._condition(text, moment))
 
     def _only_program(self) -> str:
         """The controller that is meant without a question."""
-        machines = [name for name, programs in self.log.world.programs.items() if programs.texts]
-        if len(machines) != 1:
+        controllers = [name for name, programs in self.log.world.programs.items() if programs.texts]
+        if len(controllers) != 1:
             raise Misuse(FORM_OF_A_QUESTION())
-        return machines[0]
+        return controllers[0]
 
     # ------------------------------------------------------------------ signals and conditions
 
@@ -163,7 +163,7 @@ class Why:
         """The change that `LastChanges` searches for; None for a controller, for a bare quantity that moves all the time, and for
         `idle`. Raises `Misuse`."""
         text = _text_of(question)
-        if not text or text in self.log.world.machines:
+        if not text or text in self.log.world.controllers:
             return None
         text = self._named(text)
         names = tuple(dict.fromkeys(parse_condition(text).names()))
@@ -189,7 +189,7 @@ class Why:
 
     def _has_edges(self, signal: str) -> bool:
         owner, _, pin = signal.partition(".")
-        return self.log.has(signal) or (owner in self.log.world.machines and pin in self.log.world.machines[owner].pins())
+        return self.log.has(signal) or (owner in self.log.world.controllers and pin in self.log.world.controllers[owner].pins())
 
     def _condition(self, text: str, at: Nanos) -> Asking:
         asked = self._named(text)
@@ -218,18 +218,18 @@ class Why:
         """The point of a controller with this name; None for what is none."""
         owner, _, rest = name.partition(".")
         world = self.log.world
-        return world.kind(owner).point(world.machine(owner), rest) if owner in world.machines else None
+        return world.kind(owner).point(world.controller(owner), rest) if owner in world.controllers else None
 
     def _named(self, text: str) -> str:
         """The condition with names that leave out their controller in full, where there is only one that has it."""
         world = self.log.world
         for name in dict.fromkeys(parse_condition(text).names()):
             if not self._has(name):
-                having = [machine for machine in world.machines if self._has(f"{machine}.{name}")]
-                full = [f"{machine}.{name}" for machine in having] or list(self._registers(name))
+                having = [controller for controller in world.controllers if self._has(f"{controller}.{name}")]
+                full = [f"{controller}.{name}" for controller in having] or list(self._registers(name))
                 if len(full) > 1:
                     owners = [one.partition(".")[0] for one in full]
-                    raise Misuse(AMBIGUOUS_NAME(name=name, machines=" and ".join(owners), example=full[0]))
+                    raise Misuse(AMBIGUOUS_NAME(name=name, controllers=" and ".join(owners), example=full[0]))
                 if not full:
                     self._refuse_variable(name)
                     world.signal(name)
@@ -238,18 +238,18 @@ class Why:
 
     def _refuse_variable(self, name: str) -> None:
         """Raises `Misuse` for a variable of a program, whose values are not noted."""
-        for machine, programs in self.log.world.programs.items():
-            if name.removeprefix(f"{machine}.") in programs.variables(self.log.world.now):
-                raise Misuse(VARIABLE_OF_A_PROGRAM(name=name, machine=machine))
+        for controller, programs in self.log.world.programs.items():
+            if name.removeprefix(f"{controller}.") in programs.variables(self.log.world.now):
+                raise Misuse(VARIABLE_OF_A_PROGRAM(name=name, controller=controller))
 
     def _registers(self, name: str) -> Iterator[str]:
         """Meanings of a name of a program language for each controller with a program: ``table.USER_REGISTER[10]:real`` for
         ``$R10``, also with the controller before it."""
         owner, dot, rest = name.rpartition(".")
-        for machine, programs in self.log.world.programs.items():
-            point = programs.point(rest) if not dot or machine == owner else None
-            if point is not None and self._is_signal(f"{machine}.{point}"):
-                yield f"{machine}.{point}"
+        for controller, programs in self.log.world.programs.items():
+            point = programs.point(rest) if not dot or controller == owner else None
+            if point is not None and self._is_signal(f"{controller}.{point}"):
+                yield f"{controller}.{point}"
 
     def _has(self, name: str) -> bool:
         """Whether there is a signal with this name, or a contact."""
@@ -271,9 +271,11 @@ class Why:
             return name
         owner, _, rest = name.partition(".")
         world = self.log.world
-        if owner in world.machines:
+        if owner in world.controllers:
             point = (
-                None if self.log.is_recorded(f"{owner}.{rest.upper()}") else world.kind(owner).point(world.machine(owner), rest)
+                None
+                if self.log.is_recorded(f"{owner}.{rest.upper()}")
+                else world.kind(owner).point(world.controller(owner), rest)
             )
             return f"{owner}.{rest.upper() if point is None else point.point.path}"
         return f"{owner}.{rest.lower()}"
@@ -290,7 +292,7 @@ class Why:
 
     def _from_run(self, text: str, canonical: dict[str, str], at: Nanos, *, is_bare: bool) -> FoundValue:
         """As `_from_log`, from courses that are in no trace: from interval to interval back to the last change."""
-        log, courses, machines = self.log, self._courses, self.log.world.machines
+        log, courses, controllers = self.log, self._courses, self.log.world.controllers
         courses.begin()
         if any(log.world.signal(name).continuous for name in canonical if not log.has(name)):
             recorded, watched = dict[str, str](), {text: text}
@@ -298,7 +300,7 @@ class Why:
         else:
             recorded = {name: full for name, full in canonical.items() if log.is_recorded(full)}
             named = {name: full for name, full in canonical.items() if name not in recorded}
-            watched = {name: full if full.partition(".")[0] in machines else name for name, full in named.items()}
+            watched = {name: full if full.partition(".")[0] in controllers else name for name, full in named.items()}
             watch, is_followed = watch_value, is_bare
         value: float | None = None
         intervals = list(self._on_the_way.intervals(at, self.end))
@@ -363,7 +365,7 @@ class Why:
         if owner in world.axes:
             drive = world.axes[owner].spec.drive
             return causes.motion(drive[0], drive[1].removeprefix("M"), time, owner)
-        if owner not in world.machines:
+        if owner not in world.controllers:
             lanes = [name for name in self.log.changes if name == owner or name.startswith(f"{owner}.")]
             return causes.last(lanes, time)
         axis = _AXIS.match(rest)
@@ -391,37 +393,37 @@ class Why:
 
     # ------------------------------------------------------------------ programs
 
-    def _wait(self, machine: str, at: Nanos) -> Asking:
+    def _wait(self, controller: str, at: Nanos) -> Asking:
         """Cause for which the program of a controller waits."""
         log, causes = self.log, self._causes
-        index = log.last_executed(machine, at)
+        index = log.last_executed(controller, at)
         if index < 0:
-            raise Misuse(NOTHING_EXECUTED_YET(machine=machine, at=at / SECOND))
-        executed = log.executed[machine]
+            raise Misuse(NOTHING_EXECUTED_YET(controller=controller, at=at / SECOND))
+        executed = log.executed[controller]
         here = executed[index]
-        use = causes.use(machine, index)
+        use = causes.use(controller, index)
         text, since = statement(log, here), None if log.is_in_progress(here) else here.time
-        if not use.waits or at - here.time <= log.world.programs[machine].statement_time:
-            state = DOES_NOT_WAIT(machine=machine, statement=text)
-            return (yield from self._answer(machine, at, state, since, causes.statement(machine, index)))
-        links = [link for resource in use.reads for link in self._awaited(machine, resource, at)]
+        if not use.waits or at - here.time <= log.world.programs[controller].statement_time:
+            state = DOES_NOT_WAIT(controller=controller, statement=text)
+            return (yield from self._answer(controller, at, state, since, causes.statement(controller, index)))
+        links = [link for resource in use.reads for link in self._awaited(controller, resource, at)]
         if not use.reads:
-            links.append(ChainLink(here.time, machine, WAITS_FOR_A_TIME()))
-        found = [cause for resource in use.reads if (cause := causes.resource(machine, resource, at, index))]
+            links.append(ChainLink(here.time, controller, WAITS_FOR_A_TIME()))
+        found = [cause for resource in use.reads if (cause := causes.resource(controller, resource, at, index))]
         changed = [cause for cause in found if cause.link.time > here.time]
-        first = max(changed, key=lambda cause: cause.link.time, default=None) or causes.statement(machine, index)
-        answer = yield from self._answer(machine, at, WAITS(machine=machine, statement=text), since, first)
+        first = max(changed, key=lambda cause: cause.link.time, default=None) or causes.statement(controller, index)
+        answer = yield from self._answer(controller, at, WAITS(controller=controller, statement=text), since, first)
         return answer._replace(links=tuple(dict.fromkeys((*links, *answer.links)))[:MOST_LINKS])
 
-    def _awaited(self, machine: str, resource: Resource, at: Nanos) -> Iterator[ChainLink]:
+    def _awaited(self, controller: str, resource: Resource, at: Nanos) -> Iterator[ChainLink]:
         """The present state of what a statement waits for, and of what that depends on."""
         if resource.kind is ResourceKind.PIN and resource.name:
-            yield from self._states(f"{machine}.{resource.name}", at)
+            yield from self._states(f"{controller}.{resource.name}", at)
         elif resource.kind is ResourceKind.AXIS:
-            motion = self._causes.motion(machine, resource.name, at)
-            yield ChainLink(at, machine, NO_AXIS_HAS_MOVED(time=at / SECOND)) if motion is None else motion.link
+            motion = self._causes.motion(controller, resource.name, at)
+            yield ChainLink(at, controller, NO_AXIS_HAS_MOVED(time=at / SECOND)) if motion is None else motion.link
         else:
-            yield ChainLink(at, machine, DEPENDS_ON(name=resource.name or ANY_PIN()))
+            yield ChainLink(at, controller, DEPENDS_ON(name=resource.name or ANY_PIN()))
 
     def _states(self, signal: str, at: Nanos) -> Iterator[ChainLink]:
         """The level of a signal and, one after the other, of the signals that drive it."""

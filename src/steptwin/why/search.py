@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from functools import partial
 from typing import NamedTuple, Protocol, TypeAlias
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.points import MemoryCells
 from steptwin.simulation.kinds.programs import Place, Programs, Resource, ResourceKind
 from steptwin.simulation.logic.signal import SignalOf
@@ -134,7 +134,7 @@ class LastChanges:
 
     def _may_change(self, asked: Asked, state: PastState, after: PastState) -> bool:
         """Whether something that is asked about may change between two states, one after the other."""
-        if any(name in asked.edges for machine, subject in after.changed for name in (subject, f"{machine}.{subject}")):
+        if any(name in asked.edges for controller, subject in after.changed for name in (subject, f"{controller}.{subject}")):
             return True
         if any(self._may_take_another(name, state, after) for name in asked.signals - asked.edges - asked.moving):
             return True
@@ -146,11 +146,11 @@ class LastChanges:
         if (owner, path) in after.changed:
             return True
         present = self._history.world
-        point = present.kind(owner).point(present.machine(owner), path) if owner in present.machines else None
+        point = present.kind(owner).point(present.controller(owner), path) if owner in present.controllers else None
         if point is None or point.read is None or point.turns is not None:
             return True
         if not point.is_kept:
-            return all(one.path != path for one in present.kind(owner).datasheet(present.machine(owner)).points)
+            return all(one.path != path for one in present.kind(owner).datasheet(present.controller(owner)).points)
         on = present.parts.line_of.get(owner)
         if on is not None and on[0].is_timed:
             return True  # a request is executed later than it was made
@@ -181,7 +181,7 @@ class LastChanges:
         """Whether a point may have another value after a statement that keeps what it writes."""
         values = [one.name for one in written if one.kind is ResourceKind.VALUE]
         for name in filter(None, map(world.programs[owner].point, values)):
-            other = world.kind(owner).point(world.machine(owner), name)
+            other = world.kind(owner).point(world.controller(owner), name)
             if other is None or other.point.path == path:
                 return True
             cells = None if other.memory is None else other.memory.cells
@@ -194,11 +194,11 @@ class LastChanges:
         world = self._at(state)
         signals = [signal for name in asked.moving if isinstance(signal := world.signal(name), SignalOf)]
         schedulers = {source.scheduler for signal in signals for source in signal.bring(world.now)}
-        moved = {machine for machine, subject in after.changed if subject == MOVED}
+        moved = {controller for controller, subject in after.changed if subject == MOVED}
         if (
             len(signals) < len(asked.moving)
             or not schedulers
-            or any(not moved.isdisjoint(scheduler.machines) for scheduler in schedulers)
+            or any(not moved.isdisjoint(scheduler.controllers) for scheduler in schedulers)
         ):
             return False
         return all(rest_of(signal, world.now) is not None for signal in signals)
@@ -244,7 +244,7 @@ class _Noted:
 
     def _take(self, record: TraceRecord) -> None:
         if record.kind == "edge":
-            turns = self.turns.get(record.subject) or self.turns.get(f"{record.machine}.{record.subject}")
+            turns = self.turns.get(record.subject) or self.turns.get(f"{record.controller}.{record.subject}")
             if turns is not None:
                 points.note_turn(turns, record.time, record.level())
 
@@ -259,8 +259,8 @@ class _Follower:
         self._owner, _, rest = name.partition(".")
         self._value = self._read(world.now)
         self.turns: CourseTurns = [(world.now, self._value)]
-        machine = world.machines.get(self._owner)
-        point = None if machine is None else world.kind(self._owner).point(machine, rest)
+        controller = world.controllers.get(self._owner)
+        point = None if controller is None else world.kind(self._owner).point(controller, rest)
         self._is_kept = point is not None and point.is_kept
         self._keeping: Nanos | None = None
         """The moment of a statement that may have changed it, and after which was not looked at it."""

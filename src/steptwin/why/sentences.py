@@ -22,9 +22,9 @@ SETS = Message("why.sets", "sets {levels}")
 PRESSES = Message("why.presses", "presses {button}")
 RELEASES = Message("why.releases", "releases {button}")
 WRITES = Message("why.writes", "writes {values}")
-SWITCHES_OFF_AND_ON = Message("why.switches-off-and-on", "switches {machine} off and on")
+SWITCHES_OFF_AND_ON = Message("why.switches-off-and-on", "switches {controller} off and on")
 STOPS = Message("why.stops", "stops {name}")
-STOPS_A_PROGRAM = Message("why.stops-a-program", "stops {machine}'s program ({program})")
+STOPS_A_PROGRAM = Message("why.stops-a-program", "stops {controller}'s program ({program})")
 TURNS = Message("why.turns", "turns the encoder of {axis} by {counts}")
 SETS_A_FAULT = Message("why.sets-a-fault", "sets the fault {name}")
 CLEARS_A_FAULT = Message("why.clears-a-fault", "clears the fault {name}")
@@ -38,18 +38,18 @@ END_OF_PROGRAM = Message("why.end-of-program", "the end of the program")
 
 def _halted(given: Halt) -> MessageText:
     if given.axis is None and given.program is not None:
-        return STOPS_A_PROGRAM(machine=given.machine, program=given.program)
-    return STOPS(name=given.machine if given.axis is None else f"{given.machine}.M{given.axis}")
+        return STOPS_A_PROGRAM(controller=given.controller, program=given.program)
+    return STOPS(name=given.controller if given.axis is None else f"{given.controller}.M{given.axis}")
 
 
 _WORDS: Mapping[type, Callable[[Any], MessageText]] = {
-    do.Set: lambda step: SETS(levels=[f"{machine}.{pin.upper()} = {value:g}" for machine, pin, value in step.levels]),
+    do.Set: lambda step: SETS(levels=[f"{controller}.{pin.upper()} = {value:g}" for controller, pin, value in step.levels]),
     do.Press: lambda step: PRESSES(button=step.button),
     do.Release: lambda step: RELEASES(button=step.button),
-    do.Write: lambda step: WRITES(values=[f"{machine}.{name} = {value:g}" for machine, name, value in step.values]),
-    do.PowerCycle: lambda step: SWITCHES_OFF_AND_ON(machine=step.machine),
+    do.Write: lambda step: WRITES(values=[f"{controller}.{name} = {value:g}" for controller, name, value in step.values]),
+    do.PowerCycle: lambda step: SWITCHES_OFF_AND_ON(controller=step.controller),
     Halt: _halted,
-    do.Turn: lambda step: TURNS(axis=f"{step.machine}.M{step.axis}", counts=step.counts),
+    do.Turn: lambda step: TURNS(axis=f"{step.controller}.M{step.axis}", counts=step.counts),
     do.SetFault: lambda step: SETS_A_FAULT(name=step.fault.name or step.fault.kind.name),
     do.ClearFault: lambda step: CLEARS_A_FAULT(name=step.name),
     SetVariable: lambda given: SETS_A_VARIABLE(name=given.name, value=given.value),
@@ -68,7 +68,7 @@ def statement(log: CauseLog, executed: Executed) -> MessageText:
     """A statement with its line: "line 12 `OUT3 = OFF`"."""
     if not log.is_of_present_text(executed):
         return REPLACED_STATEMENT()
-    programs, place = log.world.programs[executed.machine], executed.place
+    programs, place = log.world.programs[executed.controller], executed.place
     found, source = programs.statements(place.text)[place.number], programs.texts[place.text]
     text = visible(source.text[found.start : found.end].strip())
     return LINE(line=found.line, code=text) if text else END_OF_PROGRAM()
@@ -87,7 +87,7 @@ class Frames:
         """A request in words."""
         place, _, _ = record.subject.rpartition("/")
         self._told.clear()
-        self.words[record.machine].frame(record.time, place, FrameDirection.IN, record.data())
+        self.words[record.controller].frame(record.time, place, FrameDirection.IN, record.data())
         if self._told:
             return self._told[-1].meaning
         return record.data().decode("ascii", "backslashreplace")
@@ -95,4 +95,4 @@ class Frames:
     def reaches(self, record: TraceRecord, unit: int) -> bool:
         """Whether a record is a request that may change the controller with an address."""
         place, _, direction = record.subject.rpartition("/")
-        return direction == FrameDirection.IN.value and unit in self.words[record.machine].changes(place, record.data())
+        return direction == FrameDirection.IN.value and unit in self.words[record.controller].changes(place, record.data())

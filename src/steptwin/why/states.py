@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from typing import NamedTuple
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.points import FARTHEST_NS
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.world.history import PastState, StatesByAge
@@ -79,11 +79,11 @@ def _moving(world: Simulation) -> Iterator[tuple[str, SignalOf]]:
     """The quantities that move, and can tell when their course is another one."""
     elements = (name for built in world.parts.elements.values() for name in built)
     names = [f"{name}.{signal}" for name in elements for signal in world.parts.element_signals(name) or ()]
-    for owner, machine in world.machines.items():
+    for owner, controller in world.controllers.items():
         kind = world.kind(owner)
-        for point in kind.datasheet(machine).points:
+        for point in kind.datasheet(controller).points:
             with suppress(Misuse):  # of a row of registers one must be chosen
-                live = kind.point(machine, point.path)
+                live = kind.point(controller, point.path)
                 if live is not None and live.turns is not None and live.version is not None:
                     names.append(f"{owner}.{point.path}")
     for name in names:

@@ -13,7 +13,7 @@ from collections import deque
 from typing import NamedTuple
 from weakref import WeakSet
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.state import Plain, Stateful
 from steptwin.wire import mbap, rtu
 from steptwin.wire.crc import with_crc

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from struct import pack
 from typing import NamedTuple
 
-from steptwin.machine import MICROSECOND, SECOND, Nanos
+from steptwin.controller import MICROSECOND, SECOND, Nanos
 
 RAW_IP = 101
 RTAC_SERIAL = 250

@@ -27,8 +27,8 @@ from collections.abc import Collection
 from functools import partial
 from typing import NamedTuple
 
+from steptwin.controller import MICROSECOND, MILLISECOND, SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import MICROSECOND, MILLISECOND, SECOND, Nanos
 from steptwin.state import Plain, Stateful
 from steptwin.wire.crc import crc16, with_crc
 from steptwin.wire.pdu import REFUSED

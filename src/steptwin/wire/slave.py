@@ -1,6 +1,6 @@
 """Devices behind a Modbus line: the frames addressed to them are executed and answered.
 
-A port serves one line or one connection, as a `steptwin.machine.Port`.
+A port serves one line or one connection, as a `steptwin.controller.Port`.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ import enum
 from collections.abc import Callable, Iterable, Mapping
 from typing import Protocol, TypeAlias
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.state import Stateful
 from steptwin.wire import mbap, rtu
 from steptwin.wire.crc import crc16, with_crc

@@ -13,8 +13,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.state import Stateful
 from steptwin.wire import rtu
 from steptwin.wire.crc import with_crc

@@ -45,7 +45,7 @@ export const en = {
   showAll: "Show all",
   foldAll: "Fold all",
   unfoldAll: "Unfold all",
-  partsOf: "Parts of {machine}",
+  partsOf: "Parts of {controller}",
   lines: "Lines",
   events: "Events",
   noEvents: "Nothing has happened yet.",

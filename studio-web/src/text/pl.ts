@@ -48,7 +48,7 @@ export const pl: Record<keyof typeof en, string> = {
   showAll: "Pokaż wszystkie",
   foldAll: "Zwiń wszystkie",
   unfoldAll: "Rozwiń wszystkie",
-  partsOf: "Części: {machine}",
+  partsOf: "Części: {controller}",
   lines: "Linie",
   events: "Zdarzenia",
   noEvents: "Jeszcze nic się nie wydarzyło.",

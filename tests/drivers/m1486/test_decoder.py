@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from steptwin.controller import MILLISECOND
 from steptwin.drivers.m1486.decoder import M1486Decoder
-from steptwin.machine import MILLISECOND
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
 

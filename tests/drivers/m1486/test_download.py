@@ -7,6 +7,7 @@ from itertools import pairwise
 import pytest
 from chip_rig import KNOWN, ChipWire, chip_driver, chip_line, typed
 
+from steptwin.controller import SECOND
 from steptwin.drivers.m1486 import (
     M1486,
     Busy,
@@ -22,7 +23,6 @@ from steptwin.drivers.m1486.unit import PATIENCE_NS
 from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.commands import memory_bits
 from steptwin.m1486.lines import DUAL_DAC
-from steptwin.machine import SECOND
 
 
 def test_a_block_that_is_one_command_too_large() -> None:

@@ -7,6 +7,7 @@ import math
 import pytest
 from chip_rig import KNOWN, ChipWire, Fault, chip_driver, chip_line, typed
 
+from steptwin.controller import SECOND
 from steptwin.drivers.m1486 import (
     M1486,
     Busy,
@@ -18,7 +19,6 @@ from steptwin.drivers.m1486 import (
 from steptwin.drivers.m1486.talk import ChipRequest
 from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.lines import DUAL_DAC
-from steptwin.machine import SECOND
 
 
 @pytest.mark.parametrize(

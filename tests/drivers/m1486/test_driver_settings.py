@@ -7,6 +7,7 @@ from collections.abc import Callable
 import pytest
 from chip_rig import ChipWire, Fault, chip_driver, chip_line
 
+from steptwin.controller import SECOND
 from steptwin.drivers import Unconfirmed
 from steptwin.drivers.exchange import Job
 from steptwin.drivers.m1486 import M1486, AsyncM1486, Busy, Garbled, NoEcho, WrongType
@@ -15,7 +16,6 @@ from steptwin.drivers.m1486.talk import INVALID_COMMAND, ChipRequest
 from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.lines import DUAL_DAC
 from steptwin.m1486.variants import variant
-from steptwin.machine import SECOND
 
 
 @pytest.mark.parametrize(

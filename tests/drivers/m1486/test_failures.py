@@ -9,6 +9,7 @@ import pytest
 from chip_rig import KNOWN, ChipWire, Fault, chip_driver, typed
 from transcripts import suspending
 
+from steptwin.controller import SECOND
 from steptwin.drivers import SentLate, Unconfirmed
 from steptwin.drivers.m1486 import (
     M1486,
@@ -23,7 +24,6 @@ from steptwin.drivers.m1486 import (
     WrongType,
 )
 from steptwin.errors import LineFailure
-from steptwin.machine import SECOND
 
 
 def test_who_does_not_echo_is_told() -> None:

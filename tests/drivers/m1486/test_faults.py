@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import pytest
 from chip_rig import KINDS, ChipWire, Direction, Fault, Kind, chip_line
 
+from steptwin.controller import SECOND
 from steptwin.drivers.m1486.failures import DoubtfulMove, FileGivenUp, Garbled
 from steptwin.drivers.m1486.motion import ChipMoveFailed, ChipReason
 from steptwin.drivers.m1486.sync import M1486
 from steptwin.errors import LineFailure, Refusal, SteptwinError
-from steptwin.machine import SECOND
 
 FEWER: tuple[Kind, ...] = ("drop", "invert", "insert", "flip 0")
 FILE = "[\nf640\nr\nl2\nb64\nr\ne\n]\n"

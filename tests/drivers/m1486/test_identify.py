@@ -8,6 +8,7 @@ import pytest
 from chip_rig import BAUD, ChipWire
 from host_rig import MemoryEndpoint, Wire
 
+from steptwin.controller import SECOND
 from steptwin.drivers import LineLost
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.m1486.identify import (
@@ -23,7 +24,6 @@ from steptwin.drivers.m1486.identify import (
 from steptwin.drivers.threads import ThreadLine
 from steptwin.m1486.functions import REPORT, RETURN
 from steptwin.m1486.variants import VARIANTS
-from steptwin.machine import SECOND
 from steptwin.wire import pdu, rtu
 
 

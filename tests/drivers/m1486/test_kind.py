@@ -9,6 +9,7 @@ import pytest
 from chip_rig import KNOWN, ChipWire, chip_driver, typed
 from line_rig import at_every_address, run_virtual
 
+from steptwin.controller import Nanos
 from steptwin.drivers.exchange import LineLost
 from steptwin.drivers.kind import DeviceAddress, DeviceMotion, DriverKind, EndedMotion, FoundDevice, WantedMoves
 from steptwin.drivers.m1486 import kind
@@ -17,7 +18,6 @@ from steptwin.drivers.m1486.jog import LINK_S
 from steptwin.drivers.m1486.kind import GOES_ON, LOST, M1486_DRIVER
 from steptwin.drivers.m1486.sync import M1486
 from steptwin.errors import Misuse, Refusal
-from steptwin.machine import Nanos
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
 

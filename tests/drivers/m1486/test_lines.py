@@ -13,6 +13,7 @@ import pytest
 from chip_rig import BAUD, ChipWire, Fault, chip_line, chip_task_line
 from line_rig import MemoryEndpoint, at_every_address, in_threads, run_virtual
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.drivers import Overtaken
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.m1486 import (
@@ -30,7 +31,6 @@ from steptwin.drivers.m1486.lines import AsyncM1486Line, ThreadM1486Line, in_wor
 from steptwin.drivers.m1486.unit import SLICE_NS
 from steptwin.drivers.threads import ThreadLine
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, SECOND
 
 KNOWN = {"start_stop": 200, "acceleration": 5000, "velocity": 1000, "profile": 25000, "microstep": 1, "qualification": 1}
 

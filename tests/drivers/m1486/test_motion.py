@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
+from steptwin.controller import SECOND
 from steptwin.drivers.exchange import LineLost
 from steptwin.drivers.m1486.failures import DoubtfulMove, Garbled, NoEcho, NoRoom, Restarted, unconfirmed
 from steptwin.drivers.m1486.motion import ChipMotion, ChipMotionCommand, ChipMoveEnd, ChipReason
 from steptwin.drivers.m1486.sharedstate import SharedChipState
 from steptwin.drivers.m1486.watching import _is_watched, _Mover, early_ns, watch
-from steptwin.machine import SECOND
 
 AT = 50 * SECOND
 

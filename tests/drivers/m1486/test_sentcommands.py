@@ -7,12 +7,12 @@ from collections.abc import Callable
 import pytest
 from chip_rig import KNOWN, ChipWire, chip_driver, chip_line
 
+from steptwin.controller import SECOND
 from steptwin.drivers.m1486 import M1486, ChipReason, ProgramLost
 from steptwin.drivers.m1486.driver import START_BITS
 from steptwin.errors import Misuse
 from steptwin.m1486.commands import memory_bits
 from steptwin.m1486.variants import variant
-from steptwin.machine import SECOND
 
 ENDLESS = "[\nJ6\n@5\nF640\nR\nW500\nJ5\n@6\n]"
 ENDS: dict[str, tuple[str, bool]] = {

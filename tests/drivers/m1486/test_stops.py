@@ -13,11 +13,11 @@ from chip_rig import KNOWN, ChipWire, chip_driver, chip_line, chip_task_line
 from chip_stops import ASKED, BEGINS, FAMILIES, OPERATIONS, WAYS, trial
 from line_rig import run_virtual
 
+from steptwin.controller import SECOND
 from steptwin.drivers import Unconfirmed
 from steptwin.drivers.m1486 import M1486, AsyncM1486, Busy, FileGivenUp, PositionUnknown
 from steptwin.drivers.m1486.driver import download_to
 from steptwin.errors import Refusal
-from steptwin.machine import SECOND
 
 MOMENTS_S = {"A": (0.0, 0.001, 0.3), "B": (0.0, 0.001, 0.3), "C": (0.0, 0.002, 0.3), "E1": (0.0, 0.3, 1.2), "E2": (0.0, 0.8, 1.6)}
 """At once, in the time that commands take until they move something, and after it."""

@@ -37,9 +37,9 @@ def drum(rig: Rig) -> DeviceSubject:
 
 
 def test_an_m1486_moves_and_is_unknown_meanwhile(drum: DeviceSubject, rig: Rig) -> None:
-    assert drum.description.machines[0].datasheet.axes[0].unit == "step"
-    assert drum.description.machines[0].controls == ("move", "jog", "stop", "program")
-    assert drum.description.machines[0].unit == 3
+    assert drum.description.controllers[0].datasheet.axes[0].unit == "step"
+    assert drum.description.controllers[0].controls == ("move", "jog", "stop", "program")
+    assert drum.description.controllers[0].unit == 3
     assert [reading.value for reading in drum.read("drum.B1", "drum.U3", "drum.U20")] == [None, 0.0, ord("B")]
     drum.do(command.Move("drum", 1, by=5000.0))
     moving = {reading.point: reading for reading in drum.read("drum.counter", "drum.moving", "drum.B1", "drum.position")}
@@ -211,7 +211,7 @@ SECOND_AXIS = (command.Move("drum", 2, to=9.0), command.Jog("drum", 2, 50.0), co
         (command.ControlProgram("drum", "start"), Refusal, "an M1486 has no command to start its program"),
         (command.Jog("drum", 1, 0.0), Misuse, "the sign of the velocity is the direction"),
         *((wanted, Misuse, "axis = 2: an M1486 has axis 1 only") for wanted in SECOND_AXIS),
-        (command.StopAxes("drun"), Misuse, "no machine is called 'drun' .did you mean 'drum'.*; there are drum"),
+        (command.StopAxes("drun"), Misuse, "no controller is called 'drun' .did you mean 'drum'.*; there are drum"),
         (do.Write((("drun", "X", 1.0),)), Refusal, "write is not possible for this device"),
         (command.ReadPoints(("drum.B99",)), Misuse, "'B99' is not a point of an M1486: there are position"),
     ],

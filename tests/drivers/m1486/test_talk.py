@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
+from steptwin.controller import SECOND
 from steptwin.drivers.exchange import SendNext
 from steptwin.drivers.m1486.failures import Garbled, NoRoom
 from steptwin.drivers.m1486.talk import NOISE_NS, QUIET_NS, TYPE_QUERY, CharacterTalk, ChipRequest, ChipRequestKind, chip_name
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND
 from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import FrameDirection
 

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from host_rig import Wire, driver, spindles
 
+from steptwin.controller import SECOND
 from steptwin.drivers import Mic488, MoveFailed, NotReady, Reason
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.status import AxisStatus
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from steptwin.controller import MILLISECOND
 from steptwin.drivers.mic488.decoder import ModbusDecoder
-from steptwin.machine import MILLISECOND
 from steptwin.wire import mbap
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection

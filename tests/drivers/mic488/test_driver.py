@@ -11,6 +11,7 @@ import pytest
 from host_rig import MemoryEndpoint, Wire, async_driver, driver, run_virtual, spindles, task_line, thread_line
 from mic488_rig import loaded
 
+from steptwin.controller import SECOND
 from steptwin.drivers import (
     AsyncMic488,
     Mic488,
@@ -28,7 +29,6 @@ from steptwin.drivers.mic488.lines import ThreadModbusLine, modbus_exchanger
 from steptwin.drivers.modbus import ModbusQuery
 from steptwin.drivers.place import LineAddress
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.registermap import DataType
 from steptwin.mic488.registers import register_map

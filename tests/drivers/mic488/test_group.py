@@ -7,6 +7,7 @@ import asyncio
 import pytest
 from host_rig import Fault, Wire, async_driver, driver, run_virtual, task_line
 
+from steptwin.controller import SECOND
 from steptwin.drivers import (
     NoAnswer,
     NotReady,
@@ -19,7 +20,6 @@ from steptwin.drivers import (
 from steptwin.drivers.exchange import Job
 from steptwin.drivers.modbus import ModbusQuery
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND
 from steptwin.mic488.registermap import DataType
 from steptwin.mic488.registers import register_map
 from steptwin.mic488.values import encoded, named

@@ -9,12 +9,12 @@ from dataclasses import replace
 import pytest
 from host_rig import Fault, Wire, thread_line
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.drivers import LineLost, Mic488, NoAnswer, NoMic488
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.mic488.failures import ModbusRefusal
 from steptwin.drivers.mic488.identify import SCAN_NS, FoundUnit, scan
 from steptwin.errors import LineFailure
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.wire import rtu
 
 

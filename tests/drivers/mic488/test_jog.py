@@ -8,9 +8,9 @@ from collections.abc import Callable
 import pytest
 from host_rig import Fault, Wire, async_driver, driver, run_virtual, task_line
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.drivers import Mic488, NotReady, Reason, TooLate, Unconfirmed
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.registers import register_map
 from steptwin.wire import pdu
 

@@ -10,12 +10,12 @@ from host_rig import Wire, driver, run_virtual
 from line_rig import at_every_address
 from mic488_rig import loaded
 
+from steptwin.controller import MILLISECOND
 from steptwin.drivers.kind import DeviceAddress, DriverKind, EndedMotion, FoundDevice, WantedMoves
 from steptwin.drivers.mic488.kind import MIC488_DRIVER, RUNS_ON, of_mic488, unit_of
 from steptwin.drivers.mic488.sync import Mic488
 from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND
 from steptwin.mic488.configtext import config_text
 from steptwin.mic488.registers import FIRMWARES
 from steptwin.subject.devicetwin import DeviceTwin

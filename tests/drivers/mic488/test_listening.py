@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from steptwin.controller import MILLISECOND
 from steptwin.drivers.mic488.frames import FrameWords, ObservedFrame
 from steptwin.drivers.mic488.listening import RtuListener, TcpListener
-from steptwin.machine import MILLISECOND
 from steptwin.mic488.registermap import DataType
 from steptwin.wire import mbap
 from steptwin.wire.crc import with_crc

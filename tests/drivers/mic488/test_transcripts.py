@@ -17,11 +17,11 @@ from line_rig import at_every_address
 from transcripts import Bench, Case, cases, names_of, regenerate
 
 from steptwin import drivers
+from steptwin.controller import SECOND
 from steptwin.drivers import kind as kinds
 from steptwin.drivers.mic488 import session
 from steptwin.drivers.mic488.decoder import ModbusDecoder
 from steptwin.drivers.mic488.kind import MIC488_DRIVER
-from steptwin.machine import SECOND
 from steptwin.mic488.registers import register_map
 from steptwin.wire import pdu
 

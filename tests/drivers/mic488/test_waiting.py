@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.line import LONGEST_WAIT_S
 from steptwin.drivers.mic488.motion import MotionCommand, MotionKind, MoveEnd, Reason
 from steptwin.drivers.mic488.unit import ControlRegisters
 from steptwin.drivers.mic488.waiting import AxisWait, dynamics, wait_for
 from steptwin.errors import LineFailure, Misuse
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.registermap import DataType
 from steptwin.mic488.status import AxisStatus

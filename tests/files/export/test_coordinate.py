@@ -11,9 +11,9 @@ from textwrap import dedent
 
 import pytest
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.files.export import axis_views, read_trace, write_trace
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND, SECOND
 
 PERIOD = 10 * MILLISECOND
 MACHINE = """

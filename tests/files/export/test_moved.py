@@ -11,11 +11,11 @@ from textwrap import dedent
 
 import pytest
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse
 from steptwin.files.export import axis_views, read_trace, write_trace
 from steptwin.files.export.recording import sort_out
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.simulation.mechanics.lanes import MovedLane
 
 MACHINE = dedent("""

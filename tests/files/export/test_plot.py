@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from world_rig import Run
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.files.export import write_trace
 from steptwin.files.export.polyline import curve
 from steptwin.files.export.recording import sort_out
-from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, plan_position, plan_velocity
 from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 
@@ -38,7 +38,7 @@ def test_a_picture_names_every_lane(mic488: Run, tmp_path: Path) -> None:
     assert "IN9<" not in text
 
 
-def test_lanes_of_the_only_machine_need_no_prefix(tmp_path: Path) -> None:
+def test_lanes_of_the_only_controller_need_no_prefix(tmp_path: Path) -> None:
     trace = Trace()
     trace.add(TraceRecord(0, "m", "plan", "1", plan_position(MotionState(0, 0, 0.0, 0.0), 100, 100.0, 100.0, 100.0)))
     trace.add(TraceRecord(0, "m", "edge", "IN20", 1.0))

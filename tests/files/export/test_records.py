@@ -26,7 +26,7 @@ def test_a_trace_read_back_is_the_one_that_was_written(name: str, request: pytes
     assert saved.trace.digest() == run.trace.digest()
     assert saved.views == run.views
     assert saved.until == run.until
-    assert saved.trace.machines == run.trace.machines
+    assert saved.trace.controllers == run.trace.controllers
 
 
 def test_every_kind_of_value_comes_back(tmp_path: Path) -> None:

@@ -8,8 +8,8 @@ import pytest
 from pyarrow import parquet
 from world_rig import Run
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.files.export import tables, write_trace
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 
 PERIOD = 7 * MILLISECOND

@@ -14,12 +14,12 @@ from typing import Any, NamedTuple
 import pytest
 from world_rig import Run
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.files.export import axis_views, write_trace
 from steptwin.files.export.progress import silent
 from steptwin.files.export.recording import sort_out
 from steptwin.files.export.timeline import write_timeline
 from steptwin.files.world import World
-from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, plan_position
 from steptwin.motion.divisions import StepTrain, profile_of
 from steptwin.motion.paths import Circular, circle
@@ -138,7 +138,7 @@ def test_a_page_of_many_machines_stays_small() -> None:
                 trace.add(TraceRecord(move * SECOND, f"m{n}", "plan", axis, plan))
     page = page_of(trace)
     data = data_of(page)
-    assert (len(data["machines"]), len(data["axes"])) == (100, 400)
+    assert (len(data["controllers"]), len(data["axes"])) == (100, 400)
     empty = len(page_of(Trace(), until=SECOND))
     # A move is a plan of three segments, and with the rest four pieces of six numbers.
     assert (len(page) - empty) / (400 * moves) < 5 * 60

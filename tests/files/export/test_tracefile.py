@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse
 from steptwin.files.export import axis_views, read_trace
 from steptwin.files.export.tracefile import Ring, TraceFile, read_kept
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.script import steps as do
 

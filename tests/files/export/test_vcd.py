@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 from vcd.reader import TokenKind, tokenize
 from world_rig import Run
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.files.export import vcd
 from steptwin.files.export.progress import silent
 from steptwin.files.export.recording import Recording, sort_out
 from steptwin.files.export.vcdtext import changes_text
-from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, Profile, plan_position
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.waveforms import PERIOD, currents

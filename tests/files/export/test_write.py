@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 from world_rig import Run
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.files import export
 from steptwin.files.export import FORMATS, bar, write_trace
 from steptwin.files.export.progress import TimeProgress
 from steptwin.files.export.recording import sort_out
-from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, plan_position
 from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 
@@ -69,7 +69,7 @@ def test_extras_named_to_users_are_those_of_the_package() -> None:
         ({"where": "x", "formats": ["pdf"]}, "no format 'pdf': formats are jsonl, html"),
         ({"where": "x.vcd", "formats": ["vcd", "csv"]}, "one file cannot be vcd and csv"),
         ({"where": "x.csv", "period": 0}, "period = 0 ns: must be 1 ns or more"),
-        ({"where": "x.csv", "machines": ["c"]}, "no machine 'c' in the trace: there are a, b"),
+        ({"where": "x.csv", "controllers": ["c"]}, "no controller 'c' in the trace: there are a, b"),
         ({"where": "x.csv", "begin": 9, "until": 3}, "ends at 3 ns and begins at 9 ns"),
     ],
 )

@@ -109,7 +109,7 @@ def test_texts_are_as_long_as_there_is_room_in_letters_that_there_are() -> None:
 def test_a_point_refuses_what_is_no_value_of_it(value: float) -> None:
     async def act() -> None:
         world = GatewayWorld(PLAIN)
-        part = world.description.machines[0]
+        part = world.description.controllers[0]
         controller = EpicsController("table", world, Sampler(world.samples, {}), JogLeases(world), Role.ENGINEER)
         points = points_of(part, world.description, ["M1_VMAX"])
         record = PointRecord("ST:velocity", points[-1], controller)
@@ -126,7 +126,7 @@ def test_a_controller_that_does_not_answer_holds_up_no_other() -> None:
         answers, do = asyncio.Event(), world.do
 
         async def slow(wanted: Command) -> Result:
-            if isinstance(wanted, ReadState) and wanted.machine == "other":
+            if isinstance(wanted, ReadState) and wanted.controller == "other":
                 await answers.wait()
             return await do(wanted)
 

@@ -64,7 +64,7 @@ def test_a_motor_of_ophyd_async(tmp_path: Path) -> None:
         assert client("ophyd_motor.py", points["epics"]["port"], "ST:table:M1") == EXPECTED
     first = json.loads((tmp_path / "audit").read_text().splitlines()[0])
     assert "(EPICS, 127.0.0.1:" in first["viewer"]
-    assert (first["do"], first["fields"]["machine"]) == ("move", "table")
+    assert (first["do"], first["fields"]["controller"]) == ("move", "table")
 
 
 def test_a_motor_of_a_device_behind_the_bridge(tmp_path: Path) -> None:

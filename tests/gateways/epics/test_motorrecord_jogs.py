@@ -10,10 +10,10 @@ from motorrecord_rig import ME, OTHER, MotorRig, check, first_record
 from virtual_loop import run_virtually
 
 from steptwin.access.roles import Role
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse, Refusal
 from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.leases import JogLeases
-from steptwin.machine import SECOND
 from steptwin.simulation.script.steps import Request, Write
 from steptwin.subject.commands import Command, Enable, StopAll, StopAxes
 

@@ -62,8 +62,8 @@ def test_a_client_moves_an_axis_and_sees_it_move(broker: Mosquitto, tmp_path: Pa
         with broker.subscribe("me/answers") as answers, broker.subscribe(f"{BASE}/table/M1") as axis:
             ask = Requests(broker, answers)
             axis.wait_for(lambda one: one["retain"] == 1, "what is retained comes first")
-            assert ask("enable", machine="table", axis=1)["ok"] is None
-            assert ask("move", machine="table", axis=1, to=40.0, id="m")["id"] == "m"
+            assert ask("enable", controller="table", axis=1)["ok"] is None
+            assert ask("move", controller="table", axis=1, to=40.0, id="m")["id"] == "m"
             axis.wait_for(lambda one: one["payload"]["position"] == 40.0, "it arrives")
             values = [one["payload"]["position"] for one in axis.look()]
             assert len(values) > 5
@@ -88,10 +88,10 @@ def test_refusals_are_answers(broker: Mosquitto, tmp_path: Path) -> None:
         online(broker)
         with broker.subscribe("me/answers", f"{BASE}/answer") as answers:
             ask = Requests(broker, answers)
-            assert ask("home", machine="feed", axis=1, velocity=5)["error"]["code"] == "refusal", "it cannot do that"
+            assert ask("home", controller="feed", axis=1, velocity=5)["error"]["code"] == "refusal", "it cannot do that"
             assert ask("mvoe")["error"]["code"] == "misuse"
             assert "not taken over MQTT" in ask("save", file="/tmp/x")["error"]["message"]
-            assert "not retained" in ask("enable", "-r", machine="table", axis=1)["error"]["message"]
+            assert "not retained" in ask("enable", "-r", controller="table", axis=1)["error"]["message"]
             broker.publish(f"{BASE}/do", "neither JSON nor a command")
             found = answers.wait_for(lambda one: one["topic"] == f"{BASE}/answer", "without a response topic it is there")
             assert found["payload"]["error"]["code"] == "misuse"
@@ -120,7 +120,7 @@ def test_events_come_once_each(broker: Mosquitto, tmp_path: Path) -> None:
         online(broker)
         with broker.subscribe("me/answers") as answers, broker.subscribe(f"{BASE}/events") as events:
             ask = Requests(broker, answers)
-            ask("program", machine="table", action="start")
+            ask("program", controller="table", action="start")
             found = events.wait_for(lambda one: one["payload"]["kind"] == "status", "it comes")
             assert found["payload"]["code"] == "program-error"
             assert found["retain"] == 0
@@ -136,9 +136,9 @@ def test_the_broker_goes_and_comes_back(broker: Mosquitto, tmp_path: Path) -> No
         online(broker)
         with broker.subscribe("me/answers") as answers:
             ask = Requests(broker, answers)
-            ask("enable", machine="table", axis=1)
-            assert ask("jog", machine="table", axis=1, velocity=20.0, lease_s=5.0)["ok"] is None
-            assert "lease_s" in ask("jog", machine="table", axis=1, velocity=20.0)["error"]["message"]
+            ask("enable", controller="table", axis=1)
+            assert ask("jog", controller="table", axis=1, velocity=20.0, lease_s=5.0)["ok"] is None
+            assert "lease_s" in ask("jog", controller="table", axis=1, velocity=20.0)["error"]["message"]
         until(lambda: position(broker) > 0, "it moves")
         broker.kill()
         with ModbusTcpClient("127.0.0.1", port=points["tcp"]["port"]) as master:
@@ -166,7 +166,7 @@ def test_a_broker_that_falls_silent_is_given_up(broker: Mosquitto, tmp_path: Pat
         until(lambda: "connected again" in (tmp_path / "output").read_text(), "it is tried again")
         online(broker)
         with broker.subscribe("me/answers") as answers:
-            assert Requests(broker, answers)("stop", machine="table")["ok"] == {"program": "stopped"}
+            assert Requests(broker, answers)("stop", controller="table")["ok"] == {"program": "stopped"}
         assert broker.retained(f"{BASE}/online") is True, "the will of the session before came before this one"
 
 
@@ -195,7 +195,7 @@ def test_two_worlds_do_not_share_topics(broker: Mosquitto, tmp_path: Path) -> No
             until(lambda: told in (tmp_path / "two/output").read_text(), "the second gives way")
             with broker.subscribe("me/answers") as answers:
                 ask = Requests(broker, answers, "steptwin/hall")
-                assert ask("enable", machine="table", axis=1)["ok"] is None
+                assert ask("enable", controller="table", axis=1)["ok"] is None
                 assert [one["correlation"] for one in answers.look()] == ["r1"], "one of them has done it"
         assert broker.retained("steptwin/hall/online") is True
 
@@ -206,12 +206,12 @@ def test_roles_by_token(broker: Mosquitto, tmp_path: Path) -> None:
         online(broker)
         with broker.subscribe("me/answers") as answers:
             ask = Requests(broker, answers)
-            enable = {"machine": "table", "axis": 1}
+            enable = {"controller": "table", "axis": 1}
             assert "is for the role operator" in ask("enable", **enable)["error"]["message"]
             assert ask("enable", **enable, token="wrong")["error"]["message"] == "wrong token"
             assert ask("enable", **enable, token="0123456789abcdef")["ok"] is None
-            assert ask("stop", machine="table")["ok"] == {"program": "stopped"}
-            power = ask("power_cycle", machine="table", token="0123456789abcdef")
+            assert ask("stop", controller="table")["ok"] == {"program": "stopped"}
+            power = ask("power_cycle", controller="table", token="0123456789abcdef")
             assert "is for the role engineer; press has the role operator" in power["error"]["message"]
 
 
@@ -252,9 +252,9 @@ def test_commands_over_a_broker_are_in_the_audit_log(broker: Mosquitto, tmp_path
         online(broker)
         with broker.subscribe("me/answers") as answers:
             ask = Requests(broker, answers)
-            assert "ok" in ask("enable", machine="table", axis=1, token="letmein-0123456789")
-            assert ask("move", machine="table", axis=9, to=1, token="letmein-0123456789")["error"]["code"] == "misuse"
-            assert ask("move", machine="table", axis=1, to=1, token="lookonly-0123456789")["error"]["code"] == "refusal"
+            assert "ok" in ask("enable", controller="table", axis=1, token="letmein-0123456789")
+            assert ask("move", controller="table", axis=9, to=1, token="letmein-0123456789")["error"]["code"] == "misuse"
+            assert ask("move", controller="table", axis=1, to=1, token="lookonly-0123456789")["error"]["code"] == "refusal"
             assert "ok" in ask("read", points=["table.M1.position"], token="lookonly-0123456789")
     entries = [json.loads(line) for line in (tmp_path / "audit.jsonl").read_text().splitlines()]
     assert [(one["viewer"], one["role"], one["do"], one["outcome"]) for one in entries] == [
@@ -262,7 +262,7 @@ def test_commands_over_a_broker_are_in_the_audit_log(broker: Mosquitto, tmp_path
         ("anna (MQTT)", "operator", "move", "misuse"),
         ("screen (MQTT)", "viewer", "move", "refusal"),
     ]
-    assert entries[0]["fields"] == {"machine": "table", "axis": 1}
+    assert entries[0]["fields"] == {"controller": "table", "axis": 1}
     assert "letmein" not in (tmp_path / "audit.jsonl").read_text()
 
 
@@ -278,7 +278,7 @@ def test_two_worlds_without_names_do_not_meet(broker: Mosquitto, tmp_path: Path)
             online(broker, base)
         with broker.subscribe("me/answers") as answers:
             for base in ("steptwin/one", "steptwin/two"):
-                assert "ok" in Requests(broker, answers, base)("enable", machine="table", axis=1)
+                assert "ok" in Requests(broker, answers, base)("enable", controller="table", axis=1)
             until(lambda: broker.retained("steptwin/one/table/M1")["enabled"], "it is on")
     assert broker.retained("steptwin/two/online") is False
 
@@ -334,6 +334,6 @@ def test_a_bridge_shows_a_device(broker: Mosquitto, tmp_path: Path) -> None:
             online(broker, base)
             with broker.subscribe("me/answers") as answers, broker.subscribe(f"{base}/table/M1") as axis:
                 ask = Requests(broker, answers, base)
-                assert ask("enable", machine="table", axis=1)["ok"] is None
-                assert ask("move", machine="table", axis=1, to=40.0)["ok"] is None
+                assert ask("enable", controller="table", axis=1)["ok"] is None
+                assert ask("move", controller="table", axis=1, to=40.0)["ok"] is None
                 axis.wait_for(lambda one: one["payload"]["position"] == 40.0, "it arrives")

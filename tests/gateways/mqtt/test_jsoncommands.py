@@ -41,7 +41,7 @@ class Rig:
         return asyncio.run(self.commands.answer(JsonRequest(data, retained, (sender,))))
 
 
-ENABLE = {"do": "enable", "machine": "table", "axis": 1}
+ENABLE = {"do": "enable", "controller": "table", "axis": 1}
 
 
 def test_commands_are_in_the_audit_log(tmp_path: Path) -> None:
@@ -51,12 +51,12 @@ def test_commands_are_in_the_audit_log(tmp_path: Path) -> None:
     rig.world.audit = lambda who, do, fields, outcome: audit.add(who, 5, do, fields, outcome)
     rig.ask({**ENABLE, "token": OPERATOR})
     rig.ask(ENABLE)
-    rig.ask({"do": "state", "machine": "table"})
-    rig.ask({"do": "move", "machine": "table", "axis": 9, "to": 1, "token": OPERATOR})
-    rig.ask({"do": "stop", "machine": "table"})
+    rig.ask({"do": "state", "controller": "table"})
+    rig.ask({"do": "move", "controller": "table", "axis": 9, "to": 1, "token": OPERATOR})
+    rig.ask({"do": "stop", "controller": "table"})
 
     async def jog() -> None:
-        request = {"do": "jog", "machine": "table", "axis": 1, "velocity": 5.0, "lease_s": 1.0, "token": OPERATOR}
+        request = {"do": "jog", "controller": "table", "axis": 1, "velocity": 5.0, "lease_s": 1.0, "token": OPERATOR}
         for _ in range(3):
             await rig.commands.answer(JsonRequest(json.dumps(request).encode(), is_retained=False, sender=("me",)))
         rig.commands.lost()
@@ -70,7 +70,7 @@ def test_commands_are_in_the_audit_log(tmp_path: Path) -> None:
         ("a client without token (MQTT)", "viewer", "stop", "done"),
         ("press (MQTT)", "operator", "jog", "done"),
     ]
-    assert audit.last(100)[0].fields == {"machine": "table", "axis": 1}
+    assert audit.last(100)[0].fields == {"controller": "table", "axis": 1}
 
 
 def enabled(rig: Rig) -> list[object]:
@@ -95,7 +95,7 @@ def test_the_same_request_is_done_once(tmp_path: Path) -> None:
 def test_a_stop_is_always_done(tmp_path: Path) -> None:
     rig = Rig(tmp_path)
     for _ in range(3):
-        rig.ask({"do": "stop", "machine": "table", "id": 7})
+        rig.ask({"do": "stop", "controller": "table", "id": 7})
     assert len(rig.world.done) == 3
 
 
@@ -126,9 +126,9 @@ def test_the_role_of_those_without_a_token(keys: str, role: str, tmp_path: Path)
 
 
 REQUESTS = {
-    "viewer": {"do": "stop", "machine": "table"},
+    "viewer": {"do": "stop", "controller": "table"},
     "operator": ENABLE,
-    "engineer": {"do": "power_cycle", "machine": "table"},
+    "engineer": {"do": "power_cycle", "controller": "table"},
 }
 
 
@@ -147,11 +147,11 @@ def test_tokens_give_roles_and_are_not_seen_by_the_subject(tmp_path: Path) -> No
         (b"[]", "misuse", "a request is a line of JSON"),
         (b"[" * 100_000, "misuse", "a request is a line of JSON"),
         ({"do": "follow"}, "refusal", "follow is not taken over MQTT"),
-        ({"do": "move", "machine": "table", "axis": 1, "to": 1, "lease_s": 1}, "misuse", "lease_s is for a jog only"),
-        ({"do": "jog", "machine": "table", "axis": 1, "velocity": 5}, "misuse", "a jog needs lease_s"),
-        ({"do": "jog", "machine": "table", "axis": 1, "velocity": 5, "lease_s": True}, "misuse", "a jog needs lease_s"),
-        ({"do": "jog", "machine": "table", "axis": 1, "velocity": 5, "lease_s": 60}, "misuse", "permitted are 0.1 to 5 s"),
-        ({"do": "stop", "machine": "tabel"}, "misuse", "tabel"),
+        ({"do": "move", "controller": "table", "axis": 1, "to": 1, "lease_s": 1}, "misuse", "lease_s is for a jog only"),
+        ({"do": "jog", "controller": "table", "axis": 1, "velocity": 5}, "misuse", "a jog needs lease_s"),
+        ({"do": "jog", "controller": "table", "axis": 1, "velocity": 5, "lease_s": True}, "misuse", "a jog needs lease_s"),
+        ({"do": "jog", "controller": "table", "axis": 1, "velocity": 5, "lease_s": 60}, "misuse", "permitted are 0.1 to 5 s"),
+        ({"do": "stop", "controller": "tabel"}, "misuse", "tabel"),
     ],
 )
 def test_what_is_wrong_is_answered(payload: Any, code: str, text: str, tmp_path: Path) -> None:
@@ -176,6 +176,6 @@ def test_what_is_no_command_is_in_the_audit_log(tmp_path: Path) -> None:
     logged: list[tuple[str, str]] = []
     rig.world.audit = lambda who, do, fields, outcome: logged.append((do, outcome))
     for wrong in ({"to": "NaN"}, {"too": 5.0}, {"axis": None}):
-        rig.ask({"do": "move", "machine": "table", "axis": 1, **wrong})
+        rig.ask({"do": "move", "controller": "table", "axis": 1, **wrong})
     rig.ask({"do": "fly"})
     assert logged == [("move", "misuse")] * 3 + [("fly", "misuse")]

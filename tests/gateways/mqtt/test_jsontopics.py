@@ -32,8 +32,8 @@ def topics(text: str = TEXT, file: str = "cells/hall.toml") -> tuple[GatewayWorl
     return world, Topics("plant/steptwin", file, world.description, REGISTERS)
 
 
-def sample(world: GatewayWorld, machine: str) -> Sample:
-    return asyncio.run(Sampler(world.samples, REGISTERS).take(machine))
+def sample(world: GatewayWorld, controller: str) -> Sample:
+    return asyncio.run(Sampler(world.samples, REGISTERS).take(controller))
 
 
 def test_groups_have_topics_of_their_own() -> None:
@@ -57,7 +57,7 @@ def test_a_controller_cannot_be_called_like_a_topic(name: str) -> None:
 
 
 def values(group: Group, taken: Sample) -> dict[str, Any]:
-    ((_, payload),) = ControllerText([group], taken.machine).changed(taken)
+    ((_, payload),) = ControllerText([group], taken.controller).changed(taken)
     found = json.loads(payload)
     assert found.pop("at").endswith("Z")
     return dict(found)
@@ -137,4 +137,4 @@ def test_home_assistant_gets_one_device_for_each_controller() -> None:
     assert len({part["uniq_id"] for part in parts.values()}) == len(parts)
     speed = parts["M1_velocity"]
     assert (speed["dev_cla"], speed["unit_of_meas"], speed["val_tpl"]) == ("speed", "mm/s", "{{ value_json['velocity'] }}")
-    assert json.loads(parts["stop_M2"]["pl_prs"]) == {"do": "stop", "machine": "table", "axis": 2}
+    assert json.loads(parts["stop_M2"]["pl_prs"]) == {"do": "stop", "controller": "table", "axis": 2}

@@ -14,6 +14,7 @@ from gateway_rig import GatewayWorld
 from virtual_loop import run_virtually
 
 from steptwin.access.roles import Role
+from steptwin.controller import MILLISECOND
 from steptwin.gateways import sampling
 from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.mqtt.connection import Publication, SessionOver
@@ -21,7 +22,6 @@ from steptwin.gateways.mqtt.sparkplug import SparkplugFace
 from steptwin.gateways.mqtt.sparkplugcodec import SparkplugMetric, SparkplugPayload, SparkplugType, decode_payload, encode_payload
 from steptwin.gateways.mqtt.sparkplugmetrics import Namespace, rows_of
 from steptwin.gateways.sampling import Sampler
-from steptwin.machine import MILLISECOND
 from steptwin.subject import commands as command
 
 WORLD = '[[mic488]]\nname = "table"\n[mic488.M1]\nunit = "mm"\nvel = 40.0\n'

@@ -31,7 +31,7 @@ class Rig:
         self.world = GatewayWorld('[[mic488]]\nname = "table"\n')
         self.sampler = Sampler(self.world.samples, {})
         self.nodes = WatchedNodes()
-        points = {point.name: point for point in points_of(self.world.description.machines[0], self.world.description)}
+        points = {point.name: point for point in points_of(self.world.description.controllers[0], self.world.description)}
         self.all_of = {name: PointNode(node_id(f"table.{name}"), points[name]) for name in WATCHED}
         for node in self.all_of.values():
             self.nodes.add(node)

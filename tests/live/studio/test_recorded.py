@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse
 from steptwin.files.session import save, session_of
 from steptwin.files.world import World
 from steptwin.live.studio.recorded import recorded
-from steptwin.machine import SECOND
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.history import Past
 

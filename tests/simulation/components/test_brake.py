@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from world_rig import check_it_can_be_restored
 
+from steptwin.controller import SECOND
 from steptwin.files.export import axis_views, sort_out
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 from steptwin.simulation.toml.reader import WorldError
 
 TEXT = """

@@ -89,7 +89,7 @@ def recorded() -> Recorded:
     with lamp.registered():
         world = everything()
         world.run(for_=0.6)
-        pins = {pin for machine in world.machines.values() for pin in machine.pins()}
+        pins = {pin for controller in world.controllers.values() for pin in controller.pins()}
         moved = {
             spec.name
             for element in ELEMENTS.values()

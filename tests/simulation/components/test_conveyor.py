@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from steptwin.controller import MILLISECOND
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND
 from steptwin.simulation.components.conveyor import CONVEYOR
 from steptwin.simulation.toml.reader import WorldError
 

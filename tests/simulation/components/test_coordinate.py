@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from steptwin.machine import SECOND
+from steptwin.controller import SECOND
 from steptwin.motion import MotionState, Profile, at_rest, plan_velocity
 from steptwin.simulation.components.coordinate import PLACES, Coordinate, Pulled
 from steptwin.simulation.mechanics.course import Build, Course, MechanicalState

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from world_rig import check_it_can_be_restored
 
+from steptwin.controller import MILLISECOND
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND
 from steptwin.simulation.components.cylinder import CYLINDER
 from steptwin.simulation.toml.reader import WorldError
 

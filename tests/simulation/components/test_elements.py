@@ -14,13 +14,13 @@ from typer.testing import CliRunner
 from whole_world import everything
 
 from steptwin.cli import app
+from steptwin.controller import MILLISECOND
 from steptwin.errors import Misuse
 from steptwin.files.export import axis_views, read_trace, write_trace
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.live.options import LiveOptions, UpOptions
 from steptwin.live.running import up
-from steptwin.machine import MILLISECOND
 from steptwin.simulation.components.button import BUTTON
 from steptwin.simulation.components.contact import ContactSpec
 from steptwin.simulation.components.elementspec import NamedSpec
@@ -188,7 +188,7 @@ turret.switch1
 def test_what_elements_record_begins_with_its_first_level() -> None:
     """Every edge that no pin has."""
     world = everything()
-    pins = {pin for machine in world.machines.values() for pin in machine.pins()}
+    pins = {pin for controller in world.controllers.values() for pin in controller.pins()}
     subjects = []
     for seconds in (0.001, 2.0):
         world.run(for_=seconds)

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from world_rig import check_it_can_be_restored
 
+from steptwin.controller import SECOND
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 from steptwin.simulation.components.follower import FOLLOWER
 from steptwin.simulation.toml.reader import WorldError
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from steptwin.controller import MILLISECOND
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND
 from steptwin.simulation.toml.reader import WorldError
 
 TEXT = """

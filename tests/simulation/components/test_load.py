@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from steptwin.controller import SECOND
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 from steptwin.simulation.toml.reader import WorldError
 
 TEXT = """

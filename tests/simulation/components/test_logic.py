@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from steptwin.controller import MILLISECOND
 from steptwin.errors import Misuse, Runaway
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND
 from steptwin.simulation.components.gate import FUNCTIONS
 from steptwin.simulation.components.timer import TIMER
 from steptwin.simulation.toml.reader import WorldError
@@ -106,7 +106,7 @@ delay = "5 ms"
     there.run(for_=0.01)
     assert (there.read("a.IN3"), there.read("b.IN4")) == (0, 0)
     # Both are in one scheduler, and lanes are under its first machine.
-    assert {record.machine for record in there.trace.edges() if record.subject == "both.out"} == {"a"}
+    assert {record.controller for record in there.trace.edges() if record.subject == "both.out"} == {"a"}
 
 
 def test_a_latch_keeps_what_was_last() -> None:
@@ -231,7 +231,7 @@ def test_an_emergency_stop_chain_over_two_controllers() -> None:
     assert edges(there, "safety.nc") == [(0, 1), (15, 0), (108, 1), (315, 0)]
     # The name of a contact is a lane of its own, under a controller.
     assert edges(there, "stop2") == [(0, 1), (100, 0), (200, 1)]
-    assert {record.machine for record in there.trace.edges() if record.subject == "stop2"} == {"a"}
+    assert {record.controller for record in there.trace.edges() if record.subject == "stop2"} == {"a"}
 
 
 def test_a_pulse_that_is_too_short_does_not_move_a_relay() -> None:

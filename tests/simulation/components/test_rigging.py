@@ -309,7 +309,7 @@ def test_a_fault_of_one_line_leaves_the_others_alone(fault: str, timing: str) ->
     assert answers(spoilt, "a") == answers(sound, "a")
     assert list(spoilt.trace.faults()) == []
     assert answers(spoilt, "b") != answers(sound, "b")
-    assert {record.machine for record in spoilt.trace.faults()} in ({"b"}, {"t"})
+    assert {record.controller for record in spoilt.trace.faults()} in ({"b"}, {"t"})
 
 
 def test_bytes_of_chips_are_spared_by_a_fault_of_a_modbus_line() -> None:
@@ -323,7 +323,7 @@ def test_bytes_of_chips_are_spared_by_a_fault_of_a_modbus_line() -> None:
     world.run(for_=2.0)
     assert world.read("drum.position") == 12800
     first = next(world.trace.faults())
-    assert (first.machine, first.value) == ("chips", "python, towards the twin, byte 1 of 9: 66 is lost")
+    assert (first.controller, first.value) == ("chips", "python, towards the twin, byte 1 of 9: 66 is lost")
 
 
 @pytest.mark.parametrize(

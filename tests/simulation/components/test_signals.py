@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 from world_rig import small
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.live.world import LiveWorld, PlacePort
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.datasheet import datasheet_of
 from steptwin.simulation.components.signals import Idle, find_signal
 from steptwin.simulation.logic.signal import SignalOf
@@ -167,7 +167,7 @@ def test_idle_looks_at_what_was_busy_last_and_at_all_when_nothing_is() -> None:
     assert idle.value(world.now) == 0.0
     assert [scheduler.now for scheduler in world.schedulers] == [0, 0, 0]
     world.run(for_=1.1)
-    assert idle.bring(world.now) == tuple(world.parts.scheduler_of[name].source(name) for name in world.machines)
+    assert idle.bring(world.now) == tuple(world.parts.scheduler_of[name].source(name) for name in world.controllers)
     assert idle.value(world.now) == 1.0
     assert [scheduler.now for scheduler in world.schedulers] == [world.now] * 3
     world.mic488["c"].axis[1].enable()

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from steptwin.controller import MILLISECOND
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND
 from steptwin.simulation.toml.reader import WorldError
 
 TEXT = """

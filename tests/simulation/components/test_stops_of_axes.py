@@ -10,8 +10,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from steptwin.controller import SECOND
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 
 PULSES = 8
 """Per mm."""

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 from steptwin.simulation.components.supply import SUPPLY, Ramp
 from steptwin.simulation.toml.reader import WorldError
 
@@ -160,7 +160,7 @@ def test_what_a_supply_feeds_is_not_power_cycled_otherwise() -> None:
         world('[[script]]\nname = "s"\nsteps = [{ power_cycle = "b" }]')
 
 
-def test_a_supply_that_drops_while_the_fault_of_a_machine_lasts() -> None:
+def test_a_supply_that_drops_while_the_fault_of_a_controller_lasts() -> None:
     found = world()
     press(found)
     found.run(for_=2.5)

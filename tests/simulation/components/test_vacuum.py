@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from steptwin.controller import MILLISECOND
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND
 from steptwin.simulation.toml.reader import WorldError
 
 TEXT = """

@@ -12,10 +12,10 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse
 from steptwin.files.export import write_trace
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.motion import Profile
 
 
@@ -26,8 +26,8 @@ def world_of(text: str, **values: object) -> World:
     return World.from_toml(text)
 
 
-def edges(world: World, lane: str, machine: str = "m") -> list[tuple[int, float]]:
-    return [(record.time, float(str(record.value))) for record in world.trace.edges(machine) if record.subject == lane]
+def edges(world: World, lane: str, controller: str = "m") -> list[tuple[int, float]]:
+    return [(record.time, float(str(record.value))) for record in world.trace.edges(controller) if record.subject == lane]
 
 
 # ---------------------------------------------------------------------- levels at the beginning

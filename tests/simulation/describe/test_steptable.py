@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from steptwin.machine import SECOND
+from steptwin.controller import SECOND
 from steptwin.simulation.describe.steptable import read_step, read_steps
 from steptwin.simulation.script.steps import Note, Wait
 from steptwin.simulation.toml.reader import TomlText

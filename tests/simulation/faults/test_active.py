@@ -6,9 +6,9 @@ from unittest.mock import patch
 
 import pytest
 
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 from steptwin.simulation.components.registry import fault_kinds
 from steptwin.simulation.faults import ActiveFault, Fault, Faults, read
 from steptwin.simulation.faults.active import addresses
@@ -165,9 +165,9 @@ def test_faults_that_refuse_a_request() -> None:
     assert [one.name for one in faults.refusing()] == ["busy", "exception", "no-answer"]
 
 
-def test_without_machines_and_elements_there_are_none() -> None:
+def test_without_controllers_and_elements_there_are_none() -> None:
     faults = Faults()
-    with pytest.raises(Misuse, match="fault stall: choose a machine: there are none"):
+    with pytest.raises(Misuse, match="fault stall: choose a controller: there are none"):
         faults.add(read("stall"))
     with pytest.raises(Misuse, match="fault stall: machine = 'a': there are none"):
         faults.check(read("stall machine=a"))

@@ -22,10 +22,10 @@ def test_from_no_byte_to_all_are_written_before_a_power_cut(written: int) -> Non
     active: Any = SimpleNamespace(
         fault=SimpleNamespace(whole=lambda name: None), chance=SimpleNamespace(below=below), ns=lambda name: 5
     )
-    machine: Any = SimpleNamespace(report=lambda active, now, text: told.append(text), cut_supply=lambda now, until: None)
+    controller: Any = SimpleNamespace(report=lambda active, now, text: told.append(text), cut_supply=lambda now, until: None)
     kept = bytearray(b"new")
     assert isinstance(effect, SaveEffect)
-    effect.act(active, machine, b"old", kept, 0)
+    effect.act(active, controller, b"old", kept, 0)
     assert asked == [4]
     assert kept == b"new"[:written] + b"old"[written:]
     assert told == [f"no supply after {written} of 3 bytes were saved"]
@@ -35,10 +35,10 @@ def test_a_memory_of_which_all_is_worn_out_goes_on_so() -> None:
     effect, told = KINDS["wear"].effect, []
     fault = SimpleNamespace(whole=lambda name: 0)
     active: Any = SimpleNamespace(fault=fault, struck=5, worn=[1], chance=SimpleNamespace(below=lambda limit: limit - 1))
-    machine: Any = SimpleNamespace(report=lambda active, now, text: told.append(text))
+    controller: Any = SimpleNamespace(report=lambda active, now, text: told.append(text))
     assert isinstance(effect, SaveEffect)
     for _ in range(3):
         kept = bytearray(b"ab")
-        effect.act(active, machine, b"AB", kept, 0)
+        effect.act(active, controller, b"AB", kept, 0)
         assert kept == b"AB"
     assert told == ["after 5 saves byte 0 is worn out"]

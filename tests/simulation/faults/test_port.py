@@ -9,10 +9,10 @@ from fault_rig import ANSWER, ANSWER_PDU, READ, REQUEST, FaultRig, crc, rtu, tcp
 from hypothesis import given
 from hypothesis import strategies as st
 
+from steptwin.controller import MILLISECOND
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.line import SerialChain
 from steptwin.m1486.variants import variant
-from steptwin.machine import MILLISECOND
 from steptwin.simulation.faults import Faults, FaultyPort, FaultySendingPort, LineProtocol, read
 from steptwin.simulation.scheduler.trace import Trace
 from steptwin.wire.slave import FrameDirection, RtuSlavePort
@@ -398,11 +398,11 @@ def test_requests_the_twin_has_no_answer_for_leave_no_trace_in_the_count() -> No
     assert rig.ask() != ANSWER
 
 
-def test_what_happens_is_recorded_with_link_machine_and_moment() -> None:
+def test_what_happens_is_recorded_with_link_controller_and_moment() -> None:
     rig = FaultRig("echo nth=1", "busy nth=2")
     rig.ask()
     rig.ask()
-    told = [(r.time, r.machine, r.kind, r.subject) for r in rig.records]
+    told = [(r.time, r.controller, r.kind, r.subject) for r in rig.records]
     assert told == [(0, "link-1", "fault", "echo"), (10 * MILLISECOND, "1", "fault", "busy")]
 
 
@@ -445,7 +445,7 @@ def test_a_request_that_comes_on_no_known_link_meets_the_faults_of_every_link() 
     """As a request of a script does, also after one on a link."""
     rig = FaultRig("busy link=link-2")
     assert rig.ask() == ANSWER
-    refused = rig.machines[1].refusal(1, "", READ, rig.now)
+    refused = rig.controllers[1].refusal(1, "", READ, rig.now)
     assert refused == bytes.fromhex("83 06")
 
 

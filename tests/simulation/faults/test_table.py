@@ -28,7 +28,7 @@ def described(parameter: Parameter) -> str:
 def kind_lines(kind: FaultKind) -> list[str]:
     """``on``: the lines or the elements that can have it, otherwise machines."""
     having = ", ".join(failing(kind) or (line.value for line in kind.lines))
-    head = f"{kind.name}: {kind.layer.value}, {kind.occasion.value}, on {having or 'machines'} | {kind.meaning}"
+    head = f"{kind.name}: {kind.layer.value}, {kind.occasion.value}, on {having or 'controllers'} | {kind.meaning}"
     return [head, *map(described, kind.parameters)]
 
 

@@ -44,23 +44,23 @@ name = "chip"
 variant = "A"
 """
 )
-SHEETS = {name: WORLD.kind(name).datasheet(machine) for name, machine in WORLD.machines.items()}
+SHEETS = {name: WORLD.kind(name).datasheet(controller) for name, controller in WORLD.controllers.items()}
 
 
 @pytest.mark.parametrize("name", SHEETS)
 def test_every_pin_and_every_point_of_a_data_sheet_can_be_named(name: str) -> None:
     sheet, kind = SHEETS[name], WORLD.kind(name)
-    machine = WORLD.machines[name]
+    controller = WORLD.controllers[name]
     assert sheet.kind == kind.name
-    assert {pin.name for pin in sheet.pins} == set(machine.pins())
-    assert {pin: machine.pin(pin) for pin in machine.pins()} == machine.pins()
-    assert len(sheet.axes) == len(machine.axes)
+    assert {pin.name for pin in sheet.pins} == set(controller.pins())
+    assert {pin: controller.pin(pin) for pin in controller.pins()} == controller.pins()
+    assert len(sheet.axes) == len(controller.axes)
     paths = [point.path for point in sheet.points]
     assert len({path.upper() for path in paths}) == len(paths)
     for point in sheet.points:
         if point.path == "USER_REGISTER":
             continue  # many values
-        found = kind.point(machine, point.path)
+        found = kind.point(controller, point.path)
         assert found is not None
         assert found.point == point
         assert (found.read is not None) is (point.access is not Access.WRITE), point.path

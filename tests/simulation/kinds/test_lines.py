@@ -6,9 +6,9 @@ from functools import partial
 
 import pytest
 
+from steptwin.controller import MILLISECOND
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND
 from steptwin.simulation.kinds.lines import SCRIPTS, LineTraffic, LineWrite
 from steptwin.simulation.kinds.registry import line_kinds
 from steptwin.simulation.world.inputs import Download, SetVariable

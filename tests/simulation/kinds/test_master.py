@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.simulation.kinds.master import MOST_WAITING, Master
 
 

@@ -6,10 +6,10 @@ from collections.abc import Iterable
 
 import pytest
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.simulation.kinds.programs import Place, Programs, StatementFollower
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.subject.following import filter_of
@@ -61,18 +61,18 @@ def executed(world: World, seconds: float) -> list[tuple[int, str, str, object]]
     count = len(found)
     world.run_to(world.now + SECOND)
     assert len(found) == count  # nobody is called after `close`
-    return [(record.time, record.machine, record.subject, record.value) for record in found]
+    return [(record.time, record.controller, record.subject, record.value) for record in found]
 
 
 def test_statements_of_wbc_are_reported_with_their_lines_and_a_wait_once() -> None:
     world = two()
-    rows = [(time, line) for time, machine, text, line in executed(world, 0.02) if (machine, text) == ("m", "program 0")]
+    rows = [(time, line) for time, controller, text, line in executed(world, 0.02) if (controller, text) == ("m", "program 0")]
     assert rows == [(1_000_000, 1), (2_000_000, 3), (3_000_000, 4), (4_000_000, 7)]
 
 
 def test_commands_of_an_m1486_are_reported_with_their_lines() -> None:
     world = two()
-    rows = [(time, line) for time, machine, _, line in executed(world, 0.012) if machine == "c"]
+    rows = [(time, line) for time, controller, _, line in executed(world, 0.012) if controller == "c"]
     # The first command is done at power-on, before anybody can follow.
     lines = [4, 5, 6, 5, 6, 7, 11, 12, 8]
     assert rows == [(n * MILLISECOND, line) for n, line in enumerate(lines, start=1)]
@@ -153,8 +153,8 @@ def test_the_stack_has_what_is_executed_and_where_it_returns_to() -> None:
     world.run_to(11 * MILLISECOND)
     assert stack(chip, world.now) == [("label 1", 8)]  # W5 goes on
     assert stack(mic, world.now) == [("MAIN", 7)]
-    world.machines["m"].set_pin("IN1", 1.0, world.now)
-    world.machines["m"].set_pin("IN2", 1.0, world.now)
+    world.controllers["m"].set_pin("IN1", 1.0, world.now)
+    world.controllers["m"].set_pin("IN2", 1.0, world.now)
     while mic.depth() < 2:  # JUMP MAIN, JUMP COUNT
         world.run_to(world.now + MILLISECOND)
     assert stack(mic, world.now) == [("COUNT", 10), ("MAIN", 6)]  # JUMP MAIN is no call
@@ -166,7 +166,7 @@ def test_what_is_interrupted_is_on_the_stack_wherever_it_was() -> None:
     world = World.from_toml('[[mic488]]\nname = "m"\nprogram = "m.prg"\nstart = true\n', {"m.prg": program})
     world.run_to(100 * MILLISECOND)
     assert stack(world.programs["m"], world.now) == [("WORK", 4)]
-    world.machines["m"].set_pin("IN1", 1.0, world.now)
+    world.controllers["m"].set_pin("IN1", 1.0, world.now)
     world.run_to(300 * MILLISECOND)
     assert stack(world.programs["m"], world.now) == [("INT_IN1", 8), ("WORK", 4)]
 
@@ -181,7 +181,7 @@ def test_variables_are_read_and_set() -> None:
     chip.set_variable("register3", 77, world.now)
     assert mic.variables(world.now) == {"n": 7.5}
     assert chip.variables(world.now)["register3"] == 77.0
-    world.machines["m"].set_pin("IN2", 1.0, world.now)
+    world.controllers["m"].set_pin("IN2", 1.0, world.now)
     world.run_to(200 * MILLISECOND)
     assert mic.variables(world.now)["n"] > 8.0
     with pytest.raises(Misuse, match="no variable 'x': there are n"):
@@ -206,8 +206,8 @@ def test_a_command_that_was_overwritten_comes_from_no_text() -> None:
     chip = world.programs["c"]
     assert chip.place(0) == Place("program", 0)
     assert chip.place(1) is None  # inside a command
-    machine = world.m1486["c"].chip
-    machine.memory.reset()
+    controller = world.m1486["c"].chip
+    controller.memory.reset()
     assert chip.place(0) is None
 
 
@@ -219,7 +219,7 @@ def test_following_statements_does_not_change_what_happens() -> None:
         world.run_to(2 * SECOND)
     assert followed.trace.digest() == plain.trace.digest()
     _, events = following.take()
-    assert {("c", "program: line 4"), ("m", "program 0: line 1")} <= {(event.machine, event.payload.text) for event in events}
+    assert {("c", "program: line 4"), ("m", "program 0: line 1")} <= {(event.controller, event.payload.text) for event in events}
     following.close()
     assert not followed.m1486["c"].chip.program._hooks
     assert not followed.mic488["m"].device.program.interpreter._hooks
@@ -260,10 +260,10 @@ def test_names_of_a_wbc_program_mean_what_they_mean_to_its_statements() -> None:
     assert names == {
         "X": 2.5, "x": 2.5, "Speed": 60.0, "GO": 0.0, "$D4": 70000.0, "OUT1": 0.0, "RISFALL": 3.0, "y": None, "@HOME": None,
     }  # fmt: skip
-    world.machines["m"].set_pin("IN6", 1.0, world.now)
+    world.controllers["m"].set_pin("IN6", 1.0, world.now)
     world.run_to(120 * MILLISECOND)
     assert programs.read("go", world.now) == 1.0  # after the 10 ms of its filter
-    world.machines["m"].set_pin("IN7", 1.0, world.now)
+    world.controllers["m"].set_pin("IN7", 1.0, world.now)
     world.run_to(200 * MILLISECOND)
     assert programs.stack(world.now) == ()  # the program has ended
     assert programs.read("speed", world.now) is None
@@ -274,7 +274,7 @@ def test_names_of_an_m1486_are_its_pins_and_points() -> None:
     world = two()
     chip = world.programs["c"]
     world.run_to(100 * MILLISECOND)
-    world.machines["c"].set_pin("B3", 0.0, world.now)
+    world.controllers["c"].set_pin("B3", 0.0, world.now)
     names = {name: chip.read(name, world.now) for name in ("b3", "B4", "Variable", "register1", "U20", "lamp")}
     variable = chip.variables(world.now)["variable"]
     assert names == {"b3": 0.0, "B4": 1.0, "Variable": variable, "register1": 0.0, "U20": float(ord("B")), "lamp": None}
@@ -313,12 +313,12 @@ def test_a_chip_without_a_text_of_its_own(text: str | None) -> None:
     assert (list(chip.reached("program", [0])), chip.stack(0), chip.depth()) == ([], [], 0)
 
 
-@pytest.mark.parametrize("machine", ["m", "c"])
-def test_a_hook_at_places_is_called_there_as_one_at_all_statements(machine: str) -> None:
+@pytest.mark.parametrize("controller", ["m", "c"])
+def test_a_hook_at_places_is_called_there_as_one_at_all_statements(controller: str) -> None:
     found: dict[bool, list[tuple[int, Place | None]]] = {True: [], False: []}
     for at_all, mine in found.items():
         world = two()
-        programs = world.programs[machine]
+        programs = world.programs[controller]
         (text,) = programs.texts
         place = Place(text, list(programs.labels(text).values())[-1])
         wanted = {Place(text, number) for number in range(3)} | {place}

@@ -8,10 +8,10 @@ from collections.abc import Mapping
 
 import pytest
 
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse, Refusal, SourceErrors
 from steptwin.files.session import session_of
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 from steptwin.mic488.config import read_config
 from steptwin.mic488.inifile import IniFile
 from steptwin.simulation.kinds.m1486.kind import M1486
@@ -93,11 +93,11 @@ def test_names_of_positions_are_those_of_the_table_of_the_bank() -> None:
 )
 def test_what_is_wrong_is_refused_and_nothing_changes(place: str, text: str, error: type[Exception], message: str) -> None:
     there = world()
-    before = there.machines["table"].snapshot()
+    before = there.controllers["table"].snapshot()
     with pytest.raises(error) as refused:
         there.apply_input(Download("table", place, text))
     assert str(refused.value).startswith(message)
-    assert there.machines["table"].snapshot() == before
+    assert there.controllers["table"].snapshot() == before
     assert not there.inputs
 
 
@@ -184,7 +184,7 @@ def test_an_eeprom_takes_its_time_and_keeps_the_program() -> None:
 
 
 @pytest.mark.parametrize(
-    ("machine", "text", "error", "message"),
+    ("controller", "text", "error", "message"),
     [
         ("alone", "f640\n", Refusal, "alone is on no line, so nothing can be typed to it"),
         ("drum", "; nothing\n", Misuse, "program has no commands"),
@@ -192,10 +192,10 @@ def test_an_eeprom_takes_its_time_and_keeps_the_program() -> None:
         ("drum", "x3\nf640\n", Misuse, "X3 cannot be stored: a program to switch on with is one file for one chip"),
     ],
 )
-def test_what_a_chip_does_not_take(machine: str, text: str, error: type[Exception], message: str) -> None:
+def test_what_a_chip_does_not_take(controller: str, text: str, error: type[Exception], message: str) -> None:
     there = world()
     with pytest.raises(error) as refused:
-        there.apply_input(Download(machine, "program", text))
+        there.apply_input(Download(controller, "program", text))
     assert str(refused.value).startswith(message)
 
 
@@ -215,7 +215,7 @@ def test_a_chip_that_is_shut_down_receives_nothing(is_off: bool) -> None:
 def test_statements_are_those_of_the_present_texts() -> None:
     there = world()
     seen: list[tuple[str, str, object]] = []
-    follower = StatementFollower(there.programs, lambda record: seen.append((record.machine, record.subject, record.value)))
+    follower = StatementFollower(there.programs, lambda record: seen.append((record.controller, record.subject, record.value)))
     there.apply_input(Download("drum", "program", "; two\n\nf640\nr\n"))
     there.apply_input(Download("table", "program 3", "\n\nDELAY 0.5\n"))
     there.apply_input(do.Write((("table", "PROG_BANK_SEL", 3.0),)))
@@ -239,7 +239,7 @@ def test_the_texts_of_all_controllers() -> None:
     """Banks 0 to 5 of the MIC488 with firmware 1.70 (MIC-28), the one program of each chip."""
     rows = WorldPrograms(configured()).list()
     places = [*(f"program {bank}" for bank in range(6)), *(f"positions {bank}" for bank in range(6))]
-    assert [(row["machine"], row["place"]) for row in rows] == [
+    assert [(row["controller"], row["place"]) for row in rows] == [
         *(("table", place) for place in places), ("drum", "program"), ("feeder", "program"), ("alone", "program"),
     ]  # fmt: skip
     assert [(row["place"], row["name"]) for row in rows if not row["empty"]] == [("program 0", "a.prg"), ("positions 0", "p.csv")]

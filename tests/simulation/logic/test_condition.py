@@ -8,8 +8,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.motion import MotionState, plan_position
 from steptwin.simulation.logic.condition import Border, SignalCondition, crossing
 from steptwin.simulation.logic.expression import parse_condition

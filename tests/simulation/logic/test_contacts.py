@@ -13,8 +13,8 @@ from mic488_rig import controller
 from pulse_by_pulse import changes
 from toy import ToyAxis
 
+from steptwin.controller import MILLISECOND, SECOND, PinEdge
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, SECOND, PinEdge
 from steptwin.mic488.config import AxisConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.motion import MotionState, Profile, plan_position
@@ -215,7 +215,7 @@ def test_the_level_of_an_input_is_that_of_its_contacts_at_rest_and_of_the_switch
         scheduler.add_part(switch)
         circuit.close()
         scheduler.settle()
-        assert (scheduler.machines["m"].pins()[pin], switch.on, switch.deadline()) == (level, True, None)
+        assert (scheduler.controllers["m"].pins()[pin], switch.on, switch.deadline()) == (level, True, None)
 
 
 @given(

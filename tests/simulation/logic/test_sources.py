@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mic488_rig import controller
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.mic488.device import Mic488Device
 from steptwin.simulation.logic.sources import AnalogSource, ConstantWaveform, SineWaveform, TableWaveform, Waveform
 from steptwin.simulation.scheduler.scheduler import Scheduler

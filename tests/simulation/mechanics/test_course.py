@@ -9,7 +9,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from pulse_by_pulse import changes, pulse_by_pulse
 
-from steptwin.machine import SECOND, Nanos
+from steptwin.controller import SECOND, Nanos
 from steptwin.motion import MotionState, Profile, plan_position
 from steptwin.motion.divisions import Microstepping, step_train
 from steptwin.motion.profile import cruise

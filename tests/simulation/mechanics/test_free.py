@@ -11,7 +11,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from steptwin.machine import SECOND, Nanos
+from steptwin.controller import SECOND, Nanos
 from steptwin.motion import Profile
 from steptwin.simulation.mechanics.free import FreeMotion, slow_from
 from steptwin.simulation.mechanics.wells import Wells

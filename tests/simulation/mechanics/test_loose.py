@@ -7,7 +7,7 @@ from math import inf
 
 import pytest
 
-from steptwin.machine import MILLISECOND, SECOND, Nanos
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.motion import MotionState, Profile, at_rest, plan_position, plan_stop
 from steptwin.motion.profile import cruise
 from steptwin.simulation.mechanics.course import Build, Course, MechanicalState

@@ -11,9 +11,9 @@ from mic488_rig import controller
 from pulse_by_pulse import pulse_by_pulse
 from toy import Driven
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.status import AxisStatus
 from steptwin.motion import MotionState, plan_position
@@ -348,7 +348,7 @@ def test_the_trace_is_told_where_the_load_is_only_when_it_does_not_go_with_its_d
     drive.go(70, 10 * SECOND)
     scheduler.advance(20 * SECOND)
     loads = [record for record in told if record.kind == "load"]
-    assert [(record.machine, record.subject) for record in loads] == [("m", "1")] * len(loads)
+    assert [(record.controller, record.subject) for record in loads] == [("m", "1")] * len(loads)
     met = plan_position(MotionState(0, 0, 0.0, 0.0), 100, 500.0, 500.0, 200.0)
     held = met.pulse_time(56, 0)
     assert held is not None

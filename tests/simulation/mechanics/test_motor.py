@@ -11,8 +11,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from motor_rig import INERTIA, PER_REV, accelerated, at_speed, final, motor
 
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND
 from steptwin.motion import MotionState, Segment, plan_position, plan_velocity
 from steptwin.motion.ramps import SpeedCurve, plan_endless
 from steptwin.simulation.mechanics.course import Build, Course, MechanicalState

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from toy import Bare
 
-from steptwin.machine import Nanos, PinEdge
+from steptwin.controller import Nanos, PinEdge
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.wires import PinName, Wire
 
@@ -62,7 +62,7 @@ class Told:
 
 
 @pytest.mark.parametrize("attentive", [False, True])
-def test_of_a_machine_alone(attentive: bool) -> None:
+def test_of_a_controller_alone(attentive: bool) -> None:
     scheduler, plain, leaving, other = Scheduler(), Told(), Told(), Told()
     scheduler.add("m", Clock(10, 20, 20, 30))
     scheduler.is_attentive = attentive
@@ -75,7 +75,7 @@ def test_of_a_machine_alone(attentive: bool) -> None:
     assert leaving.take() == ([10, 20], [10, 20, 25])
     scheduler.advance(25)
     assert leaving.take() == ([], [])
-    scheduler.machines["m"].set_pin("A", 1.0, 25)
+    scheduler.controllers["m"].set_pin("A", 1.0, 25)
     scheduler.settle()
     assert (plain.take(), leaving.take()) == (([25], []), ([25], []))
     scheduler.unfollow(plain)
@@ -87,7 +87,7 @@ def test_of_a_machine_alone(attentive: bool) -> None:
     assert leaving.take() == ([], [])
 
 
-def test_of_machines_that_are_joined() -> None:
+def test_of_controllers_that_are_joined() -> None:
     scheduler, one, two, both = Scheduler(), Told(), Told(), Told()
     scheduler.add("a", Clock(10, 30))
     scheduler.add("b", Clock(20))
@@ -102,7 +102,7 @@ def test_of_machines_that_are_joined() -> None:
     assert two.take() == ([10, 20, 30], [10, 20, 30, 50])  # the wire changes its input
     assert both.take() == ([10, 20, 30], [])
     scheduler.unfollow(two)
-    scheduler.machines["b"].set_pin("A", 0.0, 50)
+    scheduler.controllers["b"].set_pin("A", 0.0, 50)
     scheduler.settle()
     assert (one.take(), two.take(), both.take()) == (([], []), ([], []), ([50], []))
     scheduler.advance(80)

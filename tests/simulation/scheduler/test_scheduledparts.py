@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.simulation.scheduler.scheduledparts import ScheduledParts
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.state import Plain

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from mic488_rig import Rig, controller
 from toy import Bare, ToyAxis
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos, PinEdge
 from steptwin.errors import Misuse, Runaway, TimeReversal
-from steptwin.machine import MILLISECOND, SECOND, Nanos, PinEdge
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.motion import MotionState, Profile, at_rest, plan_position, plan_velocity
@@ -122,7 +122,7 @@ def test_a_wire_carries_the_level_there_is_when_it_is_connected() -> None:
     assert other.pins()["IN6"] == 0.0
 
 
-def test_an_output_may_drive_several_inputs_and_its_own_machine() -> None:
+def test_an_output_may_drive_several_inputs_and_its_own_controller() -> None:
     scheduler, one, other = two_controllers()
     for target in ("other.IN1", "other.IN2", "one.IN7"):
         scheduler.connect(wire("one.M1_EN", target))
@@ -131,7 +131,7 @@ def test_an_output_may_drive_several_inputs_and_its_own_machine() -> None:
     assert (other.pins()["IN1"], other.pins()["IN2"], one.pins()["IN7"]) == (1.0, 1.0, 1.0)
 
 
-def test_edges_travel_along_a_chain_with_the_delays_of_its_machines() -> None:
+def test_edges_travel_along_a_chain_with_the_delays_of_its_controllers() -> None:
     scheduler = Scheduler()
     relays = [Relay(3 * MILLISECOND), Relay(), Relay(4 * MILLISECOND)]
     seen: list[tuple[str, PinEdge]] = []
@@ -181,7 +181,7 @@ def test_time_cannot_go_back() -> None:
     assert caught.value.args == TimeReversal(100, 99).args
 
 
-def test_a_machine_joins_at_the_time_of_the_scheduler() -> None:
+def test_a_controller_joins_at_the_time_of_the_scheduler() -> None:
     scheduler = Scheduler(SECOND)
     late, early = Mic488Device(ControllerConfig()), Mic488Device(ControllerConfig())
     scheduler.add("late", late)
@@ -189,7 +189,7 @@ def test_a_machine_joins_at_the_time_of_the_scheduler() -> None:
     early.advance(2 * SECOND)
     with pytest.raises(TimeReversal):
         scheduler.add("early", early)
-    assert list(scheduler.machines) == ["late"]
+    assert list(scheduler.controllers) == ["late"]
 
 
 def test_the_deadline_is_the_earliest_of_all() -> None:
@@ -209,7 +209,7 @@ def test_the_deadline_is_the_earliest_of_all() -> None:
     assert dues == [3, 5, 9]
 
 
-def test_a_machine_takes_the_place_of_another_with_what_it_has_to_do() -> None:
+def test_a_controller_takes_the_place_of_another_with_what_it_has_to_do() -> None:
     scheduler = Scheduler()
     scheduler.add("a", Relay())
     scheduler.add("b", Relay())
@@ -340,7 +340,7 @@ def test_switches_show_where_the_axis_is_at_any_moment(
     ("source", "target", "message"),
     [
         ("one.OUT9", "other.IN1", "'one' has no pin 'OUT9': pins are IN1, IN2"),
-        ("one.OUT1", "third.IN1", "no machine 'third': there are one, other"),
+        ("one.OUT1", "third.IN1", "no controller 'third': there are one, other"),
         ("one.OUT1", "other.OUT1", "no input pin 'OUT1': inputs are IN1 to IN20"),
     ],
 )
@@ -354,7 +354,7 @@ def test_wires_between_what_is_not_there_are_misuse(source: str, target: str, me
 
 
 @pytest.mark.parametrize(
-    ("machine", "axis", "pin", "message"),
+    ("controller", "axis", "pin", "message"),
     [
         ("one", 5, "IN1", "no axis 5 of 'one', which has 4 axes"),
         ("one", 0, "IN1", "no axis 0 of 'one', which has 4 axes"),
@@ -363,10 +363,10 @@ def test_wires_between_what_is_not_there_are_misuse(source: str, target: str, me
         ("one", 1, "OUT1", "no input pin 'OUT1'"),
     ],
 )
-def test_switches_where_nothing_is_are_misuse(machine: str, axis: int, pin: str, message: str) -> None:
+def test_switches_where_nothing_is_are_misuse(controller: str, axis: int, pin: str, message: str) -> None:
     scheduler, _, _ = two_controllers()
     with pytest.raises(Misuse, match=message):
-        place(scheduler, PositionSwitch(machine, axis, None, 10, PinName("one", pin)))
+        place(scheduler, PositionSwitch(controller, axis, None, 10, PinName("one", pin)))
     scheduler.advance(SECOND)
 
 
@@ -377,7 +377,7 @@ def test_a_switch_turned_inside_out_is_misuse() -> None:
 
 def test_names_are_given_once() -> None:
     scheduler, one, _ = two_controllers()
-    with pytest.raises(Misuse, match="there is a machine 'one' already"):
+    with pytest.raises(Misuse, match="there is a controller 'one' already"):
         scheduler.add("one", one)
 
 
@@ -385,10 +385,10 @@ def test_a_scheduler_in_which_nothing_has_changed_is_settled() -> None:
     scheduler = Scheduler()
     assert not scheduler.stale
     assert scheduler.deadline() is None
-    with pytest.raises(Misuse, match="no machine 'x': there are none"):
+    with pytest.raises(Misuse, match="no controller 'x': there are none"):
         scheduler.replace("x", Relay())
     scheduler.add("a", Relay())
-    with pytest.raises(Misuse, match="no machine 'x': there are a"):
+    with pytest.raises(Misuse, match="no controller 'x': there are a"):
         scheduler.replace("x", Relay())
     with pytest.raises(Misuse, match=r"wire to a\.A: a delay of -1 ns is negative"):
         Wire(PinName("a", "B"), PinName("a", "A"), delay=-1)
@@ -405,7 +405,7 @@ def test_each_event_is_told_with_its_scheduler() -> None:
     for scheduler in (alone, joined):
         scheduler.settle()
         scheduler.on_change = lambda one: told.append((one, one.now))
-        scheduler.machines["a"].set_pin("A", 1.0, scheduler.now)
+        scheduler.controllers["a"].set_pin("A", 1.0, scheduler.now)
         assert told == [(scheduler, scheduler.now)]
         told.clear()
         scheduler.settle()
@@ -421,7 +421,7 @@ def test_each_event_is_told_with_its_scheduler() -> None:
         told.clear()
 
 
-def test_a_machine_that_says_nothing_of_its_edges_is_looked_at() -> None:
+def test_a_controller_that_says_nothing_of_its_edges_is_looked_at() -> None:
     class Silent(Relay):
         """Its hook is not called by itself."""
 
@@ -439,12 +439,12 @@ def test_a_machine_that_says_nothing_of_its_edges_is_looked_at() -> None:
     scheduler.connect(wire("a.B", "b.A"))
     scheduler.settle()
     for name in ("loud", "a"):
-        scheduler.machines[name].set_pin("A", 1.0, 0)
+        scheduler.controllers[name].set_pin("A", 1.0, 0)
     scheduler.advance(30)
-    assert [scheduler.machines[name].pin("B") for name in ("a", "b")] == [0.0, 1.0]
+    assert [scheduler.controllers[name].pin("B") for name in ("a", "b")] == [0.0, 1.0]
 
 
-def test_an_input_that_its_machine_changes_is_recorded_once_and_so_is_what_drives_it_then() -> None:
+def test_an_input_that_its_controller_changes_is_recorded_once_and_so_is_what_drives_it_then() -> None:
     found: list[TraceRecord] = []
     scheduler, relay, target = Scheduler(record=found.append), Relay(), PinName("a", "A")
     scheduler.add("a", relay)
@@ -466,7 +466,7 @@ def test_a_snapshot_has_what_a_change_leads_to() -> None:
         scheduler.add(name, Relay())
     scheduler.connect(wire("a.B", "b.A"))
     scheduler.settle()
-    scheduler.machines["a"].set_pin("A", 1.0, 0)
+    scheduler.controllers["a"].set_pin("A", 1.0, 0)
     assert scheduler.snapshot().levels == {PinName("b", "A"): 0.0}
 
 

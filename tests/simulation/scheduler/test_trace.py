@@ -16,19 +16,19 @@ GRIDS = Microstepping(8, 64, 1500.0)
 
 def test_records_of_several_machines_are_merged_by_time_then_order_of_the_machines_then_sequence() -> None:
     trace = Trace(["b", "a"])
-    for time, machine, subject in [(1, "a", "1"), (3, "a", "2"), (3, "a", "3"), (1, "b", "4"), (2, "b", "5"), (3, "b", "6")]:
-        trace.add(TraceRecord(time, machine, "event", subject, ""))
+    for time, controller, subject in [(1, "a", "1"), (3, "a", "2"), (3, "a", "3"), (1, "b", "4"), (2, "b", "5"), (3, "b", "6")]:
+        trace.add(TraceRecord(time, controller, "event", subject, ""))
     assert [record.subject for record in trace] == ["4", "1", "5", "6", "2", "3"]
     assert [record.subject for record in trace.events("a")] == ["1", "2", "3"]
     assert list(trace.events("no such machine")) == []
 
 
-def test_records_of_machines_that_are_advanced_together_are_read_in_the_order_in_which_they_came() -> None:
+def test_records_of_controllers_that_are_advanced_together_are_read_in_the_order_in_which_they_came() -> None:
     """A cause stands before its effect at the same nanosecond, whatever the order of their controllers in the description."""
 
     def take(trace: Trace, *records: tuple[int, str, str]) -> None:
-        for time, machine, subject in records:
-            trace.add(TraceRecord(time, machine, "event", subject, ""))
+        for time, controller, subject in records:
+            trace.add(TraceRecord(time, controller, "event", subject, ""))
 
     def subjects(trace: Trace) -> str:
         return "".join(record.subject for record in trace)
@@ -45,7 +45,7 @@ def test_records_of_machines_that_are_advanced_together_are_read_in_the_order_in
     assert [record.subject for record in trace.events("cause")] == ["a", "d", "f"]
 
 
-def test_the_digest_does_not_depend_on_the_order_in_which_independent_machines_were_advanced() -> None:
+def test_the_digest_does_not_depend_on_the_order_in_which_independent_controllers_were_advanced() -> None:
     records = [TraceRecord(t, m, "edge", "OUT1", float(t % 2)) for m in ("a", "b") for t in range(5)]
     one, other = Trace(["a", "b"]), Trace(["a", "b"])
     for record in records:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 from steptwin.simulation.kinds.kind import MotionEnds
 from steptwin.simulation.kinds.registry import M1486, MIC488
 from steptwin.simulation.script import steps as do

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
+from steptwin.controller import SECOND
 from steptwin.diagnostics import Fix, Span
 from steptwin.errors import Misuse, SourceErrors
-from steptwin.machine import SECOND
 from steptwin.simulation.toml.names import Unknown
 from steptwin.simulation.toml.reader import FILE_ERRORS, MOST_FINDINGS, TomlText, WorldError
 from steptwin.simulation.toml.tomlplaces import Path
@@ -77,8 +77,8 @@ from steptwin.simulation.toml.values import (
         (points, [3], r"expected \[\[x, y\], \[x, y\], \.\.\.\]"),
         (pin_name, "table.in3", ("table", "IN3")),
         (pin_name, "a.b.c", ("a", "B.C")),
-        (pin_name, ".in3", r"'\.in3': expected MACHINE\.PIN, such as 'table\.IN3'"),
-        (pin_name, "table.", r"'table\.': expected MACHINE\.PIN"),
+        (pin_name, ".in3", r"'\.in3': expected CONTROLLER\.PIN, such as 'table\.IN3'"),
+        (pin_name, "table.", r"'table\.': expected CONTROLLER\.PIN"),
         (pin_name, "table", "'table': expected"),
         (pin_name, 3, "3: expected"),
     ],

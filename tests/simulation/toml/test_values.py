@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND
 from steptwin.simulation.toml.values import (
     MOST,
     OUTPUT,

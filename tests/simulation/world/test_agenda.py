@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
-from tests.support.toy.machine import Bare
+from tests.support.toy.controller import Bare
 
 from steptwin.errors import Misuse
 from steptwin.simulation.scheduler.scheduler import Scheduler

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from m1486_programs import permitted_programs
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.files.world import World
 from steptwin.m1486.syntax import format_program
 from steptwin.m1486.variants import variant
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.eventpoints import EventPoints, points_of, stays_between_events
 

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.script.steps import Set, Write
 from steptwin.simulation.world import history as module
 from steptwin.simulation.world.history import History, Past, PastState
@@ -40,7 +40,13 @@ def make() -> World:
 
 def shown(world: Simulation) -> tuple[object, ...]:
     found = world.snapshot(with_inputs=False)
-    return world.now, world.machine("m").pins(), world.read("m.M1.position"), world.read("m.M1.velocity"), repr(found.schedulers)
+    return (
+        world.now,
+        world.controller("m").pins(),
+        world.read("m.M1.position"),
+        world.read("m.M1.velocity"),
+        repr(found.schedulers),
+    )
 
 
 def states(history: History) -> list[PastState]:
@@ -136,7 +142,7 @@ def test_inputs_are_bounded_and_the_oldest_states_go_with_them(monkeypatch: pyte
         history.inputs_from(0)
     past = Past(history)
     assert go(past, 1_600_000_000).now == history.begin
-    assert go(past, 2_500_000_000).machine("m").pins()["IN3"] == 0.0
+    assert go(past, 2_500_000_000).controller("m").pins()["IN3"] == 0.0
     for count in range(25):  # more than may be kept, and no state among them
         world.apply_input(Set((("m", "IN3", float(count % 2)),)))
     assert (len(history), history.begin) == (0, world.now)
@@ -173,13 +179,13 @@ def test_what_is_undone_is_no_past() -> None:
     world.apply_input(Set((("m", "IN3", 1.0),)))
     world.run(for_=1)
     past = Past(history)
-    assert go(past, 2 * SECOND).machine("m").pins()["IN3"] == 1.0
+    assert go(past, 2 * SECOND).controller("m").pins()["IN3"] == 1.0
     world.restore(snapshot)
     history.gone_back()
     with pytest.raises(Misuse, match="from 0 s to 1 s"):
         go(past, 2 * SECOND)
     world.run(for_=1)
-    assert go(past, 2 * SECOND).machine("m").pins()["IN3"] == 0.0
+    assert go(past, 2 * SECOND).controller("m").pins()["IN3"] == 0.0
 
 
 def test_the_world_can_go_back_to_what_is_looked_at_and_its_digest_with_it() -> None:
@@ -255,7 +261,7 @@ def test_what_a_snapshot_that_goes_had_seen_changed_stays_with_the_next(monkeypa
         world.settle_all()
         history.take()
     assert len(history) == 16
-    changed = [name for state in states(history) for machine, name in state.changed if name.startswith("IN")]
+    changed = [name for state in states(history) for controller, name in state.changed if name.startswith("IN")]
     assert sorted(changed) == sorted(f"IN{count + 1}" for count in range(20))
 
 
@@ -292,10 +298,10 @@ def test_nothing_watches_the_trace_after_the_end() -> None:
     assert followers is None or not followers.by_name["m"]
 
 
-@pytest.mark.parametrize(("machines", "most"), [(1, 60), (2, 30), (3, 20), (5, 16)])
-def test_a_world_of_more_controllers_keeps_fewer_snapshots(monkeypatch: pytest.MonkeyPatch, machines: int, most: int) -> None:
+@pytest.mark.parametrize(("controllers", "most"), [(1, 60), (2, 30), (3, 20), (5, 16)])
+def test_a_world_of_more_controllers_keeps_fewer_snapshots(monkeypatch: pytest.MonkeyPatch, controllers: int, most: int) -> None:
     monkeypatch.setattr(module, "MOST_CONTROLLER_STATES", 60)
-    world = World.from_toml("".join(f'[[mic488]]\nname = "m{n}"\n' for n in range(machines)), keep_inputs=False)
+    world = World.from_toml("".join(f'[[mic488]]\nname = "m{n}"\n' for n in range(controllers)), keep_inputs=False)
     history = History(world)
     for _ in range(most + 2):
         world.run(for_=0.001)
@@ -317,7 +323,7 @@ def test_what_a_past_knows_of_its_place() -> None:
     assert not past.is_in_step
     for _ in past.go_on(world.now):
         pass
-    assert (past.is_in_step, past.lacks_inputs, past.world.machine("m").pins()["IN3"]) == (True, False, 1.0)
+    assert (past.is_in_step, past.lacks_inputs, past.world.controller("m").pins()["IN3"]) == (True, False, 1.0)
     past.forget()
     assert not past.is_in_step
     assert not past.world.notes_inputs  # its own inputs are kept by nobody
@@ -347,7 +353,7 @@ def test_what_is_undone_in_its_own_moment_is_gone_too() -> None:
     history.gone_back()
     assert (history.kept_inputs, history.inputs_so_far, len(history)) == (0, 0, 2)
     assert history.state_at(SECOND).inputs == 0
-    assert go(Past(history), SECOND).machine("m").pins()["IN3"] == 0.0
+    assert go(Past(history), SECOND).controller("m").pins()["IN3"] == 0.0
 
 
 @pytest.mark.parametrize("keep", [True, False])

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from world_rig import check_it_can_be_restored
 
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 from steptwin.simulation.script.control import Enable, Home
 from steptwin.simulation.script.steps import Send
 from steptwin.simulation.toml.reader import WorldError
@@ -132,17 +132,17 @@ def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: Path) -> None:
         ('{ move = "a.M1" }', "t.toml:32.*step 2: move: give either to"),
         ('{ move = "a.M1", to = 1.0, by = 2.0 }', "move: give either to"),
         ('{ move = "a.M7", to = 1.0 }', "t.toml:32.*step 2: a.M7: a has M1, M2, M3, M4"),
-        ('{ move = "b.M1", to = 1.0 }', "no machine is called 'b'"),
+        ('{ move = "b.M1", to = 1.0 }', "no controller is called 'b'"),
         ('{ mov = "a.M1", to = 1.0 }', r"has 'mov', 'to' \(did you mean 'move'\?\)"),
         ('{ home = "a.M1" }', "step 2: home: give either velocity .* or seek"),
         ('{ home = "a.M1", velocity = -5, seek = "-B8" }', "home: give either velocity .* or seek"),
         ('{ home = "a.M1", seek = "-B8" }', "'a' is a MIC488, which knows its switches: home it with a velocity"),
         ('{ home = "a.M1", seek = "B8" }', "'B8': expected a direction and an input, such as '-B8'"),
         ('{ home = "a.M1", velocity = 0 }', "its sign chooses the switch, so it must not be 0"),
-        ('{ move = "a.M0", to = 1.0 }', "'a.M0': expected MACHINE.M1 to M4"),
-        ('{ move = "a.M٣", to = 1.0 }', "expected MACHINE.M1 to M4"),
-        pytest.param('{ move = "a.M' + "9" * 5000 + '", to = 1.0 }', "expected MACHINE.M1 to M4", id="many digits"),
-        ('{ move = "a.IN1", to = 1.0 }', "expected MACHINE.M1 to M4"),
+        ('{ move = "a.M0", to = 1.0 }', "'a.M0': expected CONTROLLER.M1 to M4"),
+        ('{ move = "a.M٣", to = 1.0 }', "expected CONTROLLER.M1 to M4"),
+        pytest.param('{ move = "a.M' + "9" * 5000 + '", to = 1.0 }', "expected CONTROLLER.M1 to M4", id="many digits"),
+        ('{ move = "a.IN1", to = 1.0 }', "expected CONTROLLER.M1 to M4"),
         ('{ move = "a.M1", to = 1e39 }', "t.toml:32.*step 2: move: 1e\\+39 mm: permitted are "),
         ('{ move = "a.M1", by = -4e7 }', "t.toml:32.*step 2: move: -4e\\+07 mm: permitted are "),
     ],

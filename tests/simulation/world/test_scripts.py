@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from world_rig import small
 
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse, Runaway
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 from steptwin.simulation.logic.condition import SignalCondition
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.script import steps as do
@@ -233,7 +233,7 @@ def test_scripts_that_watch_are_looked_at_for_what_they_watch_alone(
         assert many[name] <= 1.5 * few[name], f"{name} is called {few[name]:g} times a controller with 5, {many[name]:g} with 20"
 
 
-def test_idle_is_found_whichever_machine_comes_to_rest_last() -> None:
+def test_idle_is_found_whichever_controller_comes_to_rest_last() -> None:
     for order in ((20.0, 5.0), (5.0, 20.0)):
         world = small()
         for name, distance in zip("ab", order, strict=True):
@@ -348,7 +348,7 @@ def test_scripts_of_the_description_come_before_those_from_python() -> None:
 def test_what_is_not_there_is_named() -> None:
     with pytest.raises(Misuse) as caught:
         small("").touch("nix")
-    assert str(caught.value) == "no machine or line is called 'nix'; there are a, b, c"
+    assert str(caught.value) == "no controller or line is called 'nix'; there are a, b, c"
 
 
 def test_scripts_that_watch_are_resumed_in_their_order_also_where_one_makes_the_other_go_on() -> None:

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from world_rig import SMALL, moved, small
 
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse, TimeReversal
 from steptwin.files.world import World
-from steptwin.machine import SECOND
 from steptwin.simulation.faults import read
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.steps import Steps
@@ -22,9 +22,9 @@ from steptwin.wire.crc import with_crc
 from steptwin.wire.slave import FrameDirection
 
 
-def test_machines_that_share_nothing_are_advanced_when_somebody_looks() -> None:
+def test_controllers_that_share_nothing_are_advanced_when_somebody_looks() -> None:
     world = small()
-    assert [list(scheduler.machines) for scheduler in world.schedulers] == [["a", "b"], ["c"]]
+    assert [list(scheduler.controllers) for scheduler in world.schedulers] == [["a", "b"], ["c"]]
     world.at(3.0, do.Set((("a", "IN5", 1.0),)))
     world.advance(5 * SECOND)
     assert [scheduler.now for scheduler in world.schedulers] == [3 * SECOND, 0]
@@ -235,12 +235,12 @@ def test_what_comes_from_outside_acts_and_is_in_the_trace() -> None:
     world.apply_input(do.PowerCycle("d"))
     world.run(for_=0.1)
     assert world.m1486["d"].counter == 0
-    recorded = [(r.machine, r.subject, r.value) for r in world.trace if r.kind == "input"]
+    recorded = [(r.controller, r.subject, r.value) for r in world.trace if r.kind == "input"]
     assert recorded == [("a", "M2 turned", -7), ("d", "power-cycle", "")]
     for step, message in (
         (do.Send("bys", b"x"), r"no line is called 'bys' \(did you mean 'bus'\?\); there are bus"),
         (do.Turn("d", 1, 1), "'d' is an M1486, which has no encoder"),
-        (do.PowerCycle("e"), "no machine is called 'e'"),
+        (do.PowerCycle("e"), "no controller is called 'e'"),
         (do.Wait(1), "only scripts can execute this step"),
     ):
         with pytest.raises(Misuse, match=message):
@@ -252,8 +252,8 @@ def test_what_an_action_leads_to_happens_at_once() -> None:
     world.apply_input(do.Write((("a", "M1_EN", 1.0), ("a", "M1_POS_ABS", 60.0))))
     world.apply_input(do.Press("go"))
     happened = list(world.trace)
-    assert [r.time for r in happened if (r.machine, r.kind, r.subject) == ("b", "edge", "IN4")][-1:] == [0]
-    plan = [r for r in happened if (r.machine, r.kind, r.subject) == ("a", "plan", "1")][-1]
+    assert [r.time for r in happened if (r.controller, r.kind, r.subject) == ("b", "edge", "IN4")][-1:] == [0]
+    plan = [r for r in happened if (r.controller, r.kind, r.subject) == ("a", "plan", "1")][-1]
     assert plan.value.moving(1)  # type: ignore[attr-defined]
 
 
@@ -264,7 +264,7 @@ def test_an_encoder_that_nothing_turns_stands_still() -> None:
     world.mic488["b"].axis[1].move_to(1000.0)
     world.run(for_="10 s")
     assert (world.mic488["b"].axis[1].position, world.mic488["b"].axis[1].encoder) == (1000.0, 0)
-    assert next((r.machine, r.subject, r.value) for r in world.trace if r.kind == "input") == ("b", "M1 coupled", "free")
+    assert next((r.controller, r.subject, r.value) for r in world.trace if r.kind == "input") == ("b", "M1 coupled", "free")
 
 
 def test_a_button_that_is_pressed_again_is_not_released_by_the_first_time() -> None:
@@ -334,11 +334,11 @@ def test_whoever_watches_schedulers_sees_those_that_scripts_wait_for_as_well() -
     world = small('[[script]]\nname = "s"\nsteps = [{ until = "a.IN5" }, { until = "a.IN6" }]\n')
     world.run(for_=0.1)
     seen: list[str] = []
-    world.watch_schedulers(lambda scheduler: seen.append(next(iter(scheduler.machines))))
-    for machine, pin in (("a", "IN7"), ("c", "IN7"), ("a", "IN5"), ("a", "IN6"), ("a", "IN8")):
+    world.watch_schedulers(lambda scheduler: seen.append(next(iter(scheduler.controllers))))
+    for controller, pin in (("a", "IN7"), ("c", "IN7"), ("a", "IN5"), ("a", "IN6"), ("a", "IN8")):
         seen.clear()
-        world.apply_input(do.Set(((machine, pin, 1.0),)))
-        assert set(seen) == {machine}, pin
+        world.apply_input(do.Set(((controller, pin, 1.0),)))
+        assert set(seen) == {controller}, pin
         world.run(for_=0.1)
 
 
@@ -425,7 +425,7 @@ def test_a_record_of_a_vision_system_reaches_its_controller() -> None:
     world.apply_input(See("t", 2.0, 12.5, -3.0, 90.0))
     assert before == []
     (record,) = [record for record in world.trace if record.kind == "input"]
-    assert (record.machine, record.subject, record.value) == ("t", "vision", (2.0, 12.5, -3.0, 90.0))
+    assert (record.controller, record.subject, record.value) == ("t", "vision", (2.0, 12.5, -3.0, 90.0))
     assert world.mic488["t"].device.program.registers.vision.tolist() == [1.0, 2.0, 12.5, -3.0, 90.0]
 
 

@@ -24,7 +24,7 @@ from steptwin.drivers.kinds import DRIVERS, register
 from steptwin.drivers.place import parse_line_address
 from steptwin.drivers.tcp import Channel
 from steptwin.errors import LineFailure, Misuse, Refusal
-from toy.machine import STEP_P
+from toy.controller import STEP_P
 
 PATIENCE_S = 5.0
 BAUD = 9600

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
-from steptwin.simulation.faults import AxisLoad, FaultKind, FaultyMachine, Occasion
+from steptwin.simulation.faults import AxisLoad, FaultKind, FaultyController, Occasion
 
 
 class ToyBody:
@@ -21,7 +21,7 @@ class ToyBody:
     def show_master_error(self, shown: bool, now: Nanos) -> None:
         raise AssertionError("a toy lacks this")
 
-    def watch(self, owner: FaultyMachine) -> None:
+    def watch(self, owner: FaultyController) -> None:
         """It keeps nothing, and serves no requests that could be refused."""
 
     def pin_name(self, pin: str) -> str:

@@ -6,12 +6,13 @@ from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 
+from steptwin.controller import ControllerEvent, Nanos
 from steptwin.controllerstate import DetailRow, StateAxis, StateProgram, StateReader, StateStatus
 from steptwin.datasheet import Access, AxisDescription, Datasheet, Detail, FactType, Pin, PinDirection, Point, PointEffect
 from steptwin.errors import Misuse, Refusal
-from steptwin.machine import MachineEvent, Nanos
 from steptwin.points import LivePoint, turns_of
 from steptwin.simulation.faults import AxisLoad, Faults
+from steptwin.simulation.kinds.controllerview import ControllerView
 from steptwin.simulation.kinds.kind import (
     BuildContext,
     ControllerKind,
@@ -24,7 +25,6 @@ from steptwin.simulation.kinds.kind import (
     Terminals,
 )
 from steptwin.simulation.kinds.links import LineSpec
-from steptwin.simulation.kinds.machineview import MachineView
 from steptwin.simulation.kinds.registry import KINDS, register
 from steptwin.simulation.mechanics.lanes import AxisLane, plain_view
 from steptwin.simulation.mechanics.scale import FULL_STEPS, DriveScale, GivenScale
@@ -36,9 +36,9 @@ from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import whole
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection as Way
+from toy.controller import STEP_P, Toy
 from toy.faults import ToyBody
 from toy.line import ToyLine
-from toy.machine import STEP_P, Toy
 
 
 @table("[[toy]]")
@@ -46,7 +46,7 @@ class ToySpec(ControllerSpec):
     steps: int = key(whole(1, 10), "for nothing", default=10)
 
 
-class ToyView(MachineView):
+class ToyView(ControllerView):
     def __init__(self, simulation: RunningWorld, name: str, toy: Toy) -> None:
         super().__init__(simulation, name)
         self._toy = toy
@@ -142,7 +142,7 @@ class ToyLines(LineKind[Toy, ToyLine]):
     ) -> ToyLine:
         if len(members) != 1:
             raise Misuse("a toy is alone on its line")
-        return ToyLine(scheduler, spec.name, members[0].machine, faults, record)
+        return ToyLine(scheduler, spec.name, members[0].controller, faults, record)
 
     def words(self, line: ToyLine, prefix: str, sink: Callable[[FrameLine], None]) -> ToyWords:
         return ToyWords(line, prefix, sink)
@@ -182,7 +182,7 @@ class ToyKind(ControllerKind[ToySpec, Toy, ToyView]):
     def body(self, toy: Toy, service: LineUnit, shafts: Mapping[int, AxisLoad]) -> ToyBody:
         return ToyBody(shafts.values())
 
-    def watch_events(self, toy: Toy, call: Callable[[MachineEvent], None]) -> None:
+    def watch_events(self, toy: Toy, call: Callable[[ControllerEvent], None]) -> None:
         """It reports nothing."""
 
     def keeps_memory(self, toy: Toy) -> bool:
@@ -222,7 +222,7 @@ class ToyKind(ControllerKind[ToySpec, Toy, ToyView]):
         return do.Send(line, b"M" + int(number).to_bytes(signed=True))
 
     def stop_axes(self, toy: Toy, line: str | None, command: StopAxes) -> Halt:
-        return Halt(command.machine, command.axis)
+        return Halt(command.controller, command.axis)
 
     def halt(self, toy: Toy, wanted: Halt, now: Nanos) -> None:
         toy.halt(now)

@@ -6,7 +6,7 @@ from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
 from typing import ClassVar
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.components.registry import forget, register
@@ -24,7 +24,7 @@ from steptwin.state import Stateful
 @table("[[lamp]]")
 class LampSpec(NamedSpec):
     name: str = key(name_value, "how conditions and faults name it")
-    source: Terminal = key(pin_name, "the output: MACHINE.PIN", name="from")
+    source: Terminal = key(pin_name, "the output: CONTROLLER.PIN", name="from")
     inverted: bool = key(flag, "whether it is lit while the output is off", default=False)
     warms: Nanos = key(time_value, "how long it needs to light up", default=0)
 
@@ -45,7 +45,7 @@ class Lamp(Stateful):
         self.lit = False
 
     def update(self, now: Nanos) -> None:
-        level = self.scheduler.machines[self.source.machine].pin(self.source.pin)
+        level = self.scheduler.controllers[self.source.controller].pin(self.source.pin)
         is_on = bool(level) is not self._spec.inverted
         if is_on is not self._is_on:
             self._is_on = is_on
@@ -61,7 +61,7 @@ class Lamp(Stateful):
     def _show(self, lit: bool) -> None:
         if lit is not self.lit:
             self.lit = lit
-            self.scheduler.report(self.source.machine, "edge", self._spec.name, float(lit))
+            self.scheduler.report(self.source.controller, "edge", self._spec.name, float(lit))
 
     def deadline(self) -> Nanos | None:
         return self._due

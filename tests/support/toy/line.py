@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.simulation.faults import Faults
 from steptwin.simulation.faults import LineProtocol as FaultLine
 from steptwin.simulation.kinds.lines import Line, LineEndPoint
@@ -13,7 +13,7 @@ from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import RecordSink
 from steptwin.state import Stateful
 from steptwin.wire.slave import FrameDirection
-from toy.machine import Toy
+from toy.controller import Toy
 
 
 class ToyPort(Stateful):

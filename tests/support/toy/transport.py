@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import cast
 
+from steptwin.controller import Port
 from steptwin.live.links import Feed
 from steptwin.live.transports import LinkArguments, OpenLink, Transport, forget, register
-from steptwin.machine import Port
 from steptwin.simulation.kinds.links import LinkKey
 from steptwin.simulation.toml.reader import Key
 from steptwin.simulation.toml.values import text_value

@@ -38,7 +38,7 @@ from steptwin.campaign.properties.tree import (
     PropertyFormula,
     Tally,
 )
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.simulation.logic.expression import COMPARE
 
 

@@ -52,9 +52,9 @@ def _no_lost_step(rest: str, world: Simulation | None) -> str:
     )
 
 
-def _moving_of(world: Simulation, machine: str, axis: str) -> str:
-    paths = _paths(world, machine)
-    return f"{machine}.{axis}.moving" if f"{axis}.moving" in paths else f"{machine}.moving"
+def _moving_of(world: Simulation, controller: str, axis: str) -> str:
+    paths = _paths(world, controller)
+    return f"{controller}.{axis}.moving" if f"{axis}.moving" in paths else f"{controller}.moving"
 
 
 def _never_moves(rest: str, world: Simulation | None) -> str:
@@ -82,12 +82,12 @@ def _any_moving(world: Simulation | None) -> str:
     if world is None:
         return "any.moving"
     return " or ".join(
-        f"{name}.{path}" for name in world.machines for path in _paths(world, name) if path.rpartition(".")[2] == "moving"
+        f"{name}.{path}" for name in world.controllers for path in _paths(world, name) if path.rpartition(".")[2] == "moving"
     )
 
 
-def _paths(world: Simulation, machine: str) -> list[str]:
-    return [point.path for point in world.kind(machine).datasheet(world.machines[machine]).points]
+def _paths(world: Simulation, controller: str) -> list[str]:
+    return [point.path for point in world.kind(controller).datasheet(world.controllers[controller]).points]
 
 
 def _given(name: str, rest: str, what: str) -> str:

@@ -14,8 +14,8 @@ from typing import TypeGuard
 from steptwin.campaign.properties.evaluate import forced
 from steptwin.campaign.properties.slopes import TINY, Shape, Slope
 from steptwin.campaign.properties.tree import Atom
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.simulation.components.signals import Idle
 from steptwin.simulation.logic.expression import COMPARE, value_of
 from steptwin.simulation.logic.quantities import (
@@ -360,8 +360,8 @@ def _is_alone(left: Quantity, right: Quantity, name: str) -> bool:
 def _is_event(world: Simulation, name: str, signal: SignalOf | Idle) -> bool:
     """Whether its changes are seen from outside of programs, so that a program may calculate ahead of it."""
     owner, _, rest = name.partition(".")
-    machine = world.machines.get(owner)
-    return signal.freeze is not None or (not signal.continuous and (machine is None or rest.upper() in machine.pins()))
+    controller = world.controllers.get(owner)
+    return signal.freeze is not None or (not signal.continuous and (controller is None or rest.upper() in controller.pins()))
 
 
 def _scale(world: Simulation, left: Quantity, right: Quantity) -> float:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from steptwin.campaign.properties.recording import ComparisonRecord
 from steptwin.campaign.properties.slopes import Shape, negative
 from steptwin.campaign.properties.tree import OPPOSITE, Atom
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.simulation.logic.expression import Comparison
 from steptwin.simulation.scheduler.scheduler import Source
 from steptwin.simulation.world.simulation import Simulation

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
 from typing import NamedTuple, TypeAlias
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 
 TINY = 1e-12
 """The least distance of what is true or false by nothing: a value's sign is always the truth."""

@@ -32,9 +32,9 @@ from steptwin.campaign.properties.tree import (
     PropertyFormula,
     Tally,
 )
+from steptwin.controller import Nanos
 from steptwin.durations import UNITS, duration
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.logic.expression import Comparison, ConditionParser

@@ -15,8 +15,8 @@ from steptwin.campaign.properties.slopes import TINY, Shape, Slope, shortest, va
 from steptwin.campaign.properties.text import parse_property
 from steptwin.campaign.properties.tree import Atom, CycleTime, Delayed, Holding, Lasting, PropertyFormula, Tally, measured, nodes
 from steptwin.campaign.properties.words import formula_text, found_text
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.world.simulation import Simulation
 
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from steptwin.campaign.effects import FaultEffect
 from steptwin.campaign.faultmatrix import FaultMatrix, MatrixCell
 from steptwin.campaign.report.html import link, page, table
+from steptwin.controller import SECOND
 from steptwin.coverage.table import percent_text
 from steptwin.files.textfiles import write_bytes
-from steptwin.machine import SECOND
 
 _STYLE = """
 .matrix td.e { padding: 0; } .matrix td.e a { display: block; padding: .2rem .5rem; text-decoration: none; color: inherit; }

@@ -14,7 +14,7 @@ from steptwin.campaign.description import CampaignDescription
 from steptwin.campaign.inventory import PossibleFault, occasions, possible_faults
 from steptwin.campaign.runner import CaseRunner
 from steptwin.campaign.shrink import ADDED
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.simulation.faults import Fault
 from steptwin.simulation.kinds.programs import StatementFollower
 from steptwin.simulation.scheduler.trace import TraceRecord

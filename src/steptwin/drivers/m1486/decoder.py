@@ -6,10 +6,10 @@ import re
 from collections import deque
 from collections.abc import Callable
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.m1486.characterlog import REPORTS, CharacterLog, LineSplitter, uploaded
 from steptwin.m1486.receiver import CR, EMPTY, THREE_FREE
 from steptwin.m1486.variants import variant
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.diagnostics import Severity, SourceText, render
 from steptwin.drivers.exchange import SentLate
 from steptwin.drivers.m1486.failures import Busy, DoubtfulMove, FileGivenUp
@@ -20,7 +21,6 @@ from steptwin.m1486.lines import INTERFACES, STEP_DIRECTION, Interface
 from steptwin.m1486.structure import written_label
 from steptwin.m1486.syntax import ChipCommand, ParsedProgram
 from steptwin.m1486.variants import Store, Variant
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.messages import Message, text_of
 
 DownloadProgress = Callable[[int, int], object]

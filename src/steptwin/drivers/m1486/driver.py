@@ -8,6 +8,7 @@ from math import isfinite
 from types import TracebackType
 from typing import Self
 
+from steptwin.controller import SECOND
 from steptwin.drivers.line import DriverLine, check_wait
 from steptwin.drivers.m1486.download import DownloadProgress, begin, reset, send_program, type_file
 from steptwin.drivers.m1486.failures import Busy, PositionUnknown, ProgramLost, WrongType
@@ -29,7 +30,6 @@ from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.unit import MASK
 from steptwin.m1486.variants import Store, Variant
 from steptwin.m1486.variants import variant as variant_named
-from steptwin.machine import SECOND
 from steptwin.messages import Message
 
 TIMEOUT_S = 0.5

@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.drivers.exchange import Exchanger, Job, NoAnswer
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.m1486.lines import line_endpoint
@@ -26,7 +27,6 @@ from steptwin.drivers.tcp import Endpoint
 from steptwin.drivers.threads import ThreadLine
 from steptwin.m1486.receiver import EMPTY, NO_ROOM, THREE_FREE
 from steptwin.m1486.variants import VARIANTS, Store, variant
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.wire.line import SerialLine
 
 CHIP_BAUDS = (4800, 9600, 2400, 1200, 600, 300)

@@ -13,6 +13,7 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Protocol, Self
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.drivers.exchange import Overtaken, SentLate, TooLate
 from steptwin.drivers.m1486.download import begin
 from steptwin.drivers.m1486.motion import ChipMotion
@@ -25,7 +26,6 @@ from steptwin.m1486.lines import STEP_DIRECTION
 from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.unit import MASK
 from steptwin.m1486.variants import SLOWEST_JOG, Store, Variant
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.messages import Message
 
 LINK_S = 0.15

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
 
+from steptwin.controller import SECOND
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.exchange import LineLost
 from steptwin.drivers.kind import (
@@ -46,7 +47,6 @@ from steptwin.m1486.microsteps import UNIT
 from steptwin.m1486.syntax import parse
 from steptwin.m1486.variants import DEFAULT as DEFAULT_VARIANT
 from steptwin.m1486.variants import Store
-from steptwin.machine import SECOND
 from steptwin.wire.frameline import FrameLine
 
 LOST = "; the chip has counted the whole move, so its position is wrong: home the axis, or set POSITION"

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable
 from typing import NamedTuple
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.drivers.m1486.talk import LETTERS, TYPE_QUERY
 from steptwin.m1486.variants import VARIANTS
-from steptwin.machine import MILLISECOND, Nanos
 
 ECHO_NS: Nanos = 60 * MILLISECOND
 """The time in which the last echo arrives, with adapters that delay bytes, ns."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.drivers.exchange import Exchanger
 from steptwin.drivers.lineframes import FRAMES, LineFrames
 from steptwin.drivers.m1486.decoder import M1486Decoder
@@ -14,7 +15,6 @@ from steptwin.drivers.tcp import Endpoint
 from steptwin.drivers.threads import ThreadLine
 from steptwin.errors import Misuse
 from steptwin.m1486.variants import DEFAULT
-from steptwin.machine import SECOND, Nanos
 from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import FrameDirection
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.drivers.m1486.talk import chip_name
 from steptwin.errors import Refusal
-from steptwin.machine import SECOND, Nanos
 
 MARGIN_S = 1.0
 MARGIN = 1.2

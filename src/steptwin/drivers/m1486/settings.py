@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from math import isfinite
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.m1486.commands import TABLE, find, range_text, rows
 from steptwin.m1486.commanduse import Setting
@@ -16,7 +17,6 @@ from steptwin.m1486.flow import defaults
 from steptwin.m1486.lines import Interface
 from steptwin.m1486.microsteps import FULL_STEP, HIGHEST_SPEED, PAIRS, microstep_size
 from steptwin.m1486.variants import Variant
-from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.motion.ramps import SpeedCurve, longest_within, plan_distance
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from steptwin.controller import Nanos
 from steptwin.drivers.m1486.failures import Restarted
 from steptwin.drivers.m1486.motion import ChipMotionCommand
 from steptwin.drivers.m1486.sentcommands import SentCommands
@@ -15,7 +16,6 @@ from steptwin.m1486.functions import CONTINUE, FUNCTIONS
 from steptwin.m1486.functions import TABLE as ALL_FUNCTIONS
 from steptwin.m1486.lines import Interface
 from steptwin.m1486.variants import Store, Variant
-from steptwin.machine import Nanos
 
 FUNCTION_BYTES = (17, 18, 19)
 """The numbers of ``U`` for functions 40 to 63."""

@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from functools import lru_cache
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.drivers.exchange import SendNext
 from steptwin.drivers.m1486.failures import Garbled, NoRoom
 from steptwin.errors import Misuse
@@ -21,7 +22,6 @@ from steptwin.m1486.receiver import CR, EMPTY, NO_ROOM, THREE_FREE
 from steptwin.m1486.structure import stored_bits
 from steptwin.m1486.syntax import parse_line
 from steptwin.m1486.variants import VARIANTS
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.wire.line import SerialLine
 from steptwin.wire.slave import FrameDirection
 

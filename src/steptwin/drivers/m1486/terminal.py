@@ -8,6 +8,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
+from steptwin.controller import SECOND
 from steptwin.drivers.m1486.download import MOVES
 from steptwin.drivers.m1486.unit import BEGUN_NS
 from steptwin.drivers.tcp import Channel
@@ -19,7 +20,6 @@ from steptwin.m1486.receiver import EMPTY, NO_ROOM, THREE_FREE
 from steptwin.m1486.registers import UPLOADS
 from steptwin.m1486.syntax import ChipCommand, parse_line
 from steptwin.m1486.variants import VARIANTS, Store, Variant
-from steptwin.machine import SECOND
 from steptwin.wire.line import SerialLine
 
 LOOK_S = 0.02

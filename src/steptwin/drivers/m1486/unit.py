@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from contextlib import AbstractAsyncContextManager, suppress
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.drivers.exchange import Job, NoAnswer, Overtaken, SentLate, TooLate
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.m1486.failures import Busy, Garbled, NoEcho, Restarted, SeveralChips, WrongType, unconfirmed
@@ -24,7 +25,6 @@ from steptwin.m1486.lines import INTERFACES, Interface
 from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import parse_line
 from steptwin.m1486.variants import VARIANTS, Variant
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.messages import Message, MessageText
 
 TRIES = 3

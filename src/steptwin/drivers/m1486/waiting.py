@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.drivers.line import check_wait
 from steptwin.drivers.m1486.motion import MARGIN, MARGIN_S, UNKNOWN_S, ChipMotion, ChipMotionCommand, ChipMoveEnd, ChipReason
 from steptwin.drivers.m1486.unit import ASK_AGAIN_NS, SLICE_NS, ChipUnit
 from steptwin.drivers.m1486.watching import early_ns, watch
 from steptwin.errors import LineFailure, Misuse
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 
 ANSWERED_NS: Nanos = 40 * MILLISECOND
 """A chip that takes longer to answer moved when it was asked, ns; adapters delay the answer of one at rest."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.m1486.lines import talking
 from steptwin.drivers.m1486.talk import ChipRequest
@@ -12,7 +13,6 @@ from steptwin.drivers.m1486.unit import ChipUnit
 from steptwin.drivers.tcp import Channel
 from steptwin.drivers.threads import ThreadLine
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, Nanos
 
 TIMEOUT_NS: Nanos = 500 * MILLISECOND
 

@@ -8,13 +8,13 @@ early: the chips are queried again one by one, and the one at rest answers at on
 
 from __future__ import annotations
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.drivers.m1486.failures import Restarted
 from steptwin.drivers.m1486.motion import EARLY, EARLY_S, ChipMotionCommand
 from steptwin.drivers.m1486.sharedstate import SharedChipState
 from steptwin.drivers.m1486.talk import TYPE_QUERY
 from steptwin.drivers.m1486.unit import SLICE_NS, ChipUnit
 from steptwin.errors import LineFailure, Refusal
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 
 ASK_NS: Nanos = 80 * MILLISECOND
 """Duration of a query in addition to the time on the wire, ns: each step waits for an echo."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from steptwin.controller import Nanos
 from steptwin.drivers.mic488.frames import FrameWords
 from steptwin.drivers.mic488.listening import RtuListener, TcpListener
-from steptwin.machine import Nanos
 from steptwin.mic488.registers import register_map
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection

@@ -10,6 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from steptwin.controller import SECOND
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.mic488 import identify, snapshot
 from steptwin.drivers.mic488.axis import AsyncMic488Axis
@@ -25,7 +26,6 @@ from steptwin.drivers.modbus import ModbusQuery, check_unit, words
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse
 from steptwin.inputfiles import read_bytes
-from steptwin.machine import SECOND
 from steptwin.messages import Message
 from steptwin.mic488.config import ControllerConfig, read_config
 from steptwin.mic488.describe import AxisScale

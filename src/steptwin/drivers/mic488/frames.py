@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from steptwin.machine import SECOND, Nanos
+from steptwin.controller import SECOND, Nanos
 from steptwin.mic488.describe import Wording
 from steptwin.mic488.registermap import DataType, RegisterMap
 from steptwin.mic488.registers import register_map

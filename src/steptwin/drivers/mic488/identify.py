@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.drivers.exchange import Job, LineLost
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.mic488.failures import ModbusRefusal, NoMic488
 from steptwin.drivers.modbus import ModbusQuery, words
 from steptwin.errors import LineFailure, Refusal
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.messages import Message, text_of
 from steptwin.mic488.registermap import RegisterMap
 from steptwin.mic488.registers import AXES, register_map

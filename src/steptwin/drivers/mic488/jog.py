@@ -17,6 +17,7 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.drivers.exchange import Overtaken, SentLate, TooLate
 from steptwin.drivers.mic488.failures import NotReady, Unconfirmed
 from steptwin.drivers.mic488.motion import MotionKind, MoveEnd, Reason, end_of, status_text
@@ -24,7 +25,6 @@ from steptwin.drivers.mic488.unit import ControlRegisters, Unit
 from steptwin.drivers.mic488.waiting import dynamics
 from steptwin.drivers.permission import HOLD_NS, Permission
 from steptwin.errors import LineFailure, Misuse, SteptwinError
-from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message, text_of
 from steptwin.mic488.status import AxisStatus
 

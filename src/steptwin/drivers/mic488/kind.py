@@ -8,6 +8,7 @@ from collections.abc import Callable, Collection, Generator, Sequence
 from types import TracebackType
 from typing import Any
 
+from steptwin.controller import SECOND
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.kind import (
     AddressSelection,
@@ -36,7 +37,6 @@ from steptwin.drivers.mic488.subject import Mic488Part
 from steptwin.drivers.mic488.sync import Mic488, Mic488Axis, Mic488Jog, ModbusLine
 from steptwin.drivers.typed import tied
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND
 from steptwin.mic488.registers import AXES, CONTROLLER_STATUS_TEXTS, DEFAULT_FIRMWARE, register_map
 from steptwin.wire.frameline import FrameLine
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.drivers.exchange import Exchanger
 from steptwin.drivers.lineframes import FRAMES, LineFrames
 from steptwin.drivers.mic488.frames import FrameWords
@@ -12,7 +13,6 @@ from steptwin.drivers.place import LineAddress, parse_line_address
 from steptwin.drivers.tasks import TaskLine
 from steptwin.drivers.threads import ThreadLine
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.wire.slave import FrameDirection
 
 FRAMES_PER_SECOND = 100.0

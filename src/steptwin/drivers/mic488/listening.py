@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from steptwin.controller import Nanos
 from steptwin.drivers.mic488.frames import FrameWords
-from steptwin.machine import Nanos
 from steptwin.wire import mbap
 from steptwin.wire.rtu import BURSTY_GAP_NS, FrameRole, RtuFrame, RtuFramer
 from steptwin.wire.slave import FrameDirection

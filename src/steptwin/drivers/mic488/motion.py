@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import inf
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.mic488.registers import AXIS_STATUS_TEXTS
 from steptwin.mic488.status import AxisStatus
 from steptwin.motion import MotionState, plan_position

@@ -10,6 +10,7 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager, context
 from types import MappingProxyType
 from typing import NamedTuple
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.drivers.exchange import Job, SentLate
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.mic488.failures import ModbusRefusal, NotReady, Unconfirmed, unconfirmed
@@ -17,7 +18,6 @@ from steptwin.drivers.mic488.frames import FrameWords
 from steptwin.drivers.modbus import ModbusQuery, bits, words
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message, text_of
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.describe import AxisScale, Wording

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Generic, TypeVar, cast
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.drivers.mic488.unit import Unit
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.mic488.values import UserFormat
 
 Number = TypeVar("Number", int, float)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.drivers.line import check_wait
 from steptwin.drivers.mic488.failures import MoveFailed
 from steptwin.drivers.mic488.motion import (
@@ -17,7 +18,6 @@ from steptwin.drivers.mic488.motion import (
 )
 from steptwin.drivers.mic488.unit import ControlRegisters, Unit
 from steptwin.errors import LineFailure, Misuse
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.status import AxisStatus
 
 POLL_S = 0.05

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import IO, NamedTuple
 
 from steptwin.calc import Calculation
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.extras import missing
 from steptwin.files.export.axes import axis_views, controller_views
@@ -29,7 +30,6 @@ from steptwin.files.export.records import SavedTrace, read_records, write_record
 from steptwin.files.textfiles import check_writable, new_file
 from steptwin.files.writing import as_text, is_written_directly
 from steptwin.inputfiles import open_regular
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.simulation.mechanics.lanes import AxisLane, AxisViews
 from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 from steptwin.wire.pcapng import CapturedFrame, capture
@@ -94,7 +94,7 @@ def _pcapng(recording: Recording, file: IO[bytes], options: _Options) -> None:
     def captured(record: TraceRecord) -> CapturedFrame:
         options.progress(record.time)
         client, _, direction = record.subject.rpartition("/")
-        return CapturedFrame(record.time, record.machine, client, direction == "in", record.data())
+        return CapturedFrame(record.time, record.controller, client, direction == "in", record.data())
 
     file.writelines(capture(map(captured, recording.of("frame"))))
 
@@ -148,7 +148,7 @@ def write_trace(
     formats: Sequence[str] | None = None,
     begin: Nanos = 0,
     until: Nanos | None = None,
-    machines: Collection[str] | None = None,
+    controllers: Collection[str] | None = None,
     period: Nanos = MILLISECOND,
     texts: bool = True,
     watch: ShowExport = unwatched,
@@ -158,7 +158,7 @@ def write_trace(
 
     ``views`` (`axis_views`) give units of axes, names of their terminals, and mechanics. ``title`` is the name of what ran, and
     ``ended`` (ns) when that ended; by default when all came to rest. ``formats``: by default `USUAL` for a directory,
-    otherwise that of the file's suffix. A window of time (``begin`` to ``until``, ns) and ``machines`` limit what is
+    otherwise that of the file's suffix. A window of time (``begin`` to ``until``, ns) and ``controllers`` limit what is
     shown; JSON lines always have everything. Without ``until`` everything goes on to the end, but pictures end shortly after
     the last change. ``period`` (ns) is that of samples. Without ``texts`` a VCD has no signals of type
     string (events, frames, faults), which sigrok does not read. ``watch=bar`` shows on a terminal how far each file is.
@@ -172,7 +172,7 @@ def write_trace(
         raise Misuse(f"period = {period} ns: must be 1 ns or more")
     if len(trace) and next(iter(trace), None) is None:
         raise Misuse("this trace has kept nothing but its digest: there is nothing to write")
-    recording = replace(sort_out(trace, views, begin, ended if until is None else until, machines), title=title)
+    recording = replace(sort_out(trace, views, begin, ended if until is None else until, controllers), title=title)
     ended = recording.until if ended is None else ended
     for name, path in targets:
         write = FORMATS[name].write

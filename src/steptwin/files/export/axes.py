@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 def axis_views(world: Simulation) -> AxisViews:
     """The views of all axes of the controllers in a world, with the mechanics that they move."""
     views: dict[tuple[str, str], AxisLane] = {}
-    for name, machine in world.machines.items():
-        views |= controller_views(name, world.kind(name), machine)
+    for name, controller in world.controllers.items():
+        views |= controller_views(name, world.kind(name), controller)
     moved: dict[str, list[MovedLane]] = {}
     for element in ELEMENTS.values():
         if element.moved is not None:
@@ -26,14 +26,14 @@ def axis_views(world: Simulation) -> AxisViews:
                 for axis, lane in element.moved(built):
                     moved.setdefault(axis, []).append(lane)
     for name, fitted in world.axes.items():
-        place = fitted.mechanism.machine, str(fitted.mechanism.number)
+        place = fitted.mechanism.controller, str(fitted.mechanism.number)
         views[place] = views[place]._replace(mechanics=_mechanics(fitted)._replace(moved=tuple(moved.get(name, ()))))
     return views
 
 
-def controller_views(name: str, kind: AnyKind, machine: MotionController) -> dict[tuple[str, str], AxisLane]:
+def controller_views(name: str, kind: AnyKind, controller: MotionController) -> dict[tuple[str, str], AxisLane]:
     """The views of the axes of one controller, for traces in which it is called ``name``."""
-    return {(name, axis): view for axis, view in kind.lanes(machine).items()}
+    return {(name, axis): view for axis, view in kind.lanes(controller).items()}
 
 
 def _mechanics(fitted: BuiltAxis) -> Mechanics:

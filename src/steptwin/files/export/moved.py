@@ -13,8 +13,8 @@ from itertools import pairwise
 from math import ceil, floor
 from typing import NamedTuple, TypeAlias
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.files.export.tracks import AxisTrack, PinTrack
-from steptwin.machine import SECOND, Nanos
 from steptwin.motion import Profile, Segment, at_rest
 from steptwin.motion.divisions import profile_of
 from steptwin.motion.elastic import DriveStretch, Response, ResponseStretch, Spring
@@ -44,7 +44,7 @@ def moved_track(
     lane: MovedLane, load: AxisTrack, other: AxisTrack | None, pins: Mapping[str, PinTrack], until: Nanos
 ) -> AxisTrack:
     """The motion from the first moment of ``load`` to ``until``, in the unit of the lane. ``load`` and ``other`` are those of
-    `AxisTrack.load`; ``pins`` the edges of its machine, by subject."""
+    `AxisTrack.load`; ``pins`` the edges of its controller, by subject."""
     if lane.spring is not None:
         parts = _swinging(lane, load, pins.get(f"{lane.name}.{SPRING_SHARE}"), until)
     elif other is not None:
@@ -56,7 +56,7 @@ def moved_track(
         ]
         if lane.points:
             parts = _stuck([*_lifted(parts, lane.points, lane.turn)], lane.name, pins)
-    track = AxisTrack(load.machine, AxisLane(f"{lane.name} {lane.signal}", lane.unit))
+    track = AxisTrack(load.controller, AxisLane(f"{lane.name} {lane.signal}", lane.unit))
     slack = SLACK_P * max(abs(lane.per_pulse), abs(lane.other_per_pulse)) * lane.steepest
     for part in parts:
         for begin, profile in _cubics(part, slack):

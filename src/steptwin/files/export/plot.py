@@ -16,11 +16,11 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextPath
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.files.export.polyline import curve
 from steptwin.files.export.progress import TimeProgress
 from steptwin.files.export.recording import Recording
 from steptwin.files.export.tracks import AxisTrack, PinTrack
-from steptwin.machine import SECOND, Nanos
 from steptwin.motion.divisions import profile_of
 from steptwin.motion.pulses import Reals
 
@@ -116,7 +116,7 @@ def _moves(track: AxisTrack, recording: Recording) -> bool:
 
 def _rows(recording: Recording) -> list[_PlotRow]:
     """Pins that changed, then links, events and faults."""
-    one = len(recording.machines) == 1
+    one = len(recording.controllers) == 1
     rows = [
         _PlotRow(pin.pin if one else pin.name, _ANALOG if pin.analog else _LEVEL, pin)
         for pin in recording.pins
@@ -126,10 +126,10 @@ def _rows(recording: Recording) -> list[_PlotRow]:
     for record in recording.marks:
         if record.kind in {"frame", "event", "fault"}:
             name = record.subject.partition("/")[0] if record.kind == "frame" else f"{record.kind}s"
-            marks.setdefault((record.machine, name, record.kind), []).append(record.time)
+            marks.setdefault((record.controller, name, record.kind), []).append(record.time)
     colors = {"frame": _FRAME, "event": _EVENT, "fault": _FAULT}
-    for (machine, name, kind), moments in marks.items():
-        rows.append(_PlotRow(name if one else f"{machine}.{name}", colors[kind], None, moments))
+    for (controller, name, kind), moments in marks.items():
+        rows.append(_PlotRow(name if one else f"{controller}.{name}", colors[kind], None, moments))
     return rows
 
 
@@ -141,7 +141,7 @@ def _room(labels: list[str]) -> float:
 
 
 def _label(track: AxisTrack, recording: Recording) -> str:
-    return track.view.name if len(recording.machines) == 1 else track.name
+    return track.view.name if len(recording.controllers) == 1 else track.name
 
 
 def _figure(recording: Recording, heights: list[float], left: float) -> tuple[Figure, list[Axes]]:
@@ -160,7 +160,7 @@ def _figure(recording: Recording, heights: list[float], left: float) -> tuple[Fi
     if panels:
         panels[-1].tick_params(axis="x", labelbottom=True, length=3)
         panels[-1].set_xlabel(_time_unit(recording))
-    names = ", ".join(recording.machines[:8]) + (" …" if len(recording.machines) > 8 else "")
+    names = ", ".join(recording.controllers[:8]) + (" …" if len(recording.controllers) > 8 else "")
     figure.text(left / _WIDTH_IN, 1 - 0.3 / max(height, 1.6), recording.title or names, fontsize=11, fontweight="bold")
     return figure, panels
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 from math import ceil, inf, sqrt
 from typing import NamedTuple
 
+from steptwin.controller import Nanos
 from steptwin.files.export.tracks import AxisTrack
-from steptwin.machine import Nanos
 from steptwin.motion import Profile, Segment
 from steptwin.motion.divisions import profile_of
 from steptwin.motion.paths import ArcSegment

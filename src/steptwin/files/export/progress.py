@@ -7,7 +7,7 @@ from collections.abc import Callable, Generator
 from contextlib import AbstractContextManager, contextmanager
 from typing import TypeAlias
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 
 TimeProgress: TypeAlias = Callable[[Nanos], None]
 """Called with the moment (ns) that a run or an export has reached."""

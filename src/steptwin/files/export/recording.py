@@ -6,10 +6,10 @@ import re
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.files.export.moved import moved_track
 from steptwin.files.export.tracks import AxisTrack, PinTrack
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.motion import Profile, at_rest
 from steptwin.motion.divisions import StepTrain, profile_of
 from steptwin.simulation.mechanics.course import LoadPiece
@@ -23,7 +23,7 @@ class Recording:
 
     begin: Nanos
     until: Nanos
-    machines: list[str]
+    controllers: list[str]
     axes: list[AxisTrack]
     pins: list[PinTrack]
     marks: list[TraceRecord]
@@ -49,19 +49,19 @@ def sort_out(
     views: AxisViews,
     begin: Nanos = 0,
     until: Nanos | None = None,
-    machines: Collection[str] | None = None,
+    controllers: Collection[str] | None = None,
 ) -> Recording:
-    """The tracks of ``machines`` (all of them by default) in a window of time; without ``until`` up to where all is at rest.
+    """The tracks of ``controllers`` (all of them by default) in a window of time; without ``until`` up to where all is at rest.
 
-    Raises `Misuse` for machines that are not in the trace and for a window that ends before it begins.
+    Raises `Misuse` for controllers that are not in the trace and for a window that ends before it begins.
     """
-    unknown = sorted(set(machines or ()) - set(trace.machines))
+    unknown = sorted(set(controllers or ()) - set(trace.controllers))
     if unknown:
-        raise Misuse(f"no machine {unknown[0]!r} in the trace: there are {', '.join(trace.machines) or 'none'}")
-    chosen = [name for name in trace.machines if machines is None or name in machines]
+        raise Misuse(f"no controller {unknown[0]!r} in the trace: there are {', '.join(trace.controllers) or 'none'}")
+    chosen = [name for name in trace.controllers if controllers is None or name in controllers]
     sorting, included = _Sorting(views, begin), frozenset(chosen)
     for record in trace:
-        if record.machine not in included:
+        if record.controller not in included:
             continue
         if until is not None and record.time > until:
             break
@@ -81,35 +81,35 @@ class _Sorting:
         self._last = self._changed = begin
 
     def add(self, record: TraceRecord) -> None:
-        time, machine, kind, subject, value, _ = record
+        time, controller, kind, subject, value, _ = record
         self._last = max(self._last, time)
         if not subject.startswith("AIN"):
             self._changed = max(self._changed, time)
         if isinstance(value, (Profile, StepTrain)) and kind == "plan":
-            track = self._axis(machine, subject)
+            track = self._axis(controller, subject)
             track.times.append(time)
             track.plans.append(value)
         elif isinstance(value, tuple) and kind == "load":
-            self._axis(machine, subject).place(time, [LoadPiece(*one) for one in value])
+            self._axis(controller, subject).place(time, [LoadPiece(*one) for one in value])
         elif isinstance(value, Profile) and kind == "free":
-            self._axis(machine, subject).place(time, [LoadPiece(time, False, value.base)], value)
+            self._axis(controller, subject).place(time, [LoadPiece(time, False, value.base)], value)
         elif isinstance(value, int) and kind == "coordinate":
-            self._axis(machine, subject).origins.append((time, value))
+            self._axis(controller, subject).origins.append((time, value))
         elif isinstance(value, (int, float)) and kind == "edge":
-            pin = self._pins.setdefault((machine, subject), PinTrack(machine, subject))
+            pin = self._pins.setdefault((controller, subject), PinTrack(controller, subject))
             pin.times.append(time)
             pin.levels.append(float(value))
         elif time >= self._begin:
             self._marks.append(record)
 
-    def _axis(self, machine: str, subject: str) -> AxisTrack:
-        track = self._axes.get((machine, subject))
+    def _axis(self, controller: str, subject: str) -> AxisTrack:
+        track = self._axes.get((controller, subject))
         if track is None:
-            view = self._views.get((machine, subject)) or plain_view(subject)
-            track = self._axes[machine, subject] = AxisTrack(machine, view)
+            view = self._views.get((controller, subject)) or plain_view(subject)
+            track = self._axes[controller, subject] = AxisTrack(controller, view)
         return track
 
-    def recording(self, machines: list[str], until: Nanos | None) -> Recording:
+    def recording(self, controllers: list[str], until: Nanos | None) -> Recording:
         """Raises `Misuse` for a window that ends before it begins."""
         for track in self._axes.values():
             _stand_before(track, self._begin)
@@ -121,13 +121,13 @@ class _Sorting:
             raise Misuse(f"the window of time ends at {end} ns and begins at {self._begin} ns: it must not end before it begins")
         moved = self._moved(end)
         changed = max([changed, *(_last_motion(track, end) for track in moved)])
-        order = {name: i for i, name in enumerate(machines)}
+        order = {name: i for i, name in enumerate(controllers)}
         return Recording(
             self._begin,
             end,
-            machines,
-            sorted(self._axes.values(), key=lambda track: (order[track.machine], _numbers(track.view.name))),
-            sorted(self._pins.values(), key=lambda track: (order[track.machine], _numbers(track.pin))),
+            controllers,
+            sorted(self._axes.values(), key=lambda track: (order[track.controller], _numbers(track.view.name))),
+            sorted(self._pins.values(), key=lambda track: (order[track.controller], _numbers(track.pin))),
             self._marks,
             moved,
             end if None in rests else min(changed if changed > self._begin else last, end),
@@ -137,12 +137,12 @@ class _Sorting:
         """Elements that the axes move besides their loads; not a gantry of which one axis is not chosen."""
         found: list[AxisTrack] = []
         loads = {place: track.load(its) for place, track in self._axes.items() if (its := track.view.mechanics) is not None}
-        for (machine, subject), track in self._axes.items():
-            pins = {pin: one for (of, pin), one in self._pins.items() if of == machine}
+        for (controller, subject), track in self._axes.items():
+            pins = {pin: one for (of, pin), one in self._pins.items() if of == controller}
             for lane in () if track.view.mechanics is None else track.view.mechanics.moved:
                 other = None if lane.other is None else loads.get(lane.other)
                 if until > self._begin and (lane.other is None or other is not None):
-                    found.append(moved_track(lane, loads[machine, subject], other, pins, until))
+                    found.append(moved_track(lane, loads[controller, subject], other, pins, until))
         return found
 
     def _rests(self) -> list[Nanos | None]:

@@ -1,6 +1,6 @@
 """A trace as JSON lines: all that was recorded, exactly, one record a line; and back.
 
-The first line is the head of the file: a title, names of the machines, how their axes are shown, the end of the run, the digest.
+The first line is the head of the file: a title, the controllers, how their axes are shown, the end of the run, the digest.
 A file that is written while a world runs has the end of the run and the digest in its last line; one that was cut has none.
 Every other line is a record: ``time_ns``, ``machine``, ``kind``, ``subject``, ``value``, and ``facts`` where its text has some.
 The value of a plan is as `steptwin.motion.plain` has it; bytes are ``{"hex": …}``.
@@ -14,10 +14,10 @@ from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from typing import IO, Any, NamedTuple
 
+from steptwin.controller import Nanos
 from steptwin.durations import LONGEST_NS as LATEST_NS
 from steptwin.errors import Misuse
 from steptwin.files.export.progress import TimeProgress
-from steptwin.machine import Nanos
 from steptwin.motion import Profile
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.plain import plain_plan, read_plan
@@ -62,14 +62,14 @@ def end_records(trace: Trace, until: Nanos) -> str:
 
 
 def record_line(record: TraceRecord) -> str:
-    time, machine, kind, subject, value, facts = record
-    line = {"time_ns": time, "machine": machine, "kind": kind, "subject": subject, "value": _to_json(value)}
+    time, controller, kind, subject, value, facts = record
+    line = {"time_ns": time, "machine": controller, "kind": kind, "subject": subject, "value": _to_json(value)}
     return _line({**line, "facts": dict(facts)} if facts else line)
 
 
 def _head_of(trace: Trace, views: AxisViews, title: str) -> dict[str, object]:
-    axes = [{"machine": machine, "axis": axis, **_view_to_json(view)} for (machine, axis), view in views.items()]
-    return {"steptwin_trace": FORMAT, "title": title, "machines": trace.machines, "axes": axes}
+    axes = [{"machine": controller, "axis": axis, **_view_to_json(view)} for (controller, axis), view in views.items()]
+    return {"steptwin_trace": FORMAT, "title": title, "machines": trace.controllers, "axes": axes}
 
 
 def read_records(file: IO[bytes], name: str) -> SavedTrace:
@@ -138,9 +138,9 @@ def _head(data: dict[str, Any]) -> SavedTrace:
         ):
             raise TypeError("mechanics")
         views[fitting("machine", axis["machine"], str), fitting("axis", axis["axis"], str)] = view
-    machines = fitting("machines", tuple(data["machines"]), tuple[str, ...])
+    controllers = fitting("machines", tuple(data["machines"]), tuple[str, ...])
     title = fitting("title", data.get("title", ""), str)
-    return SavedTrace(Trace(machines), views, _until(data), fitting("digest", data["digest"], str), title)
+    return SavedTrace(Trace(controllers), views, _until(data), fitting("digest", data["digest"], str), title)
 
 
 def _until(data: dict[str, Any]) -> Nanos:

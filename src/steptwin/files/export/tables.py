@@ -1,9 +1,9 @@
 """Sampled tables: time, position and velocity of every axis, level of every pin, once in every period.
 
-Columns: ``time_s``; ``MACHINE.AXIS_position_UNIT``, ``MACHINE.AXIS_velocity_UNIT_s``, both as commanded; where mechanics can be
-elsewhere ``MACHINE.NAME_true_position_UNIT``; of what axes move ``MACHINE.ELEMENT_position_UNIT``, of shafts
-``MACHINE.ELEMENT_angle_degree``; ``MACHINE.PIN``, 0 or 1, volts on analog pins. A sample has everything that happened up to its
-moment. A level that is not known yet is empty.
+Columns: ``time_s``; ``CONTROLLER.AXIS_position_UNIT``, ``CONTROLLER.AXIS_velocity_UNIT_s``, both as commanded; where mechanics
+can be elsewhere ``CONTROLLER.NAME_true_position_UNIT``; of what axes move ``CONTROLLER.ELEMENT_position_UNIT``, of shafts
+``CONTROLLER.ELEMENT_angle_degree``; ``CONTROLLER.PIN``, 0 or 1, volts on analog pins. A sample has everything that
+happened up to its moment. A level that is not known yet is empty.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from typing import IO, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.files.export.progress import TimeProgress
 from steptwin.files.export.recording import Recording
 from steptwin.files.export.tracks import AxisTrack, PinTrack
-from steptwin.machine import SECOND, Nanos
 from steptwin.motion.divisions import profile_of
 from steptwin.motion.pulses import PulseTimes, Reals, positions, velocities
 
@@ -39,13 +39,13 @@ def samples(recording: Recording, period: Nanos) -> Iterator[tuple[Nanos, Column
         for axis, (coordinate, load) in zip(recording.axes, others, strict=True):
             view = axis.view
             moved = _motion(coordinate or axis, times)
-            columns[f"{axis.machine}.{view.position_name}"], columns[f"{axis.machine}.{view.velocity_name}"] = moved
+            columns[f"{axis.controller}.{view.position_name}"], columns[f"{axis.controller}.{view.velocity_name}"] = moved
             if coordinate is not None:
-                columns[f"{axis.machine}.{view.counted_name}"], _ = _motion(axis, times)
+                columns[f"{axis.controller}.{view.counted_name}"], _ = _motion(axis, times)
             if load is not None and view.mechanics is not None:
-                columns[f"{axis.machine}.{view.mechanics.position_name}"], _ = _motion(load, times)
+                columns[f"{axis.controller}.{view.mechanics.position_name}"], _ = _motion(load, times)
         for track in recording.moved:
-            columns[f"{track.machine}.{track.plain_name}"], _ = _motion(track, times)
+            columns[f"{track.controller}.{track.plain_name}"], _ = _motion(track, times)
         columns |= {pin.name: _levels(pin, times) for pin in recording.pins}
         yield int(times[-1]), columns
         at += period * rows

@@ -12,11 +12,11 @@ from html import escape
 from importlib.resources import files
 from typing import IO
 
+from steptwin.controller import Nanos
 from steptwin.files.export.polyline import PolylinePiece, pieces_of
 from steptwin.files.export.progress import TimeProgress
 from steptwin.files.export.recording import Recording
 from steptwin.files.export.tracks import AxisTrack, PinTrack
-from steptwin.machine import Nanos
 from steptwin.motion.divisions import Plan, StepTrain, profile_of
 from steptwin.motion.plain import plain_plan
 from steptwin.simulation.scheduler.trace import TraceRecord
@@ -27,11 +27,11 @@ _MOST_BYTES = 64
 
 
 def write_timeline(recording: Recording, file: IO[str], progress: TimeProgress) -> None:
-    names = recording.title or ", ".join(recording.machines[:4]) + (" …" if len(recording.machines) > 4 else "")
+    names = recording.title or ", ".join(recording.controllers[:4]) + (" …" if len(recording.controllers) > 4 else "")
     data = {
         "begin": recording.begin,
         "span": recording.until - recording.begin,
-        "machines": recording.machines,
+        "controllers": recording.controllers,
         "axes": [_axis(track, recording, progress, i) for i, track in enumerate(recording.axes)],
         "moved": [_moved(track, recording) for track in recording.moved],
         "pins": [_pin(pin, recording) for pin in recording.pins],
@@ -80,7 +80,7 @@ def _motion(track: AxisTrack, recording: Recording) -> dict[str, object]:
         plans.append(plain_plan(profile))
     view = track.view
     return {
-        "machine": track.machine, "name": view.name, "unit": view.unit, "scale": view.pulses_per_unit,
+        "controller": track.controller, "name": view.name, "unit": view.unit, "scale": view.pulses_per_unit,
         "plans": plans, "pieces": pieces,
     }  # fmt: skip
 
@@ -94,7 +94,7 @@ def _moved(track: AxisTrack, recording: Recording) -> dict[str, object]:
         plans.append(plain_plan(plan))
     view = track.view
     return {
-        "machine": track.machine,
+        "controller": track.controller,
         "name": view.name,
         "unit": view.unit,
         "scale": 1.0,
@@ -124,7 +124,7 @@ def _divided(plan: Plan, after: Nanos, until: Nanos) -> Iterator[tuple[PolylineP
 def _pin(pin: PinTrack, recording: Recording) -> dict[str, object]:
     begin = recording.begin
     return {
-        "machine": pin.machine,
+        "controller": pin.controller,
         "name": pin.pin,
         "analog": pin.analog,
         "before": pin.level(begin),
@@ -133,10 +133,10 @@ def _pin(pin: PinTrack, recording: Recording) -> dict[str, object]:
 
 
 def _mark(record: TraceRecord, begin: Nanos) -> list[object]:
-    """Moment (ns), machine, kind, subject, text."""
+    """Moment (ns), controller, kind, subject, text."""
     value = record.value
     if isinstance(value, bytes):
         text = value[:_MOST_BYTES].hex(" ") + (f" … {len(value)} bytes" if len(value) > _MOST_BYTES else "")
     else:
         text = f"line {value}" if record.kind == "statement" else "" if value is None else str(value)
-    return [record.time - begin, record.machine, record.kind, record.subject, text]
+    return [record.time - begin, record.controller, record.kind, record.subject, text]

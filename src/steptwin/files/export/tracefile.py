@@ -8,11 +8,11 @@ from io import TextIOWrapper
 from pathlib import Path
 from typing import IO, TypeAlias
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.files.export.axes import AxisViews
 from steptwin.files.export.records import begin_records, end_records, record_line
 from steptwin.files.writing import directly, new_text
-from steptwin.machine import Nanos
 from steptwin.numerals import read_whole
 from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 from steptwin.system import reason
@@ -24,7 +24,7 @@ class Ring:
     """The last records of a trace, at most ``size``."""
 
     def __init__(self, trace: Trace, size: int) -> None:
-        self._machines = trace.machines
+        self._controllers = trace.controllers
         self._records: deque[TraceRecord] = deque(trace, maxlen=size)
         trace.watchers.append(self._records.append)
 
@@ -47,7 +47,7 @@ class Ring:
 
     def trace(self) -> Trace:
         """The present contents as a trace."""
-        held = Trace(self._machines)
+        held = Trace(self._controllers)
         for record in self._records:
             held.add(record)
         return held

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from operator import attrgetter
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.motion import Profile, at_rest
 from steptwin.motion.divisions import Plan, profile_of
 from steptwin.simulation.mechanics.course import LoadPiece
@@ -18,7 +18,7 @@ from steptwin.simulation.mechanics.lanes import AxisLane, Mechanics
 class AxisTrack:
     """The plans of an axis: each counts from its moment to that of the next. There is one at the beginning of the window."""
 
-    machine: str
+    controller: str
     view: AxisLane
     times: list[Nanos] = field(default_factory=list)
     plans: list[Plan] = field(default_factory=list)
@@ -31,7 +31,7 @@ class AxisTrack:
 
     @property
     def name(self) -> str:
-        return f"{self.machine}.{self.view.name}"
+        return f"{self.controller}.{self.view.name}"
 
     @property
     def plain_name(self) -> str:
@@ -55,7 +55,7 @@ class AxisTrack:
         """The position that registers show, which jumps where it is set; None where it is the count since power-on."""
         if not self.origins:
             return None
-        track = AxisTrack(self.machine, self.view)
+        track = AxisTrack(self.controller, self.view)
         moments = [moment for moment, _ in self.origins]
         for begin in sorted({*self.times, *(moment for moment in moments if moment >= self.times[0])}):
             past = bisect_right(moments, begin) - 1
@@ -83,7 +83,7 @@ class AxisTrack:
     def load(self, mechanics: Mechanics) -> AxisTrack:
         """The motion of the load, ``zero_p`` included."""
         view = AxisLane(f"{mechanics.name} true", mechanics.unit, mechanics.pulses_per_unit)
-        track = AxisTrack(self.machine, view)
+        track = AxisTrack(self.controller, view)
         for begin in sorted({*self.times, *(load.begin for load in self.loads if load.begin >= self.times[0])}):
             past = bisect_right(self.loads, begin, key=attrgetter("begin")) - 1
             since, follows, pulses = self.loads[past] if past >= 0 else LoadPiece(begin, True, 0)
@@ -111,14 +111,14 @@ def _passed(profile: Profile, after: Nanos, until: Nanos) -> int:
 class PinTrack:
     """The levels of a pin: each counts from its moment to that of the next."""
 
-    machine: str
+    controller: str
     pin: str
     times: list[Nanos] = field(default_factory=list)
     levels: list[float] = field(default_factory=list)
 
     @property
     def name(self) -> str:
-        return f"{self.machine}.{self.pin}"
+        return f"{self.controller}.{self.pin}"
 
     @property
     def analog(self) -> bool:

@@ -17,12 +17,12 @@ from typing import IO, NamedTuple, TypeAlias
 import numpy as np
 
 from steptwin import __version__
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.files.export.polyline import curve
 from steptwin.files.export.progress import TimeProgress
 from steptwin.files.export.recording import Recording
 from steptwin.files.export.tracks import AxisTrack, PinTrack
 from steptwin.files.export.vcdtext import Times, Tokens, changes_text
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.motion import Profile
 from steptwin.motion.divisions import Plan, StepTrain, profile_of
 from steptwin.motion.pulses import pulse_runs, step_times
@@ -71,7 +71,7 @@ class _Dump:
         self._begin = recording.begin
         self.latest = recording.begin
         """The moment of the last change given."""
-        self._declared: dict[str, list[str]] = {name: [] for name in recording.machines}
+        self._declared: dict[str, list[str]] = {name: [] for name in recording.controllers}
         self._initial: list[bytes] = []
         self._codes = 0
         self._tokens: list[bytes] = []
@@ -79,13 +79,13 @@ class _Dump:
         self._trains: list[_Train] = []
         self._phases: list[_Phases] = []
         quiet: _Quiet = []
-        pins = {(pin.machine, pin.pin): pin for pin in recording.pins}
+        pins = {(pin.controller, pin.pin): pin for pin in recording.pins}
         for track in recording.axes:
             self._add_outputs(track, pins, recording, quiet)
             self._add_motion(track, recording, quiet)
         for track in recording.moved:
             points = curve(track, recording.begin, recording.until)
-            self._add_real(track.machine, track.plain_name, points.times, points.positions, quiet)
+            self._add_real(track.controller, track.plain_name, points.times, points.positions, quiet)
         for pin in recording.pins:
             self._add_pin(pin, recording, quiet)
         self._add_texts(recording, quiet)
@@ -95,20 +95,20 @@ class _Dump:
 
     # ------------------------------------------------------------------ declarations
 
-    def _declare(self, machine: str, kind: str, width: int, name: str) -> bytes:
+    def _declare(self, controller: str, kind: str, width: int, name: str) -> bytes:
         """The code of a new variable."""
         number, self._codes = self._codes, self._codes + 1
         code = chr(33 + number % 94)
         while number >= 94:
             number = number // 94 - 1
             code += chr(33 + number % 94)
-        self._declared[machine].append(f"$var {kind} {width} {code} {_name(name)} $end\n")
+        self._declared[controller].append(f"$var {kind} {width} {code} {_name(name)} $end\n")
         return code.encode()
 
     def header(self) -> bytes:
         lines = [f"$version steptwin {__version__} $end\n$timescale 1 ns $end\n"]
-        for machine, variables in self._declared.items():
-            lines += [f"$scope module {_name(machine)} $end\n", *variables, "$upscope $end\n"]
+        for controller, variables in self._declared.items():
+            lines += [f"$scope module {_name(controller)} $end\n", *variables, "$upscope $end\n"]
         head = "".join(lines) + f"$enddefinitions $end\n#{self._begin}\n$dumpvars\n"
         return head.encode() + b"".join(self._initial) + b"$end\n"
 
@@ -116,13 +116,13 @@ class _Dump:
         outputs = track.view.outputs
         first = len(self._tokens)
         if isinstance(outputs, StepOutputs):
-            code = self._declare(track.machine, "wire", 1, outputs.step)
+            code = self._declare(track.controller, "wire", 1, outputs.step)
             rest, pulse = (b"1", b"0") if outputs.active_low else (b"0", b"1")
             self._tokens += [pulse + code + b"\n", rest + code + b"\n"]
             self._initial.append(self._tokens[first + 1])
             self._trains.append(_Train(track, first, outputs.width_ns))
             if outputs.dir is not None:
-                code = self._declare(track.machine, "wire", 1, outputs.dir)
+                code = self._declare(track.controller, "wire", 1, outputs.dir)
                 turns = _turns(track, recording.until, outputs.width_ns)
                 done = bisect_right(turns, recording.begin, key=itemgetter(0))
                 direction = turns[max(done - 1, 0)][1] if turns else 1
@@ -130,9 +130,9 @@ class _Dump:
                 quiet += [(time, _bit(direction > 0, code)) for time, direction in turns[max(done, 1) :]]
         else:
             for phase in outputs.phases:
-                code = self._declare(track.machine, "integer", 8, phase)
+                code = self._declare(track.controller, "integer", 8, phase)
                 self._tokens += [b"b%s %s\n" % (format(value & 255, "08b").encode(), code) for value in range(-127, 128)]
-            phases = _Phases(track, first, outputs, pins.get((track.machine, outputs.characteristic_pin)))
+            phases = _Phases(track, first, outputs, pins.get((track.controller, outputs.characteristic_pin)))
             self._initial += [self._tokens[token] for token in phases.at(recording.begin)]
             self._phases.append(phases)
 
@@ -141,25 +141,25 @@ class _Dump:
         coordinate = track.coordinate()
         points = curve(coordinate or track, recording.begin, recording.until)
         scale = view.pulses_per_unit
-        self._add_real(track.machine, view.position_name, points.times, [p / scale for p in points.positions], quiet)
-        self._add_real(track.machine, view.velocity_name, points.times, [v / scale for v in points.velocities], quiet)
+        self._add_real(track.controller, view.position_name, points.times, [p / scale for p in points.positions], quiet)
+        self._add_real(track.controller, view.velocity_name, points.times, [v / scale for v in points.velocities], quiet)
         if coordinate is not None:
             points = curve(track, recording.begin, recording.until)
-            self._add_real(track.machine, view.counted_name, points.times, [p / scale for p in points.positions], quiet)
+            self._add_real(track.controller, view.counted_name, points.times, [p / scale for p in points.positions], quiet)
         load = track.true()
         if load is not None and view.mechanics is not None:
             points, scale = curve(load, recording.begin, recording.until), load.view.pulses_per_unit
             name = view.mechanics.position_name
-            self._add_real(track.machine, name, points.times, [p / scale for p in points.positions], quiet)
+            self._add_real(track.controller, name, points.times, [p / scale for p in points.positions], quiet)
 
-    def _add_real(self, machine: str, name: str, times: list[Nanos], values: list[float], quiet: _Quiet) -> None:
-        code = self._declare(machine, "real", 64, name)
+    def _add_real(self, controller: str, name: str, times: list[Nanos], values: list[float], quiet: _Quiet) -> None:
+        code = self._declare(controller, "real", 64, name)
         tokens = [b"r%r %s\n" % (value, code) for value in values]
         self._initial.append(tokens[0] if tokens else b"r0.0 %s\n" % code)
         quiet += _drawn_to(times, tokens)
 
     def _add_pin(self, pin: PinTrack, recording: Recording, quiet: _Quiet) -> None:
-        code = self._declare(pin.machine, *(("real", 64) if pin.analog else ("wire", 1)), pin.pin)
+        code = self._declare(pin.controller, *(("real", 64) if pin.analog else ("wire", 1)), pin.pin)
         level = pin.level(recording.begin)
         if pin.analog:
             if level is not None:
@@ -172,17 +172,17 @@ class _Dump:
     def _add_texts(self, recording: Recording, quiet: _Quiet) -> None:
         """One variable for each link and direction, for the lines of each program, for events, faults and inputs."""
         changes: dict[tuple[str, str, str], _Quiet] = {}
-        for time, machine, kind, subject, value, _ in recording.marks:
+        for time, controller, kind, subject, value, _ in recording.marks:
             name = f"{kind}s" if kind in {"event", "fault", "input"} else f"{subject}_line" if kind == "statement" else subject
             text = value.hex(" ") if isinstance(value, bytes) else str(value) if kind == "statement" else f"{subject} {value}"
-            changes.setdefault((machine, kind, name), []).append((time, text.encode()))
-        for (machine, kind, name), texts in changes.items():
+            changes.setdefault((controller, kind, name), []).append((time, text.encode()))
+        for (controller, kind, name), texts in changes.items():
             if kind == "statement":
-                code = self._declare(machine, "integer", 32, name)
+                code = self._declare(controller, "integer", 32, name)
                 self._initial.append(b"b0 %s\n" % code)
                 quiet += [(time, b"b%s %s\n" % (format(int(line), "b").encode(), code)) for time, line in texts]
                 continue
-            code = self._declare(machine, "string", 1, name)
+            code = self._declare(controller, "string", 1, name)
             self._initial.append(b"s %s\n" % code)
             for i, (time, text) in enumerate(texts):
                 quiet.append((time, b"s%s %s\n" % (_escaped(text), code)))

@@ -137,7 +137,7 @@ class EpicsController:
     async def jog(self, owner: object, who: Putter, wanted: Jog) -> None:
         """Begin it. Raises `SteptwinError`."""
         client = self.client(who)
-        self._leases.released(wanted.machine, wanted.axis)
+        self._leases.released(wanted.controller, wanted.axis)
         await self._guarded(lambda: self._leases.jog(owner, client, wanted, JOG_LEASE_S))
 
     def extend_jog(self, owner: object, wanted: Jog) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from steptwin.access.roles import ROLES, Role
+from steptwin.controller import SECOND
 from steptwin.eventloop import endless
 from steptwin.extras import libraries_of, missing
 from steptwin.gateways.contract import GatewayState, GatewaySubject
@@ -18,9 +19,8 @@ from steptwin.gateways.epics.records import Record
 from steptwin.gateways.epics.recordset import make_records
 from steptwin.gateways.epics.server import ChannelAccessServer
 from steptwin.gateways.leases import JogLeases
-from steptwin.gateways.points import CLOCK, registers_by_machine
+from steptwin.gateways.points import CLOCK, registers_by_controller
 from steptwin.gateways.sampling import Sampler
-from steptwin.machine import SECOND
 from steptwin.simulation.toml.addresses import Address, is_loopback, parse_address
 
 if TYPE_CHECKING:
@@ -61,9 +61,9 @@ class EpicsGateway:
         hosts = [one.host for one in (address, pva) if one is not None]
         open_to = Role.ENGINEER if all(map(is_loopback, hosts)) else Role.VIEWER
         role = self._role = open_to if spec.role is None else ROLES[spec.role]
-        registers = registers_by_machine("[gateway.epics]", spec.registers, self._subject.description)
+        registers = registers_by_controller("[gateway.epics]", spec.registers, self._subject.description)
         self._sampler = Sampler(self._subject.samples, registers, spec.interval)
-        for name in (*(part.name for part in self._subject.description.machines), CLOCK):
+        for name in (*(part.name for part in self._subject.description.controllers), CLOCK):
             self._controllers[name] = EpicsController(name, self._subject, self._sampler, self._leases, role)
         records = make_records(spec.prefix, self._subject, self._controllers, registers)
         server = ChannelAccessServer(PvDatabase(records), address, beacons, self._leave)

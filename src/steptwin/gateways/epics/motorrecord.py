@@ -12,6 +12,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.controllerstate import StatusLevel
 from steptwin.datasheet import AxisDescription, Condition, Limits
 from steptwin.errors import Misuse, Refusal, SteptwinError
@@ -43,11 +44,10 @@ from steptwin.gateways.epics.records import (
     RecordBase,
 )
 from steptwin.gateways.sampling import Sample
-from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.script.control import Halt
 from steptwin.simulation.script.steps import Write
 from steptwin.subject.commands import Enable, Home, Jog, Move, StopAxes
-from steptwin.subject.contract import MachinePart
+from steptwin.subject.contract import ControllerPart
 from steptwin.subject.following import Following
 from steptwin.subject.payloads import InputPayload
 
@@ -97,7 +97,7 @@ class MotorRecord(RecordBase):
     User coordinates are dial coordinates with DIR and OFF, raw ones are steps of MRES.
     """
 
-    def __init__(self, name: str, part: MachinePart, axis: AxisDescription, controller: EpicsController) -> None:
+    def __init__(self, name: str, part: ControllerPart, axis: AxisDescription, controller: EpicsController) -> None:
         super().__init__()
         self.values = first_values()
         self.alarm = NOT_KNOWN
@@ -622,8 +622,8 @@ class MotorRecord(RecordBase):
         rows = [(axis.velocity_point, velocity)]
         if seconds:
             rows += [(point, velocity / seconds) for point in axis.ramp_points]
-        machine = self._controller.name
-        await self._controller.do(who, Write(tuple((machine, point, value) for point, value in rows)))
+        controller = self._controller.name
+        await self._controller.do(who, Write(tuple((controller, point, value) for point, value in rows)))
         await self._read_ramp()
 
     def synchronize(self) -> None:
@@ -650,7 +650,7 @@ class MotorRecord(RecordBase):
         self._controller.check_may_change(who)
 
 
-def _conditions(part: MachinePart, axis: AxisDescription) -> dict[int, Condition]:
+def _conditions(part: ControllerPart, axis: AxisDescription) -> dict[int, Condition]:
     try:
         return dict(part.datasheet.point(f"{axis.name}.status").conditions)
     except KeyError:

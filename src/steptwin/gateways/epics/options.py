@@ -6,9 +6,9 @@ import re
 from typing import Any, ClassVar
 
 from steptwin.access.roles import ROLES
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.gateways.options import GatewaySpec, listens, samples, shows
-from steptwin.machine import Nanos
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import address_value, permitting, word
 

@@ -12,7 +12,7 @@ from steptwin.gateways.epics.pointrecord import CommandRecord, PointRecord
 from steptwin.gateways.epics.recordnames import commands_of, record_name
 from steptwin.gateways.epics.records import Record
 from steptwin.gateways.points import CLOCK, CLOCK_POINTS, GatewayPoint, points_of
-from steptwin.subject.contract import MachinePart
+from steptwin.subject.contract import ControllerPart
 
 LONGEST_NAME = 60
 """Characters of the name of a record."""
@@ -26,7 +26,7 @@ def make_records(
     Raises `Misuse` for a name that is too long.
     """
     records: dict[str, Record] = {}
-    for part in subject.description.machines:
+    for part in subject.description.controllers:
         points = points_of(part, subject.description, registers[part.name])
         records |= dict(_records(prefix, part, points, controllers[part.name]))
     records |= dict(_points(prefix, CLOCK, CLOCK_POINTS, controllers[CLOCK]))
@@ -39,7 +39,7 @@ def make_records(
 
 
 def _records(
-    prefix: str, part: MachinePart, points: tuple[GatewayPoint, ...], controller: EpicsController
+    prefix: str, part: ControllerPart, points: tuple[GatewayPoint, ...], controller: EpicsController
 ) -> Iterator[tuple[str, Record]]:
     for axis in part.datasheet.axes:
         name = record_name(prefix, part.name, axis.name)
@@ -53,10 +53,10 @@ def _records(
 
 
 def _points(
-    prefix: str, machine: str, points: tuple[GatewayPoint, ...], controller: EpicsController
+    prefix: str, owner: str, points: tuple[GatewayPoint, ...], controller: EpicsController
 ) -> Iterator[tuple[str, Record]]:
     for point in points:
-        name = record_name(prefix, machine, *point.path)
+        name = record_name(prefix, owner, *point.path)
         record = PointRecord(name, point, controller)
         controller.records.append(record)
         yield name, record

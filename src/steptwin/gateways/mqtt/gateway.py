@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse
 from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.mqtt.connection import Broker, BrokerConnection
@@ -20,10 +21,9 @@ from steptwin.gateways.mqtt.jsontopics import Topics
 from steptwin.gateways.mqtt.options import MqttSpec, SparkplugSpec
 from steptwin.gateways.mqtt.sparkplug import SparkplugFace
 from steptwin.gateways.mqtt.sparkplugmetrics import Namespace, rows_of
-from steptwin.gateways.points import registers_by_machine
+from steptwin.gateways.points import registers_by_controller
 from steptwin.gateways.sampling import Sampler
 from steptwin.inputfiles import read_bytes
-from steptwin.machine import SECOND
 from steptwin.simulation.toml.addresses import parse_address
 from steptwin.system import reason
 from steptwin.textcodec import decode
@@ -48,7 +48,7 @@ class MqttGateway:
         spec = self._spec
         broker = broker_of(spec, self._folder)
         door = Doorkeeper(spec, self._folder)
-        registers = registers_by_machine("[gateway.mqtt]", spec.registers, self._subject.description)
+        registers = registers_by_controller("[gateway.mqtt]", spec.registers, self._subject.description)
         self._sampler = Sampler(self._subject.samples, registers, spec.interval)
         if spec.sparkplug is None:
             topics = Topics(spec.topic, spec.file, self._subject.description, registers)

@@ -13,7 +13,7 @@ from steptwin import __version__
 from steptwin.gateways.mqtt.connection import Publication
 from steptwin.gateways.mqtt.jsontopics import DO, ONLINE, Group, Topics, encode
 from steptwin.gateways.points import GatewayPoint, PointType
-from steptwin.subject.contract import Description, MachinePart
+from steptwin.subject.contract import ControllerPart, Description
 
 PREFIX = "homeassistant"
 _CLASSES: Mapping[str, str] = {
@@ -32,7 +32,7 @@ _UNITS: Mapping[str, str] = {"degree": "°", "degree/s": "°/s"}
 
 def discovery(topics: Topics, description: Description) -> Iterator[Publication]:
     """Retained messages, one for each controller."""
-    for part in description.machines:
+    for part in description.controllers:
         identity = _identity(f"{topics.base}/{part.name}")
         found = {
             "dev": {
@@ -78,14 +78,14 @@ def _component(point: GatewayPoint) -> dict[str, Any]:
     return found
 
 
-def _buttons(identity: str, topics: Topics, part: MachinePart) -> dict[str, dict[str, Any]]:
+def _buttons(identity: str, topics: Topics, part: ControllerPart) -> dict[str, dict[str, Any]]:
     found: dict[str, dict[str, Any]] = {}
     for one in part.takes:
         if one.command != "stop":
             continue
         axis = next((axis for axis in part.datasheet.axes if axis.number == one.axis), None)
         key = "stop" if axis is None else f"stop_{axis.name}"
-        pressed = {"do": "stop", "machine": part.name} | ({} if axis is None else {"axis": axis.number})
+        pressed = {"do": "stop", "controller": part.name} | ({} if axis is None else {"axis": axis.number})
         found[key] = {
             "p": "button",
             "name": "stop" if axis is None else f"stop {axis.name}",

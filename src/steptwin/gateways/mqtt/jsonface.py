@@ -9,6 +9,7 @@ from collections.abc import Awaitable, Mapping
 
 from aiomqtt import Message, MqttError
 
+from steptwin.controller import SECOND
 from steptwin.errors import Refusal
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.mqtt.connection import BrokerLink, Publication, SessionOver
@@ -28,7 +29,6 @@ from steptwin.gateways.mqtt.jsontopics import (
 from steptwin.gateways.mqtt.options import MqttSpec
 from steptwin.gateways.points import CLOCK
 from steptwin.gateways.sampling import Sample, Sampler
-from steptwin.machine import SECOND
 from steptwin.subject.dispatch import failure
 from steptwin.subject.following import Filter
 
@@ -75,9 +75,9 @@ class JsonFace:
         await link.publish(Publication(self._topics(DESCRIPTION), about, qos=1, retain=True))
         if self._spec.discovery is not None:
             await link.publish_all(discovery(self._topics, self._subject.description))
-        machines = [name for name in self._topics.groups if name != CLOCK]
-        await self._publish(link, await asyncio.gather(*(self._sampler.take(name) for name in machines)))
-        self._sampler.watch(machines)
+        controllers = [name for name in self._topics.groups if name != CLOCK]
+        await self._publish(link, await asyncio.gather(*(self._sampler.take(name) for name in controllers)))
+        self._sampler.watch(controllers)
         await link.publish(Publication(self._topics(ONLINE), b"true", qos=1, retain=True))
         await link.subscribe(self._topics(DO), retained=False)
         loop, interval_s = asyncio.get_running_loop(), self._spec.interval / SECOND
@@ -119,10 +119,10 @@ class JsonFace:
     async def _publish(self, link: BrokerLink, samples: list[Sample]) -> None:
         found: list[Publication] = []
         for sample in samples:
-            machine = sample.machine
-            text = self._texts.get(machine)
+            controller = sample.controller
+            text = self._texts.get(controller)
             if text is None:
-                text = self._texts[machine] = ControllerText(self._topics.groups[machine], machine)
+                text = self._texts[controller] = ControllerText(self._topics.groups[controller], controller)
             found += [Publication(topic, payload, retain=True) for topic, payload in text.changed(sample)]
         await link.publish_all(found)
 

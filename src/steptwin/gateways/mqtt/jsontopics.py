@@ -45,9 +45,9 @@ class Group:
     name: str
     points: tuple[GatewayPoint, ...]
 
-    def names(self, machine: str) -> list[str]:
+    def names(self, controller: str) -> list[str]:
         names = [point.path[-1] for point in self.points]
-        return names if self.name or machine == CLOCK else [*names, ANSWERS]
+        return names if self.name or controller == CLOCK else [*names, ANSWERS]
 
 
 class GroupText:
@@ -55,13 +55,13 @@ class GroupText:
 
     __slots__ = ("_has_answers", "_names", "_read", "_texts", "_typed", "_values", "part", "part_of", "topic")
 
-    def __init__(self, group: Group, machine: str) -> None:
+    def __init__(self, group: Group, controller: str) -> None:
         self.topic = group.topic
         self.part_of = group.points[0].part
         """The part of a state that has its values: the same object in two states between which nothing has changed."""
         self.part: object = None
         """That of what was published last; None where the controller did not answer."""
-        names = group.names(machine)
+        names = group.names(controller)
         self._has_answers = len(names) > len(group.points)
         self._read = values_of(group.points)
         self._typed = [*(point.typed for point in group.points), bool]
@@ -94,8 +94,8 @@ class GroupText:
 class ControllerText:
     """All groups of a controller, as they were published last."""
 
-    def __init__(self, groups: Iterable[Group], machine: str) -> None:
-        self._groups = [GroupText(group, machine) for group in groups]
+    def __init__(self, groups: Iterable[Group], controller: str) -> None:
+        self._groups = [GroupText(group, controller) for group in groups]
 
     def changed(self, sample: Sample) -> Iterator[tuple[str, bytes]]:
         """Topics and payloads of the groups that are not as before."""
@@ -117,7 +117,7 @@ class Topics:
         self.base = f"{beginning}/{self.name}"
         self._description = description
         self.groups: dict[str, tuple[Group, ...]] = {}
-        for part in description.machines:
+        for part in description.controllers:
             if part.name in OWN:
                 raise Misuse(f"[gateway.mqtt]: {self.base}/{part.name} is no topic for a controller: call it otherwise")
             points = points_of(part, description, registers.get(part.name, ()))
@@ -140,7 +140,7 @@ class Topics:
                 "real": part.is_real,
                 "topics": {group.topic: _described(group) for group in self.groups[part.name]},
             }
-            for part in self._description.machines
+            for part in self._description.controllers
         ]
         return {
             "name": self.name,

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from steptwin.access.roles import ROLES
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.gateways.options import GatewaySpec, samples, shows
-from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import address_value, flag, permitting, text_value, whole, whole_seconds, word
 

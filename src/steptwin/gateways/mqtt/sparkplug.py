@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 from aiomqtt import Message
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.eventloop import endless
 from steptwin.gateways.clients import GatewayClient
@@ -32,7 +33,6 @@ from steptwin.gateways.mqtt.sparkplugcodec import (
 from steptwin.gateways.mqtt.sparkplugmetrics import BDSEQ, DROPPED, REBIRTH, RESULT, MetricRow, Namespace
 from steptwin.gateways.points import CLOCK, GatewayPoint, State
 from steptwin.gateways.sampling import Sample, Sampler
-from steptwin.machine import SECOND, Nanos
 from steptwin.subject.commands import Command
 
 AT_MOST = 500
@@ -144,7 +144,7 @@ class SparkplugFace:
                 self._look(sample)
 
     def _look(self, sample: Sample) -> None:
-        name = None if sample.machine == CLOCK else sample.machine
+        name = None if sample.controller == CLOCK else sample.controller
         device = self._devices[name]
         answers = sample.state is not None
         # Births and deaths tell what appears and disappears; without a session it is kept like other changes.
@@ -336,7 +336,7 @@ class SparkplugFace:
         try:
             wanted = _command(row, metric)
         except Misuse as error:
-            self._anybody.refused(self._subject, "write", {"machine": name, "metric": called, "value": str(metric.value)})
+            self._anybody.refused(self._subject, "write", {"controller": name, "metric": called, "value": str(metric.value)})
             self._tell(name, f"{called}: {error}")
             return
         try:

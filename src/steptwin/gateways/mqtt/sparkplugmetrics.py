@@ -13,7 +13,7 @@ from steptwin.gateways.methods import METHODS, MethodRow, methods_of
 from steptwin.gateways.mqtt.sparkplugcodec import SparkplugMetric, SparkplugProperty, SparkplugType, SparkplugValue
 from steptwin.gateways.points import CLOCK_POINTS, GatewayPoint, PointType, points_of
 from steptwin.subject.commands import Command
-from steptwin.subject.contract import Description, MachinePart
+from steptwin.subject.contract import ControllerPart, Description
 
 BDSEQ, REBIRTH, RESULT, DROPPED = "bdSeq", "Node Control/Rebirth", "Commands/Result", "Store/Dropped"
 TYPES: Mapping[PointType, SparkplugType] = {
@@ -81,7 +81,7 @@ def rows_of(description: Description, registers: Mapping[str, Iterable[str]]) ->
         found[None].append(MetricRow(name, next(numbers), kind, start=start))
     if "time" in description.commands:
         found[None] += [_of_point(point, next(numbers), f"Time/{point.name}") for point in CLOCK_POINTS]
-    for part in description.machines:
+    for part in description.controllers:
         points = points_of(part, description, registers.get(part.name, ()))
         rows = found[part.name] = [_of_point(point, next(numbers), "/".join(point.path)) for point in points]
         sheet = part.datasheet
@@ -114,11 +114,11 @@ def _of_point(point: GatewayPoint, alias: int, name: str) -> MetricRow:
 class _BoundMethod:
     path: str
     row: MethodRow
-    part: MachinePart
+    part: ControllerPart
     axis: int | None
 
 
-def _methods(part: MachinePart) -> Iterator[_BoundMethod]:
+def _methods(part: ControllerPart) -> Iterator[_BoundMethod]:
     """Those with one argument at most: a jog has a lease besides, which no metric carries."""
     places = [("", "Controller", None), ("program/", "Program", None)]
     places += [(f"{axis.name}/", "Axis", axis.number) for axis in part.datasheet.axes]

@@ -16,7 +16,7 @@ from asyncua import Server, ua
 from steptwin.gateways.methods import METHODS, MethodArgument, MethodRow, methods_of
 from steptwin.gateways.opcua.nodetypes import VARIANTS, ZEROS, engineering_unit, standard, value_range
 from steptwin.gateways.points import CLOCK, CLOCK_POINTS, GatewayPoint, PointType, points_of
-from steptwin.subject.contract import Description, MachinePart
+from steptwin.subject.contract import ControllerPart, Description
 
 NAMESPACE_URI = "urn:steptwin:machines"
 NAMESPACE: Any = 2
@@ -46,13 +46,13 @@ class PointNode:
 class ArrayNode:
     """A variable that shows all elements of a point that is a list, such as the user registers of a controller."""
 
-    machine: str
+    controller: str
     path: str
     count: int
 
     @property
     def elements(self) -> tuple[str, ...]:
-        return tuple(f"{self.machine}.{self.path}[{number}]" for number in range(self.count))
+        return tuple(f"{self.controller}.{self.path}[{number}]" for number in range(self.count))
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ class BoundMethod:
     """A method of an object, which is a controller, its program, or one of its axes."""
 
     row: MethodRow
-    part: MachinePart
+    part: ControllerPart
     axis: int | None
 
 
@@ -84,13 +84,13 @@ class AddressSpaceBuilder:
         self.methods: dict[tuple[ua.NodeId, ua.NodeId], BoundMethod] = {}
         """By the ids of object and method."""
         self._description = description
-        self._kinds = {(one.machine, int(one.axis)): one.kind for one in description.axes}
+        self._kinds = {(one.controller, int(one.axis)): one.kind for one in description.axes}
         self._types()
         self._object(ROOT, standard(ua.ObjectIds.ObjectsFolder), description.name, ua.ObjectIds.FolderType)
         if "time" in description.commands:
             self._object(CLOCK, node_id(ROOT), _title(CLOCK), ua.ObjectIds.FolderType)
             self.points[CLOCK] = tuple(self._point(CLOCK, point, is_of_axis=False) for point in CLOCK_POINTS)
-        for part in description.machines:
+        for part in description.controllers:
             self._controller(part, registers.get(part.name, ()))
 
     async def add_to(self, server: Server) -> None:
@@ -102,7 +102,7 @@ class AddressSpaceBuilder:
 
     def nodes(self) -> dict[ua.NodeId, tuple[str, PointNode]]:
         """The variables, with the controller (or the clock) of each."""
-        return {node.id: (machine, node) for machine, nodes in self.points.items() for node in nodes}
+        return {node.id: (controller, node) for controller, nodes in self.points.items() for node in nodes}
 
     # ------------------------------------------------------------------ types
 
@@ -128,7 +128,7 @@ class AddressSpaceBuilder:
 
     # ------------------------------------------------------------------ objects
 
-    def _controller(self, part: MachinePart, registers: Iterable[str]) -> None:
+    def _controller(self, part: ControllerPart, registers: Iterable[str]) -> None:
         name, sheet = part.name, part.datasheet
         self._object(name, node_id(ROOT), name, "types.Controller", sheet.title)
         self._bind(part, name, "Controller", None)
@@ -156,9 +156,9 @@ class AddressSpaceBuilder:
         self.points[name] = tuple(self._point(name, point, is_of_axis=point.path[0] in axes) for point in points)
 
     def _array(self, node: ArrayNode, meaning: str) -> None:
-        path = f"{node.machine}.registers.{node.path}"
+        path = f"{node.controller}.registers.{node.path}"
         kind = standard(ua.ObjectIds.BaseDataVariableType)
-        self._item(path, node_id(f"{node.machine}.registers"), node.path, ua.ObjectIds.HasComponent, kind)
+        self._item(path, node_id(f"{node.controller}.registers"), node.path, ua.ObjectIds.HasComponent, kind)
         self.items[-1].NodeClass = ua.NodeClass.Variable
         nothing = ua.Variant([], ua.VariantType.UInt16, is_array=True)
         self.items[-1].NodeAttributes = _variable(node.path, meaning, nothing, rank=1)
@@ -169,7 +169,7 @@ class AddressSpaceBuilder:
         profile = ua.Variant(_MOTION_PROFILES.get(kind or "", _OTHER_PROFILE), ua.VariantType.Int32)
         self._property(f"{path}.MotionProfile", node_id(path), "MotionProfile", profile, ua.ObjectIds.Int32)
 
-    def _bind(self, part: MachinePart, path: str, kind: str, axis: int | None) -> None:
+    def _bind(self, part: ControllerPart, path: str, kind: str, axis: int | None) -> None:
         """Give an object those methods of its type that its controller takes."""
         for row in methods_of(part, METHODS[kind], axis):
             method = node_id(f"types.{kind}.{row.name}")
@@ -179,12 +179,12 @@ class AddressSpaceBuilder:
             self.references.append(reference)
             self.methods[node_id(path), method] = BoundMethod(row, part, axis)
 
-    def _point(self, machine: str, point: GatewayPoint, *, is_of_axis: bool) -> PointNode:
-        path = f"{machine}.{point.name}"
-        above = f"{machine}.{point.path[0]}" if len(point.path) > 1 else machine
+    def _point(self, controller: str, point: GatewayPoint, *, is_of_axis: bool) -> PointNode:
+        path = f"{controller}.{point.name}"
+        above = f"{controller}.{point.path[0]}" if len(point.path) > 1 else controller
         name = (
             _title(point.path[-1])
-            if is_of_axis or point.path[0] in ("program", "details") or above == machine
+            if is_of_axis or point.path[0] in ("program", "details") or above == controller
             else point.path[-1]
         )
         if is_of_axis and point.path[-1] in _ROBOTICS:

@@ -10,6 +10,7 @@ from pathlib import Path
 from asyncua import Server
 
 from steptwin import __version__
+from steptwin.controller import SECOND
 from steptwin.errors import LineFailure, SteptwinError
 from steptwin.eventloop import endless
 from steptwin.files.certificate import APPLICATION_URI
@@ -22,9 +23,8 @@ from steptwin.gateways.opcua.past import PastNodes
 from steptwin.gateways.opcua.security import Security
 from steptwin.gateways.opcua.service import NodeService
 from steptwin.gateways.opcua.session import GatewayServer
-from steptwin.gateways.points import registers_by_machine
+from steptwin.gateways.points import registers_by_controller
 from steptwin.gateways.sampling import Sampler
-from steptwin.machine import SECOND
 from steptwin.simulation.toml.addresses import Address, is_loopback, parse_address
 from steptwin.system import reason
 
@@ -118,7 +118,7 @@ class OpcUaGateway:
             await asyncio.sleep(LOOK_S)
 
     def _registers(self) -> dict[str, list[str]]:
-        return registers_by_machine("[gateway.opcua]", self._spec.registers, self._subject.description)
+        return registers_by_controller("[gateway.opcua]", self._spec.registers, self._subject.description)
 
     async def _publish(self, inside: GatewayServer, service: NodeService, notifications: Notifications) -> None:
         loop, interval_s = asyncio.get_running_loop(), self._spec.interval / SECOND

@@ -8,11 +8,11 @@ from copy import copy
 from asyncua import Server, ua
 from asyncua.server.event_generator import EventGenerator
 
+from steptwin.controller import SECOND
 from steptwin.datasheet import EventSeverity
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.opcua.addressspace import NAMESPACE, node_id
 from steptwin.gateways.opcua.nodetypes import standard
-from steptwin.machine import SECOND
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Following
 from steptwin.subject.payloads import StatusPayload
@@ -44,7 +44,7 @@ class Notifications:
         self._generators = generators
         self._severities = {
             (part.name, event.code): SEVERITIES[event.severity]
-            for part in subject.description.machines
+            for part in subject.description.controllers
             for event in part.datasheet.events
         }
 
@@ -53,7 +53,7 @@ class Notifications:
         """Add the type of event to ``server``, which has the objects of the controllers already."""
         kind = await server.create_custom_event_type(NAMESPACE, "MachineEventType", ua.ObjectIds.BaseEventType, FIELDS)
         generators = {SERVER: await server.get_event_generator(kind)}
-        for part in subject.description.machines:
+        for part in subject.description.controllers:
             event = copy(generators[SERVER].event)  # the library would collect its fields from the type again
             event.SourceNode, event.SourceName = None, None
             generators[part.name] = await server.get_event_generator(event, node_id(part.name))
@@ -69,16 +69,16 @@ class Notifications:
             generator.event.Severity = SEVERITIES[EventSeverity.WARNING]
             await generator.trigger(message=f"{missed} events were lost: more than {MOST_EVENTS} at once")
         for event in events:
-            for name in (SERVER, event.machine):
+            for name in (SERVER, event.controller):
                 if name in self._generators:
                     await self._trigger(self._generators[name], event)
 
     async def _trigger(self, generator: EventGenerator, event: Event) -> None:
         code = event.payload.code if isinstance(event.payload, StatusPayload) else event.kind
         shown = generator.event
-        shown.Severity = self._severities.get((event.machine, code), SEVERITIES[EventSeverity.INFORMATION])
-        shown.SourceName = event.machine
-        shown.SourceNode = node_id(event.machine) if event.machine in self._generators else standard(ua.ObjectIds.Server)
+        shown.Severity = self._severities.get((event.controller, code), SEVERITIES[EventSeverity.INFORMATION])
+        shown.SourceName = event.controller
+        shown.SourceNode = node_id(event.controller) if event.controller in self._generators else standard(ua.ObjectIds.Server)
         shown.Kind = event.kind
         shown.Code = code
         shown.VirtualTime = event.time / SECOND

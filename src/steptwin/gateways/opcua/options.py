@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from steptwin.controller import Nanos
 from steptwin.gateways.options import GatewaySpec, listens, samples, shows
-from steptwin.machine import Nanos
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import text_value, word
 

@@ -78,9 +78,9 @@ class PastNodes:
         result.StatusCode = status(ua.StatusCodes.Good if page else ua.StatusCodes.GoodNoData)
         return result
 
-    async def _kept(self, machine: str, node: PointNode, reading: _Reading, most: int) -> list[_Kept]:
+    async def _kept(self, controller: str, node: PointNode, reading: _Reading, most: int) -> list[_Kept]:
         """In the order in which they are read, one more than ``most`` where there are so many."""
-        point, backwards = f"{machine}.{node.point.name}", reading.is_backwards
+        point, backwards = f"{controller}.{node.point.name}", reading.is_backwards
         low, high = (reading.end, reading.begin) if backwards else (reading.begin, reading.end)
         begin = low if backwards or reading.at is None else reading.at
         bound = most + reading.skip + 2  # the one that held at the begin, and the first of the next page

@@ -107,12 +107,12 @@ class NodeService:
             found = self._of_node.get(node)
             if found is not None:
                 wanted.setdefault(found[0], []).append(found[1])
-        for machine, points in wanted.items():
-            await self._show(await self._sampler.take(machine), points)
+        for controller, points in wanted.items():
+            await self._show(await self._sampler.take(controller), points)
 
     async def refresh_all(self) -> None:
-        for machine, points in self._points.items():
-            await self._show(await self._sampler.take(machine), points)
+        for controller, points in self._points.items():
+            await self._show(await self._sampler.take(controller), points)
 
     def watch(self, nodes: Iterable[ua.NodeId]) -> None:
         for node in nodes:
@@ -120,15 +120,15 @@ class NodeService:
                 self._watched_arrays.setdefault(node, 0)
             found = self._of_node.get(node)
             if found is not None:
-                machine, point = found
-                self._watched.setdefault(machine, WatchedNodes()).add(point)
-                self._sampler.hasten(machine)
+                controller, point = found
+                self._watched.setdefault(controller, WatchedNodes()).add(point)
+                self._sampler.hasten(controller)
         self._sampler.watch(self._watched)
 
     def keep_followed(self, followed: Collection[ua.NodeId]) -> None:
         """Forget nodes to which no client subscribes any more."""
         self._watched_arrays = {node: left for node, left in self._watched_arrays.items() if node in followed}
-        kept = {machine: nodes for machine, nodes in self._watched.items() if nodes.keep(followed)}
+        kept = {controller: nodes for controller, nodes in self._watched.items() if nodes.keep(followed)}
         if len(kept) < len(self._watched):
             self._watched = kept
             self._sampler.watch(kept)
@@ -136,7 +136,7 @@ class NodeService:
     async def publish(self, within_s: float) -> None:
         """Notify the clients of what has changed, or of nothing ``within_s``."""
         for sample in await self._sampler.changed(within_s):
-            watched = self._watched.get(sample.machine)
+            watched = self._watched.get(sample.controller)
             if watched is not None:
                 for node, value in watched.changes(sample):
                     await self._write(sample, node, value)
@@ -152,7 +152,7 @@ class NodeService:
             await self._write(sample, node, None if sample.state is None else node.point.read(sample.state))
             if number % AT_ONCE == 0:
                 await asyncio.sleep(0)
-        watched = self._watched.get(sample.machine)
+        watched = self._watched.get(sample.controller)
         if watched is not None:
             watched.forget(points)
 
@@ -185,14 +185,14 @@ class NodeService:
             known = self._server.read_attribute_value(node, ua.AttributeIds.NodeClass).StatusCode
             is_known = known is not None and known.is_good()
             raise ua.UaStatusCodeError(ua.StatusCodes.BadNotWritable if is_known else ua.StatusCodes.BadNodeIdUnknown)
-        machine, there = found
+        controller, there = found
         point = there.point
         number = number_of(value, point.type)
         if number is None or point.write is None:
             raise ua.UaStatusCodeError(ua.StatusCodes.BadTypeMismatch)
         _check_range(number, point.limits)
         await client.do(self._subject, point.write(number))
-        await self._show(await self._sampler.take(machine), (there,))
+        await self._show(await self._sampler.take(controller), (there,))
 
     async def call(
         self, client: GatewayClient, session: object, node: ua.NodeId, method: ua.NodeId, given: Sequence[ua.Variant]

@@ -12,10 +12,10 @@ from typing import Any, TypeAlias, cast
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 
 from steptwin import __version__
+from steptwin.controller import SECOND
 from steptwin.errors import LineFailure
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.heldstate import BUSY
-from steptwin.machine import SECOND
 from steptwin.subject import commands as command
 from steptwin.subject.contract import Description
 from steptwin.subject.following import Filter
@@ -47,7 +47,7 @@ class Metrics:
     async def read(self) -> list[Metric]:
         """The present values."""
         description = self._subject.description
-        sheets = {part.name: part.datasheet for part in description.machines}
+        sheets = {part.name: part.datasheet for part in description.controllers}
         states = {name: await self._state(name) for name in sheets}
         up = [((name, sheet.kind, sheet.variant), states[name] is not None) for name, sheet in sheets.items()]
         known = {name: state for name, state in states.items() if state is not None}
@@ -61,10 +61,10 @@ class Metrics:
             *self._lines(),
         ]
 
-    async def _state(self, machine: str) -> Mapping[str, Any] | None:
+    async def _state(self, controller: str) -> Mapping[str, Any] | None:
         """None for a device that does not answer."""
         try:
-            return cast("Mapping[str, Any]", (await self._subject.do(command.ReadState(machine))).value)
+            return cast("Mapping[str, Any]", (await self._subject.do(command.ReadState(controller))).value)
         except LineFailure:
             return None
 
@@ -80,7 +80,7 @@ class Metrics:
     def _events(self) -> list[Metric]:
         missed, events = self._following.take()
         self._missed += missed
-        self._counts.update((event.machine, event.kind) for event in events)
+        self._counts.update((event.controller, event.kind) for event in events)
         counted = CounterMetricFamily(f"{PREFIX}events", "Events since the gateway was opened.", labels=("controller", "kind"))
         for labels, count in sorted(self._counts.items()):
             counted.add_metric(labels, count)

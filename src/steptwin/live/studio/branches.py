@@ -10,6 +10,7 @@ from itertools import count
 from pathlib import Path
 from typing import NamedTuple
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.errors import Misuse, Refusal
 from steptwin.eventloop import later
 from steptwin.live.lookback import Lookback
@@ -17,7 +18,6 @@ from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.studio.options import StudioOptions
 from steptwin.live.studio.processes import ChildProcesses, Process
 from steptwin.live.world import LiveWorld
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.messages import NONE, Message
 from steptwin.simulation.scheduler.trace import Mark
 from steptwin.simulation.world.snapshot import SimulationSnapshot

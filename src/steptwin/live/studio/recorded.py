@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.files import session as sessions
 from steptwin.files.beginning import is_session
 from steptwin.files.world import World
-from steptwin.machine import SECOND, Nanos
 from steptwin.simulation.world.history import History, replay
 
 STATE_NS: Nanos = SECOND

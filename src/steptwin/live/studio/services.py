@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from math import isinf
 from typing import TYPE_CHECKING, TypeVar
 
+from steptwin.controller import SECOND
 from steptwin.errors import Misuse, Refusal
 from steptwin.eventloop import later
 from steptwin.gateways.contract import OpenGateway
-from steptwin.machine import SECOND
 from steptwin.messages import Message
 from steptwin.simulation.describe.servicetables import HISTORY
 from steptwin.studio.servicerequests import MOST_POINTS, MOST_WRITES
@@ -171,6 +171,6 @@ def _write(event: KeptEvent, at_s: float) -> Mapping[str, object]:
     if event.kind == "write":
         source, what = kept["source"], kept["words"]
     else:
-        fields = ", ".join(f"{name} = {value}" for name, value in kept["fields"].items() if name != "machine")
+        fields = ", ".join(f"{name} = {value}" for name, value in kept["fields"].items() if name != "controller")
         source, what = f"{kept['viewer']} ({kept['role']})", f"{kept['do']} {fields}".rstrip()
-    return {"at_s": at_s, "source": source, "machine": event.machine, "what": what, "outcome": kept["outcome"]}
+    return {"at_s": at_s, "source": source, "controller": event.machine, "what": what, "outcome": kept["outcome"]}

@@ -214,8 +214,8 @@ class _Page:
         world = WorldPart(running.control, live.subject.followers, jogs)
         subject = CompositeSubject(world, lambda: moment().time, live.subject.numbering)
 
-        def configuration(machine: str) -> SourceText | None:
-            return configuration_text(live.world, machine) if machine in live.world.machines else None
+        def configuration(controller: str) -> SourceText | None:
+            return configuration_text(live.world, controller) if controller in live.world.controllers else None
 
         lookback = Lookback(live, server.realtime, pace, history)
         server.join(lookback)
@@ -358,7 +358,7 @@ class _Links:
         await self.connections.close()
 
 
-TEXTS_OF_A_DEVICE = Message("live.texts-of-a-device", "{machine} is a device: the texts of its programs are not known here")
+TEXTS_OF_A_DEVICE = Message("live.texts-of-a-device", "{controller} is a device: the texts of its programs are not known here")
 
 
 class _NoPrograms:
@@ -370,12 +370,12 @@ class _NoPrograms:
     def files(self) -> Mapping[str, bytes]:
         return {}
 
-    def memory(self, machine: str, place: str, text: str) -> Sequence[Mapping[str, object]]:
-        self.text(machine, place)
+    def memory(self, controller: str, place: str, text: str) -> Sequence[Mapping[str, object]]:
+        self.text(controller, place)
         return ()
 
-    def text(self, machine: str, place: str) -> Mapping[str, object]:
-        raise Misuse(TEXTS_OF_A_DEVICE(machine=machine))
+    def text(self, controller: str, place: str) -> Mapping[str, object]:
+        raise Misuse(TEXTS_OF_A_DEVICE(controller=controller))
 
 
 def _ports() -> Sequence[Mapping[str, object]]:

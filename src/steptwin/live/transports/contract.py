@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from steptwin.access.audit import CommandLog
+from steptwin.controller import Port
 from steptwin.live.clients import Clients
 from steptwin.live.links import Link
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.rfc2217 import TwinLine
-from steptwin.machine import Port
 from steptwin.simulation.kinds.links import TlsFiles
 
 

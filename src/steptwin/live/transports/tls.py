@@ -12,13 +12,13 @@ from weakref import WeakSet
 
 from steptwin.access.modbusroles import ROLE_OID, may_ask, role_of
 from steptwin.access.roles import Role
+from steptwin.controller import Nanos, Port, SendingPort, SourcedPort, sends_by_itself
 from steptwin.errors import Misuse
 from steptwin.extras import missing
 from steptwin.live.clients import BACKLOG
 from steptwin.live.tcp import listening_at
 from steptwin.live.tcp_asyncio import AsyncioConnection, TurnedAway
 from steptwin.live.transports.contract import LinkArguments, OpenLink, Transport
-from steptwin.machine import Nanos, Port, SendingPort, SourcedPort, sends_by_itself
 from steptwin.simulation.kinds.links import TlsFiles
 from steptwin.simulation.toml.addresses import Address, parse_address
 from steptwin.system import reason

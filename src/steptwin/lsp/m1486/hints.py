@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from steptwin.controller import SECOND
 from steptwin.explain.m1486 import move_duration
 from steptwin.lsp.answers import Hint
 from steptwin.lsp.m1486 import texts
@@ -14,7 +15,6 @@ from steptwin.m1486.lines import Interface
 from steptwin.m1486.structure import streams
 from steptwin.m1486.syntax import ParsedProgram
 from steptwin.m1486.variants import Variant
-from steptwin.machine import SECOND
 
 MOST_COMMANDS = 1_000
 """Most commands of a program whose moves are timed: more than any chip holds."""

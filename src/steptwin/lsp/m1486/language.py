@@ -53,7 +53,7 @@ class M1486Programs(EditorLanguage):
     """Many times what the chips of a line hold."""
 
     def around(self, session: OtherTexts, uri: str) -> tuple[Variant, Interface]:
-        chip = next((one for one in session.machines(ChipFiles) if one.program == uri), None)
+        chip = next((one for one in session.controllers(ChipFiles) if one.program == uri), None)
         return (DEFAULT, STEP_DIRECTION) if chip is None else (chip.variant, chip.interface)
 
     def analyse(self, session: OtherTexts, uri: str, lines: LineIndex) -> M1486Analysis:

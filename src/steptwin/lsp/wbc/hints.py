@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from steptwin.controller import SECOND
 from steptwin.explain.durations import move_duration
 from steptwin.lsp.answers import Hint
 from steptwin.lsp.wbc.names import Names, row_values
-from steptwin.machine import SECOND
 from steptwin.mic488.config import ControllerConfig
 from steptwin.symbols import SymbolKind, SymbolRole, Use
 from steptwin.wbc import steps as s

@@ -29,7 +29,7 @@ _BEGINNING = 4000
 
 
 @dataclass(frozen=True, slots=True)
-class ControllerFiles:
+class Mic488Files:
     """A MIC488 of a world: addresses of its files, by bank where there are banks."""
 
     firmware: str
@@ -59,14 +59,14 @@ class ControllerFiles:
             return DEFAULT
 
 
-def controller_of(world: str, table: Mapping[str, Any]) -> ControllerFiles:
+def controller_of(world: str, table: Mapping[str, Any]) -> Mic488Files:
     """The files of a MIC488, by its table in a description; wrong values are left out."""
     programs = _banks(world, table, "programs")
     single = text_of(table, "program")
     if single is not None:
         programs = {0: relative(world, single)} | programs
     config = text_of(table, "config")
-    return ControllerFiles(
+    return Mic488Files(
         str(table.get("firmware", DEFAULT.firmware)),
         None if config is None else relative(world, config),
         programs,
@@ -90,7 +90,7 @@ def _config(uri: str, text: str, firmware: str) -> ControllerConfig:
 
 
 def _context(session: OtherTexts, program: str) -> ProgramContext:
-    controller = next((one for one in session.machines(ControllerFiles) if program in one.programs.values()), None)
+    controller = next((one for one in session.controllers(Mic488Files) if program in one.programs.values()), None)
     table = (controller.table_of(program) if controller else None) or session.beside(program, POSITION_TABLES.suffix)
     config = (controller.config if controller else None) or session.beside(program, CONFIGURATIONS.suffix)
     dialect = controller.dialect if controller else DEFAULT
@@ -98,14 +98,14 @@ def _context(session: OtherTexts, program: str) -> ProgramContext:
 
 
 def _firmware(session: OtherTexts, config: str) -> str:
-    return next((one.dialect.firmware for one in session.machines(ControllerFiles) if one.config == config), DEFAULT.firmware)
+    return next((one.dialect.firmware for one in session.controllers(Mic488Files) if one.config == config), DEFAULT.firmware)
 
 
 def _programs_of(session: OtherTexts, table: str) -> list[str]:
     """The programs that use a position table."""
     found = [
         program
-        for controller in session.machines(ControllerFiles)
+        for controller in session.controllers(Mic488Files)
         for program in controller.programs.values()
         if controller.table_of(program) == table
     ]

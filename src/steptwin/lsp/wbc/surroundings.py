@@ -1,4 +1,4 @@
-"""The context of a program: the other files of its machine."""
+"""The context of a program: the other files of its controller."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from steptwin.wbc.positions import PositionTable
 
 @dataclass(frozen=True, slots=True)
 class ProgramContext:
-    """Position table and configuration, None if the machine has none, and the firmware."""
+    """Position table and configuration, None if the controller has none, and the firmware."""
 
     positions: PositionTable | None = None
     config: ControllerConfig | None = None

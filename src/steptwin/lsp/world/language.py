@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from steptwin.errors import Misuse
-from steptwin.lsp.language import EditorLanguage, MachineFiles, OtherTexts
+from steptwin.lsp.language import ControllerFiles, EditorLanguage, OtherTexts
 from steptwin.lsp.m1486.language import chip_of
 from steptwin.lsp.positions import LineIndex
 from steptwin.lsp.wbc.language import controller_of
@@ -16,7 +16,7 @@ from steptwin.lsp.world.analysis import WorldAnalysis
 from steptwin.lsp.world.built import ElementSignals
 from steptwin.simulation.kinds.registry import KINDS
 
-FILES: dict[str, Callable[[str, Mapping[str, Any]], MachineFiles | None]] = {"mic488": controller_of, "m1486": chip_of}
+FILES: dict[str, Callable[[str, Mapping[str, Any]], ControllerFiles | None]] = {"mic488": controller_of, "m1486": chip_of}
 """Readers of the files of a controller from the address of a description and its table there, by kinds of controllers."""
 
 
@@ -39,14 +39,14 @@ class Worlds(EditorLanguage):
     def analyse(self, session: OtherTexts, uri: str, lines: LineIndex) -> WorldAnalysis:
         return WorldAnalysis(uri, lines, session, session.kept(uri, ElementSignals))
 
-    def machines(self, uri: str, text: str) -> list[MachineFiles]:
-        """As `EditorLanguage.machines`. Leaves out what is wrong."""
+    def controllers(self, uri: str, text: str) -> list[ControllerFiles]:
+        """As `EditorLanguage.controllers`. Leaves out what is wrong."""
         try:
             data = tomllib.loads(text)
         except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
             raise Misuse(str(error)) from None
         read = (files(uri, table) for kind, files in FILES.items() for table in _tables(data, kind))
-        return [machine for machine in read if machine is not None]
+        return [controller for controller in read if controller is not None]
 
 
 WORLDS = Worlds()

@@ -8,8 +8,8 @@ from fractions import Fraction
 from functools import partial
 from typing import Any
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.components.encoder import EncoderSpec
@@ -76,7 +76,7 @@ class AxisSpec(NamedSpec):
     @property
     def scale(self) -> GivenScale:
         return GivenScale(
-            machine=self.drive[0],
+            controller=self.drive[0],
             is_rotary=self.kind == "rotary",
             unit=self.unit,
             pulses_per_unit=self.pulses_per_unit,
@@ -128,11 +128,11 @@ def _refers(spec: AxisSpec, described: ElementSpecs) -> Iterator[Reference]:
 
 
 def _build(spec: AxisSpec, site: Site) -> BuiltAxis:
-    machine = spec.drive[0]
-    scheduler = site.scheduler(machine)
+    controller = spec.drive[0]
+    scheduler = site.scheduler(controller)
     number, scale, build = site.memo.once(spec.path, lambda: _checked(spec, site))
-    mechanism = Mechanism(scheduler, machine, number, build, spec.name)
-    scheduler.add_part(mechanism, (machine,), spec.name)
+    mechanism = Mechanism(scheduler, controller, number, build, spec.name)
+    scheduler.add_part(mechanism, (controller,), spec.name)
     fitted = BuiltAxis(spec, scheduler, mechanism, scale)
     for n, switch in enumerate(spec.switches, start=1):
         site.text.unless_wrong(switch.path, partial(_put_switch, fitted, switch, lane_of(spec.name, n), site))
@@ -141,16 +141,16 @@ def _build(spec: AxisSpec, site: Site) -> BuiltAxis:
 
 def _checked(spec: AxisSpec, site: Site) -> tuple[int, Scale, Build]:
     """The number of its drive, its scale and its mechanics. Raises `Misuse`."""
-    machine, drive = spec.drive
+    controller, drive = spec.drive
     number = axis_number(drive)
-    axes = len(site.machine(machine).axes)
+    axes = len(site.controller(controller).axes)
     if not 1 <= number <= axes:
         there = ", ".join(f"M{n}" for n in range(1, axes + 1))
-        raise WrongTerminal(f"{machine}.{drive}", f"drive = '{machine}.{drive}': {machine} has {there}", None)
+        raise WrongTerminal(f"{controller}.{drive}", f"drive = '{controller}.{drive}': {controller} has {there}", None)
     taken = [axis.spec.name for axis in site.parts.built(AXIS).values() if axis.spec.drive == spec.drive]
     if taken:
-        raise Misuse(f"drive = '{machine}.{drive}' moves {taken[0]!r} already")
-    scale = scale_of(spec.scale, site.kind(machine).scale(spec.scale, site.machine(machine), number))
+        raise Misuse(f"drive = '{controller}.{drive}' moves {taken[0]!r} already")
+    scale = scale_of(spec.scale, site.kind(controller).scale(spec.scale, site.controller(controller), number))
     pulses = scale.nearest
     build = Build(
         sign=-1 if spec.inverted else 1,
@@ -185,14 +185,14 @@ def _fit_encoder(axis: BuiltAxis, spec: EncoderSpec | None, axes: Mapping[str, B
     controller."""
     mechanism = axis.mechanism
     name = axis.spec.drive[0]
-    kind, machine = site.kind(name), site.machine(name)
+    kind, controller = site.kind(name), site.controller(name)
     encoders = kind.encoders
     if encoders is None:
         if spec is not None:
             raise Misuse(f"encoder: {name} is {kind.title}, which reads none")
         return
     now = axis.scheduler.now
-    reader = encoders.reader(machine)
+    reader = encoders.reader(controller)
     if spec is None:
         if not mechanism.build.ideal:
             mechanism.fit(EncoderBuild(name, reader, mechanism.number), now)
@@ -203,7 +203,7 @@ def _fit_encoder(axis: BuiltAxis, spec: EncoderSpec | None, axes: Mapping[str, B
         if other is None:
             raise Unknown(spec.follows, f"encoder: follows = {spec.follows!r}: axes are {', '.join(axes)}")
         turned = other
-    counts = _counts(spec, turned, encoders, machine, mechanism.number)
+    counts = _counts(spec, turned, encoders, controller, mechanism.number)
     on_load = spec.mount == "load" or spec.follows is not None
     numerator, denominator = (None, 1) if counts is None else (counts.numerator, counts.denominator)
     turned.mechanism.fit(EncoderBuild(name, reader, mechanism.number, on_load, numerator, denominator), now)
@@ -212,10 +212,10 @@ def _fit_encoder(axis: BuiltAxis, spec: EncoderSpec | None, axes: Mapping[str, B
         target = (name, encoders.index_input(mechanism.number))
         circuit = site.circuit(axis.scheduler, target, (*spec.path, "index"), None)
         zone = Zone(low, low + spec.index_width - 1, 0, axis.scale.pulses_per_rev)
-        axis.scheduler.add_part(Switch(circuit, RotorMark(turned.mechanism), zone, now), (turned.mechanism.machine,))
+        axis.scheduler.add_part(Switch(circuit, RotorMark(turned.mechanism), zone, now), (turned.mechanism.controller,))
 
 
-def _counts(spec: EncoderSpec, turned: BuiltAxis, encoders: EncoderInputs[Any], machine: Any, number: int) -> Fraction | None:
+def _counts(spec: EncoderSpec, turned: BuiltAxis, encoders: EncoderInputs[Any], controller: Any, number: int) -> Fraction | None:
     """Counts per pulse of what turns it; None: as the controller is configured."""
     counts: Fraction | None = None
     if spec.counts_per_unit is not None:
@@ -224,7 +224,7 @@ def _counts(spec: EncoderSpec, turned: BuiltAxis, encoders: EncoderInputs[Any], 
         counts = Fraction(spec.counts_per_rev, turned.scale.pulses_per_rev)
     if spec.slip:
         if counts is None:
-            counts = encoders.counts_per_pulse(machine, number)
+            counts = encoders.counts_per_pulse(controller, number)
         counts *= 1 - exact_fraction(spec.slip)
     return counts
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Protocol, TypeVar
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.simulation.components.contact import ContactSpec
 from steptwin.simulation.logic.contacts import Circuit, Contact
 from steptwin.simulation.mechanics.belt import BeltDrive, Load, next_change
@@ -21,7 +21,7 @@ class SensorSpec(ContactSpec):
     """A light barrier, proximity switch or mark sensor over the belt."""
 
     at: float = key(number(0.0), "mm from the beginning of the belt", order=-1)
-    target: Terminal = key(INPUT_PIN, "the input, on while a workpiece covers it: MACHINE.PIN", name="to")
+    target: Terminal = key(INPUT_PIN, "the input, on while a workpiece covers it: CONTROLLER.PIN", name="to")
     sees: str = key(word(WORKPIECE, MARK), "workpiece, or the marks on workpieces", default=WORKPIECE)
 
 

@@ -36,7 +36,7 @@ def _build(spec: ButtonSpec, site: Site) -> tuple[Button, Scheduler]:
         lane=spec.name,
     )
     button.rest_at(spec.contact == "NC")
-    scheduler.add_part(button, (circuit.target.machine,), spec.name, circuit.target.machine)
+    scheduler.add_part(button, (circuit.target.controller,), spec.name, circuit.target.controller)
     return button, scheduler
 
 

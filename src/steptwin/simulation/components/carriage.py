@@ -7,8 +7,8 @@ from functools import partial
 from math import floor
 from typing import ClassVar
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.motion.elastic import Response, Spring
 from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis
@@ -69,7 +69,7 @@ class Carriage(Stateful):
         """Let the belt have a share of its frequency."""
         self._spring = Spring(self.spec.frequency * share, self.spec.damping)
         self._renew(now)
-        self.axis.scheduler.report(self.axis.mechanism.machine, "edge", f"{self.spec.name}.{SPRING_SHARE}", share)
+        self.axis.scheduler.report(self.axis.mechanism.controller, "edge", f"{self.spec.name}.{SPRING_SHARE}", share)
 
     # ------------------------------------------------------------------ part of a scheduler
 
@@ -146,16 +146,16 @@ def _slacken(active: ActiveFault, carriage: Carriage, begins: bool, now: Nanos) 
 
 def _refers(spec: CarriageSpec, described: ElementSpecs) -> Iterator[Reference]:
     drives = {axis.name: axis.drive[0] for axis in described.of(AXIS)}
-    machine = drives.get(spec.axis, spec.axis)
-    yield Reference(machine, machine, (*spec.path, "axis"))
+    controller = drives.get(spec.axis, spec.axis)
+    yield Reference(controller, controller, (*spec.path, "axis"))
     for switch in spec.switches:
-        yield Reference(machine, switch.target[0], (*switch.path, "to"))
+        yield Reference(controller, switch.target[0], (*switch.path, "to"))
 
 
 def _build(spec: CarriageSpec, site: Site) -> Carriage:
     carriage = Carriage(spec, find_axis(spec.axis, site))
     mechanism = carriage.axis.mechanism
-    carriage.axis.scheduler.add_part(carriage, (mechanism.machine, spec.axis), spec.name)
+    carriage.axis.scheduler.add_part(carriage, (mechanism.controller, spec.axis), spec.name)
     for n, switch in enumerate(spec.switches, start=1):
         site.text.unless_wrong(switch.path, partial(_put_switch, carriage, switch, lane_of(spec.name, n), site))
     return carriage

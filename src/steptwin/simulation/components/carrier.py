@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.conveyor import find_conveyor
 from steptwin.simulation.components.elementspec import ElementSpecs

@@ -40,7 +40,7 @@ class CollisionSpec(BoardSpec):
 
     @property
     def owners(self) -> tuple[str, ...]:
-        """Machines and elements whose signals are in the condition."""
+        """Controllers and elements whose signals are in the condition."""
         return owners_of(self.when)
 
     def others(self, described: ElementSpecs) -> Iterator[tuple[str, str]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.simulation.toml.table import TableSpec, key, table
 from steptwin.simulation.toml.values import INPUT_PIN, Terminal, time_value, whole, word
 
@@ -11,7 +11,7 @@ from steptwin.simulation.toml.values import INPUT_PIN, Terminal, time_value, who
 class ContactSpec(TableSpec):
     """The keys of every contact, behind those of its own."""
 
-    target: Terminal = key(INPUT_PIN, "the input: MACHINE.PIN", name="to")
+    target: Terminal = key(INPUT_PIN, "the input: CONTROLLER.PIN", name="to")
     contact: str = key(word("NO", "NC"), "NO (closed while on) or NC (open while on)", default="NO", order=1)
     join: str | None = key(
         word("parallel", "series"),

@@ -12,8 +12,8 @@ from functools import partial
 from math import ceil, floor, nan
 from typing import ClassVar
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.axis import find_axis, turns_of_axis
 from steptwin.simulation.components.beltsensor import Sensor, SensorSpec
@@ -95,7 +95,7 @@ class Conveyor(BoardPart):
         moved_by: tuple[str, ...] = (),
         turns: Callable[[Nanos], Iterator[Nanos]] = lambda now: iter(()),
     ) -> None:
-        """``own``: the drive, where it is the conveyor's own; ``moved_by``: otherwise the machine that moves it, between
+        """``own``: the drive, where it is the conveyor's own; ``moved_by``: otherwise the controller that moves it, between
         ``turns`` one way."""
         super().__init__(board)
         self.spec = spec
@@ -340,7 +340,7 @@ def _make(spec: ConveyorSpec, site: Site) -> Conveyor:
         axis = find_axis(spec.axis, site)
         per_mm = axis.scale.pulses_per_unit / exact_fraction(spec.mm_per_unit)
         turns = partial(turns_of_axis, axis)
-        conveyor = Conveyor(board, spec, axis.mechanism, per_mm, None, (axis.mechanism.machine,), turns)
+        conveyor = Conveyor(board, spec, axis.mechanism, per_mm, None, (axis.mechanism.controller,), turns)
     if conveyor.places(spec.length) < 1:
         raise Misuse(
             f"length = {spec.length:g} mm: the belt is shorter than one step of its drive, {float(1 / conveyor.per_mm):g} mm"
@@ -379,7 +379,7 @@ def _put_sensor(conveyor: Conveyor, spec: SensorSpec, lane: str, site: Site) -> 
     scheduler = conveyor.board.scheduler
     circuit = site.circuit(scheduler, spec.target, (*spec.path, "to"), spec.join)
     sensor = Sensor(circuit, conveyor, spec, site.bounce_of(circuit), lane)
-    scheduler.add_part(sensor, (conveyor.board.name,), drives=circuit.target.machine)
+    scheduler.add_part(sensor, (conveyor.board.name,), drives=circuit.target.controller)
 
 
 def _place_names(spec: ConveyorSpec) -> tuple[str, ...]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.simulation.components.beltsensor import SensorSpec
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.components.logic import BoardSpec, Joint

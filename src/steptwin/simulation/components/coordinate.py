@@ -7,7 +7,7 @@ from itertools import pairwise
 from math import ceil, floor, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
-from steptwin.machine import SECOND, Nanos
+from steptwin.controller import SECOND, Nanos
 from steptwin.motion.elastic import DriveStretch
 from steptwin.points import FARTHEST_NS
 from steptwin.simulation.mechanics.loadmotion import load_stretches

@@ -8,7 +8,7 @@ from functools import partial
 from math import floor
 from typing import ClassVar
 
-from steptwin.machine import MILLISECOND, Nanos
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.elementspec import Reference
 from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals

@@ -27,13 +27,13 @@ class Element(ElementTable[S, B]):
     """A kind of element. ``S`` is its table as a value, ``B`` the built object. Raises `IncompleteTable` for missing entries."""
 
     refers: Callable[[S, ElementSpecs], Iterable[Reference]]
-    """All machines, lines and elements with terminals that it names. Names that do not exist are reported at the path."""
+    """All controllers, lines and elements with terminals that it names. Names that do not exist are reported at the path."""
     build: Callable[[S, Site], B]
     """Adds it to its scheduler. Raises `Misuse` if it does not fit."""
     connect: Callable[[S, B, Site], None] | None = None
     """Called after all elements of this kind were built, because they may refer to each other."""
     terminals: Callable[[S], Terminals] | None = None
-    """Its own inputs and outputs, as pins of a machine: others join ``NAME.TERMINAL``. `Site.board` has their levels."""
+    """Its own inputs and outputs, as pins of a controller: others join ``NAME.TERMINAL``. `Site.board` has their levels."""
     signals: Callable[[B], Mapping[str, SignalOf]] | None = None
     """Signals for conditions, by name. Exactly the elements with a ``name`` have signals."""
     drawing: Callable[[B], Drawing] | None = None

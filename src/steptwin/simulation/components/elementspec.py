@@ -41,8 +41,8 @@ class ElementSpecs(dict[str, tuple[TableSpec, ...]]):
 
 
 class Reference(NamedTuple):
-    """Two machines, lines or elements with terminals that an element connects, so that they share a scheduler. ``path``: the key
-    that names ``other``; what names ``one`` is its own table, or another reference, in which both are the same."""
+    """Two controllers, lines or elements with terminals that an element connects, so that they share a scheduler. ``path``: the
+    key that names ``other``; what names ``one`` is its own table, or another reference, in which both are the same."""
 
     one: str
     other: str

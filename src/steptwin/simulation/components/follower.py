@@ -8,8 +8,8 @@ from functools import partial
 from math import floor
 from typing import ClassVar
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.axis import AXIS, turns_of_axis
 from steptwin.simulation.components.element import Element
@@ -145,7 +145,7 @@ class Follower(Stateful):
 
     def _report(self, what: str, level: float) -> None:
         axis = self.shaft.axis
-        axis.scheduler.report(axis.mechanism.machine, "edge", f"{self.spec.name}.{what}", level)
+        axis.scheduler.report(axis.mechanism.controller, "edge", f"{self.spec.name}.{what}", level)
 
     @property
     def moved(self) -> tuple[str, MovedLane]:
@@ -179,8 +179,8 @@ def _wear(active: ActiveFault, follower: Follower, begins: bool, now: Nanos) -> 
 # ---------------------------------------------------------------------- the element
 
 
-def _machine(spec: FollowerSpec, described: ElementSpecs) -> str:
-    """The machine that drives the axis of its shaft; otherwise the name that does not exist."""
+def _controller(spec: FollowerSpec, described: ElementSpecs) -> str:
+    """The controller that drives the axis of its shaft; otherwise the name that does not exist."""
     axes = {shaft.name: shaft.axis for shaft in described.of(SHAFT)}
     drives = {axis.name: axis.drive[0] for axis in described.of(AXIS)}
     axis = axes.get(spec.shaft)
@@ -188,10 +188,10 @@ def _machine(spec: FollowerSpec, described: ElementSpecs) -> str:
 
 
 def _refers(spec: FollowerSpec, described: ElementSpecs) -> Iterator[Reference]:
-    machine = _machine(spec, described)
-    yield Reference(machine, machine, (*spec.path, "shaft"))
+    controller = _controller(spec, described)
+    yield Reference(controller, controller, (*spec.path, "shaft"))
     for switch in spec.switches:
-        yield Reference(machine, switch.target[0], (*switch.path, "to"))
+        yield Reference(controller, switch.target[0], (*switch.path, "to"))
 
 
 def _build(spec: FollowerSpec, site: Site) -> Follower:
@@ -200,7 +200,7 @@ def _build(spec: FollowerSpec, site: Site) -> Follower:
         raise Unknown(spec.shaft, f"no shaft is called {spec.shaft!r}")
     follower = Follower(spec, shaft, site.memo.once(spec.path, lambda: _cam(spec, shaft)))
     scheduler = shaft.axis.scheduler
-    scheduler.add_part(follower, (shaft.axis.mechanism.machine, shaft.axis.spec.name, spec.shaft, spec.name), spec.name)
+    scheduler.add_part(follower, (shaft.axis.mechanism.controller, shaft.axis.spec.name, spec.shaft, spec.name), spec.name)
     for n, switch in enumerate(spec.switches, start=1):
         site.text.unless_wrong(switch.path, partial(_put_switch, follower, switch, lane_of(spec.name, n), site))
     return follower
@@ -224,7 +224,7 @@ def _put_switch(follower: Follower, spec: SwitchSpec, lane: str, site: Site) -> 
     zone = site.memo.once(spec.path, lambda: zone_of(spec, places))
     mechanism = follower.shaft.axis.mechanism
     scheduler = follower.shaft.axis.scheduler
-    put_switch(scheduler, follower, (mechanism.machine, follower.spec.shaft, follower.spec.name), zone, spec, lane, site)
+    put_switch(scheduler, follower, (mechanism.controller, follower.spec.shaft, follower.spec.name), zone, spec, lane, site)
 
 
 def _signals(follower: Follower) -> Mapping[str, SignalOf]:

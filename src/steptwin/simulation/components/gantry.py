@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import ClassVar
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.axis import BuiltAxis, find_axis
 from steptwin.simulation.components.coordinate import Coordinate, Pulled
@@ -129,7 +129,7 @@ class Gantry(Touch):
     def moved(self) -> tuple[str, MovedLane]:
         half, other_half = (end.mechanism.build.sign / (2.0 * float(end.scale.pulses_per_unit)) for end in self.ends)
         other = self.ends[1].mechanism
-        place = other.machine, str(other.number)
+        place = other.controller, str(other.number)
         return self.ends[0].spec.name, MovedLane(
             self.board.name, "position", self.unit, half, other=place, other_per_pulse=other_half
         )

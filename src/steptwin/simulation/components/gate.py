@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.scheduler.scheduler import Board
@@ -41,7 +41,7 @@ class GateSpec(BoardSpec):
     kind: str = key(word(*FUNCTIONS), ", ".join(FUNCTIONS))
     inputs: int | tuple[Terminal, ...] = key(
         GateInputs(OUTPUT, MOST_INPUTS),
-        "outputs connected to IN1, IN2 ...: MACHINE.PIN or ELEMENT.TERMINAL; or how many inputs, for wires and contacts",
+        "outputs connected to IN1, IN2 ...: CONTROLLER.PIN or ELEMENT.TERMINAL; or how many inputs, for wires and contacts",
     )
 
     @property

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from math import floor
 from typing import ClassVar
 
-from steptwin.machine import MILLISECOND, Nanos
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.carrier import HELD, PICK, PLACE, Carrier, CarrierSpec, carrier_signals
 from steptwin.simulation.components.logic import STUCK, Joint, with_terminals

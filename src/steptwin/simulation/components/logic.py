@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple, TypeVar
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
@@ -67,7 +67,7 @@ class BoardPart(Stateful, ABC):
 
     @property
     def watches(self) -> tuple[str, ...] | None:
-        """The machines and elements whose changes concern it; None: all."""
+        """The controllers and elements whose changes concern it; None: all."""
         return (self.board.name,)
 
     @property

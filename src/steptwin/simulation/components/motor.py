@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.simulation.mechanics.motor import StepperMotor
 from steptwin.simulation.mechanics.resonance import Resonance
 from steptwin.simulation.mechanics.scale import Loading, Scale, burden_of

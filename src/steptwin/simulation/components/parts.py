@@ -31,13 +31,13 @@ class WorldParts:
     record: RecordSink
     schedulers: list[Scheduler] = field(default_factory=list)
     scheduler_of: dict[str, Scheduler] = field(default_factory=dict)
-    """Schedulers of machines, lines and elements with terminals."""
-    machines: dict[str, MotionController] = field(default_factory=dict)
+    """Schedulers of controllers, lines and elements with terminals."""
+    controllers: dict[str, MotionController] = field(default_factory=dict)
     kind_of: dict[str, AnyKind] = field(default_factory=dict)
-    """Kinds of machines."""
+    """Kinds of controllers."""
     lines: dict[str, Line] = field(default_factory=dict)
     line_of: dict[str, tuple[Line, int]] = field(default_factory=dict)
-    """Line and unit (or address) of each machine."""
+    """Line and unit (or address) of each controller."""
     terminals: dict[str, Terminals] = field(default_factory=dict)
     """Terminals of elements that have some."""
     driven: dict[PinName, Path] = field(default_factory=dict)
@@ -49,7 +49,7 @@ class WorldParts:
     signals_of: dict[str, Callable[[], Mapping[str, SignalOf]]] = field(default_factory=dict)
     """Signals of built elements with names."""
     supplied: dict[str, str] = field(default_factory=dict)
-    """The power supplies of machines that have one."""
+    """The power supplies of controllers that have one."""
 
     def built(self, element: ElementTable[S, B]) -> Mapping[str, B]:
         """The built elements of a kind, by name."""

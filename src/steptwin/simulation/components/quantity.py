@@ -15,11 +15,11 @@ from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.tomlplaces import Path
 
 TIME = "time"
-"""The signal that belongs to no machine and no element."""
+"""The signal that belongs to no controller and no element."""
 
 
 def owners_of(condition: str) -> tuple[str, ...]:
-    """Machines and elements whose signals are in a condition; none for one that is wrong."""
+    """Controllers and elements whose signals are in a condition; none for one that is wrong."""
     try:
         return tuple(dict.fromkeys(owner_of(name) for name in parse_condition(condition).names()))
     except Misuse:
@@ -42,7 +42,7 @@ def check_owners(text: TomlText, path: Path, name: str, owners: tuple[str, ...])
 
 
 def owner_of(signal: str) -> str:
-    """The machine or element that has a signal."""
+    """The controller or element that has a signal."""
     return signal.partition(".")[0]
 
 
@@ -50,7 +50,7 @@ def signal_of(key: str, board: Board, site: Site, name: str) -> SignalOf | Idle:
     """A signal of what is in one scheduler with a board. Raises `Misuse`."""
     found = find_signal(site.parts, name)
     if isinstance(found, Idle) or any(source.scheduler is not board.scheduler for source in found.sources):
-        raise Misuse(f"{key}: {name!r} is no quantity of a machine or an element")
+        raise Misuse(f"{key}: {name!r} is no quantity of a controller or an element")
     found.watch(name)
     return found
 

@@ -1,15 +1,15 @@
-"""The faults of a world: checks of their places, and preparation of machines for them."""
+"""The faults of a world: checks of their places, and preparation of controllers for them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.simulation.components.axis import AXIS
 from steptwin.simulation.components.parts import WorldParts
 from steptwin.simulation.faults import ActiveFault, Fault, RequestRoute, check_place, rig
-from steptwin.simulation.faults.machine import FaultyMachine
+from steptwin.simulation.faults.controller import FaultyController
 from steptwin.simulation.faults.table import Layer, Occasion
 from steptwin.simulation.kinds.kind import LineUnit
 from steptwin.simulation.kinds.lines import SCRIPTS
@@ -34,7 +34,7 @@ class Rigging:
         self._plan.faults.add(fault, now)
 
     def put_back(self, faults: Iterable[tuple[Fault, str, Nanos]], rigged: Iterable[str], state: Any) -> None:
-        """Restore the faults of a snapshot, with name and moment, and prepare the machines that it has prepared; others remain
+        """Restore the faults of a snapshot, with name and moment, and prepare the controllers that it has prepared; others remain
         prepared for later ones."""
         kept, there = list(faults), self._plan.faults
         for name in rigged:
@@ -44,25 +44,25 @@ class Rigging:
 
     def _prepare(self, fault: Fault) -> None:
         if fault.kind.layer is Layer.PHYSICS or fault.kind.occasion is Occasion.REQUEST:
-            for name in self._plan.machines:
+            for name in self._plan.controllers:
                 self.rig(name)
 
-    def rig(self, name: str) -> FaultyMachine:
-        """Prepare a machine for faults; if an axis has mechanics, its faults act on these instead of on the encoder."""
+    def rig(self, name: str) -> FaultyController:
+        """Prepare a controller for faults; if an axis has mechanics, its faults act on these instead of on the encoder."""
         plan = self._plan
-        machine, scheduler = plan.machines[name], plan.scheduler_of[name]
-        rigged = scheduler.machines[name]
-        if isinstance(rigged, FaultyMachine):
+        controller, scheduler = plan.controllers[name], plan.scheduler_of[name]
+        rigged = scheduler.controllers[name]
+        if isinstance(rigged, FaultyController):
             return rigged
         mechanisms = {axis.mechanism.number: axis.mechanism for axis in plan.built(AXIS).values() if axis.spec.drive[0] == name}
         on = plan.line_of.get(name)
         service = LineUnit() if on is None else LineUnit(on[1], on[0].name)
-        body = plan.kind_of[name].body(machine, service, mechanisms)
+        body = plan.kind_of[name].body(controller, service, mechanisms)
         return rig(scheduler, name, plan.faults, body)
 
 
 def _wires(plan: WorldParts) -> Iterator[RequestRoute]:
-    """The routes of requests: external links of lines, described or present; scripts; None for a machine without a line."""
+    """The routes of requests: external links of lines, described or present; scripts; None for a controller without a line."""
     for spec in plan.line_specs:
         line = plan.lines.get(spec.name)
         if line is None:

@@ -8,8 +8,8 @@ from functools import partial
 from math import floor
 from typing import Any, ClassVar
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, turns_of_axis
 from steptwin.simulation.components.contact import ContactSpec
@@ -105,7 +105,7 @@ class GearedShaft(Stateful):
     def slip(self, slips: bool, now: Nanos) -> None:
         """Let the coupling slip, or grip again where the shaft is then."""
         scheduler, mechanism = self.axis.scheduler, self.axis.mechanism
-        scheduler.report(mechanism.machine, "edge", f"{self.spec.name}.{SLIPS}", float(slips))
+        scheduler.report(mechanism.controller, "edge", f"{self.spec.name}.{SLIPS}", float(slips))
         if slips:
             self._held = self.place(now)
         elif self._held is not None:
@@ -150,23 +150,23 @@ class GearedShaft(Stateful):
 
 def _refers(spec: ShaftSpec, described: ElementSpecs) -> Iterator[Reference]:
     drives = {axis.name: axis.drive[0] for axis in described.of(AXIS)}
-    machine = drives.get(spec.axis, spec.axis)
-    yield Reference(machine, machine, (*spec.path, "axis"))
+    controller = drives.get(spec.axis, spec.axis)
+    yield Reference(controller, controller, (*spec.path, "axis"))
     for cam in spec.cams:
-        yield Reference(machine, cam.target[0], (*cam.path, "to"))
+        yield Reference(controller, cam.target[0], (*cam.path, "to"))
 
 
 def _build(spec: ShaftSpec, site: Site) -> GearedShaft:
     shaft = GearedShaft(spec, find_axis(spec.axis, site))
     mechanism = shaft.axis.mechanism
-    shaft.axis.scheduler.add_part(shaft, (mechanism.machine, spec.axis, spec.name), spec.name)
+    shaft.axis.scheduler.add_part(shaft, (mechanism.controller, spec.axis, spec.name), spec.name)
     for n, cam in enumerate(spec.cams, start=1):
         site.text.unless_wrong(cam.path, partial(_put_cam, shaft, cam, lane_of(spec.name, n), site))
     return shaft
 
 
 def _put_cam(shaft: GearedShaft, cam: CamSpec, lane: str, site: Site) -> None:
-    moved_by = shaft.axis.mechanism.machine, shaft.spec.name
+    moved_by = shaft.axis.mechanism.controller, shaft.spec.name
     put_switch(shaft.axis.scheduler, shaft, moved_by, shaft.zone(cam), cam, lane, site)
 
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import TypeVar
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss, alike
@@ -27,7 +27,7 @@ MOST_COMPARED = 40
 
 
 class Idle:
-    """The signal ``idle``: all machines are idle and no transmission is pending. It is tested on one busy machine at a time."""
+    """The signal ``idle``: all controllers are idle and no transmission is pending. It tests the one that was busy last first."""
 
     continuous = False
     is_readable = True
@@ -36,16 +36,16 @@ class Idle:
 
     def __init__(self, plan: WorldParts) -> None:
         at_rest: dict[str, Callable[[Nanos], bool]] = {
-            **{name: partial(plan.kind_of[name].is_idle, machine) for name, machine in plan.machines.items()},
+            **{name: partial(plan.kind_of[name].is_idle, controller) for name, controller in plan.controllers.items()},
             **{name: partial(_is_quiet, line) for name, line in plan.lines.items()},
         }
         self._things = [(plan.scheduler_of[name].source(name), is_at_rest) for name, is_at_rest in at_rest.items()]
         self._sources = tuple(source for source, _ in self._things)
         self._busy: int | None = None
-        """Index of the machine or line that was busy last."""
+        """Index of the controller or line that was busy last."""
 
     def bring(self, now: Nanos) -> tuple[Source, ...]:
-        """As `SignalOf.bring`: a busy machine or line, or all if none is busy."""
+        """As `SignalOf.bring`: a busy controller or line, or all if none is busy."""
         for n in (*(() if self._busy is None else (self._busy,)), *range(len(self._things))):
             source, is_at_rest = self._things[n]
             source.scheduler.advance(now)
@@ -91,32 +91,32 @@ def find_signal(plan: WorldParts, name: str) -> SignalOf | Idle:
     line = plan.lines.get(owner)
     if line is not None:
         return _chosen({"idle": _quiet(line, plan.scheduler_of[owner].source(owner))}, rest, name)
-    machine = plan.machines.get(owner)
-    if machine is None:
+    controller = plan.controllers.get(owner)
+    if controller is None:
         later = plan.unbuilt(owner)
         if later is not None:
             raise Unknown(owner, SIGNAL_IS_LATER(name=name, table=later, owner=owner))
-        known = [*plan.machines, *plan.element_names, "time", "idle"]
+        known = [*plan.controllers, *plan.element_names, "time", "idle"]
         near = NearMiss()
         text = NOTHING_IS_CALLED(name=name, owner=owner, hint=near.hint(owner, known), names=known)
         raise Unknown(owner, text, near.of(owner, known))
-    return _of_machine(plan.kind_of[owner], machine, plan.scheduler_of[owner].source(owner), rest, name)
+    return _of_controller(plan.kind_of[owner], controller, plan.scheduler_of[owner].source(owner), rest, name)
 
 
 def _seconds(now: Nanos) -> float:
     return now / SECOND
 
 
-def _of_machine(kind: AnyKind, machine: MotionController, source: Source, rest: str, name: str) -> SignalOf:
+def _of_controller(kind: AnyKind, controller: MotionController, source: Source, rest: str, name: str) -> SignalOf:
     """The signal of a pin, otherwise of a point of the data sheet."""
     pin = rest.upper()
-    if pin in machine.pins():
-        unit = kind.pins(machine)[pin].unit
-        read = partial(kind.state.pin, machine, pin)
-        return SignalOf((source,), read, unit=unit, check=partial(kind.refuse_taken, machine, pin))
-    point = kind.point(machine, rest) if rest else None
+    if pin in controller.pins():
+        unit = kind.pins(controller)[pin].unit
+        read = partial(kind.state.pin, controller, pin)
+        return SignalOf((source,), read, unit=unit, check=partial(kind.refuse_taken, controller, pin))
+    point = kind.point(controller, rest) if rest else None
     if point is None:
-        raise _unknown([point.path for point in kind.datasheet(machine).points], rest, name, AND_PINS())
+        raise _unknown([point.path for point in kind.datasheet(controller).points], rest, name, AND_PINS())
     return SignalOf(
         (source,), point.read, point.turns, point.version, point.point.unit, is_kept=point.is_kept, freeze=point.freeze
     )

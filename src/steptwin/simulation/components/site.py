@@ -1,4 +1,4 @@
-"""The context in which elements are built: machines and schedulers by name, inputs and their drivers, shared contacts."""
+"""The context in which elements are built: controllers and schedulers by name, inputs and their drivers, shared contacts."""
 
 from __future__ import annotations
 
@@ -29,25 +29,25 @@ class Site:
         self._joins: dict[PinName, str | None] = {}
         """``join`` of each input with contacts."""
 
-    # ------------------------------------------------------------------ machines and schedulers
+    # ------------------------------------------------------------------ controllers and schedulers
 
-    def machine(self, name: str) -> MotionController:
-        """The machine called ``name``, which is not a line."""
-        found = self.parts.machines.get(name)
+    def controller(self, name: str) -> MotionController:
+        """The controller called ``name``, which is not a line."""
+        found = self.parts.controllers.get(name)
         if found is None and name not in self.parts.scheduler_of:
             raise Unknown(name, f"nothing is called {name!r}")
         if found is None:
             what = "an element" if name in self.parts.terminals else "a line"
-            raise Misuse(f"{name!r} is {what}; machines are {', '.join(self.parts.machines)}")
+            raise Misuse(f"{name!r} is {what}; controllers are {', '.join(self.parts.controllers)}")
         return found
 
     def kind(self, name: str) -> AnyKind:
-        """The kind of a machine."""
-        self.machine(name)
+        """The kind of a controller."""
+        self.controller(name)
         return self.parts.kind_of[name]
 
     def scheduler(self, name: str) -> Scheduler:
-        """The scheduler of a machine, a line or an element with terminals."""
+        """The scheduler of a controller, a line or an element with terminals."""
         found = self.parts.scheduler_of.get(name)
         if found is None:
             raise Unknown(name, f"nothing is called {name!r}")
@@ -61,7 +61,7 @@ class Site:
 
     def join(self, wire: Wire, path: Path) -> None:
         """Join an output to an input that nothing else drives. ``path``: the table of the wire, or the key of its source."""
-        scheduler = self.scheduler(wire.source.machine)
+        scheduler = self.scheduler(wire.source.controller)
         if self.memo.is_checked:
             self.parts.driven[wire.target] = path
         else:
@@ -70,17 +70,17 @@ class Site:
         scheduler.connect(wire)
 
     def terminal(self, name: Terminal, kind: str) -> PinName:
-        """A terminal of a machine or an element; ``kind`` is one of those of `steptwin.simulation.toml.values`."""
+        """A terminal of a controller or an element; ``kind`` is one of those of `steptwin.simulation.toml.values`."""
         pin = PinName(*name)
         if self.memo.is_checked:
             return pin
-        of_element = self.parts.terminals.get(pin.machine)
+        of_element = self.parts.terminals.get(pin.controller)
         if of_element is not None:
             of_element.check(pin, kind)
             return pin
-        machine, its = self.machine(pin.machine), self.kind(pin.machine)
+        controller, its = self.controller(pin.controller), self.kind(pin.controller)
         its.terminals.check(pin, kind)
-        its.refuse_taken(machine, pin.pin)
+        its.refuse_taken(controller, pin.pin)
         return pin
 
     def input(self, name: Terminal, path: Path, kind: str = DIGITAL_INPUT) -> PinName:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.components.site import Site
@@ -62,7 +62,7 @@ WAVEFORMS: Mapping[str, Callable[[SourceSpec], Waveform]] = {
 @table("[[source]]")
 class SourceSpec(NamedSpec):
     name: str = key(name_value, "how conditions and faults name it; without it they cannot", default="")
-    target: Terminal = key(PinOf(ANALOG_INPUT), "the analog input: MACHINE.AIN1 or AIN2", name="to")
+    target: Terminal = key(PinOf(ANALOG_INPUT), "the analog input: CONTROLLER.AIN1 or AIN2", name="to")
     kind: str = key(word(*WAVEFORMS), "constant, ramp, sine or table", default="constant")
     value: float = key(number(), "volts; of a sine its mean", default=0.0, kinds=("constant", "sine"))
     amplitude: float = key(number(), "sine: volts", default=0.0, kinds=("sine",))

@@ -6,16 +6,16 @@ from collections.abc import Iterable, Iterator, Mapping
 from math import ceil
 from typing import Any, ClassVar, NamedTuple
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.simulation.components.rigging import Rigging
 from steptwin.simulation.components.site import Site
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
+from steptwin.simulation.faults.controller import FaultyController
 from steptwin.simulation.faults.effects import ElementEffect
-from steptwin.simulation.faults.machine import FaultyMachine
 from steptwin.simulation.faults.table import number as parameter
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
@@ -125,7 +125,7 @@ class Supply(BoardPart):
     FIXED: ClassVar[tuple[str, ...]] = ("_fed", "_spec")
     __slots__ = (*FIXED, "_is_on", "_is_wanted", "_ramp", "_switch_due", "is_good", "sag")
 
-    def __init__(self, board: Board, spec: SupplySpec, fed: tuple[FaultyMachine, ...]) -> None:
+    def __init__(self, board: Board, spec: SupplySpec, fed: tuple[FaultyController, ...]) -> None:
         super().__init__(board)
         self._spec = spec
         self._fed = fed
@@ -136,8 +136,8 @@ class Supply(BoardPart):
         self.is_good = False
         self.sag: float | None = None
         """Fault: the voltage that it has at most."""
-        for machine in fed:
-            machine.supply(False, board.scheduler.now)
+        for controller in fed:
+            controller.supply(False, board.scheduler.now)
 
     def volts(self, now: Nanos) -> float:
         return self._ramp.at(now)
@@ -184,8 +184,8 @@ class Supply(BoardPart):
         self._ramp = Ramp(now, volts, target, spec.volts / takes if takes else 0.0)
 
     def _feed(self, now: Nanos) -> None:
-        for machine in self._fed:
-            machine.supply(self.is_good, now)
+        for controller in self._fed:
+            controller.supply(self.is_good, now)
         scheduler, name = self.board.scheduler, self.board.name
         fed = self._spec.feeds
         text = (SUPPLY_IS_ON if self.is_good else SUPPLY_IS_OFF)(supply=name, fed=list(fed))
@@ -223,7 +223,7 @@ def _make(spec: SupplySpec, site: Site) -> Supply:
     site.parts.faults.expect_supplies()
     fed = []
     for name in spec.feeds:
-        site.machine(name)
+        site.controller(name)
         other = site.parts.supplied.get(name)
         if other is not None:
             raise Misuse(f"feeds: {name!r} has the supply {other!r} already")

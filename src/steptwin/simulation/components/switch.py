@@ -61,7 +61,7 @@ def put_switch(
     lane: str,
     site: Site,
 ) -> None:
-    """Put a switch where a carriage, which the machines or elements ``moved_by`` move, runs over it."""
+    """Put a switch where a carriage, which the controllers or elements ``moved_by`` move, runs over it."""
     circuit = site.circuit(scheduler, spec.target, (*spec.path, "to"), spec.join)
     part = Switch(
         circuit,
@@ -74,7 +74,7 @@ def put_switch(
         chance=site.bounce_of(circuit),
         lane=lane,
     )
-    scheduler.add_part(part, (moved_by,) if isinstance(moved_by, str) else moved_by, drives=circuit.target.machine)
+    scheduler.add_part(part, (moved_by,) if isinstance(moved_by, str) else moved_by, drives=circuit.target.controller)
 
 
 def zone_of(spec: SwitchSpec, places: Callable[[float], int], period: Fraction | int | None = None) -> Zone:

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any, ClassVar
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis
 from steptwin.simulation.components.coordinate import PLACES, Coordinate, Pulled, pulled_to
@@ -105,7 +105,7 @@ class Tool(Stateful):
         elif its.held is not None:
             self._pulled[n] = Pulled(None, pulled_to(axis, Pulled(), now) - its.held)
         scheduler = axis.scheduler
-        scheduler.report(self.axes[0].mechanism.machine, "edge", f"{self.spec.name}.{belt}.{SLIPS}", float(slips))
+        scheduler.report(self.axes[0].mechanism.controller, "edge", f"{self.spec.name}.{belt}.{SLIPS}", float(slips))
         scheduler.mark(self.spec.name)
         return self._pulled[n].behind
 
@@ -145,7 +145,7 @@ class Tool(Stateful):
                     self.unit,
                     factors[0],
                     coupling=f"{self.spec.name}.{BELTS[0]}",
-                    other=(other.machine, str(other.number)),
+                    other=(other.controller, str(other.number)),
                     other_per_pulse=factors[1],
                     other_coupling=f"{self.spec.name}.{BELTS[1]}",
                 ),
@@ -157,11 +157,11 @@ class Tool(Stateful):
 
 def _refers(spec: ToolSpec, described: ElementSpecs) -> Iterator[Reference]:
     drives = {axis.name: axis.drive[0] for axis in described.of(AXIS)}
-    machine, other = (drives.get(name, name) for name in (spec.axis, spec.other))
-    yield Reference(machine, machine, (*spec.path, "axis"))
-    yield Reference(machine, other, (*spec.path, "other"))
+    controller, other = (drives.get(name, name) for name in (spec.axis, spec.other))
+    yield Reference(controller, controller, (*spec.path, "axis"))
+    yield Reference(controller, other, (*spec.path, "other"))
     for _, _, switch in spec.switches:
-        yield Reference(machine, switch.target[0], (*switch.path, "to"))
+        yield Reference(controller, switch.target[0], (*switch.path, "to"))
 
 
 def _build(spec: ToolSpec, site: Site) -> Tool:
@@ -169,15 +169,15 @@ def _build(spec: ToolSpec, site: Site) -> Tool:
     if one.scale.unit != other.scale.unit:
         raise Misuse(f"{spec.axis!r} is in {one.scale.unit} and {spec.other!r} in {other.scale.unit}: a tool has one unit")
     tool = Tool(spec, (one, other))
-    one.scheduler.add_part(tool, (*_machines(tool), spec.axis, spec.other, spec.name), spec.name)
+    one.scheduler.add_part(tool, (*_controllers(tool), spec.axis, spec.other, spec.name), spec.name)
     for name, n, switch in spec.switches:
         lane = f"{spec.name}.{name}_switch{n}"
         site.text.unless_wrong(switch.path, partial(_put_switch, tool, name, switch, lane, site))
     return tool
 
 
-def _machines(tool: Tool) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(axis.mechanism.machine for axis in tool.axes))
+def _controllers(tool: Tool) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(axis.mechanism.controller for axis in tool.axes))
 
 
 def _put_switch(tool: Tool, name: str, spec: SwitchSpec, lane: str, site: Site) -> None:
@@ -185,7 +185,7 @@ def _put_switch(tool: Tool, name: str, spec: SwitchSpec, lane: str, site: Site) 
         return round(exact_fraction(units) * PLACES)
 
     zone = zone_of(spec, places, None if spec.period is None else places(spec.period))
-    put_switch(tool.axes[0].scheduler, tool.coordinates[name], (*_machines(tool), tool.spec.name), zone, spec, lane, site)
+    put_switch(tool.axes[0].scheduler, tool.coordinates[name], (*_controllers(tool), tool.spec.name), zone, spec, lane, site)
 
 
 def _signals(tool: Tool) -> Mapping[str, SignalOf]:

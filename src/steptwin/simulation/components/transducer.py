@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import ClassVar
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.components.quantity import check_owners, owner_of
@@ -30,7 +30,7 @@ from steptwin.state import Stateful
 class TransducerSpec(NamedSpec):
     name: str = key(name_value, "how conditions and faults name it")
     of: str = key(text_value, "the signal that it measures, such as x.position, clamp.position, cup.pressure")
-    target: Terminal = key(PinOf(ANALOG_INPUT), "the analog input: MACHINE.AIN1 or AIN2", name="to")
+    target: Terminal = key(PinOf(ANALOG_INPUT), "the analog input: CONTROLLER.AIN1 or AIN2", name="to")
     points: tuple[tuple[float, float], ...] = key(points, "[[value, volts], ...] in the unit of the signal, linear between")
     resolution: float = key(number_value(0.0001, 10.0), "V: steps in which the voltage changes", default=0.01)
 

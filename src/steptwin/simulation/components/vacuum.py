@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from math import ceil
 from typing import ClassVar
 
-from steptwin.machine import MILLISECOND, Nanos
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.messages import Message
 from steptwin.motion.exponential import decay, logarithm
 from steptwin.simulation.components.carrier import HELD, PICK, PLACE, Carrier, CarrierSpec, carrier_signals

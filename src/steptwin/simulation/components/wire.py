@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementspec import ElementSpecs, Reference
 from steptwin.simulation.components.site import Site
@@ -15,8 +15,8 @@ from steptwin.simulation.toml.values import INPUT_PIN, OUTPUT_PIN, Terminal, fla
 
 @table("[[wire]]")
 class WireSpec(TableSpec):
-    source: Terminal = key(OUTPUT_PIN, "the output: MACHINE.PIN", name="from")
-    target: Terminal = key(INPUT_PIN, "the input: MACHINE.PIN", name="to")
+    source: Terminal = key(OUTPUT_PIN, "the output: CONTROLLER.PIN", name="from")
+    target: Terminal = key(INPUT_PIN, "the input: CONTROLLER.PIN", name="to")
     inverted: bool = key(flag, "whether the level is turned round", default=False)
     delay: Nanos = key(time_value, "how much later it arrives", default=0)
 

@@ -43,7 +43,7 @@ class Blueprint:
         self._findings: dict[str, tuple[SourceText, list[Diagnostic]]] = {}
         """About the files that the description names, by name."""
         self.makers: dict[str, Callable[[bytes | None], Any]] = {}
-        """Make the machine of each controller whose files have no errors, as `ControllerKind.build`."""
+        """Make the controller of each controller whose files have no errors, as `ControllerKind.build`."""
         self.connected: Sequence[Sequence[str]] | None = None
         """Groups that share a scheduler, by name (`connected_names`), once a world was built."""
         self.memo = BuildMemo()

@@ -1,4 +1,4 @@
-"""Builds machines and schedulers from a description: one scheduler for all that is connected by wires, lines and mechanics."""
+"""Builds controllers and schedulers from a description: one scheduler for all that is connected by wires, lines and mechanics."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any
 
+from steptwin.controller import ControllerEvent, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import MachineEvent, Nanos
 from steptwin.simulation.components.element import AnyElement
 from steptwin.simulation.components.elementspec import NamedSpec
 from steptwin.simulation.components.parts import WorldParts
@@ -29,7 +29,7 @@ Keep = Callable[[str, bytes, Nanos], None]
 
 
 def build(blueprint: Blueprint, record: RecordSink, keep: Keep | None = None, *, is_blank: bool = False) -> WorldParts:
-    """The machines of a description at time 0. Raises `WorldError` where its parts do not fit together.
+    """The controllers of a description at time 0. Raises `WorldError` where its parts do not fit together.
 
     ``keep`` is called whenever a controller has a new non-volatile memory. ``is_blank``: as for `Scheduler`.
     """
@@ -45,43 +45,44 @@ class _Builder:
         self.parts = WorldParts(spec.lines, spec.elements, Faults(spec.seed), record)
         self.parts.faults.sinks.append(record)
         self.site = Site(spec.text, spec.seed, blueprint.memo, self.parts)
-        self._make_machines()
+        self._make_controllers()
         self._make_schedulers()
         self._make_lines()
         self._make_elements()
 
-    # ------------------------------------------------------------------ machines
+    # ------------------------------------------------------------------ controllers
 
-    def _make_machines(self) -> None:
+    def _make_controllers(self) -> None:
         for spec in self.spec.controllers:
             if spec.name in self.blueprint.makers:
-                self.spec.text.unless_wrong(spec.path, partial(self._add_machine, spec))
+                self.spec.text.unless_wrong(spec.path, partial(self._add_controller, spec))
 
-    def _add_machine(self, spec: ControllerSpec) -> None:
+    def _add_controller(self, spec: ControllerSpec) -> None:
         memory = self.blueprint.files.get(memory_file(spec.name))
-        machine = self.blueprint.makers[spec.name](memory)
-        self.parts.machines[spec.name] = machine
+        controller = self.blueprint.makers[spec.name](memory)
+        self.parts.controllers[spec.name] = controller
         self.parts.kind_of[spec.name] = spec.kind
-        spec.kind.watch_events(machine, partial(_record_event, self.parts.record, spec.name))
+        spec.kind.watch_events(controller, partial(_record_event, self.parts.record, spec.name))
         keep = self._keep
         if keep is not None:
-            spec.kind.keep_memory(machine, memory, lambda data: keep(spec.name, data, machine.now))
+            spec.kind.keep_memory(controller, memory, lambda data: keep(spec.name, data, controller.now))
 
     # ------------------------------------------------------------------ schedulers
 
     def _make_schedulers(self) -> None:
-        """Machines connected by a line, a wire or mechanics share a scheduler; schedulers are ordered by their first machine."""
+        """Controllers connected by a line, a wire or mechanics share a scheduler; schedulers are ordered by their first
+        controller."""
         memo = self.blueprint.memo
         boards = memo.once(("boards",), lambda: {spec.name: (spec, terminals) for spec, terminals in self._boards()})
         if self.blueprint.connected is None:
-            self.blueprint.connected = connected_names(self.spec, self.parts.machines)
+            self.blueprint.connected = connected_names(self.spec, self.parts.controllers)
         for names in self.blueprint.connected:
             scheduler = Scheduler(record=self.parts.record, is_checked=memo.is_checked, is_blank=self._is_blank)
             self.parts.schedulers.append(scheduler)
             for name in names:
                 self.parts.scheduler_of[name] = scheduler
-                if name in self.parts.machines:
-                    scheduler.add(name, self.parts.machines[name])
+                if name in self.parts.controllers:
+                    scheduler.add(name, self.parts.controllers[name])
                 elif name in boards:
                     spec, terminals = boards[name]
                     self._add_board(spec, terminals, scheduler)
@@ -93,7 +94,7 @@ class _Builder:
                     yield spec, element.terminals(spec)
 
     def _add_board(self, spec: NamedSpec, terminals: Terminals, scheduler: Scheduler) -> None:
-        if not scheduler.machines and not self.spec.text.findings:
+        if not scheduler.controllers and not self.spec.text.findings:
             self.spec.text.wrong(spec.path, "D009", f"nothing joins {spec.name!r} to a controller")
         self.parts.terminals[spec.name] = terminals
         scheduler.add_board(Board(scheduler, spec.name, (*terminals.digital_inputs, *terminals.analog_inputs), terminals.outputs))
@@ -107,13 +108,13 @@ class _Builder:
     def _line(self, spec: LineSpec) -> None:
         parts, kind = self.parts, line_kinds()[spec.kind]
         members: list[Member] = []
-        for controller in self.spec.controllers:
-            if controller.line != spec.name or controller.name not in parts.machines:
+        for described in self.spec.controllers:
+            if described.line != spec.name or described.name not in parts.controllers:
                 continue
-            if controller.kind.line is not kind:
-                raise Misuse(f"{controller.name!r} cannot be on a line of kind {kind.name}")
-            machine = parts.machines[controller.name]
-            members.append(Member(spec=controller, machine=machine, address=controller.kind.address(controller, machine)))
+            if described.kind.line is not kind:
+                raise Misuse(f"{described.name!r} cannot be on a line of kind {kind.name}")
+            controller = parts.controllers[described.name]
+            members.append(Member(spec=described, controller=controller, address=described.kind.address(described, controller)))
         if not members and self.spec.text.is_any_wrong(*self.spec.text.controllers):
             self.spec.text.leave_out(spec.name)
             return
@@ -182,5 +183,5 @@ class _Builder:
         return self.site.scheduler(name)
 
 
-def _record_event(record: RecordSink, machine: str, event: MachineEvent) -> None:
-    record(TraceRecord(event.time, machine, "event", event.code, event.text, event.facts))
+def _record_event(record: RecordSink, controller: str, event: ControllerEvent) -> None:
+    record(TraceRecord(event.time, controller, "event", event.code, event.text, event.facts))

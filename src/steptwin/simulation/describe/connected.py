@@ -1,4 +1,4 @@
-"""Which machines, lines and elements with terminals of a description share a scheduler: those that anything connects."""
+"""Which controllers, lines and elements with terminals of a description share a scheduler: those that anything connects."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from steptwin.simulation.toml.tomlplaces import Path
 from steptwin.simulation.toml.values import NameOf
 
 
-def connected_names(spec: WorldSpec, machines: Iterable[str]) -> list[list[str]]:
-    """The names in each scheduler. Schedulers, and names in them, are in order: machines, lines, elements.
+def connected_names(spec: WorldSpec, controllers: Iterable[str]) -> list[list[str]]:
+    """The names in each scheduler. Schedulers, and names in them, are in order: controllers, lines, elements.
 
     Names that do not exist are reported in the text of the description.
     """
     with_terminals = [element for element in ELEMENTS.values() if element.terminals is not None]
     boards = [one.name for element in with_terminals for one in element.named(spec.elements[element.name])]
-    connected = {name: name for name in [*machines, *(line.name for line in spec.lines), *boards]}
+    connected = {name: name for name in [*controllers, *(line.name for line in spec.lines), *boards]}
 
     def root(name: str) -> str:
         while connected[name] != name:

@@ -165,7 +165,7 @@ def _faults(toml: TomlText) -> list[Fault | None]:
 
 
 def _check_names(spec: WorldSpec, elements: Iterable[NamedSpec]) -> None:
-    """Report names of lines, machines and elements that hide each other. The command line ignores case."""
+    """Report names of lines, controllers and elements that hide each other. The command line ignores case."""
     text = spec.text
     taken: dict[str, str] = {}
     for one in (*spec.lines, *spec.controllers, *elements):

@@ -11,8 +11,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Any, NamedTuple
 
+from steptwin.controller import Nanos
 from steptwin.durations import duration_text
-from steptwin.machine import Nanos
 from steptwin.simulation.describe.tables import all_keys, written
 from steptwin.simulation.faults.table import Fault, value_text
 

@@ -74,20 +74,20 @@ def _demo_axes() -> Iterator[TomlTable]:
         yield TomlTable("", {**values, **switches}, header=f"[mic488.M{n}]")
 
 
-def _spindles(machine: str, suffix: str) -> Iterator[TomlTable]:
+def _spindles(controller: str, suffix: str) -> Iterator[TomlTable]:
     for n, name in enumerate(AXES, start=1):
         remark = "Spindles with a switch at each end; travel, play, motors and encoders may follow." if n == 1 else ""
-        yield TomlTable("axis", {"name": f"{name}{suffix}", "drive": f"{machine}.M{n}"}, remark=remark)
-        yield TomlTable("switch", {"below": KL_MM, "to": f"{machine}.IN{n}"})
-        yield TomlTable("switch", {"above": KR_MM, "to": f"{machine}.IN{n + 4}"})
+        yield TomlTable("axis", {"name": f"{name}{suffix}", "drive": f"{controller}.M{n}"}, remark=remark)
+        yield TomlTable("switch", {"below": KL_MM, "to": f"{controller}.IN{n}"})
+        yield TomlTable("switch", {"above": KR_MM, "to": f"{controller}.IN{n + 4}"})
 
 
-def _switches(machine: str, axis: AxisSwitches) -> Iterator[TomlTable]:
+def _switches(controller: str, axis: AxisSwitches) -> Iterator[TomlTable]:
     """The axis with its switches."""
-    yield TomlTable("axis", {"name": f"m{axis.axis}", "drive": f"{machine}.M{axis.axis}"})
+    yield TomlTable("axis", {"name": f"m{axis.axis}", "drive": f"{controller}.M{axis.axis}"})
     for key, edge, pin, contact in (
         ("below", axis.low, axis.low_pin, axis.contacts[0]),
         ("above", axis.high, axis.high_pin, axis.contacts[1]),
     ):
         if edge is not None:
-            yield TomlTable("switch", {key: edge, "to": f"{machine}.{pin}", "contact": None if contact == "NO" else contact})
+            yield TomlTable("switch", {key: edge, "to": f"{controller}.{pin}", "contact": None if contact == "NO" else contact})

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.describe.arrangement import DrawnPlace
 from steptwin.simulation.describe.overrides import Overrides

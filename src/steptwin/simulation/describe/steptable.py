@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.simulation.faults import Fault
 from steptwin.simulation.faults import parse as parse_fault
 from steptwin.simulation.logic.expression import parse_condition
@@ -45,10 +45,10 @@ def _condition(value: Any) -> str:
     return value
 
 
-@permitting("{ 'MACHINE.NAME' = number, ... }")
+@permitting("{ 'CONTROLLER.NAME' = number, ... }")
 def _levels(value: Any) -> tuple[tuple[str, str, float], ...]:
     if not isinstance(value, Mapping) or not value:
-        raise Misuse(f"{value!r}: expected {{ 'MACHINE.NAME' = NUMBER }}")
+        raise Misuse(f"{value!r}: expected {{ 'CONTROLLER.NAME' = NUMBER }}")
     return tuple((*pin_name(name), float(level) if isinstance(level, bool) else number()(level)) for name, level in value.items())
 
 
@@ -59,13 +59,13 @@ def _fault(value: Any) -> Fault:
     return parse_fault(value)
 
 
-@permitting("MACHINE.M1 to M4")
+@permitting("CONTROLLER.M1 to M4")
 def _turned(value: Any) -> tuple[str, int]:
-    machine, axis = pin_name(value)
+    controller, axis = pin_name(value)
     number = axis_number(axis)
     if not number:
-        raise Misuse(f"{value!r}: expected MACHINE.M1 to M4")
-    return machine, number
+        raise Misuse(f"{value!r}: expected CONTROLLER.M1 to M4")
+    return controller, number
 
 
 @permitting("number other than 0")
@@ -101,7 +101,7 @@ def _turn(axis: tuple[str, int], counts: int) -> Turn:
 
 def _motion(command: Move | Home | Seek, within: Nanos | None) -> Repeat:
     """The motion that is commanded, to its end: a status from before does not count."""
-    place = command.machine, command.axis
+    place = command.controller, command.axis
     reached = ExpectReached(*place, command if isinstance(command, Seek) else None)
     return Repeat(1, (Order(command), UntilOver(*place, within), reached), is_one=True)
 
@@ -146,30 +146,30 @@ ACTIONS: Mapping[str, StepKind] = dict(
         _action(Key("wait", time_value, "a time such as '1 s'"), Wait),
         _action(Key("at", time_value, "a moment such as '10 s'"), At),
         _action(Key("until", _condition, "a condition"), Until, _WITHIN),
-        _action(Key("set", _levels, "{ 'MACHINE.PIN' = LEVEL }"), Set),
+        _action(Key("set", _levels, "{ 'CONTROLLER.PIN' = LEVEL }"), Set),
         _action(
             Key("press", name_value, "a button"),
             Press,
             Key("for", time_value, "how long", None, "duration"),
         ),
         _action(Key("release", name_value, "a button"), Release),
-        _action(Key("write", _levels, "{ 'MACHINE.REGISTER' = VALUE }"), Write),
+        _action(Key("write", _levels, "{ 'CONTROLLER.REGISTER' = VALUE }"), Write),
         _action(
-            Key("move", _turned, "MACHINE.M1 to M4: moves it, waits for the end and expects it at its target"),
+            Key("move", _turned, "CONTROLLER.M1 to M4: moves it, waits for the end and expects it at its target"),
             _move,
             Key("to", number(), "a position, in the unit of the controller", None),
             Key("by", number(), "a distance, in the unit of the controller", None),
             _WITHIN,
         ),
         _action(
-            Key("home", _turned, "MACHINE.M1 to M4: homes it, waits for the end and expects it there"),
+            Key("home", _turned, "CONTROLLER.M1 to M4: homes it, waits for the end and expects it there"),
             _home,
             Key("velocity", _home_velocity, "of a MIC488; its sign chooses the switch", None),
             Key("seek", _sought, "of an M1486: direction and input, such as '-B8'; it is then at 0", None),
             _WITHIN,
         ),
         _action(
-            Key("wait_for", _turned, "MACHINE.M1 to M4: waits for its motion to end at the target"),
+            Key("wait_for", _turned, "CONTROLLER.M1 to M4: waits for its motion to end at the target"),
             _wait_for,
             _WITHIN,
         ),
@@ -178,14 +178,14 @@ ACTIONS: Mapping[str, StepKind] = dict(
             Send,
             Key("text", _characters, "characters; \\r ends a command line", attribute="data"),
         ),
-        _action(Key("power_cycle", name_value, "a machine"), PowerCycle),
+        _action(Key("power_cycle", name_value, "a controller"), PowerCycle),
         _action(
-            Key("turn", _turned, "MACHINE.M1 to M4"),
+            Key("turn", _turned, "CONTROLLER.M1 to M4"),
             _turn,
             Key("counts", whole(-(2**31), 2**31 - 1), "encoder counts"),
         ),
         _action(
-            Key("couple", _turned, "MACHINE.M1 to M4 without mechanics"),
+            Key("couple", _turned, "CONTROLLER.M1 to M4 without mechanics"),
             _couple,
             Key("to", text_value, "what turns the encoder shaft: drive, free or blocked"),
         ),

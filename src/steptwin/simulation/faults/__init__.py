@@ -1,13 +1,13 @@
 """Faults, seeded and targeted: bytes, frames, protocol, physics.
 
 `parse` and `read` make a `Fault` of a table or a line of text; `Faults` is the set of those that are set. A `FaultyPort` stands
-between a link and a port, `rig` lets a machine in its scheduler have faults. `steptwin fault --kinds` shows `KINDS`.
+between a link and a port, `rig` lets a controller in its scheduler have faults. `steptwin fault --kinds` shows `KINDS`.
 """
 
 from steptwin.simulation.faults.active import ActiveFault, Faults
+from steptwin.simulation.faults.controller import AxisLoad, Body, FaultyController, rig
 from steptwin.simulation.faults.fault import EXAMPLE, GRAMMAR, FaultMistake, parse, read, schema
 from steptwin.simulation.faults.kinds import KINDS
-from steptwin.simulation.faults.machine import AxisLoad, Body, FaultyMachine, rig
 from steptwin.simulation.faults.places import RequestRoute, check_place
 from steptwin.simulation.faults.port import FaultyPort, FaultySendingPort
 from steptwin.simulation.faults.table import Fault, FaultKind, Layer, LineProtocol, Occasion, Parameter
@@ -23,7 +23,7 @@ __all__ = [
     "FaultKind",
     "FaultMistake",
     "Faults",
-    "FaultyMachine",
+    "FaultyController",
     "FaultyPort",
     "FaultySendingPort",
     "Layer",

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 from typing import ClassVar, NamedTuple, Protocol, TypeAlias
 from weakref import WeakSet
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.messages import NONE, Message, MessageText
 from steptwin.simulation.faults.table import Fault, Layer
 from steptwin.simulation.scheduler.chance import Chance
@@ -162,9 +162,9 @@ class FailingPort(Protocol):
 
 FAULT_IS_SET_ALREADY = Message("simulation.fault-is-set-already", "there is a fault {name!r} already")
 UNKNOWN_FAULT = Message("simulation.unknown-fault", "no fault {name!r}: set are {names}")
-NO_MACHINE_OF_A_FAULT = Message("simulation.no-machine-of-a-fault", "fault {name}: choose a machine: there are {names}")
-UNKNOWN_MACHINE_OF_A_FAULT = Message(
-    "simulation.unknown-machine-of-a-fault", "fault {name}: machine = {machine}: there are {names}"
+NO_CONTROLLER_OF_A_FAULT = Message("simulation.no-controller-of-a-fault", "fault {name}: choose a controller: there are {names}")
+UNKNOWN_CONTROLLER_OF_A_FAULT = Message(
+    "simulation.unknown-controller-of-a-fault", "fault {name}: machine = {controller}: there are {names}"
 )
 UNKNOWN_ELEMENT_OF_A_FAULT = Message(
     "simulation.unknown-element-of-a-fault", "fault {name}: element = {element}: those that can fail are {names}"
@@ -178,23 +178,23 @@ class Faults(Stateful):
     faults is not part of its state: a state is restored into the same set.
     """
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_found", "elements", "has_supplies", "link", "machines", "ports", "seed", "sinks")
+    FIXED: ClassVar[tuple[str, ...]] = ("_found", "elements", "has_supplies", "link", "controllers", "ports", "seed", "sinks")
     __slots__ = (*FIXED, "_active")
 
     def __init__(self, seed: int = 0) -> None:
         self.seed = seed
         self._active: tuple[ActiveFault, ...] = ()
         self._found: dict[tuple[str, object], tuple[ActiveFault, ...]] = {}
-        """Those of a layer, machine or element, as far as they have been asked for."""
+        """Those of a layer, controller or element, as far as they have been asked for."""
         self.sinks: list[RecordSink] = []
-        self.machines: dict[str, Failing] = {}
-        """Machines prepared for faults of physics."""
+        self.controllers: dict[str, Failing] = {}
+        """Controllers prepared for faults of physics."""
         self.elements: dict[str, Failing] = {}
         """Elements with faults."""
         self.link = ""
         """The link whose request is being served."""
         self.has_supplies = False
-        """Whether machines may be without supply, so that they do not answer."""
+        """Whether controllers may be without supply, so that they do not answer."""
         self.ports: WeakSet[FailingPort] = WeakSet()
         """Ports in use, which change with programs and clients."""
 
@@ -214,12 +214,12 @@ class Faults(Stateful):
         return bool(self.active) or self.has_supplies
 
     def expect_supplies(self) -> None:
-        """Machines may be without supply from now on."""
+        """Controllers may be without supply from now on."""
         self.has_supplies = True
         self._changed()
 
     def add(self, fault: Fault, now: Nanos = 0) -> ActiveFault:
-        """Set a fault at ``now``. Raises `Misuse` for a name in use, or an unknown machine, pin or axis."""
+        """Set a fault at ``now``. Raises `Misuse` for a name in use, or an unknown controller, pin or axis."""
         if fault.name and self._named(fault.name) is not None:
             raise Misuse(FAULT_IS_SET_ALREADY(name=fault.name))
         active = ActiveFault(fault, fault.name or self._free_name(fault.kind.name), self.seed, now)
@@ -231,7 +231,7 @@ class Faults(Stateful):
         return active
 
     def check(self, fault: Fault) -> Failing | None:
-        """The machine or element of the fault, if any. `Misuse` for a machine, pin, axis or element that does not exist."""
+        """The controller or element of the fault, if any. `Misuse` for a controller, pin, axis or element that does not exist."""
         failing = self._failing(fault)
         if failing is not None:
             failing.check(fault)
@@ -240,7 +240,7 @@ class Faults(Stateful):
     def _failing(self, fault: Fault) -> Failing | None:
         if fault.kind.layer is Layer.ELEMENT:
             return self._element(fault)
-        return self._machine(fault) if fault.kind.layer is Layer.PHYSICS else None
+        return self._controller(fault) if fault.kind.layer is Layer.PHYSICS else None
 
     def remove(self, name: str, now: Nanos) -> None:
         """Remove a fault and release what it holds. Raises `Misuse` with the existing names."""
@@ -272,17 +272,17 @@ class Faults(Stateful):
             name = f"{kind}-{number}"
         return name
 
-    def _machine(self, fault: Fault) -> Failing:
+    def _controller(self, fault: Fault) -> Failing:
         wanted = fault.get("machine")
-        if wanted is None and len(self.machines) == 1:
-            return next(iter(self.machines.values()))
-        there = list(self.machines) or NONE()
+        if wanted is None and len(self.controllers) == 1:
+            return next(iter(self.controllers.values()))
+        there = list(self.controllers) or NONE()
         if wanted is None:
-            raise Misuse(NO_MACHINE_OF_A_FAULT(name=fault.kind.name, names=there))
-        machine = self.machines.get(str(wanted))
-        if machine is None:
-            raise Misuse(UNKNOWN_MACHINE_OF_A_FAULT(name=fault.kind.name, machine=repr(wanted), names=there))
-        return machine
+            raise Misuse(NO_CONTROLLER_OF_A_FAULT(name=fault.kind.name, names=there))
+        controller = self.controllers.get(str(wanted))
+        if controller is None:
+            raise Misuse(UNKNOWN_CONTROLLER_OF_A_FAULT(name=fault.kind.name, controller=repr(wanted), names=there))
+        return controller
 
     def _element(self, fault: Fault) -> Failing:
         wanted = fault.get("element")
@@ -296,15 +296,15 @@ class Faults(Stateful):
         """The faults of an element."""
         return self._those("element", name, lambda fault: fault.get("element") == name)
 
-    def of(self, machine: str) -> tuple[ActiveFault, ...]:
-        """The faults of physics of a machine."""
-        only = len(self.machines) == 1
+    def of(self, controller: str) -> tuple[ActiveFault, ...]:
+        """The faults of physics of a controller."""
+        only = len(self.controllers) == 1
 
         def belongs(fault: Fault) -> bool:
             named = fault.get("machine")
-            return fault.kind.layer is Layer.PHYSICS and (named == machine or (only and not named))
+            return fault.kind.layer is Layer.PHYSICS and (named == controller or (only and not named))
 
-        return self._those("machine", (machine, only), belongs)
+        return self._those("controller", (controller, only), belongs)
 
     def of_layer(self, layer: Layer) -> tuple[ActiveFault, ...]:
         """The faults of one layer."""
@@ -318,8 +318,8 @@ class Faults(Stateful):
         return found
 
     def held(self, owner: str) -> dict[str, HeldLevel]:
-        """The pins of a machine, or terminals of an element, that faults hold at present, as conditions name them."""
-        failing = self.machines.get(owner) or self.elements.get(owner)
+        """The pins of a controller, or terminals of an element, that faults hold at present, as conditions name them."""
+        failing = self.controllers.get(owner) or self.elements.get(owner)
         return {} if failing is None else {f"{owner}.{terminal}": held for terminal, held in failing.held()}
 
     def refusing(self) -> tuple[ActiveFault, ...]:
@@ -331,7 +331,7 @@ class Faults(Stateful):
             port.choose()
 
     def report(self, active: ActiveFault, place: str, now: Nanos, text: str) -> None:
-        """Report an occurrence at a machine or link."""
+        """Report an occurrence at a controller or link."""
         self.record(TraceRecord(now, place, "fault", active.name, text))
 
     def record(self, record: TraceRecord) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.simulation.faults.active import ActiveFault, FaultReporter
 from steptwin.simulation.faults.table import LineProtocol
 from steptwin.wire.pdu import REFUSED

@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.simulation.faults.active import ActiveFault, FaultReporter
 from steptwin.simulation.faults.answers import AlteredAnswer, Exchange
-from steptwin.simulation.faults.machine import FaultyMachine
+from steptwin.simulation.faults.controller import FaultyController
 from steptwin.simulation.faults.table import Fault, FaultKind, Layer, Occasion, check
 from steptwin.tables import IncompleteTable
 
@@ -69,28 +69,28 @@ class RequestEffect:
 
 @dataclass(frozen=True, slots=True)
 class MomentEffect:
-    act: Callable[[ActiveFault, FaultyMachine, Nanos], None]
+    act: Callable[[ActiveFault, FaultyController, Nanos], None]
 
 
 @dataclass(frozen=True, slots=True)
 class WindowEffect:
     """``act`` is called at the beginning and at the end."""
 
-    act: Callable[[ActiveFault, FaultyMachine, Nanos], None]
+    act: Callable[[ActiveFault, FaultyController, Nanos], None]
 
 
 @dataclass(frozen=True, slots=True)
 class ChangeEffect:
     """``act`` takes the pin and its levels, before and after."""
 
-    act: Callable[[ActiveFault, FaultyMachine, str, tuple[float, float], Nanos], None]
+    act: Callable[[ActiveFault, FaultyController, str, tuple[float, float], Nanos], None]
 
 
 @dataclass(frozen=True, slots=True)
 class SaveEffect:
     """``act`` takes what the memory held and changes what it keeps."""
 
-    act: Callable[[ActiveFault, FaultyMachine, bytes, bytearray, Nanos], None]
+    act: Callable[[ActiveFault, FaultyController, bytes, bytearray, Nanos], None]
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Any, ClassVar
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import NONE, Message
 from steptwin.simulation.faults.active import ActiveFault, Faults, HeldLevel
 from steptwin.simulation.faults.table import Fault, FaultKind

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.faults.active import ActiveFault, FaultReporter
 from steptwin.simulation.faults.effects import ByteEffect, InsertEffect, PiecesEffect, Run

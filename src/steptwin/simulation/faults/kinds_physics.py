@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.faults.active import ActiveFault
+from steptwin.simulation.faults.controller import FaultyController
 from steptwin.simulation.faults.effects import ChangeEffect, MomentEffect, SaveEffect, WindowEffect
-from steptwin.simulation.faults.machine import FaultyMachine
 from steptwin.simulation.faults.table import (
     AXIS,
     LONGEST_MS,
@@ -31,56 +31,56 @@ def _axis(active: ActiveFault) -> int:
 IS_BLOCKED = Message("simulation.axis-is-blocked", "M{axis} is blocked for {time:g} s")
 
 
-def _stall(active: ActiveFault, machine: FaultyMachine, now: Nanos) -> None:
+def _stall(active: ActiveFault, controller: FaultyController, now: Nanos) -> None:
     axis = _axis(active)
-    machine.report(active, now, IS_BLOCKED(axis=axis, time=active.fault.number("for_s")))
-    machine.block(active, axis, now, now + active.ns("for_s"))
+    controller.report(active, now, IS_BLOCKED(axis=axis, time=active.fault.number("for_s")))
+    controller.block(active, axis, now, now + active.ns("for_s"))
 
 
 LOSES_PULSES = Message("simulation.axis-loses-pulses", "M{axis} loses {pulses} pulses")
 
 
-def _lose_steps(active: ActiveFault, machine: FaultyMachine, now: Nanos) -> None:
+def _lose_steps(active: ActiveFault, controller: FaultyController, now: Nanos) -> None:
     axis, pulses = _axis(active), int(active.fault.number("pulses"))
-    machine.report(active, now, LOSES_PULSES(axis=axis, pulses=pulses))
-    machine.body.shafts[axis - 1].lose(pulses, now)
+    controller.report(active, now, LOSES_PULSES(axis=axis, pulses=pulses))
+    controller.body.shafts[axis - 1].lose(pulses, now)
 
 
 ENCODER_SLIPS = Message("simulation.encoder-slips", "the encoder of M{axis} slips by {counts} counts")
 
 
-def _slip(active: ActiveFault, machine: FaultyMachine, now: Nanos) -> None:
+def _slip(active: ActiveFault, controller: FaultyController, now: Nanos) -> None:
     axis, counts = _axis(active), int(active.fault.number("counts"))
-    machine.report(active, now, ENCODER_SLIPS(axis=axis, counts=counts))
-    machine.body.shafts[axis - 1].slip(counts, now)
+    controller.report(active, now, ENCODER_SLIPS(axis=axis, counts=counts))
+    controller.body.shafts[axis - 1].slip(counts, now)
 
 
 NO_SUPPLY = Message("simulation.no-supply-for", "no supply for {time:g} s")
 
 
-def _drop_supply(active: ActiveFault, machine: FaultyMachine, now: Nanos) -> None:
-    machine.report(active, now, NO_SUPPLY(time=active.fault.number("for_s")))
-    machine.drop_supply(now, now + active.ns("for_s"))
+def _drop_supply(active: ActiveFault, controller: FaultyController, now: Nanos) -> None:
+    controller.report(active, now, NO_SUPPLY(time=active.fault.number("for_s")))
+    controller.drop_supply(now, now + active.ns("for_s"))
 
 
-def _stick(active: ActiveFault, machine: FaultyMachine, now: Nanos) -> None:
-    machine.stick(active, now)
+def _stick(active: ActiveFault, controller: FaultyController, now: Nanos) -> None:
+    controller.stick(active, now)
 
 
-def _fail_master(active: ActiveFault, machine: FaultyMachine, now: Nanos) -> None:
-    machine.fail_master(active, now)
+def _fail_master(active: ActiveFault, controller: FaultyController, now: Nanos) -> None:
+    controller.fail_master(active, now)
 
 
 BOUNCES = Message("simulation.pin-bounces", "{pin} bounces {times} times in {time:g} ms")
 
 
-def _bounce(active: ActiveFault, machine: FaultyMachine, pin: str, levels: tuple[float, float], now: Nanos) -> None:
+def _bounce(active: ActiveFault, controller: FaultyController, pin: str, levels: tuple[float, float], now: Nanos) -> None:
     """To the second level it has gone; back and there again some times, the last time at the end of the bouncing."""
     bounces, within = active.fault.whole("bounces") or 1, active.ns("for_ms")
     moments = sorted(1 + active.chance.below(within) for _ in range(2 * bounces - 1))
     changes = [(now + at, pin, to) for at, to in zip((*moments, within), levels * bounces, strict=True)]
-    machine.report(active, now, BOUNCES(pin=pin, times=bounces, time=active.fault.number("for_ms")))
-    machine.bounce(changes)
+    controller.report(active, now, BOUNCES(pin=pin, times=bounces, time=active.fault.number("for_ms")))
+    controller.bounce(changes)
 
 
 FAULT_OF_AN_ANALOG_INPUT = Message(
@@ -88,8 +88,8 @@ FAULT_OF_AN_ANALOG_INPUT = Message(
 )
 
 
-def _needs_switch(machine: FaultyMachine, fault: Fault) -> None:
-    pin = machine.pin_of(fault)
+def _needs_switch(controller: FaultyController, fault: Fault) -> None:
+    pin = controller.pin_of(fault)
     if pin.startswith("AIN"):
         raise Misuse(FAULT_OF_AN_ANALOG_INPUT(pin=pin))
 
@@ -97,23 +97,23 @@ def _needs_switch(machine: FaultyMachine, fault: Fault) -> None:
 SAVE_IS_CUT = Message("simulation.save-is-cut", "no supply after {written} of {count} bytes were saved")
 
 
-def _cut_power(active: ActiveFault, machine: FaultyMachine, old: bytes, kept: bytearray, now: Nanos) -> None:
+def _cut_power(active: ActiveFault, controller: FaultyController, old: bytes, kept: bytearray, now: Nanos) -> None:
     written = active.fault.whole("written")
     written = active.chance.below(len(kept) + 1) if written is None else min(written, len(kept))
     kept[written:] = old[written:]
-    machine.report(active, now, SAVE_IS_CUT(written=written, count=len(kept)))
-    machine.cut_supply(now, now + active.ns("for_s"))
+    controller.report(active, now, SAVE_IS_CUT(written=written, count=len(kept)))
+    controller.cut_supply(now, now + active.ns("for_s"))
 
 
 BYTE_IS_WORN = Message("simulation.byte-is-worn", "after {saves} saves byte {byte} is worn out")
 
 
-def _wear(active: ActiveFault, machine: FaultyMachine, old: bytes, kept: bytearray, now: Nanos) -> None:
+def _wear(active: ActiveFault, controller: FaultyController, old: bytes, kept: bytearray, now: Nanos) -> None:
     good = active.fault.whole("writes") or 0
     if active.struck > good and len(active.worn) < len(kept):
         sound = [place for place in range(len(kept)) if place not in active.worn]
         active.worn.append(sound[active.chance.below(len(sound))])
-        machine.report(active, now, BYTE_IS_WORN(saves=active.struck, byte=active.worn[-1]))
+        controller.report(active, now, BYTE_IS_WORN(saves=active.struck, byte=active.worn[-1]))
     for place in active.worn:
         kept[place] = old[place]
 

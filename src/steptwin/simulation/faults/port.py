@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import ClassVar
 
-from steptwin.machine import Nanos, Port, SendingPort
+from steptwin.controller import Nanos, Port, SendingPort
 from steptwin.messages import Message, text_of
 from steptwin.simulation.faults.active import ActiveFault, Faults
 from steptwin.simulation.faults.answers import Exchange, must_not_be_sent, pdu_of, spoil_answer

@@ -43,7 +43,7 @@ class Occasion(enum.StrEnum):
 
 
 class Need(enum.Enum):
-    """Ability that some machines have and others have not."""
+    """Ability that some controllers have and others have not."""
 
     ENCODER = "encoder"
     MODBUS_MASTER = "Modbus master of its own"
@@ -124,8 +124,8 @@ def _plain(number: float) -> str:
 @dataclass(frozen=True, slots=True)
 class FaultKind:
     """A row. ``own`` are the parameters of this kind alone, ``lines`` what it can happen on. ``needs``: what a
-    machine must have beyond what parameters and occasion need. ``check`` takes the `FaultyMachine`, or what was built of the
-    element, and raises `Misuse` where it cannot happen."""
+    controller must have beyond what parameters and occasion need. ``check`` takes the `FaultyController`, or what was built of
+    the element, and raises `Misuse` where it cannot happen."""
 
     name: str
     layer: Layer
@@ -256,7 +256,7 @@ _MOMENTS = (
 )
 _LINK = Parameter("link", ParameterForm.TEXT, "On this link alone, such as tcp-1, pty, serial; tcp: each tcp-N.", otherwise="all")
 _LINE = Parameter("line", ParameterForm.TEXT, "On this line of a world alone.", otherwise="all")
-_MACHINE = Parameter("machine", ParameterForm.TEXT, "Which machine; for a served twin its unit.", otherwise="the only one")
+_CONTROLLER = Parameter("machine", ParameterForm.TEXT, "Which controller; for a served twin its unit.", otherwise="the only one")
 AXIS = whole("axis", "Which axis.", 1, 16, default=1)
 PIN = Parameter("pin", ParameterForm.TEXT, "Which input.", is_required=True)
 _ADDRESSED = (
@@ -274,7 +274,7 @@ WHERE: dict[Layer, tuple[Parameter, ...]] = {
     ),
     Layer.FRAMES: _ADDRESSED,
     Layer.PROTOCOL: _ADDRESSED,
-    Layer.PHYSICS: (_MACHINE,),
+    Layer.PHYSICS: (_CONTROLLER,),
     Layer.ELEMENT: (Parameter("element", ParameterForm.TEXT, "Which element, by its name.", is_required=True),),
 }
 WHEN: dict[Occasion, tuple[Parameter, ...]] = {

@@ -14,7 +14,7 @@ class GivenFiles:
     def __init__(
         self, lines: Sequence[LineSpec], files: Mapping[str, bytes], downloaded: Mapping[tuple[str, str], SourceText]
     ) -> None:
-        """``downloaded``: what has been put into controllers, by machine and place."""
+        """``downloaded``: what has been put into controllers, by controller and place."""
         self.lines = lines
         self._files = files
         self._downloaded = downloaded
@@ -26,6 +26,6 @@ class GivenFiles:
     def accept(self, source: SourceText, findings: Iterable[Diagnostic]) -> None:
         """As `steptwin.simulation.kinds.kind.BuildContext.accept`."""
 
-    def downloaded(self, machine: str, place: str) -> SourceText | None:
+    def downloaded(self, controller: str, place: str) -> SourceText | None:
         """As `steptwin.simulation.kinds.kind.TextContext.downloaded`."""
-        return self._downloaded.get((machine, place))
+        return self._downloaded.get((controller, place))

@@ -11,8 +11,8 @@ from functools import cached_property
 from string import digits
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
 
+from steptwin.controller import ControllerEvent, Nanos
 from steptwin.errors import Misuse, Refusal
-from steptwin.machine import MachineEvent, Nanos
 from steptwin.messages import Message
 from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss
@@ -91,7 +91,7 @@ class BuildContext(Protocol):
 class TextContext(BuildContext, Protocol):
     """Further facts about the texts of programs."""
 
-    def downloaded(self, machine: str, place: str) -> SourceText | None:
+    def downloaded(self, controller: str, place: str) -> SourceText | None:
         """The text that has been put there since the beginning; None where there is none."""
         ...
 
@@ -120,8 +120,8 @@ class Terminals:
             others = [] if is_other else [pin for pin in pins if pin.rstrip(digits) != name.pin.rstrip(digits)]
             near = NearMiss()
             meant = near.of(name.pin, others)
-            text = f"{name} is not {article} {kind}{near.hint(name.pin, others)}: {kind}s of {name.machine!r} are {there}"
-            raise WrongTerminal(str(name), text, None if meant is None else f"{name.machine}.{meant}")
+            text = f"{name} is not {article} {kind}{near.hint(name.pin, others)}: {kind}s of {name.controller!r} are {there}"
+            raise WrongTerminal(str(name), text, None if meant is None else f"{name.controller}.{meant}")
 
 
 class RunningWorld(Protocol):
@@ -130,14 +130,14 @@ class RunningWorld(Protocol):
     now: Nanos
 
     @property
-    def machines(self) -> Mapping[str, MotionController]: ...
+    def controllers(self) -> Mapping[str, MotionController]: ...
 
     def kind(self, name: str, /) -> AnyKind:
-        """The kind of a machine."""
+        """The kind of a controller."""
         ...
 
     def touch(self, name: str, /) -> Scheduler:
-        """The scheduler of a machine or line, advanced to the present."""
+        """The scheduler of a controller or line, advanced to the present."""
         ...
 
     def apply_input(self, what: Step, /) -> None:
@@ -167,11 +167,11 @@ class EncoderInputs(ABC, Generic[M]):
     """The encoder inputs of a controller. Axes count from 1."""
 
     @abstractmethod
-    def reader(self, machine: M, /) -> EncoderReader:
+    def reader(self, controller: M, /) -> EncoderReader:
         """The receiver of the counts."""
 
     @abstractmethod
-    def counts_per_pulse(self, machine: M, axis: int, /) -> Fraction:
+    def counts_per_pulse(self, controller: M, axis: int, /) -> Fraction:
         """As the controller is configured for an axis."""
 
     @abstractmethod
@@ -179,11 +179,11 @@ class EncoderInputs(ABC, Generic[M]):
         """The pin of channel C of an axis."""
 
     @abstractmethod
-    def shown(self, machine: M, now: Nanos, /) -> list[dict[str, object]]:
+    def shown(self, controller: M, now: Nanos, /) -> list[dict[str, object]]:
         """Counts of each axis and what turns its encoder, as plain data."""
 
     @abstractmethod
-    def couple(self, machine: M, axis: int, coupling: str, now: Nanos, /) -> None:
+    def couple(self, controller: M, axis: int, coupling: str, now: Nanos, /) -> None:
         """Choose what turns the shaft of an axis without mechanics: one of `steptwin.simulation.script.steps.COUPLINGS`."""
 
     @abstractmethod
@@ -195,19 +195,19 @@ class NamedRegisters(ABC, Generic[M]):
     """Registers that scripts write by name."""
 
     @abstractmethod
-    def requests(self, machine: M, values: NewValues, /) -> tuple[bytes, ...]:
+    def requests(self, controller: M, values: NewValues, /) -> tuple[bytes, ...]:
         """The PDUs that write values by name. Raises `Misuse` for what a register does not take."""
 
     @abstractmethod
-    def dialect(self, machine: M, /) -> Hashable:
+    def dialect(self, controller: M, /) -> Hashable:
         """Settings on which requests depend besides names and values."""
 
     @abstractmethod
-    def execute(self, machine: M, pdu: bytes, now: Nanos, /) -> bytes:
+    def execute(self, controller: M, pdu: bytes, now: Nanos, /) -> bytes:
         """The answer to a PDU that reaches the controller without a line."""
 
     @abstractmethod
-    def ended_by(self, machine: M, pdu: bytes, /) -> tuple[int, ...]:
+    def ended_by(self, controller: M, pdu: bytes, /) -> tuple[int, ...]:
         """Motions that a PDU ends if it is a stop: the numbers of axes, and 0 for the program."""
 
 
@@ -223,7 +223,7 @@ class Vision(ABC, Generic[S, M]):
         """HOST:PORT where a running world takes records."""
 
     @abstractmethod
-    def see(self, machine: M, record: SeenRecord, now: Nanos, /) -> None: ...
+    def see(self, controller: M, record: SeenRecord, now: Nanos, /) -> None: ...
 
     @abstractmethod
     def records(self) -> Callable[[bytes], Sequence[SeenRecord]]:
@@ -242,8 +242,8 @@ CANNOT_BE_JOGGED = Message("simulation.cannot-be-jogged", "{name!r} is {kind}, w
 
 
 class ControllerKind(OptionalMethods, ABC, Generic[S, M, V]):
-    """A kind of controller: its spec, its machine, and what Python programs see of it. Each kind is one object of one class, in
-    its folder.
+    """A kind of controller: its spec, its controller, and what Python programs see of it. Each kind is one object of one class,
+    in its folder.
 
     A missing member that every kind has is a `TypeError` at import. What only some kinds have is refused in the others, or gives
     what there is without it.
@@ -289,13 +289,13 @@ class ControllerKind(OptionalMethods, ABC, Generic[S, M, V]):
 
     @abstractmethod
     def build(self, spec: S, context: BuildContext, /) -> Callable[[bytes | None], M]:
-        """Read and check its files. Gives what makes its machine at time 0, with the saved content of the non-volatile memory, if
-        any, for each world of the description: machines share only what none of them changes. Both raise `Misuse`."""
+        """Read and check its files. Gives what makes its controller at time 0, with the saved content of the non-volatile memory,
+        if any, for each world of the description: controllers share only what none of them changes. Both raise `Misuse`."""
 
     # ------------------------------------------------------------------ what only some have
 
     def lacks(self, name: str, what: str, /) -> Misuse:
-        """Refusal of what only other controllers have, of a machine with that name."""
+        """Refusal of what only other controllers have, of a controller with that name."""
         return Misuse(HAS_NONE_OF_THESE(name=name, title=self.title, what=what))
 
     encoders: EncoderInputs[M] | None = None
@@ -310,11 +310,11 @@ class ControllerKind(OptionalMethods, ABC, Generic[S, M, V]):
         """The connection of its line."""
 
     @abstractmethod
-    def address(self, spec: S, machine: M, /) -> int:
+    def address(self, spec: S, controller: M, /) -> int:
         """Unit or address on its line."""
 
     @abstractmethod
-    def announced(self, machine: M, address: int, /) -> dict[str, object]:
+    def announced(self, controller: M, address: int, /) -> dict[str, object]:
         """How drivers reach it at present: ``kind``, and the options behind an address that select it there
         (`steptwin.drivers.kind.AddressSelection`). ``address``: on the line, as it was built."""
 
@@ -326,54 +326,54 @@ class ControllerKind(OptionalMethods, ABC, Generic[S, M, V]):
     def input_pin(self, pin: str, level: float, /) -> str:
         """The pin that a name means. Raises `Misuse` with the inputs, or for a value that the pin does not take."""
 
-    def refuse_taken(self, machine: M, pin: str, /) -> None:
-        """Raises `Misuse` for a pin that is neither input nor output as the machine is configured."""
+    def refuse_taken(self, controller: M, pin: str, /) -> None:
+        """Raises `Misuse` for a pin that is neither input nor output as the controller is configured."""
 
     @abstractmethod
-    def scale(self, given: GivenScale, machine: M, axis: int, /) -> DriveScale:
+    def scale(self, given: GivenScale, controller: M, axis: int, /) -> DriveScale:
         """How its axis of a number (from 1) counts. Raises `Misuse`."""
 
     @abstractmethod
-    def lanes(self, machine: M, /) -> Mapping[str, AxisLane]:
+    def lanes(self, controller: M, /) -> Mapping[str, AxisLane]:
         """How its axes are shown in a trace, by the subject of their plans."""
 
     @abstractmethod
-    def body(self, machine: M, service: LineUnit, shafts: Mapping[int, AxisLoad], /) -> Body:
+    def body(self, controller: M, service: LineUnit, shafts: Mapping[int, AxisLoad], /) -> Body:
         """Its parts that faults act on; shafts are those of the mechanics of its axes, by number."""
 
     @abstractmethod
-    def watch_events(self, machine: M, call: Callable[[MachineEvent], None], /) -> None:
-        """Call a function with every event of the machine from now on."""
+    def watch_events(self, controller: M, call: Callable[[ControllerEvent], None], /) -> None:
+        """Call a function with every event of the controller from now on."""
 
     @abstractmethod
-    def keeps_memory(self, machine: M, /) -> bool:
+    def keeps_memory(self, controller: M, /) -> bool:
         """Whether it has non-volatile memory."""
 
     @abstractmethod
-    def keep_memory(self, machine: M, memory: bytes | None, keep: Callable[[bytes], None], /) -> None:
+    def keep_memory(self, controller: M, memory: bytes | None, keep: Callable[[bytes], None], /) -> None:
         """Call ``keep`` with its non-volatile memory after each change, and at once if it differs from the saved content
         ``memory``."""
 
     # ------------------------------------------------------------------ what there is to read of it
 
     @abstractmethod
-    def datasheet(self, machine: M, /) -> Datasheet:
-        """Its static description, the same object for all machines that have the same."""
+    def datasheet(self, controller: M, /) -> Datasheet:
+        """Its static description, the same object for all controllers that have the same."""
 
     @abstractmethod
     def datasheet_of(self, variant: str | None, /) -> Datasheet:
         """That of a controller that is not configured: of a variant by its name, or the usual one. Raises `Misuse`."""
 
     @abstractmethod
-    def pins(self, machine: M, /) -> Mapping[str, Pin]:
+    def pins(self, controller: M, /) -> Mapping[str, Pin]:
         """Those of its data sheet by name. They do not depend on its configuration, so they are there before the sheet."""
 
     @abstractmethod
-    def point(self, machine: M, name: str, /) -> LivePoint | None:
+    def point(self, controller: M, name: str, /) -> LivePoint | None:
         """The point of its data sheet that a name or an address means: what conditions, scripts and programs outside read of it.
         None where there is none; raises `Misuse` for what is half a value."""
 
-    def marks(self, machine: M, /) -> tuple[object, ...]:
+    def marks(self, controller: M, /) -> tuple[object, ...]:
         """Values of which some are others after an event that has changed points which neither move nor are only kept
         (`steptwin.points.LivePoint`). It is faster than to compare all points after each event, as is done without it."""
         return (object(),)
@@ -385,55 +385,55 @@ class ControllerKind(OptionalMethods, ABC, Generic[S, M, V]):
     @property
     @abstractmethod
     def state(self) -> StateReader[M]:
-        """Its present state; the machine is at that moment."""
+        """Its present state; the controller is at that moment."""
 
     @abstractmethod
-    def is_idle(self, machine: M, now: Nanos, /) -> bool:
+    def is_idle(self, controller: M, now: Nanos, /) -> bool:
         """Whether all axes stand and no program runs."""
 
-    def statement(self, machine: M, /) -> str | None:
+    def statement(self, controller: M, /) -> str | None:
         """The statement that its program is at, while one runs or is paused, as text."""
         return None
 
     @abstractmethod
-    def view(self, world: RunningWorld, name: str, machine: M, /) -> V:
+    def view(self, world: RunningWorld, name: str, controller: M, /) -> V:
         """Its view for Python programs in a running world."""
 
-    def remarks(self, name: str, machine: M, /) -> Sequence[str]:
+    def remarks(self, name: str, controller: M, /) -> Sequence[str]:
         """Notices for the user who starts it, under a name."""
         return ()
 
     # ------------------------------------------------------------------ commands, as its master does them
 
-    # ``line`` is the name of its line; the machine is at the present. They raise `Misuse`, and `Refusal` for what cannot be done
-    # now.
+    # ``line`` is the name of its line; the controller is at the present. They raise `Misuse`, and `Refusal` for what cannot be
+    # done now.
 
-    def enable(self, machine: M, line: str | None, command: Enable, /) -> Step:
+    def enable(self, controller: M, line: str | None, command: Enable, /) -> Step:
         raise self._cannot(command)
 
-    def move(self, machine: M, line: str | None, command: Move, /) -> Step:
+    def move(self, controller: M, line: str | None, command: Move, /) -> Step:
         raise self._cannot(command)
 
-    def home(self, machine: M, line: str | None, command: Home, /) -> Step:
+    def home(self, controller: M, line: str | None, command: Home, /) -> Step:
         if not self.offers(ControllerKind.seek):
             raise self._cannot(command)
-        raise Misuse(HOMES_BY_SEEK(name=command.machine, title=self.title))
+        raise Misuse(HOMES_BY_SEEK(name=command.controller, title=self.title))
 
-    def seek(self, machine: M, line: str | None, command: Seek, /) -> Step:
+    def seek(self, controller: M, line: str | None, command: Seek, /) -> Step:
         """The beginning of a seek, of a controller that does not know its switch."""
-        raise Misuse(HOMES_BY_VELOCITY(name=command.machine, title=self.title))
+        raise Misuse(HOMES_BY_VELOCITY(name=command.controller, title=self.title))
 
-    def jog(self, machine: M, line: str | None, command: Jog, /) -> Step:
+    def jog(self, controller: M, line: str | None, command: Jog, /) -> Step:
         raise self._cannot(command)
 
-    def stop_axes(self, machine: M, line: str | None, command: StopAxes, /) -> Step | Halt:
+    def stop_axes(self, controller: M, line: str | None, command: StopAxes, /) -> Step | Halt:
         raise self._cannot(command)
 
-    def control_program(self, machine: M, line: str | None, command: ControlProgram, /) -> Step | Halt:
+    def control_program(self, controller: M, line: str | None, command: ControlProgram, /) -> Step | Halt:
         raise self._cannot(command)
 
     def _cannot(self, command: ControllerCommand) -> Misuse:
-        return self.lacks(command.machine, f"command {type(command).__name__.lower()}")
+        return self.lacks(command.controller, f"command {type(command).__name__.lower()}")
 
     @cached_property
     def commands(self) -> Sequence[type[ControllerCommand]]:
@@ -448,36 +448,36 @@ class ControllerKind(OptionalMethods, ABC, Generic[S, M, V]):
         }
         return tuple(command for command, method in methods.items() if self.offers(method))
 
-    def step_of(self, machine: M, line: str | None, command: ControllerCommand | Seek, /) -> Step | Halt:
+    def step_of(self, controller: M, line: str | None, command: ControllerCommand | Seek, /) -> Step | Halt:
         """The step by which its master does a command; a stop is done at the controller itself."""
         match command:
             case Move():
-                return self.move(machine, line, command)
+                return self.move(controller, line, command)
             case Jog():
-                return self.jog(machine, line, command)
+                return self.jog(controller, line, command)
             case StopAxes():
-                return self.stop_axes(machine, line, command)
+                return self.stop_axes(controller, line, command)
             case Enable():
-                return self.enable(machine, line, command)
+                return self.enable(controller, line, command)
             case Home():
-                return self.home(machine, line, command)
+                return self.home(controller, line, command)
             case Seek():
-                return self.seek(machine, line, command)
+                return self.seek(controller, line, command)
             case ControlProgram():
-                return self.control_program(machine, line, command)
+                return self.control_program(controller, line, command)
 
     def motion_ends(self, name: str, axis: int, line: str | None, seek: Seek | None, /) -> MotionEnds:
-        """Conditions on an axis (from 1) of a machine with that name in conditions, or at the end of a seek. Refused where its
+        """Conditions on an axis (from 1) of a controller with that name in conditions, or at the end of a seek. Refused where its
         state does not show how a motion ended."""
         raise self.lacks(name, "status of motions: send its commands, and wait for a condition")
 
-    def dead_man_jog(self, machine: M, line: str | None, wanted: Jog, /) -> DeadManJog:
+    def dead_man_jog(self, controller: M, line: str | None, wanted: Jog, /) -> DeadManJog:
         """A jog that lasts only while it is extended."""
-        raise Refusal(CANNOT_BE_JOGGED(name=wanted.machine, kind=self.title))
+        raise Refusal(CANNOT_BE_JOGGED(name=wanted.controller, kind=self.title))
 
     @abstractmethod
-    def halt(self, machine: M, wanted: Halt, now: Nanos, /) -> None:
-        """Stop the machine, which is at that moment, at once and without its line."""
+    def halt(self, controller: M, wanted: Halt, now: Nanos, /) -> None:
+        """Stop the controller, which is at that moment, at once and without its line."""
 
     # ------------------------------------------------------------------ its programs
 
@@ -488,24 +488,24 @@ class ControllerKind(OptionalMethods, ABC, Generic[S, M, V]):
     configuration_format: ConfigurationFormat | None = None
     """How its configuration file becomes a form; None for a kind that has none."""
 
-    def texts(self, spec: S, machine: M, context: TextContext, /) -> Sequence[ProgramText]:
-        """Texts in its program memory, one text for each place there; the machine is at the present."""
+    def texts(self, spec: S, controller: M, context: TextContext, /) -> Sequence[ProgramText]:
+        """Texts in its program memory, one text for each place there; the controller is at the present."""
         return ()
 
-    def programs(self, spec: S, machine: M, context: TextContext, /) -> Programs | None:
+    def programs(self, spec: S, controller: M, context: TextContext, /) -> Programs | None:
         """Its programs while they are executed; None for a kind without any."""
         return None
 
-    def watch_program(self, machine: M, scheduler: Scheduler, name: str, /) -> ProgramReport | None:
-        """Watch the programs of the machine, which has that name in its scheduler; None without any."""
+    def watch_program(self, controller: M, scheduler: Scheduler, name: str, /) -> ProgramReport | None:
+        """Watch the programs of the controller, which has that name in its scheduler; None without any."""
         return None
 
-    def download(self, machine: M, to: Destination, source: SourceText, /) -> Downloading:
+    def download(self, controller: M, to: Destination, source: SourceText, /) -> Downloading:
         """How a text comes to one of the places of `texts`. Changes nothing yet. Raises `SourceErrors` for a text with errors,
         and `Refusal` for what cannot be done now."""
-        raise self.lacks(to.machine, "program memory")
+        raise self.lacks(to.controller, "program memory")
 
-    def configuration(self, spec: S, machine: M, context: BuildContext, /) -> SourceText | None:
+    def configuration(self, spec: S, controller: M, context: BuildContext, /) -> SourceText | None:
         """Its configuration file: as it was given, else made of its settings; None for a kind that has none."""
         return None
 
@@ -543,7 +543,7 @@ class Member(Generic[M]):
     """A controller on a line."""
 
     spec: ControllerSpec
-    machine: M
+    controller: M
     address: int
 
 

@@ -11,8 +11,8 @@ from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from typing import Any, ClassVar, NamedTuple, Protocol
 
+from steptwin.controller import Nanos, Port, sends_by_itself
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos, Port, sends_by_itself
 from steptwin.messages import Message
 from steptwin.simulation.faults import Faults, FaultyPort, FaultySendingPort
 from steptwin.simulation.faults import LineProtocol as FaultLine

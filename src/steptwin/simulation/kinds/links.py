@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.durations import duration
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.simulation.toml.reader import Key
 from steptwin.simulation.toml.table import TableSpec, key, table
 from steptwin.simulation.toml.values import address_value, name_value, number, permitting, text_value, whole, word

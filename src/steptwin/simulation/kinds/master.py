@@ -6,8 +6,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import ClassVar
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.state import Stateful
 

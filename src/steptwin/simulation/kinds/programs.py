@@ -11,8 +11,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
+from steptwin.controller import Nanos
 from steptwin.diagnostics import SourceText
-from steptwin.machine import Nanos
 from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
 from steptwin.statements import StatementHook
 

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from steptwin.controller import Nanos
 from steptwin.diagnostics import Diagnostic, SourceText
 from steptwin.explain.model import MemoryPart
-from steptwin.machine import Nanos
 from steptwin.simulation.script.steps import Step
 
 
@@ -59,7 +59,7 @@ class ProgramText:
 class Destination(NamedTuple):
     """Where a text goes."""
 
-    machine: str
+    controller: str
     line: str | None
     """The name of its line; None where it is on none."""
     place: str

@@ -13,8 +13,8 @@ from functools import lru_cache
 from math import inf, nextafter
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import Message, text_of
 from steptwin.points import FARTHEST_NS
 from steptwin.simulation.logic.expression import REMEMBERED, Comparison, Truth, comparisons, parse_condition, truth_of

@@ -11,8 +11,8 @@ from fractions import Fraction
 from math import ceil, floor
 from typing import ClassVar, Protocol
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.motion.divisions import profile_of
 from steptwin.motioncontroller import Drive
 from steptwin.simulation.scheduler.chance import Chance
@@ -134,9 +134,9 @@ class Circuit:
         self.contacts: list[Contact] = []
 
     @property
-    def machine(self) -> str:
+    def controller(self) -> str:
         """The subject of the records of its contacts."""
-        return self._scheduler.owner(self.target.machine)
+        return self._scheduler.owner(self.target.controller)
 
     @property
     def is_blank(self) -> bool:
@@ -150,11 +150,11 @@ class Circuit:
 
     def mark(self) -> None:
         """One of the contacts bounces from now on."""
-        self._scheduler.mark(self.target.machine)
+        self._scheduler.mark(self.target.controller)
 
     def report(self, lane: str, level: float) -> None:
         """The level of one contact, apart from the others of the input."""
-        self._scheduler.report(self.machine, "edge", lane, level)
+        self._scheduler.report(self.controller, "edge", lane, level)
 
 
 class Contact(Stateful):
@@ -183,9 +183,9 @@ class Contact(Stateful):
         circuit.contacts.append(self)
 
     @property
-    def machine(self) -> str:
+    def controller(self) -> str:
         """The subject of its records."""
-        return self._circuit.machine
+        return self._circuit.controller
 
     def rest_at(self, closed: bool) -> None:
         """Set its initial state; `Circuit.close` sets the input."""
@@ -302,7 +302,7 @@ class PositionSwitch:
     ``axis`` counts from 1. ``normally_closed`` gives 0 while the switch is on.
     """
 
-    machine: str
+    controller: str
     axis: int
     low: int | None
     high: int | None
@@ -320,12 +320,12 @@ def place(scheduler: Scheduler, switch: PositionSwitch) -> None:
     """Add a switch and drive its input to the present state."""
     scheduler.check(switch.target)
     try:
-        drive = scheduler.drive_of(switch.machine, switch.axis)
+        drive = scheduler.drive_of(switch.controller, switch.axis)
     except Misuse as error:
         raise Misuse(f"switch on {switch.target}: {error}") from None
     zone = Zone(switch.low, switch.high)
     circuit = Circuit(scheduler, switch.target)
     scheduler.add_part(
-        Switch(circuit, CountedPosition(drive), zone, scheduler.now, normally_closed=switch.normally_closed), (switch.machine,)
+        Switch(circuit, CountedPosition(drive), zone, scheduler.now, normally_closed=switch.normally_closed), (switch.controller,)
     )
     circuit.close()

@@ -9,7 +9,7 @@ from itertools import pairwise
 from math import floor, isnan
 from typing import ClassVar
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.simulation.logic.condition import Signal, crossing
 from steptwin.simulation.mechanics.scale import exact_fraction
 from steptwin.simulation.toml.values import MOST

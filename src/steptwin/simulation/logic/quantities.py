@@ -10,8 +10,8 @@ from itertools import chain
 from math import fmod, inf, isfinite, isnan, nan
 from typing import Protocol, TypeAlias
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.points import FARTHEST_NS
 from steptwin.simulation.mechanics.scale import LENGTHS, TURNS

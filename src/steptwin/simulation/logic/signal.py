@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.scheduler.scheduler import Source
 
@@ -16,7 +16,7 @@ CAN_ONLY_BE_WRITTEN = Message("simulation.can-only-be-written", "{name} can only
 
 @dataclass(frozen=True, slots=True)
 class SignalOf:
-    """A signal, and the machines, lines and elements that compute it: their schedulers must be advanced before it is read."""
+    """A signal, and the controllers, lines and elements that compute it: their schedulers must be advanced before it is read."""
 
     sources: tuple[Source, ...]
     read: Callable[[Nanos], float] | None

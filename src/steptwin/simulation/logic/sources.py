@@ -6,8 +6,8 @@ from bisect import bisect_right
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.motion.trig import sine
 from steptwin.simulation.scheduler.scheduler import Scheduler, Source
 from steptwin.simulation.scheduler.wires import PinName

@@ -6,7 +6,7 @@ from fractions import Fraction
 from math import ceil
 from typing import ClassVar, NamedTuple, Protocol
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.state import Stateful
 
 

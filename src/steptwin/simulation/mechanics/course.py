@@ -22,7 +22,7 @@ from math import ceil, inf
 from operator import attrgetter
 from typing import NamedTuple
 
-from steptwin.machine import SECOND, Nanos
+from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message, MessageText
 from steptwin.motion import Profile, Segment
 from steptwin.motion.divisions import Plan, profile_of

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import ceil, inf, sqrt
 
-from steptwin.machine import SECOND, Nanos
+from steptwin.controller import SECOND, Nanos
 from steptwin.motion import Profile, Segment
 from steptwin.motion.profile import cruise, ramp
 from steptwin.simulation.mechanics.wells import Wells

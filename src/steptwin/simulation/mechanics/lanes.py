@@ -1,6 +1,6 @@
 """Display data of the axes of a trace: their unit, and the terminals with their pulses or currents.
 
-A trace has pulses only. The display data are static: they are read from a machine once and stored with the trace.
+A trace has pulses only. The display data are static: they are read from a controller once and stored with the trace.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import NamedTuple, TypeAlias
 
-from steptwin.machine import MICROSECOND, Nanos
+from steptwin.controller import MICROSECOND, Nanos
 
 
 class StepOutputs(NamedTuple):
@@ -17,7 +17,7 @@ class StepOutputs(NamedTuple):
 
     step: str = "STEP"
     dir: str | None = "DIR"
-    """None if the machine has this pin itself, so that its edges are in the trace."""
+    """None if the controller has this pin itself, so that its edges are in the trace."""
     active_low: bool = False
     width_ns: Nanos = 5 * MICROSECOND
     """Drawn width of a pulse; less if the next one follows within twice this time."""
@@ -59,7 +59,7 @@ class MovedLane(NamedTuple):
     spring: tuple[float, float] | None = None
     """Frequency (Hz) and damping ratio."""
     other: tuple[str, str] | None = None
-    """Machine and subject of the other axis of a gantry or a tool."""
+    """Controller and subject of the other axis of a gantry or a tool."""
     other_per_pulse: float = 0.0
     other_coupling: str = ""
     """As ``per_pulse`` and ``coupling``, of the other axis."""
@@ -118,7 +118,7 @@ class AxisLane(NamedTuple):
 
 
 AxisViews: TypeAlias = Mapping[tuple[str, str], AxisLane]
-"""By machine and subject of its ``plan`` records (``"1"``…)."""
+"""By controller and subject of its ``plan`` records (``"1"``…)."""
 
 
 def plain_view(axis: str) -> AxisLane:

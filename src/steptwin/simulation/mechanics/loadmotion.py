@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from math import inf
 from typing import Any
 
-from steptwin.machine import SECOND, Nanos
+from steptwin.controller import SECOND, Nanos
 from steptwin.motion import Profile, Segment
 from steptwin.motion.divisions import profile_of
 from steptwin.motion.elastic import DriveStretch

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.messages import Message
 from steptwin.motion import Profile, at_rest
 from steptwin.motion.divisions import profile_of

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from operator import attrgetter
 from typing import ClassVar, NamedTuple, Protocol
 
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import MILLISECOND, Nanos
 from steptwin.messages import Message
 from steptwin.motion import Profile
 from steptwin.motion.divisions import profile_of
@@ -59,12 +59,12 @@ class EncoderReader(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class EncoderBuild:
-    """An encoder that the controller ``device``, called ``machine`` in the scheduler, reads for its axis ``axis`` (from 1).
+    """An encoder that the controller ``device``, called ``controller`` in the scheduler, reads for its axis ``axis`` (from 1).
 
     ``counts`` (negative: backwards) per ``pulses`` of the drive that turns it; None: as the controller is configured.
     """
 
-    machine: str
+    controller: str
     device: EncoderReader
     axis: int
     on_load: bool = False
@@ -85,10 +85,10 @@ STANDS = Message("simulation.stands-behind", "{axis} stands, {pulses} pulses beh
 
 
 class Mechanism(Stateful):
-    """The mechanics of axis ``number`` (from 1) of a machine in ``scheduler``: a part of the scheduler, and a carriage for
+    """The mechanics of axis ``number`` (from 1) of a controller in ``scheduler``: a part of the scheduler, and a carriage for
     switches."""
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_encoders", "_scheduler", "_name", "_revision", "build", "machine", "number")
+    FIXED: ClassVar[tuple[str, ...]] = ("_encoders", "_scheduler", "_name", "_revision", "build", "controller", "number")
     __slots__ = (
         *FIXED,
         "_blockers",
@@ -112,10 +112,10 @@ class Mechanism(Stateful):
         "_stop_due",
     )
 
-    def __init__(self, scheduler: Scheduler, machine: str, number: int, build: Build, name: str = "axis") -> None:
+    def __init__(self, scheduler: Scheduler, controller: str, number: int, build: Build, name: str = "axis") -> None:
         self._scheduler = scheduler
         self._name = name
-        self.machine = machine
+        self.controller = controller
         self.number = number
         self.build = build
         self._encoders: list[EncoderBuild] = []
@@ -152,12 +152,14 @@ class Mechanism(Stateful):
         """The course that was reported."""
         self._simple = build.ideal
         """Whether the load always was, and always will be, at the commanded position."""
-        drive = scheduler.drive_of(machine, number)
+        drive = scheduler.drive_of(controller, number)
         here = 0 if scheduler.is_blank else build.sign * drive.plan.count(scheduler.now) + build.zero
         if scheduler.is_blank:
             pass  # it is restored, where another one has been
         elif (build.low is not None and here < build.low) or (build.high is not None and here > build.high):
-            raise Misuse(f"{machine} axis {number} stands at {here} imp, outside its hard stops {build.low} to {build.high} imp")
+            raise Misuse(
+                f"{controller} axis {number} stands at {here} imp, outside its hard stops {build.low} to {build.high} imp"
+            )
         self._revision = drive.revision
         self._course = Course(build, drive.plan, scheduler.now, MechanicalState(here, here))
         if self._loose is not None and not scheduler.is_blank:
@@ -165,7 +167,7 @@ class Mechanism(Stateful):
 
     @property
     def _drive(self) -> Drive:
-        return self._scheduler.machines[self.machine].axes[self.number - 1]
+        return self._scheduler.controllers[self.controller].axes[self.number - 1]
 
     # ------------------------------------------------------------------ position
 
@@ -186,7 +188,7 @@ class Mechanism(Stateful):
         return course.field(now) - course.at(now).rotor
 
     def version(self) -> object:
-        return self._scheduler.machines[self.machine].axes[self.number - 1].revision, self._changes
+        return self._scheduler.controllers[self.controller].axes[self.number - 1].revision, self._changes
 
     def place(self, now: Nanos) -> int:
         return self.course(now).load_at(now)
@@ -201,7 +203,7 @@ class Mechanism(Stateful):
             drive = self._drive
             if drive.revision != self._revision or (self._loose is not None and self._loose.is_switched(drive, now)):
                 self._renew(drive, now)
-                self._scheduler.mark(self.machine)  # switches on it look ahead
+                self._scheduler.mark(self.controller)  # switches on it look ahead
             elif self._due is not None and self._due <= now:
                 self._turn_encoders(now)
             if self._stall_due is not None and self._stall_due <= now:
@@ -223,12 +225,12 @@ class Mechanism(Stateful):
             self._reported = None
             state = course.at(now)
             moved = Profile(free.start, free.base + (state.load - state.rotor) * self.build.sign, free.segments, free.final_p)
-            self._scheduler.report(self.machine, "free", str(self.number), moved)
+            self._scheduler.report(self.controller, "free", str(self.number), moved)
             return
         pieces = _from(course.load_pieces(), now)
         if self._reported is None or pieces != _from(self._reported, now):
             self._reported = pieces
-            self._scheduler.report(self.machine, "load", str(self.number), pieces)
+            self._scheduler.report(self.controller, "load", str(self.number), pieces)
 
     def deadline(self) -> Nanos | None:
         """Courses are computed in advance: what is due is to be reported, or concerns followers and the current of the axis."""
@@ -250,7 +252,7 @@ class Mechanism(Stateful):
                 ("stalled", stalled),
                 ("lost", 0 if stalled else self.lost(now)),
             )
-            self._scheduler.report(self.machine, "event", "stall", text, *facts)
+            self._scheduler.report(self.controller, "event", "stall", text, *facts)
         self._stall_due = self._course.next_stall(now)
 
     def _watch_stops(self, now: Nanos) -> None:
@@ -264,7 +266,7 @@ class Mechanism(Stateful):
             else:
                 text = (LEAVES_UPPER if side == "upper" else LEAVES_LOWER)(axis=self._name, pulses=lost)
             facts = ("axis", self.number), ("element", self._name), ("stop", side), ("pushes", pushes), ("lost", lost)
-            self._scheduler.report(self.machine, "event", "hard-stop", text, *facts)
+            self._scheduler.report(self.controller, "event", "hard-stop", text, *facts)
             self._stop = stop
         self._stop_due = self._course.next_stop(now)
 
@@ -324,7 +326,7 @@ class Mechanism(Stateful):
             lost = self.lost(now)
             text = self._loose.why(axis=self._name) if falls else STANDS(axis=self._name, pulses=lost)
             facts = ("axis", self.number), ("element", self._name), ("falls", falls), ("lost", lost)
-            self._scheduler.report(self.machine, "event", "fall", text, *facts)
+            self._scheduler.report(self.controller, "event", "fall", text, *facts)
         self._rest_due = free.end if free is not None and falls else None
 
     def brake(self, torque: float, now: Nanos) -> None:
@@ -334,7 +336,7 @@ class Mechanism(Stateful):
         state = self.at(now)
         self._brake = torque
         self._renew(self._drive, now, state)
-        self._scheduler.mark(self.machine)
+        self._scheduler.mark(self.controller)
 
     def burden(self, by: str, more: Burden, now: Nanos) -> None:
         """Let the element ``by`` load the rotor with ``more``, in place of what it did before."""
@@ -348,7 +350,7 @@ class Mechanism(Stateful):
         state = course.at(now)
         rests = self._loose is not None and self._settles(self._loose, course, before, now)
         self._renew(self._drive, now, state, rests=rests)
-        self._scheduler.mark(self.machine)
+        self._scheduler.mark(self.controller)
 
     def _settles(self, loose: Looseness, course: Course, before: Burden, now: Nanos) -> bool:
         """Whether a free rotor stands whose load changes from ``before`` where it changed the other way the last time."""
@@ -378,8 +380,8 @@ class Mechanism(Stateful):
 
     @property
     def may_turn(self) -> set[str]:
-        """Machines whose encoders it may turn without an event of theirs."""
-        return {encoder.machine for encoder in self._encoders if self.build.is_loose or encoder.machine != self.machine}
+        """Controllers whose encoders it may turn without an event of theirs."""
+        return {encoder.controller for encoder in self._encoders if self.build.is_loose or encoder.controller != self.controller}
 
     def _turn_encoders(self, now: Nanos) -> None:
         course = self._course
@@ -395,7 +397,7 @@ class Mechanism(Stateful):
 
     def _is_own(self, encoder: EncoderBuild) -> bool:
         """Whether an encoder belongs to the same axis of the same controller."""
-        return (encoder.machine, encoder.axis) == (self.machine, self.number)
+        return (encoder.controller, encoder.axis) == (self.controller, self.number)
 
     # ------------------------------------------------------------------ faults
 
@@ -414,7 +416,7 @@ class Mechanism(Stateful):
         self._blockers = (*others, by) if blocked else ()
         stalled = state.stalled or (not blocked and self.build.motor is not None)
         self._renew(self._drive, now, state._replace(stalled=stalled))
-        self._scheduler.mark(self.machine)
+        self._scheduler.mark(self.controller)
 
     def lose(self, pulses: int, now: Nanos) -> None:
         """Move the rotor ``pulses`` behind the field (negative: ahead), within the hard stops."""
@@ -427,13 +429,13 @@ class Mechanism(Stateful):
         self._simple = False
         behind = self.course(now).field(now) - rotor
         self._renew(self._drive, now, MechanicalState(rotor, min(max(load, rotor), rotor + build.play), stalled, behind))
-        self._scheduler.mark(self.machine)
+        self._scheduler.mark(self.controller)
 
     def slip(self, counts: int, now: Nanos) -> None:
         """Let the encoders slip by ``counts`` on their shaft."""
         for encoder in self._encoders:
             encoder.device.turn_encoder(encoder.axis, counts, now)
-        self._scheduler.mark(self.machine)
+        self._scheduler.mark(self.controller)
 
     # Revisions of a drive are not restored, so the state only holds whether the course belongs to the drive's present plan.
 

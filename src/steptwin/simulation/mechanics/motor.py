@@ -18,8 +18,8 @@ from itertools import pairwise
 from math import inf, sqrt
 from typing import Any, NamedTuple, TypeAlias
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.motion import Segment
 from steptwin.simulation.mechanics.resonance import MotionPart, Resonance

@@ -62,7 +62,7 @@ class Scale:
 class GivenScale:
     """Scale as the table of an axis gives it; None for the rest."""
 
-    machine: str
+    controller: str
     """The controller of the axis, for messages."""
     is_rotary: bool
     unit: str | None
@@ -113,7 +113,7 @@ def _per_unit(given: GivenScale, drive: DriveScale) -> tuple[str, Fraction]:
         return unit, drive.pulses_per_rev * TURNS[unit]
     if given.unit is None and not is_rotary:
         return PULSES, Fraction(1)
-    raise Misuse(f"unit = {unit!r}: give pulses_per_unit or pitch, for {given.machine} {drive.text}")
+    raise Misuse(f"unit = {unit!r}: give pulses_per_unit or pitch, for {given.controller} {drive.text}")
 
 
 def _arm(scale: Scale, what: str) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import ClassVar
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.state import Stateful
 
 

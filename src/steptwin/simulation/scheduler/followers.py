@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Protocol
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 
 
 class SchedulerFollower(Protocol):
@@ -27,14 +27,14 @@ class SchedulerFollowers:
 
     def __init__(self) -> None:
         self.by_name: dict[str, dict[SchedulerFollower, None]] = {}
-        """By the machines, lines and elements on which they depend."""
+        """By the controllers, lines and elements on which they depend."""
         self.leaving: list[SchedulerFollower] = []
         """Those that are notified before each event."""
         self.news: dict[SchedulerFollower, None] = {}
         """Those that will be notified."""
 
     def add(self, follower: SchedulerFollower, names: Iterable[str], *, leaves: bool) -> None:
-        """Tell it of events at machines, lines and elements with these names; ``leaves``: and before each event."""
+        """Tell it of events at controllers, lines and elements with these names; ``leaves``: and before each event."""
         for name in names:
             self.by_name.setdefault(name, {})[follower] = None
         if leaves:

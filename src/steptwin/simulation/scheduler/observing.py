@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.simulation.scheduler.scheduler import Source
 
 
@@ -18,7 +18,7 @@ class WorldObserver(Protocol):
     entry: int
     """The number of its valid entry in an agenda."""
     sources: tuple[Source, ...]
-    """The machines, lines and elements on which what it sees depends."""
+    """The controllers, lines and elements on which what it sees depends."""
 
     def leave(self, moment: Nanos) -> None:
         """Before anything happens at ``moment``: what moves is still on the way that it had before."""

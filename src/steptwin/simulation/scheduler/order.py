@@ -20,7 +20,7 @@ def successors(
     reached: dict[str, set[str]] = {}
     for wire in wires:
         if not wire.delay:
-            reached.setdefault(wire.source.machine, set()).add(wire.target.machine)
+            reached.setdefault(wire.source.controller, set()).add(wire.target.controller)
     found: list[set[int]] = []
     for number, name in enumerate(names):
         concerned = {drives[number]} if number in drives else set()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.motion import Profile
 from steptwin.motion.divisions import profile_of
 from steptwin.motioncontroller import MotionController
@@ -10,13 +10,13 @@ from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
 
 
 class RecordedPlans:
-    """The plans and coordinate offsets of a machine's axes that were recorded last."""
+    """The plans and coordinate offsets of a controller's axes that were recorded last."""
 
     __slots__ = ("_drives", "_name", "_origins", "_profiles", "_revisions")
 
-    def __init__(self, name: str, machine: MotionController) -> None:
+    def __init__(self, name: str, controller: MotionController) -> None:
         self._name = name
-        self._drives = [(i, str(i + 1), drive) for i, drive in enumerate(machine.axes)]
+        self._drives = [(i, str(i + 1), drive) for i, drive in enumerate(controller.axes)]
         self._revisions = [-1] * len(self._drives)
         self._profiles: list[Profile | None] = [None] * len(self._drives)
         self._origins = [0] * len(self._drives)

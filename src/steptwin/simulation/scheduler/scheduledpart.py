@@ -1,20 +1,20 @@
-"""Parts that a scheduler runs between its machines, and the state of a scheduler as plain values."""
+"""Parts that a scheduler runs between its controllers, and the state of a scheduler as plain values."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.simulation.scheduler.wires import DelayedLevel, PinName
 from steptwin.state import Plain
 
 
 class ScheduledPart(Protocol):
-    """A part between machines: mechanics, a switch, a source, a line. Its state is plain (`steptwin.state.Stateful`)."""
+    """A part between controllers: mechanics, a switch, a source, a line. Its state is plain (`steptwin.state.Stateful`)."""
 
     def deadline(self) -> Nanos | None:
-        """The time of its next event of its own, as for a machine."""
+        """The time of its next event of its own, as for a controller."""
         ...
 
     def update(self, now: Nanos) -> None:
@@ -27,10 +27,10 @@ class ScheduledPart(Protocol):
 
 
 class SchedulerState(NamedTuple):
-    """State of a scheduler, its machines and its parts."""
+    """State of a scheduler, its controllers and its parts."""
 
     now: Nanos
-    machines: tuple[Any, ...]
+    controllers: tuple[Any, ...]
     parts: tuple[Plain, ...]
     levels: Mapping[PinName, float]
     delayed: tuple[DelayedLevel, ...]

@@ -21,7 +21,7 @@ class ScheduledParts:
     def __init__(self) -> None:
         self.parts: list[ScheduledPart] = []
         self.by_name: dict[str, list[int]] = {}
-        """The parts that watch a machine, a line or an element, by its name."""
+        """The parts that watch a controller, a line or an element, by its name."""
         self._watched: list[tuple[str, ...] | None] = []
         """The names that each part watches; None: everything."""
         self.all: list[int] = []
@@ -29,7 +29,7 @@ class ScheduledParts:
         self.computes: list[str | None] = []
         """The line or element whose signals each part computes."""
         self._drives: dict[int, str] = {}
-        """The machine or element whose input a part drives."""
+        """The controller or element whose input a part drives."""
         self.turns = Turns()
         """Those that are updated when the signals settle."""
         self.dues = Dues()

@@ -1,7 +1,7 @@
-"""The event-driven scheduler: machines, the wires between their pins, and the parts (mechanics, switches, lines) between them.
+"""The event-driven scheduler: controllers, the wires between their pins, and the parts (mechanics, switches, lines) between them.
 
-A scheduler is itself a machine in virtual time. Machines without a common wire are put into separate schedulers, so that each one
-is advanced only when an event concerns it.
+A scheduler is itself a machine in virtual time. Controllers without a common wire are put into separate schedulers, so that each
+one is advanced only when an event concerns it.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import ClassVar, NamedTuple
 
+from steptwin.controller import Fact, Nanos, PinEdge
 from steptwin.errors import Misuse, Runaway, TimeReversal
-from steptwin.machine import Fact, Nanos, PinEdge
 from steptwin.messages import NONE, Message
 from steptwin.motioncontroller import Drive, MotionController
 from steptwin.simulation.scheduler.followers import SchedulerFollower, SchedulerFollowers
@@ -28,7 +28,7 @@ MAX_ROUNDS_PER_INSTANT = 1000
 
 
 class Source(NamedTuple):
-    """A machine, a line or an element of a scheduler, on which a value depends."""
+    """A controller, a line or an element of a scheduler, on which a value depends."""
 
     scheduler: Scheduler
     name: str
@@ -95,26 +95,26 @@ class Board(Stateful):
         self.scheduler.put(self.name, output, level)
 
 
-MACHINE_IS_THERE = Message("simulation.machine-is-there", "there is a machine {name!r} already")
-NO_SUCH_MACHINE = Message("simulation.no-such-machine", "no machine {name!r}: there are {names}")
+CONTROLLER_IS_THERE = Message("simulation.controller-is-there", "there is a controller {name!r} already")
+UNKNOWN_CONTROLLER = Message("simulation.unknown-controller", "no controller {name!r}: there are {names}")
 NOTHING_COMPUTES_SIGNALS = Message(
     "simulation.nothing-computes-signals", "nothing computes signals of {name!r}: there are {names}"
 )
-NO_SUCH_PIN = Message("simulation.no-such-pin", "{machine!r} has no pin {pin!r}: pins are {names}")
-NO_AXIS_OF = Message("simulation.no-axis-of", "no axis {axis} of {machine!r}, which has {count} axes")
+NO_SUCH_PIN = Message("simulation.no-such-pin", "{controller!r} has no pin {pin!r}: pins are {names}")
+NO_AXIS_OF = Message("simulation.no-axis-of", "no axis {axis} of {controller!r}, which has {count} axes")
 SIGNALS_DO_NOT_SETTLE = Message(
     "simulation.signals-do-not-settle", "signals did not settle after {most} rounds at {now} ns: a loop of wires"
 )
 
 
 class Scheduler:
-    """Runs machines together. Ties in time are broken by the order in which machines and parts were added.
+    """Runs controllers together. Ties in time are broken by the order in which controllers and parts were added.
 
-    An event costs what it changes: only machines and parts that are due, or that something they watch has changed (`mark`), are
-    looked at.
+    An event costs what it changes: only controllers and parts that are due, or that something they watch has changed (`mark`),
+    are looked at.
 
-    Before a machine is changed directly (by a request or a pin), the scheduler must be advanced to that moment, so that delayed
-    levels arrive in order; the effects propagate with the next `advance`, `deadline` or `settle`.
+    Before a controller is changed directly (by a request or a pin), the scheduler must be advanced to that moment, so that
+    delayed levels arrive in order; the effects propagate with the next `advance`, `deadline` or `settle`.
 
     ``record`` gets the first level of each driven input, every edge of an output and of an input, and every new plan of an axis.
     """
@@ -125,12 +125,12 @@ class Scheduler:
         """``is_checked``: its wires join what exists, because they do so in another scheduler of the same description.
         ``is_blank``: `restore` comes next, with all levels; until then it drives and records nothing."""
         self.now = now
-        self.machines: dict[str, MotionController] = {}
+        self.controllers: dict[str, MotionController] = {}
         self.boards: dict[str, Board] = {}
         """Terminals of elements."""
         self._parts = ScheduledParts()
         self.observers: list[Callable[[str, PinEdge], None]] = []
-        """Called with machine name and edge, in order, for every output edge."""
+        """Called with controller name and edge, in order, for every output edge."""
         self.stale = False
         """Whether something changed since the signals last settled."""
         self.is_attentive = False
@@ -143,7 +143,7 @@ class Scheduler:
         self.followers: SchedulerFollowers | None = None
         """Followers that are notified of each event; None: there have been none yet."""
         self._changed: set[str] = set()
-        """The machines, lines and elements that were looked at since the last `take_changed`."""
+        """The controllers, lines and elements that were looked at since the last `take_changed`."""
         self._is_checked, self.is_blank = is_checked, is_blank
         self._record = record
         self.wires = Wires(self.drive)
@@ -152,23 +152,23 @@ class Scheduler:
         self._recorded: dict[PinName, tuple[Nanos, float]] = {}
         """The last recorded edge of each driven input."""
         self._plans: list[RecordedPlans] = []
-        """The plans of each machine that were recorded last."""
+        """The plans of each controller that were recorded last."""
         self._names: list[str] = []
-        """The names of the machines, by number."""
+        """The names of the controllers, by number."""
         self._pin_names: dict[str, tuple[str, ...]] = {}
-        """Pins of machines and elements that were asked for."""
+        """Pins of controllers and elements that were asked for."""
         self._numbers: dict[str, int] = {}
-        """The numbers of the machines, by name."""
+        """The numbers of the controllers, by name."""
         self._sources: dict[str, Source] = {}
-        """The machines, and the lines and elements with a part that computes their signals."""
-        self._machine_turns = Turns()
+        """The controllers, and the lines and elements with a part that computes their signals."""
+        self._controller_turns = Turns()
         """Those whose edges have to be taken when the signals settle."""
-        self._machine_dues = Dues()
-        self._machines_looked_at: set[int] = set()
+        self._controller_dues = Dues()
+        self._controllers_looked_at: set[int] = set()
         """Those whose deadlines may have changed since the signals last settled."""
         self._due: Nanos | None = None
         self._alone: tuple[str, RecordedPlans] | None = None
-        """The only machine of a scheduler without parts and wires, for which nothing has to be scheduled."""
+        """The only controller of a scheduler without parts and wires, for which nothing has to be scheduled."""
 
     # ------------------------------------------------------------------ what is in it
 
@@ -177,35 +177,35 @@ class Scheduler:
         """In the order in which they are updated."""
         return self._parts.parts
 
-    def add(self, name: str, machine: MotionController) -> None:
-        """Add a machine and set its ``changed`` hook. Raises `TimeReversal` if its time is after the scheduler's."""
-        if name in self.machines:
-            raise Misuse(MACHINE_IS_THERE(name=name))
+    def add(self, name: str, controller: MotionController) -> None:
+        """Add a controller and set its ``changed`` hook. Raises `TimeReversal` if its time is after the scheduler's."""
+        if name in self.controllers:
+            raise Misuse(CONTROLLER_IS_THERE(name=name))
         if not self.is_blank:
-            machine.advance(self.now)
-        self.machines[name] = machine
+            controller.advance(self.now)
+        self.controllers[name] = controller
         self._numbers[name] = len(self._names)
         self._names.append(name)
         self._sources[name] = Source(self, name)
-        self._plans.append(RecordedPlans(name, machine))
-        machine.changed = partial(self.mark, name)
+        self._plans.append(RecordedPlans(name, controller))
+        controller.changed = partial(self.mark, name)
         self._join()
         if len(self._names) == 1 and not self.parts and not self.wires:
             self._alone = name, self._plans[0]
         self.mark(name)
 
     def _join(self) -> None:
-        """Something joins the machines: from now on it is scheduled what has to be looked at."""
+        """Something joins the controllers: from now on it is scheduled what has to be looked at."""
         if self._alone is not None:
             self._alone = None
             self.mark()
 
-    def replace(self, name: str, machine: MotionController) -> None:
-        """Replace the machine ``name`` by a wrapper with the same pins and axes."""
-        if name not in self.machines:
-            raise Misuse(NO_SUCH_MACHINE(name=name, names=list(self.machines) or NONE()))
-        self.machines[name] = machine
-        machine.changed = partial(self.mark, name)
+    def replace(self, name: str, controller: MotionController) -> None:
+        """Replace the controller ``name`` by a wrapper with the same pins and axes."""
+        if name not in self.controllers:
+            raise Misuse(UNKNOWN_CONTROLLER(name=name, names=list(self.controllers) or NONE()))
+        self.controllers[name] = controller
+        controller.changed = partial(self.mark, name)
         self.mark(name)
 
     def add_board(self, board: Board) -> None:
@@ -218,8 +218,8 @@ class Scheduler:
         """Add a part; it is first updated when the signals settle next, then whenever it is due or something that it watches has
         changed.
 
-        ``watches``: names of machines, lines and elements; None: every change. ``name``: the line or element whose signals it
-        computes; they may change with each of its updates, and only then. ``drives``: the machine or element whose input
+        ``watches``: names of controllers, lines and elements; None: every change. ``name``: the line or element whose signals it
+        computes; they may change with each of its updates, and only then. ``drives``: the controller or element whose input
         it drives.
         """
         self._join()
@@ -242,7 +242,7 @@ class Scheduler:
         self.mark()
 
     def source(self, name: str) -> Source:
-        """The machine, line or element ``name`` as what a value depends on."""
+        """The controller, line or element ``name`` as what a value depends on."""
         found = self._sources.get(name)
         if found is None:
             raise Misuse(NOTHING_COMPUTES_SIGNALS(name=name, names=list(self._sources) or NONE()))
@@ -256,35 +256,37 @@ class Scheduler:
         if not self.is_blank:
             self.drive(wire.target, wire.transmitted(self._level(wire.source)))
         self.wires.add(wire)
-        self.mark(wire.target.machine)
+        self.mark(wire.target.controller)
 
     def wire_to(self, target: PinName) -> Wire | None:
         """The wire that drives an input, if one does."""
         return next((wire for wire in self.wires if wire.target == target), None)
 
     def check(self, name: PinName) -> None:
-        """Raises `Misuse` if the machine or its pin does not exist."""
+        """Raises `Misuse` if the controller or its pin does not exist."""
         if self._is_checked:
             return
-        if name.machine not in self.machines and name.machine not in self.boards:
-            raise Misuse(NO_SUCH_MACHINE(name=name.machine, names=list(self.machines) or NONE()))
-        pins = self._pin_names.get(name.machine)
+        if name.controller not in self.controllers and name.controller not in self.boards:
+            raise Misuse(UNKNOWN_CONTROLLER(name=name.controller, names=list(self.controllers) or NONE()))
+        pins = self._pin_names.get(name.controller)
         if pins is None:
-            board = self.boards.get(name.machine)
-            pins = self._pin_names[name.machine] = tuple(self.machines[name.machine].pins() if board is None else board.levels)
+            board = self.boards.get(name.controller)
+            pins = self._pin_names[name.controller] = tuple(
+                self.controllers[name.controller].pins() if board is None else board.levels
+            )
         if name.pin not in pins:
-            raise Misuse(NO_SUCH_PIN(machine=name.machine, pin=name.pin, names=list(pins)))
+            raise Misuse(NO_SUCH_PIN(controller=name.controller, pin=name.pin, names=list(pins)))
 
     def _level(self, name: PinName) -> float:
-        board = self.boards.get(name.machine)
-        return self.machines[name.machine].pin(name.pin) if board is None else board.levels[name.pin]
+        board = self.boards.get(name.controller)
+        return self.controllers[name.controller].pin(name.pin) if board is None else board.levels[name.pin]
 
-    def drive_of(self, machine: str, axis: int) -> Drive:
+    def drive_of(self, controller: str, axis: int) -> Drive:
         """The drive of ``axis`` (from 1). Raises `Misuse` if it does not exist."""
-        found = self.machines.get(machine)
+        found = self.controllers.get(controller)
         axes = () if found is None else found.axes
         if not 1 <= axis <= len(axes):
-            raise Misuse(NO_AXIS_OF(axis=axis, machine=machine, count=len(axes)))
+            raise Misuse(NO_AXIS_OF(axis=axis, controller=controller, count=len(axes)))
         return axes[axis - 1]
 
     def follow(self, follower: SchedulerFollower, names: Iterable[str], *, leaves: bool = False) -> None:
@@ -299,23 +301,23 @@ class Scheduler:
             self.followers.remove(follower)
 
     def take_changed(self) -> set[str]:
-        """The machines, lines and elements whose signals may have changed since the last call, as far as signals have settled."""
+        """The controllers, lines and elements whose signals may have changed since the last call, if signals have settled."""
         changed, self._changed = self._changed, set()
         return changed
 
     def mark(self, name: str | None = None) -> None:
-        """Register a change of a machine, a line or an element, or of anything: the signals have to settle."""
+        """Register a change of a controller, a line or an element, or of anything: the signals have to settle."""
         if self._alone is not None or self.is_blank:
             pass  # it is looked at whenever the scheduler settles, all of it after `restore`
         elif name is None:
             for number in range(len(self._names)):
-                self._machine_turns.add(number)
+                self._controller_turns.add(number)
             for number in range(len(self.parts)):
                 self._parts.turns.add(number)
         else:
-            of_machine = self._numbers.get(name)
-            if of_machine is not None:
-                self._machine_turns.add(of_machine)
+            of_controller = self._numbers.get(name)
+            if of_controller is not None:
+                self._controller_turns.add(of_controller)
             for number in self._parts.by_name.get(name, ()):
                 self._parts.turns.add(number)
         self.stale = True
@@ -335,32 +337,32 @@ class Scheduler:
     def set_input(self, target: PinName, level: float, *, is_first: bool = False) -> None:
         """Drive an input now. Its resulting level, which a fault may hold, is recorded where it changes or ``is_first``.
 
-        The machine's own report of the same edge is not recorded again.
+        The controller's own report of the same edge is not recorded again.
         """
-        board = self.boards.get(target.machine)
+        board = self.boards.get(target.controller)
         if board is not None:
             board.set_pin(target.pin, level, self.now)
-            self.mark(target.machine)
+            self.mark(target.controller)
             return
-        machine, (_, pin) = self.machines[target.machine], target
+        controller, (_, pin) = self.controllers[target.controller], target
         if self._record is None:
-            machine.set_pin(pin, level, self.now)
+            controller.set_pin(pin, level, self.now)
             return
         known = self._recorded.get(target)
-        before = machine.pin(pin) if known is None else known[1]
-        machine.set_pin(pin, level, self.now)
-        after = machine.pin(pin)
+        before = controller.pin(pin) if known is None else known[1]
+        controller.set_pin(pin, level, self.now)
+        after = controller.pin(pin)
         if is_first or after != before:
             self.mark_recorded(target, self.now, after)
-            self._record(TraceRecord(self.now, target.machine, "edge", pin, after))
+            self._record(TraceRecord(self.now, target.controller, "edge", pin, after))
 
     def mark_recorded(self, target: PinName, now: Nanos, level: float) -> None:
-        """Mark an edge of an input as recorded, in case its machine reports it too."""
+        """Mark an edge of an input as recorded, in case its controller reports it too."""
         self._recorded[target] = now, level
 
     def owner(self, name: str) -> str:
-        """The machine under which ``name`` is recorded: itself, or the first one for an element with terminals."""
-        return next(iter(self.machines), name) if name in self.boards else name
+        """The controller under which ``name`` is recorded: itself, or the first one for an element with terminals."""
+        return next(iter(self.controllers), name) if name in self.boards else name
 
     def put(self, element: str, output: str, level: float) -> None:
         """An output of an element has another level now, or its first one."""
@@ -368,10 +370,10 @@ class Scheduler:
         self.wires.transmit(PinName(element, output), level, self.now)
         self.mark(element)
 
-    def report(self, machine: str, kind: str, subject: str, value: object, *facts: Fact) -> None:
-        """Record an event of a machine at the present moment."""
+    def report(self, controller: str, kind: str, subject: str, value: object, *facts: Fact) -> None:
+        """Record an event of a controller at the present moment."""
         if self._record is not None and not self.is_blank:
-            self._record(TraceRecord(self.now, machine, kind, subject, value, facts))
+            self._record(TraceRecord(self.now, controller, kind, subject, value, facts))
 
     # ------------------------------------------------------------------ time
 
@@ -398,46 +400,46 @@ class Scheduler:
             if self.followers is not None and self.followers.leaving:
                 self.followers.leave(self._due)
             self.now = self._due
-            self._advance_machines(now)
+            self._advance_controllers(now)
             for number in self._parts.dues.take(self.now):
                 self._parts.turns.add(number)
             if self.wires.delayed:
                 self.wires.arrive(self.now)
             self.settle()
 
-    def _advance_machines(self, now: Nanos) -> None:
-        """Advance the machines that are due; a single one to where it changes something, or where anything else is due."""
-        due = self._machine_dues.take(self.now)
+    def _advance_controllers(self, now: Nanos) -> None:
+        """Advance the controllers that are due; a single one to where it changes something, or where anything else is due."""
+        due = self._controller_dues.take(self.now)
         until = self._nothing_else_until(now) if len(due) == 1 and not self.is_attentive else self.now
         for number in due:
             name = self._names[number]
             self.stale = False
             if until > self.now:
-                self.now = self.machines[name].advance_to_change(until)
+                self.now = self.controllers[name].advance_to_change(until)
             else:
-                self.machines[name].advance(self.now)
-            if not self.stale:  # the machine has not called its hook
+                self.controllers[name].advance(self.now)
+            if not self.stale:  # the controller has not called its hook
                 self.mark(name)
 
     def _nothing_else_until(self, now: Nanos) -> Nanos:
-        """The last moment, at most ``now``, before anything is due besides a machine that is due now."""
-        until, dues = now, (self._machine_dues.first(), self._parts.dues.first())
+        """The last moment, at most ``now``, before anything is due besides a controller that is due now."""
+        until, dues = now, (self._controller_dues.first(), self._parts.dues.first())
         for due in (*dues, self.wires.next_arrival()) if self.wires.delayed else dues:
             if due is not None and due <= until:
                 until = due - 1
         return until
 
     def _advance_alone(self, name: str, plans: RecordedPlans, now: Nanos) -> None:
-        machine, due = self.machines[name], self._due
+        controller, due = self.controllers[name], self._due
         self._changed.add(name)
         while due is not None and due <= now:
             if self.followers is not None:
                 self.followers.leave(due)
             if self.is_attentive:
-                machine.advance(due)
+                controller.advance(due)
                 self.now = due
             else:
-                self.now = machine.advance_to_change(now)
+                self.now = controller.advance_to_change(now)
             self._settle_alone(name, plans)
             if self.followers is not None:
                 self.followers.news |= self.followers.by_name.get(name, {})
@@ -447,13 +449,13 @@ class Scheduler:
                 self.on_change(self)
 
     def _settle_alone(self, name: str, plans: RecordedPlans) -> None:
-        """As `settle`, for a single machine without parts and wires."""
-        machine = self.machines[name]
-        for edge in machine.take_edges():
+        """As `settle`, for a single controller without parts and wires."""
+        controller = self.controllers[name]
+        for edge in controller.take_edges():
             self._edge(name, edge)
         if self._record is not None:
             plans.report(self._record, self.now)
-        self._due = machine.deadline()
+        self._due = controller.deadline()
         self.stale = False
 
     def deadline(self) -> Nanos | None:
@@ -496,23 +498,23 @@ class Scheduler:
             parts[number].update(self.now)
 
     def _take_edges(self) -> None:
-        while (number := self._machine_turns.take()) is not None:
-            self._machines_looked_at.add(number)
+        while (number := self._controller_turns.take()) is not None:
+            self._controllers_looked_at.add(number)
             name = self._names[number]
-            for edge in self.machines[name].take_edges():
+            for edge in self.controllers[name].take_edges():
                 self._edge(name, edge)
 
     def _find_deadlines(self) -> None:
-        """Record new plans of the machines that were looked at, and find when anything is due next."""
+        """Record new plans of the controllers that were looked at, and find when anything is due next."""
         followers = self.followers
-        for number in sorted(self._machines_looked_at):
+        for number in sorted(self._controllers_looked_at):
             if self._record is not None:
                 self._plans[number].report(self._record, self.now)
             name = self._names[number]
             self._changed.add(name)
             if followers is not None and name in followers.by_name:
                 followers.news |= followers.by_name[name]
-            self._machine_dues.put(number, self.machines[name].deadline())
+            self._controller_dues.put(number, self.controllers[name].deadline())
         parts = self._parts
         for number in parts.looked_at:
             of = parts.computes[number]
@@ -521,9 +523,9 @@ class Scheduler:
                 if followers is not None and of in followers.by_name:
                     followers.news |= followers.by_name[of]
             parts.dues.put(number, parts.parts[number].deadline())
-        self._machines_looked_at.clear()
+        self._controllers_looked_at.clear()
         parts.looked_at.clear()
-        due, of_parts = self._machine_dues.first(), parts.dues.first()
+        due, of_parts = self._controller_dues.first(), parts.dues.first()
         if due is None or (of_parts is not None and of_parts < due):
             due = of_parts
         arrival = self.wires.next_arrival() if self.wires.delayed else None
@@ -547,17 +549,17 @@ class Scheduler:
             self.settle()
         return SchedulerState(
             self.now,
-            tuple(machine.snapshot() for machine in self.machines.values()),
+            tuple(controller.snapshot() for controller in self.controllers.values()),
             tuple(part.copy_state() for part in self.parts),
             self._levels.copy(),
             tuple(self.wires.delayed),
         )
 
     def restore(self, state: SchedulerState) -> None:
-        """Restore the state of a scheduler with the same machines and parts."""
+        """Restore the state of a scheduler with the same controllers and parts."""
         self.now, self.is_blank = state.now, False
-        for machine, its_state in zip(self.machines.values(), state.machines, strict=True):
-            machine.restore(its_state)
+        for controller, its_state in zip(self.controllers.values(), state.controllers, strict=True):
+            controller.restore(its_state)
         for part, its_state in zip(self.parts, state.parts, strict=True):
             part.set_state(its_state)
         self._levels = dict(state.levels)

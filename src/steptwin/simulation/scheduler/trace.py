@@ -1,8 +1,9 @@
 """Record of a world, exact and compact: profiles instead of pulses, edges instead of samples.
 
-Each machine's records come in the order in which they happened to it. Machines that share a scheduler are advanced together, so
-their records are merged by (time, order in which they happened): a cause stands before its effect of the same nanosecond.
-Machines of several schedulers are advanced apart from each other; theirs are merged by (time, order of the schedulers).
+Each controller's records come in the order in which they happened to it. Controllers that share a scheduler are advanced
+together, so their records are merged by (time, order in which they happened): a cause stands before its effect of the same
+nanosecond. Controllers of several schedulers are advanced apart from each other; theirs are merged by (time, order of the
+schedulers).
 
 Values by kind: ``plan`` the new `Profile` of an axis (subject ``"1"``…), in pulses, or the `StepTrain` of one that does not give
 a pulse for every unit of position; ``load`` where the load of an axis is until the next such record: tuples (moment, whether it
@@ -24,8 +25,8 @@ from itertools import islice
 from operator import itemgetter
 from typing import Any, NamedTuple, TypeAlias
 
+from steptwin.controller import Fact, Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Fact, Nanos
 from steptwin.motion import Profile, Segment
 from steptwin.motion.divisions import Plan, StepTrain
 from steptwin.motion.paths import ArcSegment
@@ -38,7 +39,7 @@ class TraceRecord(NamedTuple):
     """A record of a trace."""
 
     time: Nanos
-    machine: str
+    controller: str
     kind: str
     subject: str
     value: object
@@ -72,40 +73,40 @@ RecordSink: TypeAlias = Callable[[TraceRecord], None]
 
 
 class Trace:
-    """The records of a world. ``machines`` fixes their order in the digest; a machine not named there comes last.
+    """The records of a world. ``controllers`` fixes their order in the digest; a controller not named there comes last.
 
     With ``keep=False`` only the digest and the number of records grow: for runs too long to be kept.
     """
 
-    def __init__(self, machines: Iterable[str] = (), *, keep: bool = True) -> None:
+    def __init__(self, controllers: Iterable[str] = (), *, keep: bool = True) -> None:
         self.is_kept = keep
         self.is_recorded = True
         """Whether there is a digest."""
-        self._streams: dict[str, _Stream] = {name: _Stream() for name in machines}
+        self._streams: dict[str, _Stream] = {name: _Stream() for name in controllers}
         self._together: Sequence[Sequence[str]] = ()
         self._latest_number = 0
         self.watchers: list[RecordSink] = []
         """Called with every record."""
 
     @property
-    def machines(self) -> list[str]:
+    def controllers(self) -> list[str]:
         return list(self._streams)
 
-    def read_together(self, machines: Iterable[Sequence[str]]) -> None:
-        """Read the records of these machines, which share a scheduler, in the order in which they came; those of each scheduler
-        one after the other, and before those of machines that are not named."""
-        self._together = tuple(machines)
+    def read_together(self, controllers: Iterable[Sequence[str]]) -> None:
+        """Read the records of these controllers, which share a scheduler, in the order in which they came; those of each
+        scheduler one after the other, and before those of controllers that are not named."""
+        self._together = tuple(controllers)
 
     def add(self, record: TraceRecord) -> None:
-        """Take what happened to a machine after everything taken of it before. `Misuse` where its time goes back.
+        """Take what happened to a controller after everything taken of it before. `Misuse` where its time goes back.
 
         ``value`` is immutable; one of a kind that `encode` does not know makes `digest` raise.
         """
-        stream = self._streams.get(record.machine)
+        stream = self._streams.get(record.controller)
         if stream is None:
-            stream = self._streams[record.machine] = _Stream()
+            stream = self._streams[record.controller] = _Stream()
         if record.time < stream.latest:
-            raise Misuse(f"{record.machine}: a record of {record.time} ns after one of {stream.latest} ns")
+            raise Misuse(f"{record.controller}: a record of {record.time} ns after one of {stream.latest} ns")
         stream.latest = record.time
         stream.count += 1
         if self.is_kept:
@@ -130,40 +131,40 @@ class Trace:
             groups.append(_as_they_came(streams) if len(streams) > 1 else streams[0].records if streams else ())
         return merge(*groups, *(stream.records for stream in apart.values()), key=itemgetter(0))
 
-    def of(self, *kinds: str, machine: str | None = None) -> Iterator[TraceRecord]:
-        """The records of these kinds, of one machine where it is named, in order. `Misuse` for an unknown kind."""
+    def of(self, *kinds: str, controller: str | None = None) -> Iterator[TraceRecord]:
+        """The records of these kinds, of one controller where it is named, in order. `Misuse` for an unknown kind."""
         for kind in kinds:
             if kind not in KINDS:
                 raise Misuse(f"no kind of record {kind!r}: kinds are {', '.join(KINDS)}")
-        if machine is None:
+        if controller is None:
             chosen: Iterator[TraceRecord] = iter(self)
         else:
-            chosen = iter(self._streams[machine].records if machine in self._streams else ())
+            chosen = iter(self._streams[controller].records if controller in self._streams else ())
         return (record for record in chosen if record.kind in kinds)
 
-    def plans(self, machine: str | None = None) -> Iterator[TraceRecord]:
-        return self.of("plan", machine=machine)
+    def plans(self, controller: str | None = None) -> Iterator[TraceRecord]:
+        return self.of("plan", controller=controller)
 
-    def loads(self, machine: str | None = None) -> Iterator[TraceRecord]:
-        return self.of("load", machine=machine)
+    def loads(self, controller: str | None = None) -> Iterator[TraceRecord]:
+        return self.of("load", controller=controller)
 
-    def edges(self, machine: str | None = None) -> Iterator[TraceRecord]:
-        return self.of("edge", machine=machine)
+    def edges(self, controller: str | None = None) -> Iterator[TraceRecord]:
+        return self.of("edge", controller=controller)
 
-    def frames(self, machine: str | None = None) -> Iterator[TraceRecord]:
-        return self.of("frame", machine=machine)
+    def frames(self, controller: str | None = None) -> Iterator[TraceRecord]:
+        return self.of("frame", controller=controller)
 
-    def statements(self, machine: str | None = None) -> Iterator[TraceRecord]:
-        return self.of("statement", machine=machine)
+    def statements(self, controller: str | None = None) -> Iterator[TraceRecord]:
+        return self.of("statement", controller=controller)
 
-    def events(self, machine: str | None = None) -> Iterator[TraceRecord]:
-        return self.of("event", machine=machine)
+    def events(self, controller: str | None = None) -> Iterator[TraceRecord]:
+        return self.of("event", controller=controller)
 
-    def inputs(self, machine: str | None = None) -> Iterator[TraceRecord]:
-        return self.of("input", machine=machine)
+    def inputs(self, controller: str | None = None) -> Iterator[TraceRecord]:
+        return self.of("input", controller=controller)
 
-    def faults(self, machine: str | None = None) -> Iterator[TraceRecord]:
-        return self.of("fault", machine=machine)
+    def faults(self, controller: str | None = None) -> Iterator[TraceRecord]:
+        return self.of("fault", controller=controller)
 
     def stop(self) -> None:
         """Keep no records and no digest from now on; only `watchers` are called."""
@@ -182,7 +183,7 @@ class Trace:
         return Mark(tuple((name, stream.mark()) for name, stream in self._streams.items()))
 
     def rewind(self, mark: Mark) -> None:
-        """Have the past of ``mark``, which was taken of this trace or of one of the same machines."""
+        """Have the past of ``mark``, which was taken of this trace or of one of the same controllers."""
         known = dict(mark.streams)
         for name in known:
             self._streams.setdefault(name, _Stream())
@@ -192,7 +193,7 @@ class Trace:
 
     def digest(self) -> str:
         """Equal for two runs of the same world, on any machine and Python version: 32 hexadecimal digits. A digest of the digests
-        of the machines: their merged order follows from their times. Raises `Misuse` if nothing is recorded."""
+        of the controllers: their merged order follows from their times. Raises `Misuse` if nothing is recorded."""
         if not self.is_recorded:
             raise Misuse("nothing is recorded of this world: it has no digest")
         whole = blake2b(digest_size=DIGEST_BYTES)
@@ -203,7 +204,7 @@ class Trace:
 
 
 class StreamMark(NamedTuple):
-    """The past of one machine: its records, as far as they are kept, and what was hashed of them."""
+    """The past of one controller: its records, as far as they are kept, and what was hashed of them."""
 
     count: int
     latest: Nanos
@@ -224,7 +225,7 @@ def _mark_of(latest: Nanos, records: tuple[TraceRecord, ...], numbers: tuple[int
 
 
 def _as_they_came(streams: Iterable[_Stream]) -> Iterator[TraceRecord]:
-    """The records of several machines by time, those of one moment in the order in which they came."""
+    """The records of several controllers by time, those of one moment in the order in which they came."""
     numbered = (zip(stream.records, stream.numbers, strict=True) for stream in streams)
     return (record for record, _ in merge(*numbered, key=_time_and_number))
 
@@ -240,14 +241,14 @@ class Mark(NamedTuple):
 
 
 class _Stream:
-    """The records of one machine."""
+    """The records of one controller."""
 
     __slots__ = ("_hashed", "count", "hash", "latest", "numbers", "records")
 
     def __init__(self) -> None:
         self.records: list[TraceRecord] = []
         self.numbers: list[int] = []
-        """Number of each record among those of all machines."""
+        """Number of each record among those of all controllers."""
         self.count = 0
         self.latest: Nanos = 0
         self.hash = blake2b(digest_size=DIGEST_BYTES)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from heapq import heapify, heappop, heappush
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 
 _FEW = 64
 """Number of outdated entries that a queue tolerates before it removes them."""

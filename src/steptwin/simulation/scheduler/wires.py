@@ -6,18 +6,18 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 
 
 class PinName(NamedTuple):
-    """A pin of a machine, or a terminal of an element."""
+    """A pin of a controller, or a terminal of an element."""
 
-    machine: str
+    controller: str
     pin: str
 
     def __str__(self) -> str:
-        return f"{self.machine}.{self.pin}"
+        return f"{self.controller}.{self.pin}"
 
 
 @dataclass(frozen=True, slots=True)

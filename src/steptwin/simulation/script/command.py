@@ -64,7 +64,7 @@ def _levels(value: Any) -> tuple[tuple[str, str, float], ...]:
 
 
 LEVELS = ValueType(
-    '{"MACHINE.NAME": NUMBER, ...}',
+    '{"CONTROLLER.NAME": NUMBER, ...}',
     {
         "type": "object",
         "minProperties": 1,
@@ -73,7 +73,7 @@ LEVELS = ValueType(
         "propertyNames": {"pattern": "^[^.]+[.].+$", "maxLength": LONGEST_TEXT},
     },
     _levels,
-    lambda levels: {f"{machine}.{name}": value for machine, name, value in levels},
+    lambda levels: {f"{controller}.{name}": value for controller, name, value in levels},
 )
 
 

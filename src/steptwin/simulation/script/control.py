@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Annotated, TypeAlias
 
 from steptwin.errors import Misuse
-from steptwin.fields import AxisNumber, MachineName, Meaning, choice, whole
+from steptwin.fields import AxisNumber, ControllerName, Meaning, choice, whole
 from steptwin.messages import Message
 from steptwin.simulation.script.command import UNITS, command
 
@@ -20,7 +20,7 @@ STOPPED = "program: what the program does now: running (it goes on), paused, sto
 class Enable:
     """Switch a drive on or off."""
 
-    machine: MachineName
+    controller: ControllerName
     axis: AxisNumber
     on: Annotated[bool, Meaning("Whether it is to be on.")] = True
 
@@ -33,7 +33,7 @@ EITHER_TO_OR_BY = Message("simulation.either-to-or-by", "move: give either to (a
 class Move:
     """Begin to move to a position, or by a distance."""
 
-    machine: MachineName
+    controller: ControllerName
     axis: AxisNumber
     to: Annotated[float | None, Meaning("To this position.", unit=UNITS)] = None
     by: Annotated[float | None, Meaning("By this distance.", unit=UNITS)] = None
@@ -48,7 +48,7 @@ class Move:
 class Home:
     """Begin to home; the sign of the velocity chooses the switch."""
 
-    machine: MachineName
+    controller: ControllerName
     axis: AxisNumber
     velocity: Annotated[float, Meaning("Its sign chooses the switch.", unit=f"{UNITS}/s")]
 
@@ -58,7 +58,7 @@ class Seek:
     """Begin to home a controller that does not know its switch: move in ``direction`` (1 or -1) until the input ``pin`` ends it,
     which is then the position 0."""
 
-    machine: str
+    controller: str
     axis: int
     direction: int
     pin: str
@@ -69,7 +69,7 @@ class Seek:
 class Jog:
     """Begin to move at a velocity, without end."""
 
-    machine: MachineName
+    controller: ControllerName
     axis: AxisNumber
     velocity: Annotated[float, Meaning("Velocity with its sign.", unit=f"{UNITS}/s")]
 
@@ -77,18 +77,18 @@ class Jog:
 @command("stop", "Stop as fast as the controller does, with a ramp or without. The program of a MIC488 goes on.", STOPPED)
 @dataclass(frozen=True, slots=True)
 class StopAxes:
-    """Stop an axis as fast as the controller does; without one, all axes of the machine."""
+    """Stop an axis as fast as the controller does; without one, all axes of the controller."""
 
-    machine: MachineName
+    controller: ControllerName
     axis: Annotated[int | None, Meaning("The number of an axis; all without.", whole(1, 64))] = None
 
 
-@command("program", "Start, pause or stop the program of a machine.")
+@command("program", "Start, pause or stop the program of a controller.")
 @dataclass(frozen=True, slots=True)
 class ControlProgram:
-    """Start, pause or stop the program of a machine."""
+    """Start, pause or stop the program of a controller."""
 
-    machine: MachineName
+    controller: ControllerName
     action: Annotated[str, Meaning("What to do.", choice("start", "pause", "stop"))]
 
 
@@ -97,7 +97,7 @@ class Halt:
     """Stop a controller at the controller itself, whatever its line does: an axis (None: all of them), or with ``program``
     ("pause" or "stop") its program and no axis. What scripts and commands have sent it over its line before is dropped."""
 
-    machine: str
+    controller: str
     axis: int | None = None
     program: str | None = None
 
@@ -109,17 +109,17 @@ class Halt:
         return "all axes" if self.axis is None else f"axis {self.axis}"
 
 
-def ended(machine: str, numbers: Iterable[int]) -> list[Halt]:
+def ended(controller: str, numbers: Iterable[int]) -> list[Halt]:
     """Halts that a write of registers means, by the numbers of axes, and 0 for the program."""
-    return [Halt(machine, number) if number else Halt(machine, program="stop") for number in sorted(numbers)]
+    return [Halt(controller, number) if number else Halt(controller, program="stop") for number in sorted(numbers)]
 
 
-def standstill(machine: str, program_actions: Collection[str]) -> tuple[Halt, ...]:
+def standstill(controller: str, program_actions: Collection[str]) -> tuple[Halt, ...]:
     """Stop everything of a controller whose program takes these actions. A program is paused where that can be done, because its
     end may switch drives off (MIC-31), and a load would fall; axes are stopped again, because it may have begun a motion."""
     if not program_actions:
-        return (Halt(machine),)
-    return Halt(machine), Halt(machine, program="pause" if "pause" in program_actions else "stop"), Halt(machine)
+        return (Halt(controller),)
+    return Halt(controller), Halt(controller, program="pause" if "pause" in program_actions else "stop"), Halt(controller)
 
 
 ControllerCommand: TypeAlias = Enable | Move | Home | Jog | StopAxes | ControlProgram

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol, TypeAlias
 
-from steptwin.machine import MILLISECOND, Nanos
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.simulation.script import steps as do
 
 REST_NS: Nanos = 300 * MILLISECOND
@@ -22,7 +22,7 @@ Given: TypeAlias = Sequence[do.Write | do.Send]
 
 
 class DeadManJog(Protocol):
-    """One axis that is jogged; the machine is at ``now`` in every call."""
+    """One axis that is jogged; the controller is at ``now`` in every call."""
 
     @property
     def lasts_ns(self) -> Nanos:

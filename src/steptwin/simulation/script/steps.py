@@ -12,9 +12,9 @@ from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias, cast
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.fields import CHARACTERS, HEX, TIME, AxisNumber, MachineName, Meaning, choice, whole
-from steptwin.machine import SECOND, Nanos
+from steptwin.fields import CHARACTERS, HEX, TIME, AxisNumber, ControllerName, Meaning, choice, whole
 from steptwin.messages import Message
 from steptwin.simulation.faults import Fault
 from steptwin.simulation.script.command import FAULT, LEVELS, UNITS, command
@@ -64,7 +64,7 @@ class Until:
 @command("set", "Inputs take levels, all of them or none.")
 @dataclass(frozen=True, slots=True)
 class Set:
-    """Set inputs (machine, pin, level): 0, 1 or volts."""
+    """Set inputs (controller, pin, level): 0, 1 or volts."""
 
     levels: Annotated[tuple[tuple[str, str, float], ...], Meaning("0, 1, volts.", LEVELS)]
 
@@ -90,9 +90,9 @@ class Release:
 @command("write", "Registers take values by name, as a Modbus master writes them.")
 @dataclass(frozen=True, slots=True)
 class Write:
-    """Write registers by name (machine, register, value in configured units), as a Modbus master does."""
+    """Write registers by name (controller, register, value in configured units), as a Modbus master does."""
 
-    values: Annotated[tuple[tuple[str, str, float], ...], Meaning("Registers by MACHINE.REGISTER.", LEVELS, unit=UNITS)]
+    values: Annotated[tuple[tuple[str, str, float], ...], Meaning("Registers by CONTROLLER.REGISTER.", LEVELS, unit=UNITS)]
 
 
 @command("send", "Characters go to a line.")
@@ -122,10 +122,10 @@ class Request:
         _check_ns(self.within)
 
 
-@command("power_cycle", "Switch a machine off and on again.")
+@command("power_cycle", "Switch a controller off and on again.")
 @dataclass(frozen=True, slots=True)
 class PowerCycle:
-    machine: MachineName
+    controller: ControllerName
 
 
 @command("turn", "Turn the encoder shaft of an axis.")
@@ -133,7 +133,7 @@ class PowerCycle:
 class Turn:
     """Turn the encoder shaft of an axis by counts."""
 
-    machine: MachineName
+    controller: ControllerName
     axis: AxisNumber
     counts: Annotated[int, Meaning("By how much.", whole(-(2**31), 2**31 - 1), unit="encoder counts")]
 
@@ -146,7 +146,7 @@ UNKNOWN_COUPLING = Message("simulation.unknown-coupling", "{coupling!r}: an enco
 class Couple:
     """Choose what turns the encoder shaft of an axis without mechanics: one of `COUPLINGS`."""
 
-    machine: MachineName
+    controller: ControllerName
     axis: AxisNumber
     coupling: Annotated[str, Meaning("What turns it.", choice(*COUPLINGS), name="to")]
 
@@ -215,7 +215,7 @@ class Order:
 class UntilOver:
     """Wait until an axis (from 1) has no motion to a target in progress, at most for ``within``. Result: whether it is so."""
 
-    machine: str
+    controller: str
     axis: int
     within: Nanos | None = None
 
@@ -227,7 +227,7 @@ class UntilOver:
 class ExpectReached:
     """Expect that the last motion of an axis (from 1) has come to its target; ``seek``: to the end of this one."""
 
-    machine: str
+    controller: str
     axis: int
     seek: Seek | None = None
 

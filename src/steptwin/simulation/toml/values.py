@@ -9,9 +9,9 @@ from itertools import pairwise
 from math import isnan
 from typing import Any, Generic, TypeAlias, TypeVar
 
+from steptwin.controller import SECOND
 from steptwin.durations import duration
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.toml.addresses import parse_address
 
@@ -21,7 +21,7 @@ MOST = 1e300
 T = TypeVar("T")
 
 Terminal: TypeAlias = tuple[str, str]
-"""Machine and pin, as a description names them."""
+"""Controller and pin, as a description names them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,13 +207,13 @@ DIGITAL_INPUT, ANALOG_INPUT, OUTPUT = "digital input", "analog input", "output"
 """Kinds of terminals."""
 
 
-@permitting("MACHINE.PIN")
+@permitting("CONTROLLER.PIN")
 def pin_name(value: Any) -> tuple[str, str]:
-    """``MACHINE.PIN``."""
-    machine, dot, pin = value.partition(".") if isinstance(value, str) else ("", "", "")
-    if not dot or not machine or not pin:
-        raise Misuse(f"{value!r}: expected MACHINE.PIN, such as 'table.IN3'")
-    return machine, pin.upper()
+    """``CONTROLLER.PIN``."""
+    controller, dot, pin = value.partition(".") if isinstance(value, str) else ("", "", "")
+    if not dot or not controller or not pin:
+        raise Misuse(f"{value!r}: expected CONTROLLER.PIN, such as 'table.IN3'")
+    return controller, pin.upper()
 
 
 _AXIS = re.compile(r"M([1-9][0-9]{0,3})\Z")
@@ -227,14 +227,14 @@ def axis_number(name: str) -> int:
 
 @dataclass(frozen=True, slots=True)
 class PinOf:
-    """``MACHINE.PIN`` or ``ELEMENT.TERMINAL``, a terminal of a kind; a list of them where there may be several."""
+    """``CONTROLLER.PIN`` or ``ELEMENT.TERMINAL``, a terminal of a kind; a list of them where there may be several."""
 
     kind: str
     most: int = 1
 
     @property
     def permitted(self) -> str:
-        there = f"{self.kind}: MACHINE.PIN" + ("" if self.kind == ANALOG_INPUT else " or ELEMENT.TERMINAL")
+        there = f"{self.kind}: CONTROLLER.PIN" + ("" if self.kind == ANALOG_INPUT else " or ELEMENT.TERMINAL")
         return there if self.most == 1 else f"{there}, or a list of up to {self.most}"
 
     def __call__(self, value: Any) -> Any:

@@ -43,13 +43,13 @@ def act(model: Model, scripts: Scripts, what: ExternalInput) -> None:
     action(model, scripts, what)
 
 
-def _record(model: Model, machine: str, what: str, value: object) -> None:
-    model.trace.add(TraceRecord(model.now, machine, "input", what, value))
+def _record(model: Model, controller: str, what: str, value: object) -> None:
+    model.trace.add(TraceRecord(model.now, controller, "input", what, value))
 
 
 @contextmanager
 def _now(model: Model, name: str) -> Generator[Scheduler]:
-    """The scheduler of a machine or line, advanced to the present; it settles after the action."""
+    """The scheduler of a controller or line, advanced to the present; it settles after the action."""
     scheduler = model.touch(name)
     yield scheduler
     scheduler.mark(name)
@@ -83,9 +83,9 @@ def _releasing(button: str) -> str:
     return f"{_RELEASE}{button}"
 
 
-def _downloading(machine: str) -> str:
+def _downloading(controller: str) -> str:
     """The name of the script that types a text into a controller."""
-    return f"download {machine}"
+    return f"download {controller}"
 
 
 def _is_release(script: str) -> bool:
@@ -95,36 +95,36 @@ def _is_release(script: str) -> bool:
 def _move_button(model: Model, scripts: Scripts, name: str, *, pressed: bool) -> None:
     button, _ = model.button(name)
     scripts.unschedule(_releasing(name))
-    with _now(model, button.machine):
-        _record(model, button.machine, name, "pressed" if pressed else "released")
+    with _now(model, button.controller):
+        _record(model, button.controller, name, "pressed" if pressed else "released")
         button.press(pressed, model.now)
 
 
 def _write(model: Model, scripts: Scripts, step: do.Write) -> None:
     parts, now = model.parts, model.now
-    for name, values in model.by_machine(step):
+    for name, values in model.by_controller(step):
         scheduler = model.touch(name)  # as `_now` does: every write of every script comes here
-        machine, on = parts.machines[name], parts.line_of.get(name)
+        controller, on = parts.controllers[name], parts.line_of.get(name)
         for pdu in model.requests(name, values):
             if on is not None:
                 line, unit = on
                 line.master.ask(encode_frame(unit, pdu), ANSWER_NS, now)
             else:
                 _record(model, name, "request", pdu)
-                model.registers(name).execute(machine, pdu, now)
+                model.registers(name).execute(controller, pdu, now)
         scheduler.mark(name if on is None else on[0].name)
         scheduler.settle()
 
 
 def _halt(model: Model, scripts: Scripts, given: Halt) -> None:
-    with _now(model, given.machine):
-        on = model.parts.line_of.get(given.machine)
+    with _now(model, given.controller):
+        on = model.parts.line_of.get(given.controller)
         if on is not None:
             line, unit = on
             line.recall(unit, model.now)
-        _record(model, given.machine, "stop", given.scope)
-        scripts.unschedule(_downloading(given.machine))
-        model.kind(given.machine).halt(model.machine(given.machine), given, model.now)
+        _record(model, given.controller, "stop", given.scope)
+        scripts.unschedule(_downloading(given.controller))
+        model.kind(given.controller).halt(model.controller(given.controller), given, model.now)
 
 
 def _end_scripts(model: Model, scripts: Scripts, given: EndScripts) -> None:
@@ -151,31 +151,31 @@ def _bytes(model: Model, scripts: Scripts, given: Bytes) -> None:
 
 
 def _see(model: Model, scripts: Scripts, given: See) -> None:
-    vision = model.vision(given.machine)
-    with _now(model, given.machine):
-        _record(model, given.machine, "vision", given[1:])
-        vision.see(model.machine(given.machine), given[1:], model.now)
+    vision = model.vision(given.controller)
+    with _now(model, given.controller):
+        _record(model, given.controller, "vision", given[1:])
+        vision.see(model.controller(given.controller), given[1:], model.now)
 
 
 def _download(model: Model, scripts: Scripts, given: Download) -> None:
-    kind = model.kind(given.machine)
+    kind = model.kind(given.controller)
     if not kind.offers(ControllerKind.download):
-        raise kind.lacks(given.machine, "program memory")
-    with _now(model, given.machine):
-        on = model.parts.line_of.get(given.machine)
-        source = SourceText(name_of_text(model, given.machine, given.place), given.text)
-        to = Destination(given.machine, None if on is None else on[0].name, given.place)
-        found = kind.download(model.machine(given.machine), to, source)
+        raise kind.lacks(given.controller, "program memory")
+    with _now(model, given.controller):
+        on = model.parts.line_of.get(given.controller)
+        source = SourceText(name_of_text(model, given.controller, given.place), given.text)
+        to = Destination(given.controller, None if on is None else on[0].name, given.place)
+        found = kind.download(model.controller(given.controller), to, source)
         found.put(model.now)
-        _record(model, given.machine, "download", given.place)
-        model.downloaded[given.machine, given.place] = source
+        _record(model, given.controller, "download", given.place)
+        model.downloaded[given.controller, given.place] = source
     if found.typed:
-        scripts.schedule(_downloading(given.machine), found.typed)
+        scripts.schedule(_downloading(given.controller), found.typed)
 
 
 def _set_variable(model: Model, scripts: Scripts, given: SetVariable) -> None:
-    with _now(model, given.machine):
-        model.programs_of(given.machine).set_variable(given.name, given.value, model.now)
+    with _now(model, given.controller):
+        model.programs_of(given.controller).set_variable(given.name, given.value, model.now)
 
 
 def _leave(model: Model, scripts: Scripts, given: Leave) -> None:
@@ -189,24 +189,24 @@ def _refused(model: Model, scripts: Scripts, given: Refused) -> None:
 
 
 def _power_cycle(model: Model, scripts: Scripts, step: do.PowerCycle) -> None:
-    machine = model.machine(step.machine)
-    with _now(model, step.machine):
-        _record(model, step.machine, "power-cycle", "")
-        machine.power_cycle(model.now)
+    controller = model.controller(step.controller)
+    with _now(model, step.controller):
+        _record(model, step.controller, "power-cycle", "")
+        controller.power_cycle(model.now)
 
 
 def _turn(model: Model, scripts: Scripts, step: do.Turn) -> None:
-    encoders = model.encoders(step.machine)
-    with _now(model, step.machine):
-        _record(model, step.machine, f"M{step.axis} turned", step.counts)
-        encoders.reader(model.machine(step.machine)).turn_encoder(step.axis, step.counts, model.now)
+    encoders = model.encoders(step.controller)
+    with _now(model, step.controller):
+        _record(model, step.controller, f"M{step.axis} turned", step.counts)
+        encoders.reader(model.controller(step.controller)).turn_encoder(step.axis, step.counts, model.now)
 
 
 def _couple(model: Model, scripts: Scripts, step: do.Couple) -> None:
-    encoders = model.encoders(step.machine)
-    with _now(model, step.machine):
-        _record(model, step.machine, f"M{step.axis} coupled", step.coupling)
-        encoders.couple(model.machine(step.machine), step.axis, step.coupling, model.now)
+    encoders = model.encoders(step.controller)
+    with _now(model, step.controller):
+        _record(model, step.controller, f"M{step.axis} coupled", step.coupling)
+        encoders.couple(model.controller(step.controller), step.axis, step.coupling, model.now)
 
 
 def _set_fault(model: Model, scripts: Scripts, step: do.SetFault) -> None:

@@ -1,4 +1,4 @@
-"""Scheduling of waiting scripts: at fixed moments, and when a machine, a line or an element changes on which their condition
+"""Scheduling of waiting scripts: at fixed moments, and when a controller, a line or an element changes on which their condition
 depends.
 
 A script with a condition is evaluated only at its due moment or when one of these may have changed; watched schedulers are
@@ -12,7 +12,7 @@ from heapq import heapify, heappop, heappush
 from itertools import count
 from typing import Generic, TypeAlias, TypeVar
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.simulation.scheduler.observing import WorldObserver
 from steptwin.simulation.scheduler.scheduler import Scheduler, Source
 from steptwin.simulation.scheduler.turns import Dues
@@ -106,8 +106,8 @@ class Agenda(Generic[W]):
 
 
 class Watchers:
-    """Which scripts depend on which machines, lines and elements, when their schedulers are due, and what has changed since the
-    last `take`."""
+    """Which scripts depend on which controllers, lines and elements, when their schedulers are due, and what has changed since
+    the last `take`."""
 
     __slots__ = ("_again", "_changed", "_dues", "_numbers", "_schedulers", "_scripts", "_watch")
 

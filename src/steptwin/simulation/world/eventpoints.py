@@ -6,21 +6,21 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.points import LivePoint
 from steptwin.simulation.world.simulation import Simulation
 
 
 def points_of(world: Simulation, owner: str) -> Iterator[tuple[str, LivePoint | None]]:
     """Those of a data sheet that are no pins, by path; None for a row of registers, of which one must be chosen."""
-    machine, kind = world.machine(owner), world.kind(owner)
-    pins = machine.pins()
-    for point in kind.datasheet(machine).points:
+    controller, kind = world.controller(owner), world.kind(owner)
+    pins = controller.pins()
+    for point in kind.datasheet(controller).points:
         if point.path not in pins:
             live = None
             with suppress(Misuse):
-                live = kind.point(machine, point.path)
+                live = kind.point(controller, point.path)
             yield point.path, live
 
 
@@ -33,19 +33,19 @@ class EventPoints:
     not read."""
 
     def __init__(self, world: Simulation, owner: str, points: Mapping[str, LivePoint]) -> None:
-        machine, kind = world.machine(owner), world.kind(owner)
+        controller, kind = world.controller(owner), world.kind(owner)
         groups: defaultdict[int, dict[str, Callable[[Nanos], float]]] = defaultdict(dict)
         for path, point in points.items():
             if point.read is not None:
                 groups[kind.mark_of(path)][path] = point.read
         self._marks_of = kind.marks
-        self._machine = machine
+        self._controller = controller
         self._groups = dict(groups)
         self.read(world.now)
 
     def read(self, now: Nanos) -> Mapping[str, float]:
         """The present values, whatever they were before."""
-        self._marks: tuple[object, ...] = self._marks_of(self._machine)
+        self._marks: tuple[object, ...] = self._marks_of(self._controller)
         self._values: dict[int, list[float]] = {
             group: [read(now) for read in reads.values()] for group, reads in self._groups.items()
         }
@@ -55,7 +55,7 @@ class EventPoints:
 
     def changed(self, now: Nanos) -> dict[str, float]:
         """The values that are others than at the last call."""
-        marks, before = self._marks_of(self._machine), self._marks
+        marks, before = self._marks_of(self._controller), self._marks
         if marks == before:
             return {}
         self._marks = marks

@@ -12,9 +12,9 @@ from collections.abc import Callable, Iterable, Iterator
 from itertools import islice
 from typing import NamedTuple, TypeAlias
 
+from steptwin.controller import SECOND, Nanos
 from steptwin.durations import duration_text
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.world.eventpoints import EventPoints, points_of, stays_between_events
@@ -73,7 +73,7 @@ MOVED = ""
 _MOTIONS = frozenset({"plan", "load", "free", "coordinate", "fault", "input"})
 
 Changed: TypeAlias = tuple[str, str]
-"""Machine and subject of the records of what has edges, machine and path of a point, or machine and `MOVED`."""
+"""Controller and subject of the records of what has edges, controller and path of a point, or controller and `MOVED`."""
 
 ACTED: Changed = ("", "")
 """A script acted, or something came from outside."""
@@ -164,7 +164,7 @@ class ChangedSince:
         self._names: set[Changed] = set()
         world.trace.watchers.append(self._take)
         world.act_watchers.append(self._act)
-        self._points = [_ChangedPoints(world, owner, self._names.add) for owner in world.machines]
+        self._points = [_ChangedPoints(world, owner, self._names.add) for owner in world.controllers]
 
     def close(self) -> None:
         self._world.trace.watchers.remove(self._take)
@@ -174,9 +174,9 @@ class ChangedSince:
 
     def _take(self, record: TraceRecord) -> None:
         if record.kind == "edge":
-            self._names.add((record.machine, record.subject))
+            self._names.add((record.controller, record.subject))
         elif record.kind in _MOTIONS:
-            self._names.add((record.machine, MOVED))
+            self._names.add((record.controller, MOVED))
 
     def _act(self, script: str, what: ExternalInput) -> None:
         self._names.add(ACTED)
@@ -232,7 +232,7 @@ class History:
         self.world = world
         self.branch = 0
         """Counts how often the world has gone back; each time, the past after that moment is replaced."""
-        most = max(LEAST_STATES, min(MOST_STATES, MOST_CONTROLLER_STATES // max(1, len(world.machines))))
+        most = max(LEAST_STATES, min(MOST_STATES, MOST_CONTROLLER_STATES // max(1, len(world.controllers))))
         self._states = StatesByAge(most)
         self._inputs: deque[RecordedInput] = deque()
         self._bytes = 0

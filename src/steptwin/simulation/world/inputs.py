@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple, TypeAlias
 
-from steptwin.fields import PROGRAM, MachineName, Meaning
+from steptwin.fields import PROGRAM, ControllerName, Meaning
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.command import command
 from steptwin.simulation.script.control import Halt
@@ -23,7 +23,7 @@ class Bytes(NamedTuple):
 class See(NamedTuple):
     """A record of a vision system arrives at a controller."""
 
-    machine: MachineName
+    controller: ControllerName
     number: Annotated[float, Meaning("The number of the record.")]
     x: Annotated[float, Meaning("The x of the record.")]
     y: Annotated[float, Meaning("The y of the record.")]
@@ -37,7 +37,7 @@ class See(NamedTuple):
 class Download(NamedTuple):
     """A text goes into the program memory of a controller."""
 
-    machine: MachineName
+    controller: ControllerName
     place: Annotated[str, Meaning("Where, such as program 0, positions 0 (MIC488, by bank), program (M1486).")]
 
     """One of the places of `steptwin.simulation.world.worldprograms.program_texts`."""
@@ -47,7 +47,7 @@ class Download(NamedTuple):
 class SetVariable(NamedTuple):
     """A debugger sets a variable of a controller's program."""
 
-    machine: str
+    controller: str
     name: str
     value: float
 

@@ -11,8 +11,8 @@ from itertools import groupby
 from operator import itemgetter
 from typing import Any
 
+from steptwin.controller import Nanos
 from steptwin.diagnostics import SourceText
-from steptwin.machine import Nanos
 from steptwin.messages import NONE, Message, text_of
 from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss
@@ -38,21 +38,21 @@ from steptwin.simulation.toml.names import Unknown
 from steptwin.simulation.world.reports import Reports
 
 WORLD = "world"
-"""The machine name in records that belong to no machine."""
+"""The controller name in records that belong to no controller."""
 MOST_REMEMBERED = 10_000
 """Size limit of each cache of requests, signals and conditions, which scripts use repeatedly."""
 
 
 UNKNOWN = Message("simulation.unknown", "no {what} is called {name!r}{hint}; there are {names}")
-A_MACHINE_OR_LINE = Message("simulation.machine-or-line", "machine or line")
-A_MACHINE = Message("simulation.machine", "machine")
+A_CONTROLLER_OR_LINE = Message("simulation.controller-or-line", "controller or line")
+A_CONTROLLER = Message("simulation.controller", "controller")
 A_BUTTON = Message("simulation.button", "button")
 A_LINE = Message("simulation.line", "line")
 
 
 class Model:
-    """The schedulers, machines, lines and elements of a description. A scheduler is advanced to the present before it is read or
-    changed."""
+    """The schedulers, controllers, lines and elements of a description. A scheduler is advanced to the present before it is read
+    or changed."""
 
     def __init__(self, blueprint: Blueprint, *, keep_trace: bool, keep_memory: Keep | None, is_blank: bool) -> None:
         """``is_blank``: a snapshot is restored next."""
@@ -77,15 +77,15 @@ class Model:
         self._signals: dict[str, SignalOf | Idle] = {}
         self._conditions: dict[str, SignalCondition] = {}
         self.downloaded: dict[tuple[str, str], SourceText] = {}
-        """Texts that have been put into controllers since the beginning, by machine and place, as it was written."""
+        """Texts that have been put into controllers since the beginning, by controller and place, as it was written."""
         self.given = GivenFiles(spec.lines, self.files, self.downloaded)
         self.rigging = Rigging(self.parts)
 
     # ------------------------------------------------------------------ what is in it
 
     @property
-    def machines(self) -> Mapping[str, MotionController]:
-        return self.parts.machines
+    def controllers(self) -> Mapping[str, MotionController]:
+        return self.parts.controllers
 
     @property
     def lines(self) -> Mapping[str, Line]:
@@ -100,10 +100,10 @@ class Model:
         return self.parts.schedulers
 
     def touch(self, name: str) -> Scheduler:
-        """The scheduler of a machine or line, advanced to the present. Raises `Misuse` with the existing names."""
+        """The scheduler of a controller or line, advanced to the present. Raises `Misuse` with the existing names."""
         scheduler = self.parts.scheduler_of.get(name)
         if scheduler is None:
-            raise self.unknown(A_MACHINE_OR_LINE(), name, self.parts.scheduler_of)
+            raise self.unknown(A_CONTROLLER_OR_LINE(), name, self.parts.scheduler_of)
         scheduler.advance(self.now)
         return scheduler
 
@@ -146,7 +146,7 @@ class Model:
     @cached_property
     def programs(self) -> Mapping[str, Programs]:
         """The programs of controllers that have any, by name of the controller."""
-        found = {one.name: one.kind.programs(one, self.machines[one.name], self.given) for one in self.spec.controllers}
+        found = {one.name: one.kind.programs(one, self.controllers[one.name], self.given) for one in self.spec.controllers}
         return {name: programs for name, programs in found.items() if programs is not None}
 
     def settle_all(self) -> None:
@@ -156,69 +156,69 @@ class Model:
 
     # ------------------------------------------------------------------ by name
 
-    def machine(self, name: str) -> MotionController:
-        """The machine called ``name``. Raises `Misuse` with the existing ones."""
-        machine = self.parts.machines.get(name)
-        if machine is None:
-            raise self.unknown(A_MACHINE(), name, self.machines)
-        return machine
+    def controller(self, name: str) -> MotionController:
+        """The controller called ``name``. Raises `Misuse` with the existing ones."""
+        controller = self.parts.controllers.get(name)
+        if controller is None:
+            raise self.unknown(A_CONTROLLER(), name, self.controllers)
+        return controller
 
     def kind(self, name: str) -> AnyKind:
-        """The kind of a machine. Raises `Misuse` with the existing machines."""
+        """The kind of a controller. Raises `Misuse` with the existing controllers."""
         kind = self.parts.kind_of.get(name)
         if kind is None:
-            raise self.unknown(A_MACHINE(), name, self.machines)
+            raise self.unknown(A_CONTROLLER(), name, self.controllers)
         return kind
 
     def input_pin(self, name: str, pin: str, level: float) -> str:
         """The name of the input that ``pin`` means. Raises `Misuse` with the existing inputs, and for a level out of range."""
         kind = self.kind(name)
         found = kind.input_pin(pin, level)
-        kind.refuse_taken(self.machine(name), found)
+        kind.refuse_taken(self.controller(name), found)
         return found
 
     def registers(self, name: str) -> NamedRegisters[Any]:
-        """The registers of a machine. Raises `Misuse` if it has none."""
+        """The registers of a controller. Raises `Misuse` if it has none."""
         kind = self.kind(name)
         if kind.registers is None:
             raise kind.lacks(name, "registers")
         return kind.registers
 
     def encoders(self, name: str) -> EncoderInputs[Any]:
-        """The encoder inputs of a machine. Raises `Misuse` if it has none."""
+        """The encoder inputs of a controller. Raises `Misuse` if it has none."""
         kind = self.kind(name)
         if kind.encoders is None:
             raise kind.lacks(name, "encoder")
         return kind.encoders
 
     def vision(self, name: str) -> Vision[Any, Any]:
-        """The vision registers of a machine. Raises `Misuse` if it has none."""
+        """The vision registers of a controller. Raises `Misuse` if it has none."""
         kind = self.kind(name)
         if kind.vision is None:
             raise kind.lacks(name, "vision registers")
         return kind.vision
 
     @staticmethod
-    def by_machine(step: do.Write) -> list[tuple[str, NewValues]]:
-        """The values that a step writes, grouped by machine."""
+    def by_controller(step: do.Write) -> list[tuple[str, NewValues]]:
+        """The values that a step writes, grouped by controller."""
         groups: list[tuple[str, NewValues]] = []
         for name, group in groupby(step.values, key=itemgetter(0)):
             groups.append((name, tuple(map(itemgetter(1, 2), group))))
         return groups
 
     def requests(self, name: str, values: NewValues) -> tuple[bytes, ...]:
-        """The PDUs that write ``values`` to `registers` of a machine. Raises `Misuse` for values that one does not accept."""
-        registers, machine = self.registers(name), self.parts.machines[name]
-        key = (self.parts.kind_of[name].name, registers.dialect(machine), values)
+        """The PDUs that write ``values`` to `registers` of a controller. Raises `Misuse` for values that one does not accept."""
+        registers, controller = self.registers(name), self.parts.controllers[name]
+        key = (self.parts.kind_of[name].name, registers.dialect(controller), values)
         found = self._encoded.get(key)
         if found is None:
             if len(self._encoded) >= MOST_REMEMBERED:
                 self._encoded.clear()
-            found = self._encoded[key] = registers.requests(machine, values)
+            found = self._encoded[key] = registers.requests(controller, values)
         return found
 
     def programs_of(self, name: str) -> Programs:
-        """The programs of a machine. Raises `Misuse` for a machine without."""
+        """The programs of a controller. Raises `Misuse` for a controller without."""
         kind = self.kind(name)
         if name not in self.programs:
             raise kind.lacks(name, "program whose text is known")

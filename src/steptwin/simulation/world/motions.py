@@ -20,12 +20,12 @@ def ordered(model: Model, command: ControllerCommand | Seek) -> Step | Halt:
 
     Raises `Misuse` and `Refusal`.
     """
-    name = command.machine
-    kind, machine = model.kind(name), model.machine(name)
+    name = command.controller
+    kind, controller = model.kind(name), model.controller(name)
     model.touch(name)
-    machine.advance(model.now)
+    controller.advance(model.now)
     on = model.parts.line_of.get(name)
-    return kind.step_of(machine, None if on is None else on[0].name, command)
+    return kind.step_of(controller, None if on is None else on[0].name, command)
 
 
 def motion_ends(model: Model, name: str, axis: int, seek: Seek | None = None) -> MotionEnds:
@@ -34,7 +34,7 @@ def motion_ends(model: Model, name: str, axis: int, seek: Seek | None = None) ->
     Raises `Misuse` for one that is not there, or does not show how its motions end.
     """
     kind = model.kind(name)
-    axes = len(model.machine(name).axes)
+    axes = len(model.controller(name).axes)
     if not 1 <= axis <= axes:
         raise Misuse(f"{name}.M{axis}: {name} has {', '.join(f'M{number}' for number in range(1, axes + 1))}")
     on = model.parts.line_of.get(name)

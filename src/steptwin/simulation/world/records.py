@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
+from steptwin.controller import SECOND, Fact
 from steptwin.errors import Misuse
-from steptwin.machine import SECOND, Fact
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.components.parts import WorldParts
 from steptwin.simulation.scheduler.trace import TraceRecord
@@ -63,7 +63,7 @@ class Selection:
 
 def names_of(record: TraceRecord) -> Iterator[str]:
     """Names of what a record is about: who reports it, the button or pin of an input, what its facts name."""
-    yield record.machine
+    yield record.controller
     if record.kind == "input":
         yield record.subject
     yield from (fact for _, fact in record.facts if isinstance(fact, str))
@@ -90,16 +90,16 @@ def _chosen(option: str, texts: Sequence[str], known: Sequence[str]) -> frozense
 
 def named_in(parts: WorldParts) -> Iterable[str]:
     """The names of what reports anything in a world."""
-    return (*parts.machines, *parts.lines, *parts.element_names)
+    return (*parts.controllers, *parts.lines, *parts.element_names)
 
 
-def owner_of(machine: str, facts: Iterable[Fact]) -> str:
+def owner_of(controller: str, facts: Iterable[Fact]) -> str:
     """Who reports an event: the element that its facts name, which is recorded under a controller that it is connected to."""
-    return str(dict(facts).get("element", machine))
+    return str(dict(facts).get("element", controller))
 
 
 def describe(record: TraceRecord) -> str:
     """Describe a record in one line."""
     what = f"{record.subject}: " if record.kind != "event" or record.subject in _NAMED else ""
     value = record.value.hex(" ") if isinstance(record.value, bytes) else record.value
-    return f"{record.time / SECOND:12.6f} s  {owner_of(record.machine, record.facts):<10} {what}{value}".rstrip()
+    return f"{record.time / SECOND:12.6f} s  {owner_of(record.controller, record.facts):<10} {what}{value}".rstrip()

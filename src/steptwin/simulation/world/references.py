@@ -45,7 +45,7 @@ def check_faults(model: Model, faults: Sequence[Fault | None]) -> None:
 
 
 def _is_on_something_broken(model: Model, fault: Fault) -> bool:
-    """Whether a fault concerns, or may concern, a machine or line whose own table has errors."""
+    """Whether a fault concerns, or may concern, a controller or line whose own table has errors."""
     text = model.spec.text
     named = [str(name) for key in ("machine", "line", "element") if (name := fault.get(key)) is not None]
     return any(map(text.may_be_broken, named)) if named else text.is_any_wrong(*text.controllers, "line", "axis")
@@ -108,15 +108,15 @@ def _condition(model: Model, step: do.Until | do.Expect) -> None:
 
 def _order(model: Model, step: do.Order) -> None:
     command = step.command
-    motion_ends(model, command.machine, command.axis)
+    motion_ends(model, command.controller, command.axis)
     with suppress(Refusal):  # what cannot be done now may be possible later
         check_step(model, ordered(model, command))
     if isinstance(command, Seek):
-        model.condition(motion_ends(model, command.machine, command.axis, command).reached)
+        model.condition(motion_ends(model, command.controller, command.axis, command).reached)
 
 
 def _motion(model: Model, step: do.UntilOver | do.ExpectReached) -> None:
-    motion_ends(model, step.machine, step.axis)
+    motion_ends(model, step.controller, step.axis)
 
 
 def _set(model: Model, step: do.Set) -> None:
@@ -129,7 +129,7 @@ def _button(model: Model, step: do.Press | do.Release) -> None:
 
 
 def _write(model: Model, step: do.Write) -> None:
-    for name, values in model.by_machine(step):
+    for name, values in model.by_controller(step):
         model.requests(name, values)
 
 
@@ -143,51 +143,53 @@ def _send(model: Model, step: do.Send) -> None:
 
 IS_SWITCHED_BY_A_SUPPLY = Message(
     "simulation.is-switched-by-a-supply",
-    "{machine!r} is switched by its supply {supply!r}: switch that, or let it have a brown-out",
+    "{controller!r} is switched by its supply {supply!r}: switch that, or let it have a brown-out",
 )
 
 
 def _power_cycle(model: Model, step: do.PowerCycle) -> None:
-    model.machine(step.machine)
-    supply = model.parts.supplied.get(step.machine)
+    model.controller(step.controller)
+    supply = model.parts.supplied.get(step.controller)
     if supply is not None:
-        raise Misuse(IS_SWITCHED_BY_A_SUPPLY(machine=step.machine, supply=supply))
+        raise Misuse(IS_SWITCHED_BY_A_SUPPLY(controller=step.controller, supply=supply))
 
 
 WRONG_HALT_OF_A_PROGRAM = Message("simulation.wrong-halt-of-a-program", "program = {program!r}: permitted are pause and stop")
-WRONG_AXIS_TO_HALT = Message("simulation.wrong-axis-to-halt", "axis = {axis}: {machine!r} is {title}, which has axes 1 to {most}")
+WRONG_AXIS_TO_HALT = Message(
+    "simulation.wrong-axis-to-halt", "axis = {axis}: {controller!r} is {title}, which has axes 1 to {most}"
+)
 
 
 def _halt(model: Model, given: Halt) -> None:
-    kind = model.kind(given.machine)
-    axes = len(model.machine(given.machine).axes)
+    kind = model.kind(given.controller)
+    axes = len(model.controller(given.controller).axes)
     if given.program not in (None, "pause", "stop"):
         raise Misuse(WRONG_HALT_OF_A_PROGRAM(program=given.program))
     if given.axis is not None and not 1 <= given.axis <= axes:
-        raise Misuse(WRONG_AXIS_TO_HALT(axis=given.axis, machine=given.machine, title=kind.title, most=axes))
+        raise Misuse(WRONG_AXIS_TO_HALT(axis=given.axis, controller=given.controller, title=kind.title, most=axes))
 
 
 def _turn(model: Model, step: do.Turn) -> None:
-    model.encoders(step.machine).check_turn(step.axis, step.counts)
+    model.encoders(step.controller).check_turn(step.axis, step.counts)
 
 
 ENCODER_OF_AN_AXIS = Message("simulation.encoder-of-an-axis", "{drive}: its encoder is part of the mechanics of axis {name!r}")
 
 
 def _couple(model: Model, step: do.Couple) -> None:
-    model.encoders(step.machine).check_turn(step.axis, 0)
-    drive = step.machine, f"M{step.axis}"
+    model.encoders(step.controller).check_turn(step.axis, 0)
+    drive = step.controller, f"M{step.axis}"
     for axis in model.axes.values():
         if axis.spec.drive == drive:
             raise Misuse(ENCODER_OF_AN_AXIS(drive=".".join(drive), name=axis.spec.name))
 
 
 def _see(model: Model, step: See) -> None:
-    model.vision(step.machine)
+    model.vision(step.controller)
 
 
 def _set_variable(model: Model, step: SetVariable) -> None:
-    model.programs_of(step.machine)
+    model.programs_of(step.controller)
 
 
 def _fault(model: Model, step: do.SetFault) -> None:

@@ -6,8 +6,8 @@ from array import array
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeAlias
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.script import steps as do
 
@@ -125,7 +125,7 @@ class Script:
         self.entry = 0
         """The number of its valid entry in an agenda."""
         self.sources: tuple[Any, ...] = ()
-        """The machines, lines and elements on which its wait depends (`steptwin.simulation.scheduler.scheduler.Source`)."""
+        """The controllers, lines and elements on which its wait depends (`steptwin.simulation.scheduler.scheduler.Source`)."""
         self.ended = False
 
     def send(self, value: Any) -> do.Step | None:

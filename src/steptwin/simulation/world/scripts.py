@@ -7,8 +7,8 @@ from functools import partial
 from heapq import heappop, heappush
 from typing import Any, NamedTuple, TypeAlias
 
+from steptwin.controller import Nanos
 from steptwin.errors import Refusal, Runaway
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.kinds.master import Master
 from steptwin.simulation.scheduler.observing import WorldObserver
@@ -308,11 +308,11 @@ class Scripts:
         return self._take(found, script)
 
     def _wait_for_end(self, step: do.UntilOver, script: Script) -> StepResult:
-        over = motion_ends(self._model, step.machine, step.axis).over
+        over = motion_ends(self._model, step.controller, step.axis).over
         return ScriptWait(None if step.within is None else self._model.now + step.within, over), None
 
     def _expect_reached(self, step: do.ExpectReached, script: Script) -> StepResult:
-        self._do(script, do.Expect(motion_ends(self._model, step.machine, step.axis, step.seek).reached))
+        self._do(script, do.Expect(motion_ends(self._model, step.controller, step.axis, step.seek).reached))
         return None, None
 
     def _stop(self, step: do.Stop, script: Script) -> StepResult:

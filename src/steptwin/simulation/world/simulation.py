@@ -1,7 +1,7 @@
 """A running world: its schedulers, each advanced on demand, and its scripts.
 
-Machines without a connection are in separate schedulers. A scheduler is advanced to the present before it is read or changed; the
-schedulers that a condition depends on are advanced event by event. The result therefore does not depend on the order in which
+Controllers without a connection are in separate schedulers. A scheduler is advanced to the present before it is read or changed;
+the schedulers that a condition depends on are advanced event by event. The result therefore does not depend on the order in which
 schedulers are advanced.
 """
 
@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse, Runaway, TimeReversal
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.describe.blueprint import Blueprint, FileContents
 from steptwin.simulation.describe.build import Keep
@@ -213,7 +213,7 @@ class Simulation(Model):
             self.now,
             tuple(scheduler.snapshot() for scheduler in self.schedulers),
             tuple((active.fault, active.name, active.since) for active in self.parts.faults.active),
-            tuple(self.parts.faults.machines),
+            tuple(self.parts.faults.controllers),
             self.parts.faults.copy_state(),
             self._scripts.state(),
             tuple(self.inputs) if with_inputs else (),

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from steptwin.controller import Nanos
 from steptwin.diagnostics import SourceText
-from steptwin.machine import Nanos
 from steptwin.simulation.describe.blueprint import FileContents
 from steptwin.simulation.describe.overrides import Overrides
 from steptwin.simulation.faults import Fault
@@ -35,7 +35,7 @@ class SimulationSnapshot:
     faults: tuple[tuple[Fault, str, Nanos], ...]
     """The faults that were set, with their names and moments."""
     rigged: tuple[str, ...]
-    """The machines that were prepared for faults."""
+    """The controllers that were prepared for faults."""
     faults_state: Any
     scripts: ScriptsState
     inputs: tuple[RecordedInput, ...]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from steptwin.controller import Nanos
 from steptwin.diagnostics import visible
-from steptwin.machine import Nanos
 from steptwin.simulation.faults.active import HeldLevel
 from steptwin.simulation.kinds.programs import Place, Resource, ResourceKind
 from steptwin.simulation.world.simulation import Simulation
@@ -40,31 +40,31 @@ def waiting(simulation: Simulation) -> Iterator[Waiting]:
                 yield Waiting(script.name, what)
 
 
-def _statement(simulation: Simulation, machine: str, place: Place) -> str:
-    programs = simulation.programs[machine]
+def _statement(simulation: Simulation, controller: str, place: Place) -> str:
+    programs = simulation.programs[controller]
     found, source = programs.statements(place.text)[place.number], programs.texts[place.text]
     return f"{source.name}:{found.line} {visible(source.text[found.start : found.end].strip())}"
 
 
 def _states(
-    simulation: Simulation, machine: str, resource: Resource, drivers: dict[str, list[Connection]], held: dict[str, HeldLevel]
+    simulation: Simulation, controller: str, resource: Resource, drivers: dict[str, list[Connection]], held: dict[str, HeldLevel]
 ) -> Iterator[str]:
     """The present level of a pin that a statement reads, and what drives it; where the axes are that it waits for."""
     if resource.kind is ResourceKind.AXIS:
-        for axis in simulation.kind(machine).state(simulation.machine(machine), simulation.now).axes:
+        for axis in simulation.kind(controller).state(simulation.controller(controller), simulation.now).axes:
             if axis.moving and resource.name in ("", str(axis.number)):
                 place = "" if axis.position is None else f" at {axis.position:g} {axis.unit}"
-                yield f"{machine}.{axis.name} moves{place}"
+                yield f"{controller}.{axis.name} moves{place}"
     elif resource.kind is ResourceKind.PIN and resource.name:
-        yield from _level(simulation, machine, resource.name, drivers, held)
+        yield from _level(simulation, controller, resource.name, drivers, held)
 
 
 def _level(
-    simulation: Simulation, machine: str, name: str, drivers: dict[str, list[Connection]], held: dict[str, HeldLevel]
+    simulation: Simulation, controller: str, name: str, drivers: dict[str, list[Connection]], held: dict[str, HeldLevel]
 ) -> Iterator[str]:
-    pin = f"{machine}.{name}"
+    pin = f"{controller}.{name}"
     level = simulation.read(pin)
-    terminals = simulation.kind(machine).terminals
+    terminals = simulation.kind(controller).terminals
     if pin in held:
         yield f"{pin} is {held[pin].words()}"
     elif name not in (*terminals.digital_inputs, *terminals.analog_inputs):
@@ -77,7 +77,7 @@ def _level(
 
 def _held(simulation: Simulation) -> dict[str, HeldLevel]:
     faults = simulation.parts.faults
-    return {signal: held for owner in (*faults.machines, *faults.elements) for signal, held in faults.held(owner).items()}
+    return {signal: held for owner in (*faults.controllers, *faults.elements) for signal, held in faults.held(owner).items()}
 
 
 def _drivers(simulation: Simulation) -> dict[str, list[Connection]]:
@@ -89,6 +89,6 @@ def _drivers(simulation: Simulation) -> dict[str, list[Connection]]:
 
 def unchanged_inputs(simulation: Simulation, since: Nanos) -> list[str]:
     """The inputs of controllers that something drives and that have had one level since a moment, as far as the trace is kept."""
-    changed = {(record.machine, record.subject) for record in simulation.trace.edges() if record.time > since}
-    driven = dict.fromkeys(one.target for one in connections(simulation.parts) if one.target.machine in simulation.machines)
-    return [str(pin) for pin in driven if (pin.machine, pin.pin) not in changed]
+    changed = {(record.controller, record.subject) for record in simulation.trace.edges() if record.time > since}
+    driven = dict.fromkeys(one.target for one in connections(simulation.parts) if one.target.controller in simulation.controllers)
+    return [str(pin) for pin in driven if (pin.controller, pin.pin) not in changed]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.simulation.components.elementspec import NamedSpec
 from steptwin.simulation.components.parts import WorldParts
 from steptwin.simulation.scheduler.wires import PinName
@@ -44,4 +44,4 @@ def connections(parts: WorldParts) -> Iterator[Connection]:
 
 def terminal_name(parts: WorldParts, pin: PinName) -> str:
     """A pin as conditions name it: terminals of elements in small letters."""
-    return f"{pin.machine}.{pin.pin.lower()}" if pin.machine in parts.terminals else str(pin)
+    return f"{pin.controller}.{pin.pin.lower()}" if pin.controller in parts.terminals else str(pin)

@@ -17,47 +17,47 @@ FINDING = ("line", "column", "end_line", "end_column", "severity", "code", "mess
 """Fields of a diagnostic as plain values (`steptwin.diagnostics.to_json`)."""
 
 
-def address_of(machine: str, place: str, language: TextLanguage) -> str:
+def address_of(controller: str, place: str, language: TextLanguage) -> str:
     """The address under which editors know a text."""
-    return f"steptwin:///{machine}/{place.replace(' ', '-')}{language.suffix}"
+    return f"steptwin:///{controller}/{place.replace(' ', '-')}{language.suffix}"
 
 
-NO_SUCH_CONTROLLER = Message("simulation.no-such-controller", "there is no controller {machine!r}: there are {names}")
+NO_SUCH_CONTROLLER = Message("simulation.no-such-controller", "there is no controller {controller!r}: there are {names}")
 
 
-def program_texts(model: Model, machine: str) -> Sequence[ProgramText]:
+def program_texts(model: Model, controller: str) -> Sequence[ProgramText]:
     """Program texts of a controller, at the present moment of the world; empty without any. Raises `Misuse` for another name."""
-    if machine not in model.machines:
-        raise Misuse(NO_SUCH_CONTROLLER(machine=machine, names=list(model.machines)))
-    model.touch(machine)
-    spec = next(one for one in model.spec.controllers if one.name == machine)
-    return spec.kind.texts(spec, model.machines[machine], model.given)
+    if controller not in model.controllers:
+        raise Misuse(NO_SUCH_CONTROLLER(controller=controller, names=list(model.controllers)))
+    model.touch(controller)
+    spec = next(one for one in model.spec.controllers if one.name == controller)
+    return spec.kind.texts(spec, model.controllers[controller], model.given)
 
 
 NO_PLACE_FOR_A_PROGRAM = Message(
-    "simulation.no-place-for-a-program", "{machine} has no place {place!r} for a program: places are {places}"
+    "simulation.no-place-for-a-program", "{controller} has no place {place!r} for a program: places are {places}"
 )
 
 
-def text_at(model: Model, machine: str, place: str) -> ProgramText:
+def text_at(model: Model, controller: str, place: str) -> ProgramText:
     """Raises `Misuse` with the places there are."""
-    there = {text.place: text for text in program_texts(model, machine)}
+    there = {text.place: text for text in program_texts(model, controller)}
     if place not in there:
-        raise Misuse(NO_PLACE_FOR_A_PROGRAM(machine=machine, place=place, places=list(there) or NONE()))
+        raise Misuse(NO_PLACE_FOR_A_PROGRAM(controller=controller, place=place, places=list(there) or NONE()))
     return there[place]
 
 
-def name_of_text(model: Model, machine: str, place: str) -> str:
+def name_of_text(model: Model, controller: str, place: str) -> str:
     """Name of the text at a place, or of the place where nothing is there yet. Raises `Misuse`."""
-    return text_at(model, machine, place).source.name
+    return text_at(model, controller, place).source.name
 
 
-def configuration_text(model: Model, machine: str) -> SourceText | None:
+def configuration_text(model: Model, controller: str) -> SourceText | None:
     """The configuration file of a controller by name; None for a kind that has none. Raises `Misuse` for another name."""
-    if machine not in model.machines:
-        raise Misuse(NO_SUCH_CONTROLLER(machine=machine, names=list(model.machines)))
-    spec = next(one for one in model.spec.controllers if one.name == machine)
-    return spec.kind.configuration(spec, model.machines[machine], model.given)
+    if controller not in model.controllers:
+        raise Misuse(NO_SUCH_CONTROLLER(controller=controller, names=list(model.controllers)))
+    spec = next(one for one in model.spec.controllers if one.name == controller)
+    return spec.kind.configuration(spec, model.controllers[controller], model.given)
 
 
 class WorldPrograms:
@@ -68,17 +68,17 @@ class WorldPrograms:
 
     def list(self) -> Sequence[Mapping[str, object]]:
         """The texts of all controllers."""
-        return [_plain(name, text) for name in self._model.machines for text in program_texts(self._model, name)]
+        return [_plain(name, text) for name in self._model.controllers for text in program_texts(self._model, name)]
 
-    def text(self, machine: str, place: str) -> Mapping[str, object]:
+    def text(self, controller: str, place: str) -> Mapping[str, object]:
         """One of them, with what its checker finds. Raises `Misuse`."""
-        text = text_at(self._model, machine, place)
+        text = text_at(self._model, controller, place)
         findings = [{key: row[key] for key in FINDING} for row in to_json(text.source, text.check())]
-        return {**_plain(machine, text), "text": text.source.text, "diagnostics": findings}
+        return {**_plain(controller, text), "text": text.source.text, "diagnostics": findings}
 
-    def memory(self, machine: str, place: str, text: str) -> Sequence[Mapping[str, object]]:
+    def memory(self, controller: str, place: str, text: str) -> Sequence[Mapping[str, object]]:
         """Use of the memory at a place by a text; empty for one with errors. Raises `Misuse`."""
-        return [part._asdict() for part in text_at(self._model, machine, place).memory(text)]
+        return [part._asdict() for part in text_at(self._model, controller, place).memory(text)]
 
     def files(self) -> Mapping[str, bytes]:
         """Files that an editor server needs, by address: texts, configurations, and a description of their controllers."""
@@ -118,21 +118,21 @@ def _keys(spec: ControllerSpec, texts: Sequence[ProgramText]) -> Iterator[str]:
             yield f'{language.key} = "{_name(spec.name, of_key[0])}"'
 
 
-def _name(machine: str, text: ProgramText) -> str:
+def _name(controller: str, text: ProgramText) -> str:
     """Name of a text, seen from the description."""
-    return address_of(machine, text.place, text.language).removeprefix("steptwin:///")
+    return address_of(controller, text.place, text.language).removeprefix("steptwin:///")
 
 
-def _plain(machine: str, text: ProgramText) -> Mapping[str, object]:
+def _plain(controller: str, text: ProgramText) -> Mapping[str, object]:
     return {
-        "machine": machine,
+        "controller": controller,
         "place": text.place,
         "name": text.source.name,
         "language": text.language.name,
         "suffix": text.language.suffix,
         "has_statements": text.language.has_statements,
         "is_typed": text.language.is_typed,
-        "address": address_of(machine, text.place, text.language),
+        "address": address_of(controller, text.place, text.language),
         "empty": text.is_empty,
         "running": text.is_running,
         "line": text.line,

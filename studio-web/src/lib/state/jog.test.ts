@@ -5,7 +5,7 @@ import { DeadManJog } from "./jog";
 let asked: string[];
 let answer: (name: string) => Promise<unknown>;
 const failed = vi.fn();
-const FIELDS = { machine: "table", axis: 1, velocity: 10 };
+const FIELDS = { controller: "table", axis: 1, velocity: 10 };
 // The answers of a fake are not typed by name.
 const ask = (async (name: string) => {
   asked.push(name);

@@ -19,7 +19,7 @@ export type Control = "enable" | "move" | "home" | "jog" | "stop" | "program";
 export interface AxisModel {
   /** `table.M1`, as points and conditions name it. */
   id: string;
-  machine: string;
+  controller: string;
   number: number;
   /** `M1`. */
   name: string;
@@ -45,7 +45,7 @@ export interface AxisModel {
   limits: [string, string] | null;
 }
 
-export interface MachineModel {
+export interface ControllerModel {
   name: string;
   /** A device: its positions are samples, and it may move something. */
   isReal: boolean;
@@ -64,7 +64,7 @@ export interface MachineModel {
 
 export interface Model {
   name: string;
-  machines: readonly MachineModel[];
+  controllers: readonly ControllerModel[];
   lines: readonly Line[];
   mechanics: readonly Mechanics[];
   buttons: readonly string[];
@@ -88,19 +88,19 @@ function axisPoint(sheet: Datasheet, points: ReadonlyMap<string, Point>, axis: A
 }
 
 function axisModel(
-  machine: string,
+  controller: string,
   sheet: Datasheet,
   points: ReadonlyMap<string, Point>,
   axis: AxisSheet,
   mechanics: string,
 ): AxisModel {
-  const full = (path: string | null) => (path === null ? null : `${machine}.${path}`);
+  const full = (path: string | null) => (path === null ? null : `${controller}.${path}`);
   const find = (what: string) => full(axisPoint(sheet, points, axis, what));
   const register = (name: string) => full(points.has(`${axis.name}_${name}`) ? `${axis.name}_${name}` : null);
   const [left, right] = [register("POSLIM_L"), register("POSLIM_R")];
   return {
-    id: `${machine}.${axis.name}`,
-    machine,
+    id: `${controller}.${axis.name}`,
+    controller,
     number: axis.number,
     name: axis.name,
     label: axis.name,
@@ -121,11 +121,11 @@ function axisModel(
 }
 
 export function modelOf(description: Description): Model {
-  const machines = description.machines.map((part): MachineModel => {
+  const controllers = description.controllers.map((part): ControllerModel => {
     const sheet = description.datasheets[part.datasheet] as Datasheet;
     const points = new Map(sheet.points.map((point) => [point.path, point]));
     const mechanicsOf = (number: number) =>
-      description.axes.find(({ machine, axis }) => machine === part.name && axis === String(number))?.name ?? "";
+      description.axes.find(({ controller, axis }) => controller === part.name && axis === String(number))?.name ?? "";
     const full = (path: string) => (points.has(path) ? `${part.name}.${path}` : null);
     return {
       name: part.name,
@@ -141,10 +141,10 @@ export function modelOf(description: Description): Model {
       program: full("program"),
     };
   });
-  nameAxes(machines);
+  nameAxes(controllers);
   return {
     name: description.name,
-    machines,
+    controllers,
     lines: description.lines,
     mechanics: description.axes,
     buttons: description.buttons,
@@ -154,9 +154,9 @@ export function modelOf(description: Description): Model {
   };
 }
 
-function nameAxes(machines: readonly MachineModel[]): void {
-  const several = machines.filter(({ axes }) => axes.length > 1);
-  for (const { name, axes } of machines) {
+function nameAxes(controllers: readonly ControllerModel[]): void {
+  const several = controllers.filter(({ axes }) => axes.length > 1);
+  for (const { name, axes } of controllers) {
     for (const axis of axes) {
       const isTaken = several.some((other) => other.name !== name && other.axes.some((one) => one.name === axis.name));
       if (axes.length === 1) axis.label = name;

@@ -6,7 +6,7 @@ import { ownerOf } from "./owner";
 const event = (facts: Record<string, string | number>): SubjectEvent => ({
   number: 1,
   time_ns: "5",
-  machine: "cell",
+  controller: "cell",
   kind: "status",
   code: "workpiece",
   axis: null,

@@ -6,8 +6,8 @@ class Level {
 
 /** By `table.IN3`. */
 export function levelsOf(state: Hello["state"]): [string, number | null][] {
-  return Object.entries(state).flatMap(([machine, { pins }]) =>
-    Object.entries(pins).map(([pin, level]): [string, number | null] => [`${machine}.${pin}`, level]),
+  return Object.entries(state).flatMap(([controller, { pins }]) =>
+    Object.entries(pins).map(([pin, level]): [string, number | null] => [`${controller}.${pin}`, level]),
   );
 }
 

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { SubjectEvent } from "../protocol/types";
-import type { MachineModel } from "./model";
+import type { ControllerModel } from "./model";
 import { severityOf, stopsMotor } from "./severity";
 
 const MACHINE = {
@@ -10,7 +10,7 @@ const MACHINE = {
       { code: "homed", severity: "information" },
     ],
   },
-} as unknown as MachineModel;
+} as unknown as ControllerModel;
 const event = (kind: string, code = "") => ({ kind, code }) as SubjectEvent;
 
 test("events are as grave as their data sheet has them", () => {

@@ -17,7 +17,7 @@ import { Edges } from "./edges";
 import { EventLog } from "./events.svelte";
 import { EarlierEvents, type PastEvents } from "./history";
 import { Lookback, plansOf, type Past } from "./lookback.svelte";
-import { modelOf, type AxisModel, type MachineModel, type Model } from "./model";
+import { modelOf, type AxisModel, type ControllerModel, type Model } from "./model";
 import { levelsOf, Pins } from "./pins.svelte";
 import { severityOf, type Severity } from "./severity";
 import { Watches, type Watch } from "./watch.svelte";
@@ -26,7 +26,7 @@ export type EventKind = SubjectEvent["kind"];
 
 const EMPTY: Model = {
   name: "",
-  machines: [],
+  controllers: [],
   lines: [],
   mechanics: [],
   buttons: [],
@@ -160,12 +160,12 @@ export class Studio {
     return this.hello?.with_token.includes(name) ?? false;
   }
 
-  machine(name: string): MachineModel | undefined {
-    return this.model.machines.find((machine) => machine.name === name);
+  controller(name: string): ControllerModel | undefined {
+    return this.model.controllers.find((controller) => controller.name === name);
   }
 
   severity(event: SubjectEvent): Severity {
-    return severityOf(event, this.machine(event.machine));
+    return severityOf(event, this.controller(event.controller));
   }
 
   axis(model: AxisModel): AxisState {
@@ -271,7 +271,7 @@ export class Studio {
   private describe(hello: Hello): void {
     this.description = JSON.stringify(hello.description);
     this.model = modelOf(hello.description);
-    const axes = this.model.machines.flatMap((machine) => machine.axes);
+    const axes = this.model.controllers.flatMap((controller) => controller.axes);
     this.axes = new Map(axes.map((axis) => [axis.id, new AxisState(axis)]));
   }
 
@@ -328,7 +328,7 @@ export class Studio {
         this.forgetAfter(BigInt(event.time_ns));
         this.connection.resync();
       } else if (event.kind === "edge") {
-        const pin = `${event.machine}.${event.pin}`;
+        const pin = `${event.controller}.${event.pin}`;
         this.pins.take({ [pin]: event.level });
         this.edges.take(pin, BigInt(event.time_ns), event.level);
       }
@@ -340,13 +340,13 @@ export class Studio {
   private takeEarlier({ from_ns, state, plans, events }: PastEvents): void {
     const all = [...plans, ...events];
     for (const axis of this.axes.values()) {
-      const { machine, number } = axis.model;
+      const { controller, number } = axis.model;
       const own = all.filter((event) => event.kind === "plan" || event.kind === "coordinate");
-      axis.takeEarlier(own.filter((event) => event.machine === machine && event.axis === String(number)));
+      axis.takeEarlier(own.filter((event) => event.controller === controller && event.axis === String(number)));
     }
     const first = levelsOf(state).map(([pin, level]) => [pin, BigInt(from_ns), level] as const);
     const edges = events.filter((event) => event.kind === "edge");
-    const later = edges.map((event) => [`${event.machine}.${event.pin}`, BigInt(event.time_ns), event.level] as const);
+    const later = edges.map((event) => [`${event.controller}.${event.pin}`, BigInt(event.time_ns), event.level] as const);
     this.edges.takeEarlier([...first, ...later]);
   }
 
@@ -354,8 +354,8 @@ export class Studio {
     this.pins.show(past === null ? null : past.state);
     const plans = past === null ? [] : plansOf(past);
     for (const axis of this.axes.values()) {
-      const { machine, number } = axis.model;
-      axis.show(plans.find((plan) => plan.machine === machine && plan.axis === String(number)) ?? null);
+      const { controller, number } = axis.model;
+      axis.show(plans.find((plan) => plan.controller === controller && plan.axis === String(number)) ?? null);
     }
   }
 
@@ -368,8 +368,8 @@ export class Studio {
 
   private toAxis(event: SubjectEvent): void {
     if (event.kind !== "plan" && event.kind !== "coordinate" && event.kind !== "sample") return;
-    const machine = this.machine(event.machine);
-    const model = machine?.axes.find(({ number }) => String(number) === event.axis);
+    const controller = this.controller(event.controller);
+    const model = controller?.axes.find(({ number }) => String(number) === event.axis);
     if (model !== undefined) this.axis(model).take(event);
   }
 }

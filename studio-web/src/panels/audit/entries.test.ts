@@ -10,11 +10,11 @@ const entry = (viewer: string, name: string, fields: Entry["fields"], outcome: E
   fields,
   outcome,
 });
-const moved = entry("piotr", "move", { machine: "table", axis: 1, to: 20 }, "done");
-const refused = entry("hmi (OPC UA, 127.0.0.1:4)", "home", { machine: "drum" }, "refusal");
+const moved = entry("piotr", "move", { controller: "table", axis: 1, to: 20 }, "done");
+const refused = entry("hmi (OPC UA, 127.0.0.1:4)", "home", { controller: "drum" }, "refusal");
 
 test("fields are said in a line", () => {
-  expect(fieldsOf(moved)).toBe("machine table, axis 1, to 20");
+  expect(fieldsOf(moved)).toBe("controller table, axis 1, to 20");
 });
 
 test("the newest come first, and each word of the filter has to be somewhere", () => {

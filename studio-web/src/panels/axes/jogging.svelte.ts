@@ -48,7 +48,7 @@ export class Jogging {
   /** A jog of anybody sets the register of the greatest velocity to its own, until the axis stands again. */
   private greatestOf(axis: AxisModel): number | null {
     const found = this.watch()?.get(axis.fastest) ?? null;
-    const isJogged = this.studio.leases.some((lease) => lease.machine === axis.machine && lease.axis === axis.number);
+    const isJogged = this.studio.leases.some((lease) => lease.controller === axis.controller && lease.axis === axis.number);
     const before = this.greatest.get(axis.id) ?? null;
     if (before !== null && (isJogged || this.studio.axis(axis).isMoving(this.studio.now()) === true)) return before;
     if (found !== null) this.greatest.set(axis.id, found);
@@ -59,7 +59,7 @@ export class Jogging {
   begin(axis: AxisModel, sign: number, isOver: () => void, percent = this.percent): void {
     this.end(axis);
     const velocity = (sign * this.fullOf(axis) * percent) / 100;
-    const fields = { machine: axis.machine, axis: axis.number, velocity };
+    const fields = { controller: axis.controller, axis: axis.number, velocity };
     const jog: DeadManJog = DeadManJog.begin(
       (name, given, within) => this.studio.ask(name, given, within),
       fields,

@@ -6,7 +6,7 @@ import { Jogging } from "./jogging.svelte";
 
 const AXIS = {
   id: "table.1",
-  machine: "table",
+  controller: "table",
   axis: 1,
   number: 1,
   fastest: null,

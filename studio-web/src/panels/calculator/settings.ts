@@ -1,4 +1,4 @@
-import type { MachineModel } from "../../lib/state/model";
+import type { ControllerModel } from "../../lib/state/model";
 
 /** Something that is set for a move: a register by its name, or a command by its letter. */
 export interface Setting {
@@ -25,11 +25,11 @@ export interface Sending {
 /** The command that makes one controller of a line listen, where there is one. */
 const SELECT = "X";
 
-export const isPoint = (machine: MachineModel, { code }: Setting): boolean => machine.points.has(code);
+export const isPoint = (controller: ControllerModel, { code }: Setting): boolean => controller.points.has(code);
 
 /** What has to be sent so that the controller has the values; `pick` chooses new or old ones. */
 export function sendingOf(
-  machine: MachineModel,
+  controller: ControllerModel,
   changes: readonly Change[],
   pick: (change: Change) => number | null,
 ): Sending {
@@ -38,11 +38,11 @@ export function sendingOf(
   for (const change of changes) {
     const value = pick(change);
     if (value === null) continue;
-    if (isPoint(machine, change)) writes[`${machine.name}.${change.code}`] = value;
+    if (isPoint(controller, change)) writes[`${controller.name}.${change.code}`] = value;
     else commands.push(`${change.code}${value}`);
   }
-  const isSelected = machine.sheet.commands.some(({ code }) => code === SELECT) && machine.unit !== null;
-  const lines = isSelected ? [`${SELECT}${machine.unit!.toString(16).toUpperCase()}`, ...commands] : commands;
+  const isSelected = controller.sheet.commands.some(({ code }) => code === SELECT) && controller.unit !== null;
+  const lines = isSelected ? [`${SELECT}${controller.unit!.toString(16).toUpperCase()}`, ...commands] : commands;
   return { writes, text: commands.length ? lines.map((line) => `${line}\r`).join("") : "" };
 }
 

@@ -4,7 +4,7 @@ import { bytesOf, csvOf, frameOf, isTcp, sendable, Statistics, type Frame, type 
 let number = 0;
 function frame(time_ms: number, direction: "in" | "out", hex: string, client = "tcp-1"): Frame {
   const data = hex.replaceAll(" ", "");
-  const event = { kind: "frame", machine: "bus", number: ++number, time_ns: String(BigInt(time_ms) * 1_000_000n) };
+  const event = { kind: "frame", controller: "bus", number: ++number, time_ns: String(BigInt(time_ms) * 1_000_000n) };
   return frameOf({ ...event, client, direction, data, words: 'read "M1"' } as unknown as FrameEvent, true);
 }
 
@@ -42,7 +42,7 @@ test("CSV quotes meanings", () => {
 
 test("a request has room for the newest frames", () => {
   expect(sendable([frame(1, "in", ASKED)])).toEqual([
-    { time_ns: "1000000", machine: "bus", client: "tcp-1", direction: "in", data: ASKED.replaceAll(" ", "") },
+    { time_ns: "1000000", controller: "bus", client: "tcp-1", direction: "in", data: ASKED.replaceAll(" ", "") },
   ]);
   const many = Array.from({ length: 5000 }, (_, at) => frame(at, "out", "00".repeat(260)));
   const sent = sendable(many);

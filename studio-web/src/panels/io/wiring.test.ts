@@ -13,7 +13,7 @@ const wire = (source: string, target: string, more: Partial<Connection> = {}): C
 
 const model = (connections: Connection[]): Model =>
   ({
-    machines: [{ name: "cell", sheet: { title: "MIC488" } }],
+    controllers: [{ name: "cell", sheet: { title: "MIC488" } }],
     elements: [
       { name: "safety", kind: "relay" },
       { name: "spare", kind: "gate" },

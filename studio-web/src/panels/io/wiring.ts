@@ -45,9 +45,9 @@ function connected(connections: readonly Connection[], side: "source" | "target"
 }
 
 /** Controllers first, then elements, each with its inputs and outputs: IN2 before IN10. */
-export function nodesOf({ machines, elements, connections }: Model): Node[] {
+export function nodesOf({ controllers, elements, connections }: Model): Node[] {
   const owners = [
-    ...machines.map(({ name, sheet }) => ({ name, kind: sheet.title })),
+    ...controllers.map(({ name, sheet }) => ({ name, kind: sheet.title })),
     ...elements.map(({ name, kind }) => ({ name, kind })),
   ];
   return owners

@@ -5,7 +5,7 @@ import { alarmsOf } from "./alarms";
 const limit = (number: number, axis: string): SubjectEvent => ({
   number,
   time_ns: String(number),
-  machine: "table",
+  controller: "table",
   kind: "status",
   code: "limit",
   axis,

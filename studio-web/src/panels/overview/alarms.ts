@@ -2,7 +2,7 @@ import type { SubjectEvent } from "../../lib/protocol/types";
 import { ownerOf } from "../../lib/state/owner";
 import type { Severity } from "../../lib/state/severity";
 
-/** An alarm, and how often it came: the same machine, code and axis. */
+/** An alarm, and how often it came: the same controller, code and axis. */
 export interface Alarm {
   key: string;
   severity: Severity;

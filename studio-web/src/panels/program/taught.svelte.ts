@@ -26,7 +26,7 @@ class Waiting {
 export const waiting = new Waiting();
 
 interface Table {
-  machine: string;
+  controller: string;
   place: string;
   address: string;
 }
@@ -34,7 +34,7 @@ interface Table {
 /** A row gets into the text of a table that is not in an editor; it stays a draft until it is downloaded. */
 export async function teachDraft(studio: Studio, table: Table, { name, row }: Taught): Promise<void> {
   const world = studio.model.name;
-  const { text } = await studio.ask("program_text", { machine: table.machine, place: table.place });
+  const { text } = await studio.ask("program_text", { controller: table.controller, place: table.place });
   const [changed] = withRow(draftOf(world, table.address) ?? text, name, row);
   keepDraft(world, table.address, changed === text ? null : changed);
 }

@@ -3,7 +3,7 @@ import { texts } from "../../text";
 export const t = texts(
   {
     title: "Registers",
-    machine: "Controller",
+    controller: "Controller",
     search: "Find a point",
     searchHelp: "name, meaning or address",
     group: "Group",
@@ -34,7 +34,7 @@ export const t = texts(
     as: "as",
     first: "First user register",
     noValue: "cannot be read",
-    table: "Points of {machine}",
+    table: "Points of {controller}",
     tags: "Tag list",
     cyclic: "Cyclic read",
     every: "every {time} s",
@@ -48,7 +48,7 @@ export const t = texts(
   },
   {
     title: "Rejestry",
-    machine: "Sterownik",
+    controller: "Sterownik",
     search: "Znajdź punkt",
     searchHelp: "nazwa, znaczenie lub adres",
     group: "Grupa",
@@ -79,7 +79,7 @@ export const t = texts(
     as: "jako",
     first: "Pierwszy rejestr użytkownika",
     noValue: "nie da się odczytać",
-    table: "Punkty: {machine}",
+    table: "Punkty: {controller}",
     tags: "Lista znaczników",
     cyclic: "Odczyt cykliczny",
     every: "co {time} s",

@@ -1,4 +1,4 @@
-import type { AxisModel, MachineModel, Model } from "../../lib/state/model";
+import type { AxisModel, ControllerModel, Model } from "../../lib/state/model";
 import type { Quantity } from "./columns";
 
 interface Common {
@@ -7,7 +7,7 @@ interface Common {
   label: string;
   unit: string;
   /** null: of a line. */
-  machine: MachineModel | null;
+  controller: ControllerModel | null;
 }
 
 export interface CurveSignal extends Common {
@@ -50,7 +50,7 @@ export const isLane = (signal: Signal): boolean => signal.kind === "level" || is
 const WAVEFORM = "N";
 type Words = Quantity | "current" | "frames" | "statements";
 
-const passed = (kind: PassedSignal["kind"], source: string): Omit<PassedSignal, "label" | "machine"> => ({
+const passed = (kind: PassedSignal["kind"], source: string): Omit<PassedSignal, "label" | "controller"> => ({
   id: `${source}.${kind}`,
   unit: "",
   kind,
@@ -59,43 +59,43 @@ const passed = (kind: PassedSignal["kind"], source: string): Omit<PassedSignal, 
 
 /** All that can be shown, in the order of the model. */
 export function signalsOf(model: Model, words: (what: Words) => string): Signal[] {
-  const several = model.machines.length > 1;
-  const ofMachines = model.machines.flatMap((machine): Signal[] => {
-    const curves = machine.axes.flatMap((axis): Signal[] =>
+  const several = model.controllers.length > 1;
+  const ofControllers = model.controllers.flatMap((controller): Signal[] => {
+    const curves = controller.axes.flatMap((axis): Signal[] =>
       (["position", "velocity"] as const).map((kind) => ({
         id: `${axis.id}.${kind}`,
         label: `${axis.label} ${words(kind)}`,
         unit: kind === "position" ? axis.unit : `${axis.unit}/s`,
-        machine,
+        controller,
         kind,
         axis,
       })),
     );
-    const pin = `${machine.name}.${WAVEFORM}`;
-    const drives = machine.sheet.pins.some(({ name }) => name === WAVEFORM) ? machine.axes : [];
+    const pin = `${controller.name}.${WAVEFORM}`;
+    const drives = controller.sheet.pins.some(({ name }) => name === WAVEFORM) ? controller.axes : [];
     const currents = drives.flatMap((axis): Signal[] =>
       ([1, 2] as const).map((phase) => ({
         id: `${axis.id}.current${phase}`,
         label: `${axis.label} ${words("current")} ${phase}`,
         unit: "%",
-        machine,
+        controller,
         kind: "current",
         axis,
         pin,
         phase,
       })),
     );
-    const statements: Signal[] = machine.isReal
+    const statements: Signal[] = controller.isReal
       ? []
-      : [{ ...passed("statements", machine.name), machine, label: `${machine.name} ${words("statements")}` }];
-    const pins = machine.sheet.pins.map((pin): Signal => {
-      const label = several ? `${machine.name} ${pin.name}` : pin.name;
+      : [{ ...passed("statements", controller.name), controller, label: `${controller.name} ${words("statements")}` }];
+    const pins = controller.sheet.pins.map((pin): Signal => {
+      const label = several ? `${controller.name} ${pin.name}` : pin.name;
       const common = {
-        id: `${machine.name}.${pin.name}`,
+        id: `${controller.name}.${pin.name}`,
         label,
         unit: pin.unit,
-        machine,
-        pin: `${machine.name}.${pin.name}`,
+        controller,
+        pin: `${controller.name}.${pin.name}`,
       };
       return { ...common, kind: pin.unit === "V" ? "voltage" : "level" };
     });
@@ -103,10 +103,10 @@ export function signalsOf(model: Model, words: (what: Words) => string): Signal[
   });
   const frames = model.lines.map(({ name }): Signal => ({
     ...passed("frames", name),
-    machine: null,
+    controller: null,
     label: `${name} ${words("frames")}`,
   }));
-  return [...ofMachines, ...frames];
+  return [...ofControllers, ...frames];
 }
 
 /** Shown at first: positions of the axes that drive something, or of the first four. */

@@ -304,7 +304,7 @@ function drawGrid(pen, view, height) {
   for (let t = first; t <= view.to; t += step) c.fillRect(Math.round(pen.x(t)), 0, 1, height);
 }
 
-// Of a machine that is folded: how fast the fastest of its axes is, and where something happened.
+// Of a controller that is folded: how fast the fastest of its axes is, and where something happened.
 function drawSummary(pen, { motions, marks }, top, bottom) {
   const c = pen.context, begin = Math.max(pen.x(0), 0), end = Math.min(pen.x(SPAN), pen.width);
   c.fillStyle = pen.color("--velocity");

@@ -151,11 +151,11 @@ class Pin {
 
 // ---------------------------------------------------------------------- lanes
 
-// What a machine does, for the row of one that is folded.
-function summaryOf(machine) {
-  const motions = DATA.axes.filter((axis) => axis.machine === machine).map((axis) => new Motion(axis)).filter((motion) => motion.moves());
+// What a controller does, for the row of one that is folded.
+function summaryOf(controller) {
+  const motions = DATA.axes.filter((axis) => axis.controller === controller).map((axis) => new Motion(axis)).filter((motion) => motion.moves());
   const fastest = (motion) => Math.max(...motion.range(true, 0, SPAN).map(Math.abs)) || 1;
-  return { motions: motions.map((motion) => ({ motion, fastest: fastest(motion) })), marks: DATA.marks.filter((mark) => mark[1] === machine) };
+  return { motions: motions.map((motion) => ({ motion, fastest: fastest(motion) })), marks: DATA.marks.filter((mark) => mark[1] === controller) };
 }
 
 const HEIGHTS = { group: 28, still: 22, position: 62, velocity: 46, step: 26, level: 24, analog: 40, frames: 40, statement: 24, marks: 24 };
@@ -168,13 +168,13 @@ function rangeOf(curves, velocity, from, to) {
   return [Math.min(...ranges.map(([least]) => least)), Math.max(...ranges.map(([, most]) => most))];
 }
 
-// All lanes of a machine, in the order in which they are shown. Times of marks are in a flat list of their own for searching.
-function lanesOf(machine) {
+// All lanes of a controller, in the order in which they are shown. Times of marks are in a flat list of their own for searching.
+function lanesOf(controller) {
   const lanes = [];
   const still = [];
-  for (const axis of DATA.axes.filter((axis) => axis.machine === machine)) {
+  for (const axis of DATA.axes.filter((axis) => axis.controller === controller)) {
     const motion = new Motion(axis), load = axis.true && new Motion(axis.true), curve = { motion, color: COLORS.position };
-    const common = { machine, motion, unit: axis.unit, first: lanes.length === 0 };
+    const common = { controller, motion, unit: axis.unit, first: lanes.length === 0 };
     const moves = motion.moves(), count = axis.counted ? new Motion(axis.counted) : motion;
     if (!moves && !load?.changes() && !axis.counted) {
       const stands = motion.position(0, 0) === 0 ? "" : ` at ${positionText(motion, 0)} ${axis.unit}`;
@@ -190,40 +190,40 @@ function lanesOf(machine) {
         position.name += `, ${axis.true.name}`;
         position.curves.push({ ...its, dashed: true });
       } else {
-        lanes.push({ machine, motion: load, unit: axis.true.unit, kind: "position", isTrue: true, name: `${axis.true.name} position`, curves: [its] });
+        lanes.push({ controller, motion: load, unit: axis.true.unit, kind: "position", isTrue: true, name: `${axis.true.name} position`, curves: [its] });
       }
     }
     if (axis.counted) {
       const its = { motion: count, color: COLORS.position };
-      lanes.push({ machine, motion: count, unit: axis.unit, kind: "position", name: `${axis.name} since power-on`, curves: [its] });
+      lanes.push({ controller, motion: count, unit: axis.unit, kind: "position", name: `${axis.name} since power-on`, curves: [its] });
     }
     if (!moves) continue;
     lanes.push({ ...common, kind: "velocity", name: `${axis.name} velocity`, curves: [{ motion, color: COLORS.velocity }], first: false });
     lanes.push({ ...common, motion: count, kind: "step", name: `${axis.name} pulses`, first: false });
   }
-  for (const moved of DATA.moved.filter((one) => one.machine === machine)) {
+  for (const moved of DATA.moved.filter((one) => one.controller === controller)) {
     const motion = new Motion(moved), curves = [{ motion, color: COLORS.true }];
-    if (motion.changes()) lanes.push({ machine, motion, unit: moved.unit, kind: "position", isTrue: true, name: moved.name, curves });
+    if (motion.changes()) lanes.push({ controller, motion, unit: moved.unit, kind: "position", isTrue: true, name: moved.name, curves });
     else still.push(`${moved.name} ${positionText(motion, 0)} ${moved.unit}`);
   }
   for (const lane of lanes) if (lane.curves) lane.range = rangeOf(lane.curves, lane.kind === "velocity", 0, SPAN);
   if (still.length) {
-    lanes.push({ machine, kind: "still", name: `no motion: ${still.join(", ")}`, first: lanes.length === 0 });
+    lanes.push({ controller, kind: "still", name: `no motion: ${still.join(", ")}`, first: lanes.length === 0 });
   }
-  const pins = DATA.pins.filter((pin) => pin.machine === machine);
+  const pins = DATA.pins.filter((pin) => pin.controller === controller);
   pins.forEach((pin, i) => {
     const data = new Pin(pin);
-    lanes.push({ machine, kind: pin.analog ? "analog" : "level", name: pin.name, pin: data, first: i === 0, range: data.range(0, SPAN) });
+    lanes.push({ controller, kind: pin.analog ? "analog" : "level", name: pin.name, pin: data, first: i === 0, range: data.range(0, SPAN) });
   });
   const groups = new Map();
   DATA.marks.forEach((mark, index) => {
     const [, its, kind, subject] = mark;
-    if (its !== machine) return;
+    if (its !== controller) return;
     const name = kind === "frame" ? subject.split("/")[0] : kind === "statement" ? subject : MARK_NAMES[kind] ?? kind;
     const key = `${kind} ${name}`;
     if (!groups.has(key)) {
       const lane = kind === "frame" ? "frames" : kind === "statement" ? "statement" : "marks";
-      groups.set(key, { machine, kind: lane, name, mark: kind, times: [], marks: [], first: groups.size === 0 });
+      groups.set(key, { controller, kind: lane, name, mark: kind, times: [], marks: [], first: groups.size === 0 });
     }
     groups.get(key).times.push(mark[0]);
     groups.get(key).marks.push(index);

@@ -6,15 +6,15 @@ const view = { from: 0, to: SPAN, scaled: false };
 let cursor = 0, mark = null, hover = null, chosen = 0, dirty = false, overviewImage = null, lanesKey = "", layout = 0;
 const LEAST_VIEW = 200;
 
-const machines = DATA.machines.map((name) => ({ name, lanes: null, summary: null, open: DATA.machines.length <= 8 }));
-machines[0] && (machines[0].open = true);
+const controllers = DATA.controllers.map((name) => ({ name, lanes: null, summary: null, open: DATA.controllers.length <= 8 }));
+controllers[0] && (controllers[0].open = true);
 let lanes = [], wanted = [];
 
-// Lanes with all the wanted words; without any, those of the machines that are not folded.
-function lanesShown(machine) {
-  if (!wanted.length) return machine.open ? machine.lanes ??= lanesOf(machine.name) : [];
-  return (machine.lanes ??= lanesOf(machine.name)).filter((lane) => {
-    const text = `${machine.name} ${lane.name}`.toLowerCase();
+// Lanes with all the wanted words; without any, those of the controllers that are not folded.
+function lanesShown(controller) {
+  if (!wanted.length) return controller.open ? controller.lanes ??= lanesOf(controller.name) : [];
+  return (controller.lanes ??= lanesOf(controller.name)).filter((lane) => {
+    const text = `${controller.name} ${lane.name}`.toLowerCase();
     return wanted.every((word) => text.includes(word));
   });
 }
@@ -22,9 +22,9 @@ function lanesShown(machine) {
 function layOut() {
   layout += 1;
   lanes = [];
-  for (const machine of machines) {
-    if (machines.length > 1 && !wanted.length) lanes.push({ kind: "group", name: machine.name, group: machine, height: HEIGHTS.group });
-    lanes.push(...lanesShown(machine));
+  for (const controller of controllers) {
+    if (controllers.length > 1 && !wanted.length) lanes.push({ kind: "group", name: controller.name, group: controller, height: HEIGHTS.group });
+    lanes.push(...lanesShown(controller));
   }
   let y = 0;
   lanesElement.replaceChildren(...lanes.map((lane, i) => {
@@ -38,7 +38,7 @@ function layOut() {
     if (lane.group) element.setAttribute("aria-expanded", lane.group.open);
     const name = document.createElement("span"), value = document.createElement("span");
     name.className = "name";
-    name.textContent = name.title = wanted.length && machines.length > 1 ? `${lane.machine}.${lane.name}` : lane.name;
+    name.textContent = name.title = wanted.length && controllers.length > 1 ? `${lane.controller}.${lane.name}` : lane.name;
     value.className = "value";
     element.append(name, value);
     element.addEventListener("click", () => { choose(i); if (lane.group) fold(lane.group); });
@@ -49,11 +49,11 @@ function layOut() {
   choose(chosen);
 }
 
-function fold(machine, all = false) {
-  const open = !machine.open;
-  for (const one of all ? machines : [machine]) one.open = open;
+function fold(controller, all = false) {
+  const open = !controller.open;
+  for (const one of all ? controllers : [controller]) one.open = open;
   layOut();
-  choose(lanes.findIndex((lane) => lane.group === machine));
+  choose(lanes.findIndex((lane) => lane.group === controller));
 }
 
 function want(text) {
@@ -453,12 +453,12 @@ function paintRows() {
   const last = Math.min(first + Math.ceil(rows.clientHeight / ROW) + 4, listed.length);
   const elements = [$("rows-space")];
   for (let i = first; i < last; i++) {
-    const [t, machine, kind, subject, text] = DATA.marks[listed[i]], row = document.createElement("div");
+    const [t, controller, kind, subject, text] = DATA.marks[listed[i]], row = document.createElement("div");
     row.className = "row";
     row.style.top = `${i * ROW}px`;
     row.setAttribute("role", "option");
     if (i === current) row.setAttribute("aria-selected", "true");
-    for (const [name, content] of [["time", moment(t)], ["machine", machine], ["kind", kind], ["subject", subject], ["text", text]]) {
+    for (const [name, content] of [["time", moment(t)], ["controller", controller], ["kind", kind], ["subject", subject], ["text", text]]) {
       const cell = document.createElement("span");
       cell.className = name === "text" && kind === "frame" ? "text hex" : name;
       cell.textContent = cell.title = content;

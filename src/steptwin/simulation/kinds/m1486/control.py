@@ -35,16 +35,16 @@ def typed(chip: M1486Chip, line: str, *texts: str) -> do.Send:
     return do.Send(line, "".join(f"{text}\r" for text in (f"x{chip.address:X}", *closing, *texts)).encode("ascii"))
 
 
-ONE_AXIS_ONLY = Message("simulation.m1486.one-axis-only", "{machine}: no axis {axis}: an M1486 has one, 1")
-IS_ON_NO_LINE = Message("simulation.m1486.is-on-no-line", "{machine} is on no line, so no commands can be sent to it")
+ONE_AXIS_ONLY = Message("simulation.m1486.one-axis-only", "{controller}: no axis {axis}: an M1486 has one, 1")
+IS_ON_NO_LINE = Message("simulation.m1486.is-on-no-line", "{controller} is on no line, so no commands can be sent to it")
 
 
 def typed_for(chip: M1486Chip, line: str | None, command: Move | Seek | Jog, *texts: str) -> do.Send:
     """Raises `Refusal` where nothing can be typed."""
     if command.axis != 1:
-        raise Misuse(ONE_AXIS_ONLY(machine=command.machine, axis=command.axis))
+        raise Misuse(ONE_AXIS_ONLY(controller=command.controller, axis=command.axis))
     if line is None:
-        raise Refusal(IS_ON_NO_LINE(machine=command.machine))
+        raise Refusal(IS_ON_NO_LINE(controller=command.controller))
     return typed(chip, line, *texts)
 
 

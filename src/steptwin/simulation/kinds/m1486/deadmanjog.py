@@ -5,6 +5,7 @@ G+ and G- are never used: nothing ends them. No move is cut short, because Kill 
 
 from __future__ import annotations
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.errors import Misuse, Refusal
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.drive import speed_curve
@@ -13,7 +14,6 @@ from steptwin.m1486.present import program_words
 from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import ChipCommand
 from steptwin.m1486.variants import SLOWEST_JOG, Store
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.messages import Message, text_of
 from steptwin.motion.ramps import longest_within
 from steptwin.simulation.kinds.m1486.control import IS_NOT_AT_REST, IS_ON_NO_LINE, ONE_AXIS_ONLY, typed
@@ -42,11 +42,11 @@ class M1486DeadManJog:
     jogged now."""
 
     def __init__(self, chip: M1486Chip, line: str | None, wanted: Jog) -> None:
-        name = wanted.machine
+        name = wanted.controller
         if wanted.axis != 1:
-            raise Misuse(ONE_AXIS_ONLY(machine=name, axis=wanted.axis))
+            raise Misuse(ONE_AXIS_ONLY(controller=name, axis=wanted.axis))
         if line is None:
-            raise Refusal(IS_ON_NO_LINE(machine=name))
+            raise Refusal(IS_ON_NO_LINE(controller=name))
         if chip.variant.store is Store.EEPROM:
             raise Refusal(EEPROM_IS_NOT_JOGGED(name=name, title=chip.variant.title))
         if chip.is_timed and chip.uart.baud < SLOWEST_JOG:

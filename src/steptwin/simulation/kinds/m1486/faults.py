@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.pins import ALIASES, known_pin, refuse_taken
 from steptwin.m1486.variants import Store
-from steptwin.machine import Nanos
 from steptwin.messages import Message
-from steptwin.simulation.faults.machine import AxisLoad, FaultyMachine
+from steptwin.simulation.faults.controller import AxisLoad, FaultyController
 from steptwin.simulation.faults.table import FaultKind, Need, Occasion
 
 WRONG_LEVEL = Message("simulation.m1486.wrong-level", "{pin} = {level:g}: a digital input is 0 or 1")
@@ -37,7 +37,7 @@ class M1486Body:
     def show_master_error(self, shown: bool, now: Nanos) -> None:
         """There is none."""
 
-    def watch(self, owner: FaultyMachine) -> None:
+    def watch(self, owner: FaultyController) -> None:
         chip = self._chip
         store = chip.store
         chip.store = lambda image: _keep(chip, store, owner, image)
@@ -52,7 +52,7 @@ class M1486Body:
             raise Misuse(WRONG_LEVEL(pin=pin, level=level))
 
 
-def _keep(chip: M1486Chip, store: Callable[[bytes], bytes | None] | None, owner: FaultyMachine, image: bytes) -> bytes:
+def _keep(chip: M1486Chip, store: Callable[[bytes], bytes | None] | None, owner: FaultyController, image: bytes) -> bytes:
     size = max(len(image), len(chip.image))
     old, new = chip.image.ljust(size, b"\xff"), image.ljust(size, b"\xff")
     kept = owner.kept(old, new, chip.now)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
+from steptwin.controller import ControllerEvent, Nanos
 from steptwin.controllerstate import ProgramActivity
 from steptwin.datasheet import Datasheet, Pin
 from steptwin.diagnostics import SourceText
@@ -18,7 +19,6 @@ from steptwin.m1486.pins import CONTROL_PINS, LINE_PINS, OUTPUT_PINS, WAVEFORM, 
 from steptwin.m1486.present import program_words, state_of
 from steptwin.m1486.signals import STEP_PULSE_NS
 from steptwin.m1486.variants import Store, variant
-from steptwin.machine import MachineEvent, Nanos
 from steptwin.messages import Message, MessageText
 from steptwin.points import LivePoint
 from steptwin.simulation.faults import AxisLoad
@@ -54,15 +54,16 @@ POSITION = Message("simulation.m1486.position", "position {position:g} {unit}")
 DISTANCE = Message("simulation.m1486.distance", "distance {distance:g} {unit}")
 VELOCITY = Message("simulation.m1486.velocity", "velocity {velocity:g} {unit}/s, V{number:g}")
 COUNTER_SHOWS_THE_TARGET = Message(
-    "simulation.m1486.counter-shows-the-target", "{machine} was stopped in a move: its counter does not show where it is (M-16)"
+    "simulation.m1486.counter-shows-the-target",
+    "{controller} was stopped in a move: its counter does not show where it is (M-16)",
 )
 PROGRAM_CAN_ONLY_BE_STOPPED = Message(
     "simulation.m1486.program-can-only-be-stopped",
-    "{machine}: an M1486 has no command to {action} its program: only stop can be done",
+    "{controller}: an M1486 has no command to {action} its program: only stop can be done",
 )
 NO_COMMANDS = Message("simulation.m1486.no-commands", "{name} has no commands")
-CANNOT_BE_TYPED_TO = Message("simulation.m1486.cannot-be-typed-to", "{machine} is on no line, so nothing can be typed to it")
-RECEIVES_NOTHING = Message("simulation.m1486.receives-nothing", "{machine} is {words}, so it receives nothing")
+CANNOT_BE_TYPED_TO = Message("simulation.m1486.cannot-be-typed-to", "{controller} is on no line, so nothing can be typed to it")
+RECEIVES_NOTHING = Message("simulation.m1486.receives-nothing", "{controller} is {words}, so it receives nothing")
 
 
 class M1486Kind(ControllerKind[M1486Spec, M1486Chip, M1486View]):
@@ -134,7 +135,7 @@ class M1486Kind(ControllerKind[M1486Spec, M1486Chip, M1486View]):
     def body(self, chip: M1486Chip, service: LineUnit, shafts: Mapping[int, AxisLoad]) -> M1486Body:
         return M1486Body(chip, shafts.values())
 
-    def watch_events(self, chip: M1486Chip, call: Callable[[MachineEvent], None]) -> None:
+    def watch_events(self, chip: M1486Chip, call: Callable[[ControllerEvent], None]) -> None:
         chip.on_event = call
 
     def keeps_memory(self, chip: M1486Chip) -> bool:
@@ -177,10 +178,10 @@ class M1486Kind(ControllerKind[M1486Spec, M1486Chip, M1486View]):
     # It has no enable, its home is a line that is not known (`seek`), and programs begin at labels: characters go to its line.
 
     def move(self, chip: M1486Chip, line: str | None, command: Move) -> do.Send:
-        refuse_busy(chip, command.machine)
+        refuse_busy(chip, command.controller)
         if command.to is not None:
             if not chip.drive.is_valid:
-                raise Refusal(COUNTER_SHOWS_THE_TARGET(machine=command.machine))
+                raise Refusal(COUNTER_SHOWS_THE_TARGET(controller=command.controller))
             what = POSITION(position=command.to, unit=UNIT)
             text = "h" if command.to == 0 else number(chip, "G", command.to, what)
             on_grid(chip, command.to - chip.drive.counter_u(chip.now), what)
@@ -193,23 +194,23 @@ class M1486Kind(ControllerKind[M1486Spec, M1486Chip, M1486View]):
 
     def seek(self, chip: M1486Chip, line: str | None, command: Seek) -> do.Send:
         """At start/stop speed until the line has its end level; then the counter is 0."""
-        refuse_busy(chip, command.machine)
+        refuse_busy(chip, command.controller)
         return typed_for(chip, line, command, f"{')' if command.direction > 0 else '('}{line_number(command.pin)}", "c100")
 
     def jog(self, chip: M1486Chip, line: str | None, command: Jog) -> do.Send:
         """V is in full steps/s; a type for 24 MHz makes twice as many of them."""
-        refuse_busy(chip, command.machine)
+        refuse_busy(chip, command.controller)
         steps = abs(command.velocity) / (FULL_STEP * chip.variant.clock)
         velocity = number(chip, "V", steps, VELOCITY(velocity=command.velocity, unit=UNIT, number=steps))
         return typed_for(chip, line, command, velocity, "g+" if command.velocity > 0 else "g-", "r")
 
     def stop_axes(self, chip: M1486Chip, line: str | None, command: StopAxes) -> Halt:
-        return Halt(command.machine, command.axis)
+        return Halt(command.controller, command.axis)
 
     def control_program(self, chip: M1486Chip, line: str | None, command: ControlProgram) -> Halt:
         if command.action != "stop":
-            raise Refusal(PROGRAM_CAN_ONLY_BE_STOPPED(machine=command.machine, action=command.action))
-        return Halt(command.machine, program=command.action)
+            raise Refusal(PROGRAM_CAN_ONLY_BE_STOPPED(controller=command.controller, action=command.action))
+        return Halt(command.controller, program=command.action)
 
     def motion_ends(self, name: str, axis: int, line: str | None, seek: Seek | None) -> MotionEnds:
         """Whether what was typed has been executed, and no move was stopped before its end; a seek has come to its line."""
@@ -267,10 +268,10 @@ class M1486Kind(ControllerKind[M1486Spec, M1486Chip, M1486View]):
             raise Misuse(NO_COMMANDS(name=source.name))
         image_of(program, chip.variant)
         if to.line is None:
-            raise Refusal(CANNOT_BE_TYPED_TO(machine=to.machine))
+            raise Refusal(CANNOT_BE_TYPED_TO(controller=to.controller))
         if chip.is_shut_down:
-            raise Refusal(RECEIVES_NOTHING(machine=to.machine, words=MessageText(program_words(chip, chip.now))))
-        return Downloading(typed=tuple(memory.typed_program(chip, to.machine, to.line, program)))
+            raise Refusal(RECEIVES_NOTHING(controller=to.controller, words=MessageText(program_words(chip, chip.now))))
+        return Downloading(typed=tuple(memory.typed_program(chip, to.controller, to.line, program)))
 
 
 M1486 = M1486Kind()

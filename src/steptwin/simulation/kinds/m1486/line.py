@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
+from steptwin.controller import Nanos, Port
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.line import SerialChain
-from steptwin.machine import Nanos, Port
 from steptwin.simulation.faults import Faults
 from steptwin.simulation.faults import LineProtocol as FaultLine
 from steptwin.simulation.kinds.lines import SCRIPTS, Line, LineEndPoint, LineTraffic

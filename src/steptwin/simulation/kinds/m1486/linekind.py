@@ -36,7 +36,7 @@ class CharacterLines(LineKind[M1486Chip, ChipLine]):
         """As `LineKind.make`. Raises `Misuse` for addresses that are taken, and for strict timing."""
         if spec.timing == "strict":
             raise Misuse("timing = 'strict' is for lines of kind modbus: an M1486 has no time-out between characters")
-        return ChipLine(scheduler, spec.name, record, faults, [member.machine for member in members])
+        return ChipLine(scheduler, spec.name, record, faults, [member.controller for member in members])
 
     def words(self, line: ChipLine, prefix: str, sink: Callable[[FrameLine], None]) -> ChipLineWords:
         return ChipLineWords(line, prefix, sink)

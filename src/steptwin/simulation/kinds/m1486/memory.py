@@ -47,13 +47,13 @@ def is_in(chip: M1486Chip, file: StoredFile | None) -> bool:
     return file is not None and begin is not None and chip.memory.holds(begin, file)
 
 
-def typed_program(chip: M1486Chip, machine: str, line: str, program: ParsedProgram) -> Iterator[do.Step]:
+def typed_program(chip: M1486Chip, controller: str, line: str, program: ParsedProgram) -> Iterator[do.Step]:
     """An EEPROM takes its time for Reset and for each command."""
     commands = [str(command).lower() for command in program.all_commands]
     if commands[0] != "[":
         commands = ["[", *commands, "]"]
     yield from _line(chip, line, f"x{chip.address:X}\rk\r\\\r")
-    yield do.Until(f"not {machine}.moving")
+    yield do.Until(f"not {controller}.moving")
     yield do.Wait(chip.variant.erase_ns)
     for command in commands:
         yield from _line(chip, line, f"{command}\r")

@@ -6,6 +6,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Collection, Mapping, Sequence
 
 from steptwin.controlflow import ControlFlow
+from steptwin.controller import Nanos
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486Chip
@@ -18,7 +19,6 @@ from steptwin.m1486.structure import CommandStream, streams
 from steptwin.m1486.successors import flow_of
 from steptwin.m1486.syntax import ChipCommand, parse
 from steptwin.m1486.unit import MASK
-from steptwin.machine import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.kinds.m1486.memory import PLACE as TEXT
 from steptwin.simulation.kinds.m1486.statement_use import use_of

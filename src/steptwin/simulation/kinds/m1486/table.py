@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from steptwin.controller import Nanos
 from steptwin.m1486.lines import INTERFACES
 from steptwin.m1486.variants import VARIANTS
-from steptwin.machine import Nanos
 from steptwin.simulation.kinds.kind import ControllerSpec
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import permitting, text_value, time_value, whole, word

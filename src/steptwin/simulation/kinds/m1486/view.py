@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from steptwin.m1486.chip import M1486Chip
+from steptwin.simulation.kinds.controllerview import ControllerView
 from steptwin.simulation.kinds.kind import RunningWorld
-from steptwin.simulation.kinds.machineview import MachineView
 
 
-class M1486View(MachineView):
+class M1486View(ControllerView):
     """An M1486. Positions in minimum microsteps."""
 
     def __init__(self, world: RunningWorld, name: str, chip: M1486Chip) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 
+from steptwin.controller import Nanos
 from steptwin.m1486.characterlog import CharacterLog, LineSplitter
-from steptwin.machine import Nanos
 from steptwin.simulation.kinds.m1486.line import ChipLine
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.wire.frameline import FrameLine

@@ -6,8 +6,8 @@ A move runs at VMAX, so VMAX is the velocity of the jog for as long as that last
 
 from __future__ import annotations
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.errors import Misuse, Refusal
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.device import Mic488Device
@@ -27,14 +27,14 @@ OWN = frozenset({AxisStatus.POSITION, AxisStatus.REACHED, AxisStatus.CORRECTION}
 """Statuses of an axis during a jog; another status means that the axis was stopped or has another motion."""
 SAME = 1e-6
 """Velocities that differ by less, as a fraction, are the same: they go through a REAL."""
-UNKNOWN_AXIS = Message("simulation.mic488.unknown-axis", "{machine}: no axis {axis}: a MIC488 has 1 to {most}")
+UNKNOWN_AXIS = Message("simulation.mic488.unknown-axis", "{controller}: no axis {axis}: a MIC488 has 1 to {most}")
 IS_NOT_ENABLED = Message("simulation.mic488.is-not-enabled", "{name} is not enabled: switch its drive on first")
 HAS_A_POSITION_ERROR = Message("simulation.mic488.has-a-position-error", "{name} has a position error: stop it first")
 PROGRAM_IS_RUNNING = Message(
-    "simulation.mic488.program-is-running", "{machine} runs its program: pause or stop it before an axis is jogged"
+    "simulation.mic488.program-is-running", "{controller} runs its program: pause or stop it before an axis is jogged"
 )
 WAITS_FOR_TRIGGERS = Message(
-    "simulation.mic488.waits-for-triggers", "{machine} waits for triggers (AXIS_CTR_MODE), so an axis cannot be jogged"
+    "simulation.mic488.waits-for-triggers", "{controller} waits for triggers (AXIS_CTR_MODE), so an axis cannot be jogged"
 )
 WRONG_VELOCITY = Message(
     "simulation.mic488.wrong-velocity",
@@ -48,7 +48,7 @@ class Mic488DeadManJog:
 
     def __init__(self, device: Mic488Device, line: str | None, wanted: Jog) -> None:
         if not 1 <= wanted.axis <= AXES:
-            raise Misuse(UNKNOWN_AXIS(machine=wanted.machine, axis=wanted.axis, most=AXES))
+            raise Misuse(UNKNOWN_AXIS(controller=wanted.controller, axis=wanted.axis, most=AXES))
         self._device = device
         self._axis: Axis = device.axes[wanted.axis - 1]
         self._wanted = wanted
@@ -69,15 +69,15 @@ class Mic488DeadManJog:
 
     def _check(self) -> None:
         wanted, axis = self._wanted, self._axis
-        name = f"{wanted.machine} M{wanted.axis}"
+        name = f"{wanted.controller} M{wanted.axis}"
         if not axis.can_move:
             raise Refusal(IS_NOT_ENABLED(name=name))
         if axis.status is AxisStatus.ERROR:
             raise Refusal(HAS_A_POSITION_ERROR(name=name))
         if self._device.program.state is ProgramState.RUNNING:
-            raise Refusal(PROGRAM_IS_RUNNING(machine=wanted.machine))
+            raise Refusal(PROGRAM_IS_RUNNING(controller=wanted.controller))
         if self._device.trigger_mode:
-            raise Refusal(WAITS_FOR_TRIGGERS(machine=wanted.machine))
+            raise Refusal(WAITS_FOR_TRIGGERS(controller=wanted.controller))
         vmax = axis.vmax_p / axis.gear
         if not 0.0 < abs(wanted.velocity) <= vmax * (1.0 + SAME):
             unit = axis.config.unit_name
@@ -95,7 +95,7 @@ class Mic488DeadManJog:
         self._begun = now if self._begun is None else self._begun
         has_moved = axis.revision != self._revision
         if axis.status not in OWN and (has_moved or now - self._begun > BEGIN_NS):
-            self.over = f"{self._wanted.machine} M{axis.number}: {AXIS_STATUS_TEXTS[axis.status]}"
+            self.over = f"{self._wanted.controller} M{axis.number}: {AXIS_STATUS_TEXTS[axis.status]}"
             self._due = now
             return self.advance(now)
         self._due, self._before = now + STOP_NS, axis.revision
@@ -155,4 +155,4 @@ class Mic488DeadManJog:
         return (self._value("VMAX", self._vmax_p / self._axis.gear),)
 
     def _value(self, register: str, value: float) -> tuple[str, str, float]:
-        return self._wanted.machine, f"M{self._axis.number}_{register}", value
+        return self._wanted.controller, f"M{self._axis.number}_{register}", value

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.mic488.core import ControllerCore, check_pin
 from steptwin.mic488.device import Mic488Device, Serving
 from steptwin.mic488.encoder import Coupling
 from steptwin.simulation.faults.answers import NEVER_SENT
-from steptwin.simulation.faults.machine import AxisLoad, FaultyMachine
+from steptwin.simulation.faults.controller import AxisLoad, FaultyController
 from steptwin.simulation.faults.table import FaultKind, Need
 from steptwin.wire.pdu import exception_pdu
 
@@ -50,7 +50,7 @@ class Mic488Body:
     def show_master_error(self, shown: bool, now: Nanos) -> None:
         self._device.set_master_error(shown, now)
 
-    def watch(self, owner: FaultyMachine) -> None:
+    def watch(self, owner: FaultyController) -> None:
         device = self._device
         device.slave = _Watched(device.slave, self._unit, self._line, owner)
         device.store = _keeping(device, device.store, owner)
@@ -65,7 +65,7 @@ class Mic488Body:
 class _Watched:
     """In front of the slave."""
 
-    def __init__(self, slave: Serving, unit: int, line: str, owner: FaultyMachine) -> None:
+    def __init__(self, slave: Serving, unit: int, line: str, owner: FaultyController) -> None:
         self._slave = slave
         self._unit = unit
         self._line = line
@@ -80,7 +80,7 @@ class _Watched:
 
 
 def _keeping(
-    device: Mic488Device, store: Callable[[bytes], bytes | None] | None, owner: FaultyMachine
+    device: Mic488Device, store: Callable[[bytes], bytes | None] | None, owner: FaultyController
 ) -> Callable[[bytes], bytes | None]:
     def keep(memory: bytes) -> bytes:
         kept = owner.kept(device.memory, memory, device.now)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
 
+from steptwin.controller import ControllerEvent, Nanos
 from steptwin.datasheet import Datasheet, Pin
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse, Refusal
-from steptwin.machine import MachineEvent, Nanos
 from steptwin.messages import Message
 from steptwin.mic488 import datasheet, points
 from steptwin.mic488.axis import Axis
@@ -203,7 +203,7 @@ class Mic488Kind(ControllerKind[Mic488Spec, Mic488Device, Mic488View]):
             found.shafts[number - 1] = shaft
         return found
 
-    def watch_events(self, device: Mic488Device, call: Callable[[MachineEvent], None]) -> None:
+    def watch_events(self, device: Mic488Device, call: Callable[[ControllerEvent], None]) -> None:
         device.on_event = call
 
     def keeps_memory(self, device: Mic488Device) -> bool:
@@ -261,12 +261,12 @@ class Mic488Kind(ControllerKind[Mic488Spec, Mic488Device, Mic488View]):
         return _write(command, "VEL_ABS", command.velocity)
 
     def stop_axes(self, device: Mic488Device, line: str | None, command: StopAxes) -> Halt:
-        return Halt(command.machine, command.axis)
+        return Halt(command.controller, command.axis)
 
     def control_program(self, device: Mic488Device, line: str | None, command: ControlProgram) -> do.Write | Halt:
         if command.action != "start":
-            return Halt(command.machine, program=command.action)
-        return do.Write(((command.machine, "PROGRAM_CTRL", float(PROGRAM[command.action])),))
+            return Halt(command.controller, program=command.action)
+        return do.Write(((command.controller, "PROGRAM_CTRL", float(PROGRAM[command.action])),))
 
     def motion_ends(self, name: str, axis: int, line: str | None, seek: Seek | None) -> MotionEnds:
         """By the status, which is that of a motion as soon as the request that starts it has been answered."""
@@ -325,7 +325,7 @@ class Mic488Kind(ControllerKind[Mic488Spec, Mic488Device, Mic488View]):
 
 def _write(command: Enable | Move | Home | Jog, register: str, value: float) -> do.Write:
     """A register of the axis of a command, by the rest of its name."""
-    return do.Write(((command.machine, f"M{command.axis}_{register}", value),))
+    return do.Write(((command.controller, f"M{command.axis}_{register}", value),))
 
 
 def _check_position(axis: Axis, value: float) -> None:

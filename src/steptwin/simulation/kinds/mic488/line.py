@@ -7,7 +7,7 @@ from functools import partial
 from operator import itemgetter
 from typing import ClassVar
 
-from steptwin.machine import Nanos, Port
+from steptwin.controller import Nanos, Port
 from steptwin.mic488.device import Mic488Device, pause_observer
 from steptwin.mic488.vision import Com1Port, uses_vision
 from steptwin.simulation.faults import Faults

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.mic488.config import BAUDS
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.framelog import FrameLog
@@ -44,7 +44,7 @@ class ModbusLines(LineKind[Mic488Device, ModbusBus]):
         for member in members:
             if member.address in devices:
                 raise Misuse(f"unit {member.address} is both {names[member.address]!r} and {member.spec.name!r}")
-            devices[member.address] = member.machine
+            devices[member.address] = member.controller
             names[member.address] = member.spec.name
         if spec.baud is not None and spec.baud not in BAUDS:
             raise Misuse(f"baud = {spec.baud}: a MIC488 has {', '.join(map(str, BAUDS))} bit/s")

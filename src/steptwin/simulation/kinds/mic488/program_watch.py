@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from typing import NamedTuple
 
+from steptwin.controller import SECOND, Nanos, PinEdge
 from steptwin.diagnostics import visible
-from steptwin.machine import SECOND, Nanos, PinEdge
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program_banks import LoadedProgram

@@ -7,8 +7,8 @@ from collections.abc import Collection, Mapping, Sequence
 from functools import cached_property
 
 from steptwin.controlflow import ControlFlow
+from steptwin.controller import Nanos
 from steptwin.diagnostics import SourceText
-from steptwin.machine import Nanos
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program_banks import LoadedProgram
 from steptwin.mic488.program_registers import ACCESS

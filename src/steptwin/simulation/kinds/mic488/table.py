@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, TypeAlias
 
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos
 from steptwin.mic488.config import AXIS_KEYS, INPUT_KEYS, INPUTS, NO_INPUT, ConfigKey, ControllerConfig
 from steptwin.mic488.registers import AXES, FIRMWARES
 from steptwin.simulation.kinds.kind import ControllerSpec

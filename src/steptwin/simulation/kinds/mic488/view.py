@@ -9,12 +9,12 @@ from steptwin.messages import Message
 from steptwin.mic488.axis import Axis
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.status import AxisStatus, ProgramState
+from steptwin.simulation.kinds.controllerview import ControllerView
 from steptwin.simulation.kinds.kind import RunningWorld
-from steptwin.simulation.kinds.machineview import MachineView
 from steptwin.simulation.script import steps as do
 
 
-class Mic488View(MachineView):
+class Mic488View(ControllerView):
     """A MIC488. ``device`` is the controller itself: what is changed there directly is not part of a session."""
 
     def __init__(self, world: RunningWorld, name: str, device: Mic488Device) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 
-from steptwin.machine import Nanos
+from steptwin.controller import Nanos
 from steptwin.mic488.framelog import FrameLog
 from steptwin.simulation.kinds.mic488.line import ModbusBus
 from steptwin.simulation.scheduler.trace import TraceRecord

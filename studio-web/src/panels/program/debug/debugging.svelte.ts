@@ -6,7 +6,7 @@ import type { Studio } from "../../../lib/state/studio.svelte";
 /** As the studio gives it; all viewers have the same ones. */
 export interface Breakpoint {
   number: number;
-  machine: string | null;
+  controller: string | null;
   program: string | null;
   /** Of the statement. */
   line: number | null;
@@ -21,7 +21,7 @@ export interface Breakpoint {
 
 /** What a breakpoint is given. */
 export type Wanted = Partial<
-  Pick<Breakpoint, "machine" | "program" | "line" | "label" | "value" | "condition" | "hits" | "log">
+  Pick<Breakpoint, "controller" | "program" | "line" | "label" | "value" | "condition" | "hits" | "log">
 >;
 
 export interface Frame {
@@ -40,7 +40,7 @@ export interface Watched {
 
 export type Stopped = Pick<
   Extract<SubjectEvent, { kind: "stopped" }>,
-  "time_ns" | "machine" | "reason" | "what" | "breakpoints" | "program" | "line" | "past"
+  "time_ns" | "controller" | "reason" | "what" | "breakpoints" | "program" | "line" | "past"
 >;
 type Logged = Extract<SubjectEvent, { kind: "log" }>;
 export type Way = "in" | "over" | "out" | "back" | "continue" | "run_back";
@@ -78,7 +78,7 @@ export class Debugging {
   watches = $state.raw<readonly Watched[]>([]);
   logged = $state.raw<readonly Logged[]>([]);
   /** The controller whose stack and values are shown. */
-  machine = $state("");
+  controller = $state("");
 
   constructor(private readonly studio: Studio) {}
 
@@ -140,23 +140,23 @@ export class Debugging {
   }
 
   private async look(): Promise<void> {
-    const { machine } = this;
+    const { controller } = this;
     const stands = this.stop !== null || (this.isUsed && !this.studio.pace.running);
-    this.frames = stands && machine ? await this.ask("stack", machine) : [];
+    this.frames = stands && controller ? await this.ask("stack", controller) : [];
     const expressions = this.watches.map(({ expression }) => expression);
-    const found = await Promise.all(expressions.map((expression) => this.evaluated(machine, expression)));
-    if (machine === this.machine && expressions.length === this.watches.length) this.watches = found;
+    const found = await Promise.all(expressions.map((expression) => this.evaluated(controller, expression)));
+    if (controller === this.controller && expressions.length === this.watches.length) this.watches = found;
   }
 
-  private ask(name: "stack", machine: string): Promise<readonly Frame[]> {
-    return this.studio.ask(name, { machine }).then(
+  private ask(name: "stack", controller: string): Promise<readonly Frame[]> {
+    return this.studio.ask(name, { controller }).then(
       (frames) => frames as readonly Frame[],
       () => [],
     );
   }
 
-  private evaluated(machine: string, expression: string): Promise<Watched> {
-    return this.studio.ask("evaluate", { machine, expression }).then(
+  private evaluated(controller: string, expression: string): Promise<Watched> {
+    return this.studio.ask("evaluate", { controller, expression }).then(
       (found) => ({ expression, value: (found as { value: string }).value, problem: null }),
       (error: unknown) => ({ expression, value: null, problem: saidOf(error) }),
     );
@@ -187,8 +187,8 @@ export class Debugging {
     await this.refresh();
   }
 
-  at(machine: string, program: string, line: number): Breakpoint | undefined {
-    return this.breakpoints.find((one) => one.machine === machine && one.program === program && one.line === line);
+  at(controller: string, program: string, line: number): Breakpoint | undefined {
+    return this.breakpoints.find((one) => one.controller === controller && one.program === program && one.line === line);
   }
 
   async stopOn(event: Event, isOn: boolean): Promise<void> {
@@ -198,15 +198,15 @@ export class Debugging {
   }
 
   async go(way: Way): Promise<void> {
-    const { machine } = this;
+    const { controller } = this;
     if (way === "continue") await this.studio.act("run", { way: "forwards" });
     else if (way === "run_back") await this.studio.act("run", { way: "backwards" });
-    else await this.studio.act("step_program", { machine, way });
+    else await this.studio.act("step_program", { controller, way });
     await this.refresh();
   }
 
   async assign(name: string, expression: string): Promise<boolean> {
-    const isDone = await this.studio.act("set_value", { machine: this.machine, name, expression });
+    const isDone = await this.studio.act("set_value", { controller: this.controller, name, expression });
     await this.refresh();
     return isDone;
   }

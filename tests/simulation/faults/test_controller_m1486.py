@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.encoding import encode
 from steptwin.m1486.lines import DUAL_DAC
 from steptwin.m1486.syntax import parse as parse_m1486
 from steptwin.m1486.variants import variant
-from steptwin.machine import MILLISECOND, SECOND
 from steptwin.simulation.faults import Faults, read, rig
 from steptwin.simulation.kinds.m1486.faults import M1486Body
 from steptwin.simulation.scheduler.scheduler import Scheduler
@@ -81,8 +81,8 @@ def test_stuck_and_bouncing_pins_of_a_chip_by_either_name() -> None:
     one, scheduler = chip("stuck pin=jog value=0 from_s=1", "bounce pin=b3 bounces=1 for_ms=1")
     scheduler.advance(SECOND)
     assert one.pins()["JOG"] == 0
-    scheduler.machines["1"].set_pin("JOG", 1, SECOND)
-    scheduler.machines["1"].set_pin("B3", 0, SECOND)
+    scheduler.controllers["1"].set_pin("JOG", 1, SECOND)
+    scheduler.controllers["1"].set_pin("B3", 0, SECOND)
     scheduler.settle()
     assert (one.pins()["JOG"], one.pins()["B3"]) == (0, 0)
     levels = set()

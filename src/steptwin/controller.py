@@ -1,6 +1,6 @@
 """The contracts of a pure machine with the shell that gives it time and bytes; times, pins and events.
 
-A machine never reads a clock, a file or a socket. Time is an argument, the next deadline a return value.
+A controller never reads a clock, a file or a socket. Time is an argument, the next deadline a return value.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Fact: TypeAlias = tuple[str, Any]
 
 
 class PinEdge(NamedTuple):
-    """A pin of a machine took a new value."""
+    """A pin of a controller took a new value."""
 
     time: Nanos
     pin: str
@@ -29,7 +29,7 @@ class PinEdge(NamedTuple):
     """0.0 or 1.0 on digital pins; volts on analog pins."""
 
 
-class MachineEvent(Protocol):
+class ControllerEvent(Protocol):
     """Something that happened in a controller, for traces and for people. Controllers add fields of their own."""
 
     @property
@@ -47,7 +47,7 @@ class MachineEvent(Protocol):
         ...
 
 
-class Machine(Protocol):
+class Controller(Protocol):
     """A pure machine in virtual time.
 
     ``advance(now)`` runs every internal event with time <= now, in order; an input at ``now`` is applied after them.
@@ -60,7 +60,10 @@ class Machine(Protocol):
 
 
 class Port(Protocol):
-    """The serial or network face of machines, for one link, connection or program. Machines are at ``now`` in every call."""
+    """The serial or network face of controllers, for one link, connection or program.
+
+    Controllers are at ``now`` in every call.
+    """
 
     @property
     def broken(self) -> str | None:

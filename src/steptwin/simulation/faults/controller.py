@@ -1,12 +1,12 @@
-"""Faults of physics: inputs, shafts, supply and memory of a machine; and requests that it refuses."""
+"""Faults of physics: inputs, shafts, supply and memory of a controller; and requests that it refuses."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple, Protocol
 
+from steptwin.controller import Nanos, PinEdge
 from steptwin.errors import Misuse
-from steptwin.machine import Nanos, PinEdge
 from steptwin.messages import Message, text_of
 from steptwin.motioncontroller import Drive, MotionController
 from steptwin.simulation.faults.active import ActiveFault, Faults, HeldLevel
@@ -36,7 +36,7 @@ class AxisLoad(Protocol):
 
 
 class Body(Protocol):
-    """The parts of a machine that can fail, besides its pins."""
+    """The parts of a controller that can fail, besides its pins."""
 
     shafts: list[AxisLoad]
     """By axis. Mechanics replace the loads of their axes."""
@@ -49,8 +49,8 @@ class Body(Protocol):
         """Set or clear the error that a slave of its own Modbus master does not answer."""
         ...
 
-    def watch(self, owner: FaultyMachine) -> None:
-        """Call ``owner`` before requests are served (`FaultyMachine.refusal`) and memory is saved (`FaultyMachine.kept`)."""
+    def watch(self, owner: FaultyController) -> None:
+        """Call ``owner`` before requests are served (`FaultyController.refusal`) and memory is saved (`.kept`)."""
         ...
 
     def pin_name(self, pin: str) -> str:
@@ -63,18 +63,18 @@ class Body(Protocol):
 
 
 class FaultySnapshot(NamedTuple):
-    """State of the faults of a machine, and of the machine."""
+    """State of the faults of a controller, and of the controller."""
 
     faults: Plain
-    machine: Any
+    controller: Any
 
 
-MACHINE_LACKS_WHAT_FAILS = Message("simulation.machine-lacks-what-fails", "fault {name}: {machine!r} {problem}")
+CONTROLLER_LACKS_WHAT_FAILS = Message("simulation.controller-lacks-what-fails", "fault {name}: {controller!r} {problem}")
 UNKNOWN_AXIS_OF_A_FAULT = Message("simulation.unknown-axis-of-a-fault", "fault {name}: axis = {axis}: permitted are 1 to {most}")
-PIN_WITH_ITS_MACHINE = Message(
-    "simulation.pin-with-its-machine", "fault {name}: pin = {pin!r}: name the machine as machine=NAME, and the pin alone"
+PIN_WITH_ITS_CONTROLLER = Message(
+    "simulation.pin-with-its-controller", "fault {name}: pin = {pin!r}: name the controller as machine=NAME, and the pin alone"
 )
-UNKNOWN_PIN_OF_A_FAULT = Message("simulation.unknown-pin-of-a-fault", "fault {name}: pin = {pin!r}: {machine!r} has {names}")
+UNKNOWN_PIN_OF_A_FAULT = Message("simulation.unknown-pin-of-a-fault", "fault {name}: pin = {pin!r}: {controller!r} has {names}")
 PIN_IS_STUCK = Message("simulation.pin-is-stuck", "{pin} is stuck at {level:g}")
 PIN_IS_FREE = Message("simulation.pin-is-free", "{pin} is free")
 SLAVE_IS_MUTE = Message("simulation.slave-is-mute", "a slave of its Modbus master does not answer")
@@ -82,8 +82,8 @@ SLAVE_ANSWERS_AGAIN = Message("simulation.slave-answers-again", "the slave of it
 REFUSED_REQUEST = Message("simulation.refused-request", "{what}: {bytes}")
 
 
-class FaultyMachine(Stateful):
-    """Wraps a machine in its scheduler and applies faults to its inputs, shafts, supply and memory.
+class FaultyController(Stateful):
+    """Wraps a controller in its scheduler and applies faults to its inputs, shafts, supply and memory.
 
     Inputs are set through it, so that a stuck switch remains stuck.
     """
@@ -109,7 +109,7 @@ class FaultyMachine(Stateful):
         self._stuck: dict[str, str] = {}
         """The fault that holds each input."""
         self._mute: list[str] = []
-        """Faults because of which a slave of the machine does not answer."""
+        """Faults because of which a slave of the controller does not answer."""
         self._released: list[tuple[Nanos, str, int]] = []
         """The moment at which each fault releases its axis."""
         self._off_until: Nanos | None = None
@@ -120,7 +120,7 @@ class FaultyMachine(Stateful):
         self._fresh = self.copy_state()
         body.watch(self)
 
-    # ------------------------------------------------------------------ the machine's own
+    # ------------------------------------------------------------------ the controller's own
 
     @property
     def axes(self) -> Sequence[Drive]:
@@ -133,7 +133,7 @@ class FaultyMachine(Stateful):
         return self.inner.take_edges()
 
     def pins(self) -> Mapping[str, float]:
-        """Levels at the machine, with the faults."""
+        """Levels at the controller, with the faults."""
         return self.inner.pins()
 
     def pin(self, name: str) -> float:
@@ -151,11 +151,11 @@ class FaultyMachine(Stateful):
         return FaultySnapshot(self.copy_state(), self.inner.snapshot())
 
     def restore(self, snapshot: Any) -> None:
-        """A snapshot taken before the machine could have faults is one without faults."""
+        """A snapshot taken before the controller could have faults is one without faults."""
         if not isinstance(snapshot, FaultySnapshot):
             snapshot = FaultySnapshot(self._fresh, snapshot)
         self.set_state(snapshot.faults)
-        self.inner.restore(snapshot.machine)
+        self.inner.restore(snapshot.controller)
 
     # ------------------------------------------------------------------ time
 
@@ -250,10 +250,10 @@ class FaultyMachine(Stateful):
     # ------------------------------------------------------------------ setting and removing
 
     def check(self, fault: Fault) -> None:
-        """`Misuse` unless the machine has the axis or input."""
+        """`Misuse` unless the controller has the axis or input."""
         lacks = self.body.lacks(fault.kind)
         if lacks is not None:
-            raise Misuse(MACHINE_LACKS_WHAT_FAILS(name=fault.kind.name, machine=self.name, problem=text_of(lacks)))
+            raise Misuse(CONTROLLER_LACKS_WHAT_FAILS(name=fault.kind.name, controller=self.name, problem=text_of(lacks)))
         axis = fault.whole("axis")
         if axis is not None and axis > len(self.body.shafts):
             raise Misuse(UNKNOWN_AXIS_OF_A_FAULT(name=fault.kind.name, axis=axis, most=len(self.body.shafts)))
@@ -264,14 +264,14 @@ class FaultyMachine(Stateful):
         pin = self.pin_of(fault)
         levels = self.inner.pins()
         if "." in pin:
-            raise Misuse(PIN_WITH_ITS_MACHINE(name=fault.kind.name, pin=pin))
+            raise Misuse(PIN_WITH_ITS_CONTROLLER(name=fault.kind.name, pin=pin))
         if pin not in levels:
-            raise Misuse(UNKNOWN_PIN_OF_A_FAULT(name=fault.kind.name, pin=pin, machine=self.name, names=list(levels)))
+            raise Misuse(UNKNOWN_PIN_OF_A_FAULT(name=fault.kind.name, pin=pin, controller=self.name, names=list(levels)))
         level = fault.get("value")
         self.body.check_pin(pin, level if isinstance(level, float) else levels[pin])
 
     def begin(self, active: ActiveFault) -> None:
-        """A fault of this machine was set."""
+        """A fault of this controller was set."""
         if active.fault.kind.parameter("pin") is not None:
             pin = self.pin_of(active.fault)
             self._outer.setdefault(pin, self.inner.pin(pin))
@@ -280,7 +280,7 @@ class FaultyMachine(Stateful):
         self.changed()
 
     def end(self, active: ActiveFault, now: Nanos) -> None:
-        """Remove a fault of this machine and release what it holds."""
+        """Remove a fault of this controller and release what it holds."""
 
         if active.fault.kind.parameter("pin") is not None:
             pin = self.pin_of(active.fault)
@@ -403,15 +403,15 @@ class FaultyMachine(Stateful):
         return True
 
 
-def rig(scheduler: Scheduler, name: str, faults: Faults, body: Body) -> FaultyMachine:
-    """Apply faults of physics and protocol to the machine ``name`` of a scheduler."""
+def rig(scheduler: Scheduler, name: str, faults: Faults, body: Body) -> FaultyController:
+    """Apply faults of physics and protocol to the controller ``name`` of a scheduler."""
 
     def on_edge(pin: str, now: Nanos, level: float) -> None:
         scheduler.mark_recorded(PinName(name, pin), now, level)
 
-    machine = scheduler.machines[name]
-    if isinstance(machine, FaultyMachine):
-        return machine
-    failing = faults.machines[name] = FaultyMachine(machine, name, faults, body, on_edge)
+    controller = scheduler.controllers[name]
+    if isinstance(controller, FaultyController):
+        return controller
+    failing = faults.controllers[name] = FaultyController(controller, name, faults, body, on_edge)
     scheduler.replace(name, failing)
     return failing

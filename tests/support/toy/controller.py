@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
+from steptwin.controller import Nanos, PinEdge
 from steptwin.errors import Misuse, TimeReversal
-from steptwin.machine import Nanos, PinEdge
 from steptwin.motion import MotionState, Profile, at_rest, plan_position, plan_stop
 from steptwin.motioncontroller import Drive
 from steptwin.state import Plain, Stateful

@@ -9,13 +9,13 @@ import pytest
 from fault_rig import ANSWER, READ, FaultRig, rtu
 from toy import Bare, ToyBody
 
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.machine import MILLISECOND, SECOND, Nanos
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.status import AxisStatus
-from steptwin.simulation.faults import Faults, FaultyMachine, read, rig
+from steptwin.simulation.faults import Faults, FaultyController, read, rig
 from steptwin.simulation.kinds.mic488.faults import Mic488Body
 from steptwin.simulation.logic.contacts import PositionSwitch, place
 from steptwin.simulation.scheduler.scheduler import Scheduler
@@ -174,7 +174,7 @@ def test_master_error_stays_when_the_controller_is_switched_off_and_on() -> None
 def test_what_shows_no_master_error_says_so() -> None:
     scheduler, faults = Scheduler(), Faults()
     scheduler.add("old", Mic488Device(ControllerConfig(), "1.40"))
-    rig(scheduler, "old", faults, Mic488Body(scheduler.machines["old"], 1))  # type: ignore[arg-type]
+    rig(scheduler, "old", faults, Mic488Body(scheduler.controllers["old"], 1))  # type: ignore[arg-type]
     with pytest.raises(Misuse, match=r"fault master-error: 'old' has firmware 1\.40, which has no M_STATUS: 1\.70 has"):
         faults.add(read("master-error"))
 
@@ -378,7 +378,7 @@ def test_worn_bytes_keep_what_they_have() -> None:
         ("stuck pin=IN1 machine=7", "fault stuck: machine = '7': there are 1"),
     ],
 )
-def test_what_a_machine_does_not_have_cannot_fail(fault: str, text: str) -> None:
+def test_what_a_controller_does_not_have_cannot_fail(fault: str, text: str) -> None:
     rig = FaultRig()
     with pytest.raises(Misuse) as refused:
         rig.add(fault)
@@ -387,9 +387,9 @@ def test_what_a_machine_does_not_have_cannot_fail(fault: str, text: str) -> None
     assert rig.ask(READ) == ANSWER
 
 
-def test_where_there_are_several_machines_one_is_to_be_chosen() -> None:
+def test_where_there_are_several_controllers_one_is_to_be_chosen() -> None:
     rig = FaultRig(units=(1, 2))
-    with pytest.raises(Misuse, match="fault slip: choose a machine: there are 1, 2"):
+    with pytest.raises(Misuse, match="fault slip: choose a controller: there are 1, 2"):
         rig.add("slip")
     rig.add("slip machine=2 counts=5")
     rig.wait(0.1)
@@ -433,27 +433,27 @@ def test_state_of_physics_taken_out_and_put_back_changes_nothing() -> None:
     assert go_on() == first
 
 
-def test_a_machine_with_faults_is_switched_off_and_on() -> None:
+def test_a_controller_with_faults_is_switched_off_and_on() -> None:
     """EN and the outputs fall with the power (MIC-27); a pulse that nobody gives any more turns nothing."""
     rig = moving("stall at_s=100")
-    machine = rig.scheduler.machines["1"]
+    controller = rig.scheduler.controllers["1"]
     rig.wait(1.0)
-    assert machine.pins()["M1_EN"] == 1.0
-    machine.power_off(rig.now)
-    assert machine.pins()["M1_EN"] == 0.0
+    assert controller.pins()["M1_EN"] == 1.0
+    controller.power_off(rig.now)
+    assert controller.pins()["M1_EN"] == 0.0
     before = counts(rig)
     rig.wait(1.0)
     assert counts(rig)[0] == before[0]
     assert rig.ask(ENABLE, ms=0) != ENABLE
-    machine.power_cycle(rig.now)
+    controller.power_cycle(rig.now)
     rig.wait(0.1)
     assert rig.device.axes[0].status is AxisStatus.OFF
     rig.ask(ENABLE, ms=0)
-    assert machine.pins()["M1_EN"] == 1.0
+    assert controller.pins()["M1_EN"] == 1.0
 
 
-def test_a_pin_of_a_fault_is_named_without_its_machine() -> None:
-    with pytest.raises(Misuse, match=r"fault stuck: pin = '1\.IN4': name the machine as machine=NAME, and the pin alone"):
+def test_a_pin_of_a_fault_is_named_without_its_controller() -> None:
+    with pytest.raises(Misuse, match=r"fault stuck: pin = '1\.IN4': name the controller as machine=NAME, and the pin alone"):
         FaultRig("stuck pin=1.IN4 value=1")
 
 
@@ -496,35 +496,35 @@ class Heard(Bare):
         self.asked.append(("on", now // MILLISECOND))
 
 
-def faulty(fault: str) -> tuple[Heard, FaultyMachine]:
+def faulty(fault: str) -> tuple[Heard, FaultyController]:
     scheduler, faults, inner = Scheduler(), Faults(0), Heard()
     scheduler.add("a", inner)
-    machine = rig(scheduler, "a", faults, ToyBody())
+    controller = rig(scheduler, "a", faults, ToyBody())
     faults.add(read(fault), 0)
     inner.asked.clear()
-    return inner, machine
+    return inner, controller
 
 
-def test_a_machine_comes_to_the_moment_of_a_fault_before_the_fault_acts() -> None:
-    inner, machine = faulty("supply-drop at_s=1 for_s=0.5")
-    machine.advance(2 * SECOND)
+def test_a_controller_comes_to_the_moment_of_a_fault_before_the_fault_acts() -> None:
+    inner, controller = faulty("supply-drop at_s=1 for_s=0.5")
+    controller.advance(2 * SECOND)
     assert inner.asked == [("advance", 1000), ("off", 1000), ("advance", 1500), ("on", 1500), ("advance", 2000)]
 
 
-def test_a_machine_looks_ahead_no_further_than_to_a_fault() -> None:
-    inner, machine = faulty("supply-drop at_s=1 for_s=0.5")
-    machine.advance(SECOND // 2)
+def test_a_controller_looks_ahead_no_further_than_to_a_fault() -> None:
+    inner, controller = faulty("supply-drop at_s=1 for_s=0.5")
+    controller.advance(SECOND // 2)
     for until in (SECOND - 1, SECOND, 2 * SECOND):
-        assert machine.advance_to_change(until) < SECOND
+        assert controller.advance_to_change(until) < SECOND
     assert all(moment < SECOND for what, moment in inner.asked if what == "look")
-    machine.advance(SECOND - 1)
-    assert machine.advance_to_change(2 * SECOND) == SECOND
+    controller.advance(SECOND - 1)
+    assert controller.advance_to_change(2 * SECOND) == SECOND
 
 
-def test_its_scheduler_is_told_when_the_supply_of_a_machine_fails() -> None:
-    _, machine = faulty("supply-drop at_s=1 for_s=0.5")
+def test_its_scheduler_is_told_when_the_supply_of_a_controller_fails() -> None:
+    _, controller = faulty("supply-drop at_s=1 for_s=0.5")
     told: list[bool] = []
-    machine.changed = lambda: told.append(True)
+    controller.changed = lambda: told.append(True)
     for on in (False, True):
-        machine.supply(on, 0)
+        controller.supply(on, 0)
     assert told == [True, True]

@@ -9,7 +9,7 @@ from steptwin.simulation.kinds.kind import RunningWorld
 from steptwin.simulation.script import steps as do
 
 
-class MachineView:
+class ControllerView:
     """The common part of all controllers' views."""
 
     def __init__(self, world: RunningWorld, name: str) -> None:
@@ -23,13 +23,13 @@ class MachineView:
     def state(self) -> ControllerState:
         """Status, program, axes, pins and details."""
         self._touch()
-        return self._world.kind(self.name).state(self._world.machines[self.name], self._world.now)
+        return self._world.kind(self.name).state(self._world.controllers[self.name], self._world.now)
 
     @property
     def pins(self) -> Mapping[str, float]:
         """The level of every pin: 0, 1, volts."""
         self._touch()
-        return self._world.kind(self.name).state.pins(self._world.machines[self.name], self._world.now)
+        return self._world.kind(self.name).state.pins(self._world.controllers[self.name], self._world.now)
 
     def set_pin(self, pin: str, value: float) -> None:
         """Set an input from outside: 0, 1, volts. Raises `Misuse`."""
