@@ -5,11 +5,11 @@ Computed in whole numbers and fractions, so that a place at which the follower i
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from itertools import pairwise
-from math import lcm
+from math import floor, lcm
 from typing import NamedTuple
 
 MOST_TURNS = 100
@@ -54,6 +54,20 @@ class Cam:
         i = bisect_right(self._x, x)
         x0, x1, y0, y1 = self._x[i - 1], self._x[i], self._y[i - 1], self._y[i]
         return _Ratio(y0 * (x1 - x0) + (y1 - y0) * (x - x0), (x1 - x0) * self._lifts)
+
+    def span(self, place: float, way: int) -> tuple[float, float, float, float]:
+        """The least and greatest place of a stretch, and ``rise`` and ``shift``: in it the lift is ``rise`` · place + ``shift``.
+
+        ``place``, which need not be whole, is in it; at a corner, the stretch in ``way`` from there.
+        """
+        turns = floor(place / self.turn)
+        x = (place - turns * float(self.turn)) * self._places
+        i = bisect_right(self._x, x) if way > 0 else bisect_left(self._x, x)
+        i = min(max(i, 1), len(self._x) - 1)
+        x0, x1, y0, y1 = self._x[i - 1], self._x[i], self._y[i - 1], self._y[i]
+        low, high = (float(x / self._places + turns * self.turn) for x in (x0, x1))
+        rise = (y1 - y0) * self._places / ((x1 - x0) * self._lifts)
+        return low, high, rise, y0 / self._lifts - rise * low
 
     def _spans(self, level: Fraction, direction: int) -> Iterator[tuple[_Ratio, _Ratio]]:
         """Where in a revolution the lift is at the level, or beyond it in the direction."""

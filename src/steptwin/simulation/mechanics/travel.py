@@ -41,13 +41,13 @@ class Travel(Stateful):
         self._begin = now
         self._direction = direction
 
-    def _speed(self, direction: int) -> int:
+    def speed(self, direction: int) -> int:
         """Places per nanosecond."""
         return self._back if direction > 0 else self._forth
 
     def place(self, now: Nanos) -> int:
         """As `MovingPart.place`."""
-        moved = self._direction * self._speed(self._direction) * (now - self._begin)
+        moved = self._direction * self.speed(self._direction) * (now - self._begin)
         return min(max(self._place + moved, 0), self.full)
 
     def version(self) -> object:
@@ -59,7 +59,7 @@ class Travel(Stateful):
         way = (position - self._place) * direction
         if direction != self._direction or (position - self.place(after)) * direction <= 0 or not 0 <= position <= self.full:
             return None
-        return self._begin - (-way // self._speed(direction))
+        return self._begin - (-way // self.speed(direction))
 
     def turns(self, now: Nanos) -> Iterator[Nanos]:
         """The moments, ns, at which it has left the end where it stands and at which it arrives at the other end."""

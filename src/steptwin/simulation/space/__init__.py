@@ -1,0 +1,1 @@
+"""Frames, bodies and their contacts in space, exact in whole nanometres (ADR 30)."""

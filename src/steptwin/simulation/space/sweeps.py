@@ -1,0 +1,105 @@
+"""Where bodies may come before their plans change: what cannot meet by then is not searched for contacts."""
+
+from __future__ import annotations
+
+from bisect import bisect_left, insort
+from typing import NamedTuple, TypeAlias
+
+from steptwin.controller import Nanos
+from steptwin.motion.trig import cosine, length, sine
+from steptwin.simulation.space.bodies import Body, Box
+from steptwin.simulation.space.frames import AXES, Joint
+from steptwin.simulation.space.pieces import span
+
+ROUNDING_NM = 1.0
+
+Bounds: TypeAlias = tuple[float, float, float]
+"""nm by x, y and z of the floor; infinite for a motion that does not end."""
+
+
+class Sweep(NamedTuple):
+    """All that a body may occupy."""
+
+    low: Bounds
+    high: Bounds
+
+
+def sweep(body: Body, now: Nanos) -> Sweep:
+    """What a body may occupy from a moment on, as everything below it moves now."""
+    shape = body.shape
+    half = shape.half if isinstance(shape, Box) else (shape.radius, shape.radius, shape.half)
+    low = [float(c - h) for c, h in zip(body.centre, half, strict=True)]
+    high = [float(c + h) for c, h in zip(body.centre, half, strict=True)]
+    for frame in body.frame.line():
+        if frame.joint is not None:
+            _carry(frame.joint, low, high, now)
+        for axis, shift in enumerate(frame.at):
+            low[axis] += shift
+            high[axis] += shift
+    (a, b, c), (d, e, f) = low, high
+    return Sweep((a - ROUNDING_NM, b - ROUNDING_NM, c - ROUNDING_NM), (d + ROUNDING_NM, e + ROUNDING_NM, f + ROUNDING_NM))
+
+
+def _carry(joint: Joint, low: list[float], high: list[float], now: Nanos) -> None:
+    axis, sign = joint.along
+    least, most = (sign * end for end in span(joint.motion.pieces(now))[::sign])
+    if not joint.turns:
+        low[axis] += least
+        high[axis] += most
+        return
+    u, v = (axis + 1) % 3, (axis + 2) % 3
+    corners = [(x, y) for x in (low[u], high[u]) for y in (low[v], high[v])]
+    if least == most:
+        c, s = cosine(least), sine(least)
+        corners = [(c * x - s * y, s * x + c * y) for x, y in corners]
+    else:
+        far = max(length(x, y) for x, y in corners)
+        corners = [(-far, -far), (far, far)]
+    low[u], high[u] = min(x for x, _ in corners), max(x for x, _ in corners)
+    low[v], high[v] = min(y for _, y in corners), max(y for _, y in corners)
+
+
+class Sweeps:
+    """The sweeps of bodies by name, each axis in order."""
+
+    __slots__ = ("_by_name", "_highs", "_lows")
+
+    def __init__(self) -> None:
+        self._by_name: dict[str, Sweep] = {}
+        self._lows: tuple[list[tuple[float, str]], ...] = ([], [], [])
+        self._highs: tuple[list[tuple[float, str]], ...] = ([], [], [])
+
+    def put(self, name: str, its: Sweep) -> None:
+        """In place of an earlier one of the same name."""
+        if name in self._by_name:
+            self.remove(name)
+        self._by_name[name] = its
+        for ends, values in ((self._lows, its.low), (self._highs, its.high)):
+            for ordered, value in zip(ends, values, strict=True):
+                insort(ordered, (value, name))
+
+    def remove(self, name: str) -> None:
+        its = self._by_name.pop(name)
+        for ends, values in ((self._lows, its.low), (self._highs, its.high)):
+            for ordered, value in zip(ends, values, strict=True):
+                del ordered[bisect_left(ordered, (value, name))]
+
+    def near(self, name: str) -> list[str]:
+        """The others that it may meet, in order: whose sweep has a part in common with its own."""
+        its = self._by_name[name]
+        counts = [
+            count
+            for axis in range(len(AXES))
+            for count in (
+                (bisect_left(self._lows[axis], (its.high[axis], "")), axis, True),
+                (len(self._highs[axis]) - bisect_left(self._highs[axis], (its.low[axis], "")), axis, False),
+            )
+        ]
+        count, axis, is_low = min(counts)
+        ordered = self._lows[axis][:count] if is_low else self._highs[axis][len(self._highs[axis]) - count :]
+        return sorted(other for _, other in ordered if other != name and _meet(its, self._by_name[other]))
+
+
+def _meet(one: Sweep, other: Sweep) -> bool:
+    ends = zip(one.low, one.high, other.low, other.high, strict=True)
+    return all(low < its_high and its_low < high for low, high, its_low, its_high in ends)

@@ -1,0 +1,138 @@
+"""Moments of contact that are calculated by hand, and what a search costs."""
+
+from __future__ import annotations
+
+from math import inf
+
+import pytest
+from space_scenes import bodies_of, motion_of, random_scene
+
+from steptwin.controller import SECOND, Nanos
+from steptwin.motion.profile import Profile, cruise, ramp
+from steptwin.simulation.space import contacts
+from steptwin.simulation.space.bodies import Body, Box, Cylinder
+from steptwin.simulation.space.contacts import NEVER, Look, Pair
+from steptwin.simulation.space.frames import FLOOR, Direction, Frame, Joint
+
+MM = 10**6
+CUBE = Box((10 * MM, 10 * MM, 10 * MM))
+
+
+def at_speed(nm_s: float, seconds: float = inf) -> Profile:
+    return Profile(0, 0, (cruise(0.0, seconds, 0.0, nm_s),), 0.0 if seconds == inf else nm_s * seconds)
+
+
+def axis(plan: Profile, name: str = "x", at: tuple[int, int, int] = (0, 0, 0), on: Frame = FLOOR, along: int = 0) -> Frame:
+    return Frame(name, on, at, Joint(motion_of(plan), Direction(along, 1)))
+
+
+def table(turns_s: float) -> Frame:
+    return Frame("table", FLOOR, (0, 0, 0), Joint(motion_of(at_speed(4.0 * turns_s)), Direction(2, 1), turns=True))
+
+
+@pytest.fixture
+def looks(monkeypatch: pytest.MonkeyPatch) -> list[Nanos]:
+    """The moments at which a search has looked."""
+    found: list[Nanos] = []
+    look = contacts._Stretch.look
+
+    def count(self: contacts._Stretch, now: Nanos) -> object:
+        found.append(now)
+        return look(self, now)
+
+    monkeypatch.setattr(contacts._Stretch, "look", count)
+    return found
+
+
+def test_a_cube_enters_another_and_leaves_it() -> None:
+    """At 10 mm/s it needs 0.8 s for the gap of 8 mm, and 150 ns for half of the next nm; then it has to go on for 40 mm."""
+    pair = Pair(Body("cube", axis(at_speed(10e6, 6.0)), CUBE), Body("wall", FLOOR, CUBE, (28 * MM, 5 * MM, 0)))
+    assert pair.next_change(0) == Look(800_000_051, changes=True)
+    assert [pair.overlap(800_000_050 + more) for more in (0, 1)] == [False, True]
+    assert pair.next_change(800_000_051) == Look(4_799_999_950, changes=True)
+    assert pair.next_change(4_799_999_950) == NEVER
+
+
+def test_a_ramp_reaches_a_wall_at_the_root_of_its_way() -> None:
+    """2 · 8 000 000.5 nm / (1 m/s²) = 16.000001 · 10⁻³ s²: after 0.126 491 110 s."""
+    plan = Profile(0, 0, (ramp(0.0, 0.0, 0.0, 1e9, 1e9),), 5e8)
+    pair = Pair(Body("cube", axis(plan), CUBE), Body("wall", FLOOR, CUBE, (28 * MM, 0, 0)))
+    found = pair.next_change(0).at
+    assert found is not None
+    assert 0.5e9 * (found / SECOND) ** 2 > 8_000_000.5 >= 0.5e9 * ((found - 1) / SECOND) ** 2
+
+
+def test_an_arm_meets_a_post_at_an_angle() -> None:
+    """Half of its width and the radius of the post, 5 + 10 mm, at 150 mm: arcsin 0.1 before a quarter turn."""
+    arm = Body("arm", table(0.25), Box((100 * MM, 5 * MM, 5 * MM)), (100 * MM, 0, 0))
+    post = Body("post", FLOOR, Cylinder(10 * MM, 20 * MM), (0, 150 * MM, 0))
+    pair = Pair(arm, post)
+    begins = pair.next_change(0).at or 0
+    ends = pair.next_change(begins).at or 0
+    assert begins == pytest.approx(936_231_440, abs=3)
+    assert (begins + ends) / 2 == pytest.approx(SECOND, abs=2)
+    assert pair.next_change(ends).at == pytest.approx(begins + 4 * SECOND, abs=2), "in the next revolution"
+
+
+def test_two_that_move_alike_are_apart_however_near_they_are(looks: list[Nanos]) -> None:
+    plan = Profile(0, 0, (ramp(0.0, 0.0, 0.0, 1e9, 2e9), cruise(0.5, 2.0, 2.5e8, 1e9), ramp(2.0, 1.75e9, 1e9, 0.0, 2e9)), 2e9)
+    front = Body("front", axis(plan, "front", (20 * MM, 0, 0)), CUBE)
+    pair = Pair(Body("rear", axis(plan, "rear"), CUBE), front)
+    assert pair.next_change(0) == NEVER
+    assert len(looks) < 20
+
+
+def test_one_that_slides_along_a_wall_does_not_touch_it(looks: list[Nanos]) -> None:
+    wall = Body("wall", FLOOR, Box((1000 * MM, 10 * MM, 10 * MM)), (0, 20 * MM, 0))
+    assert Pair(Body("cube", axis(at_speed(1e9, 2.0)), CUBE), wall).next_change(0) == NEVER
+    assert Pair(Body("can", axis(at_speed(1e9, 2.0)), Cylinder(10 * MM, 10 * MM)), wall).next_change(0) == NEVER
+    assert len(looks) < 12
+
+
+def test_one_that_circles_a_column_at_a_constant_gap_does_not_touch_it(looks: list[Nanos]) -> None:
+    """For ever, a hundredth of a mm away: seen from the table the column stands."""
+    shoe = Body("shoe", table(3.0), CUBE, (60 * MM, 0, 0))
+    assert Pair(shoe, Body("column", FLOOR, Cylinder(49_990_000, 10 * MM))).next_change(0) == NEVER
+    assert len(looks) < 10
+
+
+def test_what_an_arm_that_turns_for_ever_does_not_reach_costs_nothing(looks: list[Nanos]) -> None:
+    arm = Body("arm", table(3.0), Box((100 * MM, 5 * MM, 5 * MM)), (100 * MM, 0, 0))
+    assert Pair(arm, Body("post", FLOOR, Cylinder(10 * MM, 20 * MM), (150 * MM, 152 * MM, 0))).next_change(0) == NEVER
+    assert Pair(arm, Body("below", FLOOR, CUBE, (150 * MM, 0, -15 * MM))).next_change(0) == NEVER
+    assert len(looks) < 10
+
+
+def test_a_pair_between_which_nothing_moves_is_constant(looks: list[Nanos]) -> None:
+    gantry = axis(at_speed(1e9))
+    pair = Pair(Body("one", gantry, CUBE), Body("other", Frame("plate", gantry, (5, 5, 5)), CUBE))
+    assert pair.is_constant
+    assert pair.next_change(0) == NEVER
+    assert not looks
+
+
+@pytest.mark.parametrize("seed", [3, 12, 25, 41, 77, 106])
+def test_what_is_found_does_not_depend_on_when_and_how_far_was_looked(seed: int) -> None:
+    def changes(most: int, also: list[Nanos]) -> list[Nanos]:
+        pair, now, found = Pair(*bodies_of(random_scene(seed))), 0, []
+        while True:
+            at, is_change = pair.next_change(now, most)
+            if at is None:
+                return found
+            between = [moment for moment in also if now < moment < at]
+            now = between[0] if between else at
+            found += [now] if is_change and not between else []
+
+    expected = changes(10**6, [])
+    assert changes(7, []) == expected
+    assert changes(10**6, [n * 7_654_321 for n in range(60)]) == expected
+
+
+def test_an_end_of_the_looks_gives_a_moment_to_go_on_from() -> None:
+    """Nothing is left out silently."""
+    arm = Body("arm", table(3.0), Box((100 * MM, 5 * MM, 5 * MM)), (100 * MM, 0, 0))
+    ring = Body("ring", FLOOR, CUBE, (-14 * MM, 1 * MM, 14 * MM))
+    look = Pair(arm, ring).next_change(0, 3)
+    assert look.at is not None
+    assert not look.changes
+    assert look.at > 0
