@@ -12,6 +12,7 @@ The fixture `serve` starts the real command.
 from __future__ import annotations
 
 import asyncio
+import gc
 import io
 import json
 import os
@@ -31,6 +32,7 @@ from guard import guarded
 from hypothesis import Phase, settings
 from soak import time_limit
 from virtual_loop import VirtualLoop, run_virtually
+from warm import COMMAND
 
 import steptwin.services  # noqa: F401  descriptions are checked for their tables, too
 from steptwin.live.realtimedriver import RealTimeDriver
@@ -58,7 +60,7 @@ for _number in (signal.SIGINT, signal.SIGHUP):
 # Commands that tests start compile nothing twice, whatever the surroundings say.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
-STEPTWIN = str(Path(sys.executable).with_name("steptwin"))
+STEPTWIN = COMMAND
 
 PEER_FIXTURES = {"require_peer", "require_library"}
 IN_WALL_TIME = (
@@ -74,8 +76,6 @@ IN_WALL_TIME = (
     "test_other_systems.py",
 )
 """Tests with processes of their own, on a machine that may have other work."""
-TESTS = Path(__file__).parent
-SOAK_TESTS = TESTS / "soak"
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -87,12 +87,18 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         has_peer = bool(PEER_FIXTURES.intersection(getattr(item, "fixturenames", ())))
         if has_peer:
             item.add_marker(pytest.mark.peers)
-        is_in_wall_time = any(item.path.is_relative_to(TESTS / part) for part in IN_WALL_TIME)
-        if os.environ.get("STEPTWIN_REQUIRE_PEERS") == "1" and (has_peer or is_in_wall_time):
+        place = item.nodeid.removeprefix("tests/").partition("/")[0].partition("::")[0]
+        if os.environ.get("STEPTWIN_REQUIRE_PEERS") == "1" and (has_peer or place in IN_WALL_TIME):
             item.add_marker(pytest.mark.flaky(reruns=1))
-        if item.path.is_relative_to(SOAK_TESTS):
+        if place == "soak":
             item.add_marker(pytest.mark.soak)
             item.add_marker(pytest.mark.timeout(soak_limit))
+
+
+def pytest_collection_finish() -> None:
+    """What describes all tests is there to stay: each look for garbage would look at it, too, for half a second."""
+    gc.collect()
+    gc.freeze()
 
 
 def _missing(peer: str) -> NoReturn:

@@ -17,14 +17,13 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from shell import Shell
+from tests.conftest import STEPTWIN
 
 from steptwin.cli.device import SuspensionDetector, print_started, shown, table
 from steptwin.drivers import Mic488
 from steptwin.errors import Refusal
 from steptwin.live.ports import FoundPort
 from steptwin.mic488.registers import register_map
-
-STEPTWIN = str(Path(sys.executable).with_name("steptwin"))
 
 
 @given(st.floats(width=32, allow_nan=False))

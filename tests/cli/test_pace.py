@@ -12,12 +12,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from tests.conftest import STEPTWIN
 from typer.testing import CliRunner
 
 from steptwin.cli import app
 
 FEEDER = Path(__file__).parents[2] / "examples" / "worlds" / "feeder.toml"
-STEPTWIN = str(Path(sys.executable).with_name("steptwin"))
 Up = subprocess.Popen[str]
 
 

@@ -6,7 +6,6 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -14,8 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
-
-STEPTWIN = str(Path(sys.executable).with_name("steptwin"))
+from tests.conftest import STEPTWIN
 
 FILES = {
     "chip.m1486": "[\nw300\nu20\nw300\nu16\n]\n",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import sys
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,7 +12,7 @@ from typing import Any, NamedTuple
 
 import pytest
 from device_rig import CELL, Rig
-from tests.conftest import until
+from tests.conftest import STEPTWIN, until
 
 from steptwin.controller import SECOND
 from steptwin.controllerstate import read_state
@@ -50,7 +49,7 @@ def in_this_process(directory: Path) -> Generator[Way]:
 def in_another_process(directory: Path) -> Generator[Way]:
     (directory / "cell.toml").write_text(CELL)
     environment = {**os.environ, "TERM": "dumb"}
-    started = [sys.executable, "-m", "steptwin", "up", "cell.toml", "--speed", "0", "--ready-file", "ready.json"]
+    started = [STEPTWIN, "up", "cell.toml", "--speed", "0", "--ready-file", "ready.json"]
     with (directory / "out").open("w") as out:
         process = subprocess.Popen(started, cwd=directory, env=environment, stdout=out, stderr=out)
     try:

@@ -18,11 +18,11 @@ from typing import IO
 
 import pytest
 from soak import scaled
+from tests.conftest import STEPTWIN
 
 from steptwin.live.remote import RemoteSubject
 from steptwin.subject.following import filter_of
 
-STEPTWIN = Path(sys.executable).with_name("steptwin")
 JOGGING = Path(__file__).parents[1] / "support/jogging.py"
 LINES = (("mic488", 9600, "threads"), ("mic488", 9600, "tasks"), ("B", 1200, "threads"), ("B", 1200, "tasks"),
          ("B2x", 9600, "threads"), ("B2x", 9600, "tasks"))  # fmt: skip

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 from collections.abc import Callable
 from queue import Queue
 from threading import Thread
 from typing import Any
+
+from tests.conftest import STEPTWIN
 
 LONG_S = 100.0
 """Bound of a wait for what comes soon."""
@@ -21,7 +22,7 @@ class Refused(Exception):
 class DapClient:
     def __init__(self) -> None:
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "steptwin", "dap"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+            [STEPTWIN, "dap"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
         )
         self.events: list[dict[str, Any]] = []
         self._waiting: Queue[dict[str, Any] | None] = Queue()

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
-from tests.conftest import until
+from tests.conftest import STEPTWIN, until
 
 from steptwin.controller import MILLISECOND
 from steptwin.debug.debugger import Debugger
@@ -66,7 +65,7 @@ def running_twin(folder: Path) -> Generator[None]:
     (folder / "two.toml").write_text(BOTH)
     ready = folder / "ready.json"
     with (folder / "out").open("w") as out:
-        command = [sys.executable, "-m", "steptwin", "up", "two.toml", "--ready-file", "ready.json"]
+        command = [STEPTWIN, "up", "two.toml", "--ready-file", "ready.json"]
         process = subprocess.Popen(command, cwd=folder, stdout=out, stderr=out, env={**os.environ, "TERM": "dumb"})
     try:
         until(lambda: ready.exists() or process.poll() is not None, "the twin is ready")

@@ -1,6 +1,6 @@
 """What tests start ends with them, however they end: a process of its own waits for the end of a pipe and kills what is left.
 
-A pipe ends on every system when its writer is gone, killed or not.
+A pipe ends on every system when its writer is gone, killed or not. The command `steptwin` begins warm (`warm.py`).
 """
 
 from __future__ import annotations
@@ -11,7 +11,10 @@ import signal
 import subprocess
 import sys
 from collections.abc import Generator, Iterable
+from pathlib import Path
 from typing import Any
+
+from warm import Warm
 
 
 def kill_what_is_left(lines: Iterable[str]) -> None:
@@ -42,12 +45,29 @@ def guarded() -> Generator[None]:
         guard.stdin.write(f"{sign}{process}\n")
         guard.stdin.flush()
 
+    warm = Warm()
+
     class Guarded(plain):  # type: ignore[misc, valid-type]
         def __init__(self, *arguments: Any, **options: Any) -> None:
             self._noted = False
+            self._is_plain = bool(options.keys() - {"stdin", "stdout", "stderr", "cwd", "env", "text", "encoding", "bufsize"})
             super().__init__(*arguments, **options)
             self._noted = True
             note("+", self.pid)
+
+        def _execute_child(
+            self, args: Any, executable: Any, preexec_fn: Any, close_fds: Any, pass_fds: Any, cwd: Any, env: Any, *rest: Any
+        ) -> None:
+            environment = os.environ if env is None else env
+            if self._is_plain or not warm.can(args, environment):
+                super()._execute_child(args, executable, preexec_fn, close_fds, pass_fds, cwd, env, *rest)  # type: ignore[misc]
+                return
+            pipes = rest[3:9]  # behind startupinfo, creationflags and shell: of each pipe the reading end, then the writing one
+            ends = (pipes[0], pipes[3], pipes[5])
+            descriptors = [number if end == -1 else end for number, end in enumerate(ends)]
+            self.pid = warm.fork([str(one) for one in args[1:]], str(cwd or Path.cwd()), environment, descriptors)
+            self._child_created = True
+            self._close_pipe_fds(*pipes)  # type: ignore[attr-defined]
 
         def poll(self) -> int | None:
             return self._ended(super().poll())
@@ -67,6 +87,7 @@ def guarded() -> Generator[None]:
         yield
     finally:
         subprocess.Popen = plain  # type: ignore[misc]
+        warm.close()
         guard.communicate()
 
 
