@@ -31,7 +31,7 @@ def test_the_service_keeps_to_its_description(start_studio: Callable[..., Proces
             response = operation.definition.raw["responses"]["200"]["content"]["application/json"]["schema"]
             assert response["properties"]["ok"], operation.path
 
-        @settings(max_examples=4, deadline=None, suppress_health_check=list(HealthCheck))
+        @settings(max_examples=2, deadline=None, suppress_health_check=list(HealthCheck))
         @given(case=operation.as_strategy())
         def keeps(case: schemathesis.Case) -> None:
             case.call_and_validate(checks=CHECKS)

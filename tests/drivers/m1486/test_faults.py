@@ -111,7 +111,7 @@ def cases(name: str) -> Iterator[Fault]:
     OPERATIONS[name].do(chip)
     for direction, count in wire.passed.items():
         for index in range(begin[direction], count):
-            for kind in KINDS[index % 2 :: 2] if name == "move_to" else (FEWER[index % len(FEWER)],):
+            for kind in KINDS[index % 4 :: 4] if name == "move_to" else (FEWER[index % len(FEWER)],):
                 yield Fault(direction, index, kind)
 
 
@@ -212,15 +212,15 @@ def test_a_stop_with_a_fault_at_every_character() -> None:
 
 
 @pytest.mark.parametrize("kind", FEWER)
-def test_opening_with_a_fault_at_every_character(kind: str) -> None:
+def test_opening_with_a_fault_at_any_character(kind: Kind) -> None:
     """Before chips echo nothing can be verified: a fault may set something then, but moves nothing and selects nobody else."""
     wire = ChipWire("B", (0, 7), statement_ns=0)
     wire.put()
     M1486(chip_line(wire), 7).open()
     for direction, count in list(wire.passed.items()):
-        for index in range(min(count, 30)):
+        for index in range(FEWER.index(kind) % 2, min(count, 30), 2):
             wire = ChipWire("B", (0, 7), statement_ns=0)
-            wire.put(Fault(direction, index, kind))  # type: ignore[arg-type]
+            wire.put(Fault(direction, index, kind))
             chip = M1486(chip_line(wire), 7)
             try:
                 chip.open()
