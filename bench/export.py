@@ -9,9 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from steptwin.controller import SECOND, Nanos
-from steptwin.files.export import AxisLane, write_trace
+from steptwin.files.export import AxisChannel, write_trace
 from steptwin.motion import MotionState, plan_position
-from steptwin.simulation.mechanics.lanes import PhaseOutputs
+from steptwin.simulation.mechanics.channels import PhaseOutputs
 from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 
 HOUR: Nanos = 3600 * SECOND
@@ -64,7 +64,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         minute = run_of(60 * SECOND, 32_000.0)
-        steps = {("table", str(axis)): AxisLane(f"M{axis}") for axis in range(1, AXES + 1)}
+        steps = {("table", str(axis)): AxisChannel(f"M{axis}") for axis in range(1, AXES + 1)}
         phases = {key: view._replace(outputs=PhaseOutputs()) for key, view in steps.items()}
         print(f"{'value change dump':<34}{'changes':>12}")
         for title, views in (("STEP and DIR, four axes, a minute", steps), ("phase currents of the same", phases)):

@@ -51,7 +51,7 @@ Steps = Sequence[tuple[float, str]]
 
 
 def draw(name: str, text: str, steps: Steps, end_s: float, curves: Sequence[str], levels: Sequence[str]) -> None:
-    """Signals over the time: ``curves`` above one another, ``levels`` as lanes."""
+    """Signals over the time: ``curves`` above one another, ``levels`` as channels."""
     world = World.from_toml(CONTROLLER + text)
     times: list[float] = []
     read: dict[str, list[float]] = {signal: [] for signal in (*curves, *levels)}

@@ -17,7 +17,7 @@ from steptwin.messages import MessageText
 from steptwin.motion.elastic import Response
 from steptwin.motion.profile import Profile
 from steptwin.simulation.logic.contacts import Zone
-from steptwin.simulation.mechanics.course import Course
+from steptwin.simulation.mechanics.trajectory import Trajectory
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.state import Stateful
@@ -67,8 +67,8 @@ def test_a_branch_does_not_compute_again_when_switches_change(whole_trace: list[
     assert list(other.trace) == whole_trace
 
 
-VALUES = (Profile, Course, Response, MessageText)
-"""Immutable, although they keep what they have computed of their course, or their values."""
+VALUES = (Profile, Trajectory, Response, MessageText)
+"""Immutable, although they keep what they have computed of their trajectory, or their values."""
 CHANGING = (list, dict, set, deque, bytearray, array, Stateful, Scheduler, Simulation)
 
 

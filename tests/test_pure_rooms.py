@@ -51,7 +51,7 @@ files = {name: (examples / "worlds" / name).read_bytes() for name in read_world(
 
 simulation = Simulation(Blueprint(read_world("feeder.toml", text), files))
 simulation.advance(20_000_000_000)
-simulation.settle_all()
+simulation.sync_all()
 print(simulation.trace.digest())
 print(sorted(name for name in sys.modules if name.partition(".")[0] in BLOCKED))
 """
@@ -71,5 +71,5 @@ def test_worlds_and_programs_run_without_wheels_clocks_sockets_and_threads() -> 
 
     with World.load(EXAMPLES / "worlds/feeder.toml") as world:
         world.advance(20_000_000_000)
-        world.settle_all()
+        world.sync_all()
         assert digest == world.trace.digest()

@@ -74,12 +74,12 @@ class Ports(Stateful):
         self.out += [(piece.port, sent) for sent in self.ports[piece.port].to_send(now)]
         end = now + piece.pause
         while True:
-            dues = [due for port in self.ports if (due := port.deadline()) is not None and due < end]
-            if not dues:
+            deadlines = [due for port in self.ports if (due := port.deadline()) is not None and due < end]
+            if not deadlines:
                 return end
             for number, port in enumerate(self.ports):
-                if port.deadline() == min(dues):
-                    self.out += [(number, sent) for sent in port.to_send(min(dues))]
+                if port.deadline() == min(deadlines):
+                    self.out += [(number, sent) for sent in port.to_send(min(deadlines))]
 
 
 PIECES = [

@@ -36,16 +36,16 @@ class MemoryCells:
 
 @dataclass(frozen=True, slots=True)
 class LivePoint:
-    """A point of one controller. Between its events the value stays as it is unless there are ``turns``."""
+    """A point of one controller. Between its events the value stays as it is unless there are ``turning_points``."""
 
     point: Point
     read: Callable[[Nanos], float] | None
     """The value at the moment to which the controller has come; reading changes nothing. None where it can only be written."""
-    turns: TurningPoints | None = None
+    turning_points: TurningPoints | None = None
     version: Callable[[], object] | None = None
-    """A value that changes whenever ``turns`` may have changed; None if that is unknown."""
+    """A value that changes whenever ``turning_points`` may have changed; None if that is unknown."""
     freeze: Callable[[Nanos], Callable[[Nanos], float]] | None = None
-    """Gives the course at a moment as a function that stays as it is; None where there is none."""
+    """Gives the trajectory at a moment as a function that stays as it is; None where there is none."""
     is_kept: bool = False
     """Whether a write, by a request or a statement, only keeps the value, which is not an event of the controller. Besides, it
     becomes what it is after power-on."""
@@ -53,32 +53,32 @@ class LivePoint:
     """Where it is, if it is part of a memory."""
 
 
-def turns_of(profile: Callable[[], Profile]) -> TurningPoints:
+def turning_points_of(profile: Callable[[], Profile]) -> TurningPoints:
     """The ends of the segments of a profile."""
 
-    def turns(now: Nanos) -> Iterator[Nanos]:
+    def turning_points(now: Nanos) -> Iterator[Nanos]:
         present = profile()
         gone = now - present.start
         return iter([present.start + int(end) for end in present.ends if gone < end < inf])
 
-    return turns
+    return turning_points
 
 
 def end_of(profile: Callable[[], Profile]) -> TurningPoints:
     """The end of a profile alone."""
 
-    def turns(now: Nanos) -> Iterator[Nanos]:
+    def turning_points(now: Nanos) -> Iterator[Nanos]:
         end = profile().end
         return iter(() if end is None or end <= now else (end,))
 
-    return turns
+    return turning_points
 
 
-def turns_of_round(profile: Callable[[], Profile], count: Callable[[Nanos], int], size: int) -> TurningPoints:
+def turning_points_of_round(profile: Callable[[], Profile], count: Callable[[Nanos], int], size: int) -> TurningPoints:
     """The same for a shown ``count`` that wraps, and jumps, at every multiple of ``size``."""
-    ends = turns_of(profile)
+    ends = turning_points_of(profile)
 
-    def turns(now: Nanos) -> Iterator[Nanos]:
+    def turning_points(now: Nanos) -> Iterator[Nanos]:
         begin = now
         for end in ends(now):
             yield from _jumps(count, size, begin, end)
@@ -86,7 +86,7 @@ def turns_of_round(profile: Callable[[], Profile], count: Callable[[Nanos], int]
             begin = end
         yield from _jumps(count, size, begin, now + FARTHEST_NS)
 
-    return turns
+    return turning_points
 
 
 def _jumps(count: Callable[[Nanos], int], size: int, begin: Nanos, end: Nanos) -> Iterator[Nanos]:

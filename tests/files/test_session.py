@@ -221,7 +221,7 @@ def test_what_is_refused_leaves_no_mark(step: ExternalInput, message: str) -> No
     before = world.trace.digest()
     with pytest.raises(Misuse, match=message):
         world.apply_input(step)
-    world.settle_all()
+    world.sync_all()
     assert (world.trace.digest(), world.inputs) == (before, [])
 
 

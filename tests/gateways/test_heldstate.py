@@ -191,7 +191,7 @@ class Holder:
 
     def check(self) -> None:
         for name in self.held:
-            self.subject.world.touch(name)  # as the timer of a running world does
+            self.subject.world.sync(name)  # as the timer of a running world does
         for event in self.following.take().events:
             for part in self.parts:
                 if isinstance(event.payload, RestoredPayload):

@@ -15,9 +15,9 @@ from sqlalchemy import Engine
 from steptwin.cli.history import _local
 from steptwin.errors import Misuse
 from steptwin.history import writer as writing
+from steptwin.history.intervals import read_interval
 from steptwin.history.reading import HistoryDatabase
 from steptwin.history.spool import Spool
-from steptwin.history.stretches import read_stretch
 from steptwin.simulation.script.steps import Set
 from steptwin.subject.commands import Enable, Move
 
@@ -67,7 +67,7 @@ def test_a_clock_that_is_set_during_a_motion(by_us: int, database: str) -> None:
         at = [BEGAN_US + round(s * 1e6) + (by_us if s > 10.0 else 0) for s in motion.seconds.tolist()]
         off = np.abs(motion.at.astype(np.int64) - np.array(at))
         assert int(np.max(np.delete(off, 100))) <= 1000  # at 10 s it is both
-        # a stretch of the wall clock after it
+        # an interval of the wall clock after it
         begin, end = wall(made.wall_us() - 2_000_000), wall(made.wall_us())
         late = past.series("table.M1.position", begin, end, every_s=0.5)
         assert late.seconds.tolist() == [15.0, 15.5, 16.0, 16.5]
@@ -149,16 +149,16 @@ def warsaw(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         ("2026-10-25 02:30+01:00", "2026-10-25T01:30:00+00:00"),
     ],
 )
-def test_dates_of_a_stretch(text: str, moment: str, database: str) -> None:
+def test_dates_of_an_interval(text: str, moment: str, database: str) -> None:
     made = RecordedWorld(CELL)
     made.end()
     made.written(database)
     with HistoryDatabase(database) as past:
-        stretch = read_stretch(past, None, text, None)
-        assert isinstance(stretch.begin, datetime)
-        assert stretch.begin.astimezone(UTC).isoformat() == moment
+        interval = read_interval(past, None, text, None)
+        assert isinstance(interval.begin, datetime)
+        assert interval.begin.astimezone(UTC).isoformat() == moment
         with pytest.raises(Misuse, match="this is before"):
-            read_stretch(past, None, "2026-10-25 02:30+01:00", "2026-10-25 02:30+02:00")
+            read_interval(past, None, "2026-10-25 02:30+01:00", "2026-10-25 02:30+02:00")
 
 
 @pytest.mark.usefixtures("warsaw")

@@ -112,7 +112,7 @@ def test_positions_and_velocities_of_a_motion(kept: str) -> None:
         assert ends.seconds.tolist() == pytest.approx([0.0, 1.0, 1.0, 2.0, 3.0, 4.0, 10.0])
 
 
-def test_a_stretch_of_the_wall_clock(kept: str) -> None:
+def test_an_interval_of_the_wall_clock(kept: str) -> None:
     with HistoryDatabase(kept) as past:
         found = past.series("table.M1.position", at(2.0), at(3.0), every_s=0.25)
         assert found.at.astype("int64").tolist() == [BEGAN_US + round(1e6 * (2 + place / 4)) for place in range(5)]

@@ -80,8 +80,8 @@ def test_the_state_has_the_variables_of_a_program(tmp_path: Path) -> None:
     device = world.mic488["table"].device
     for moment, value in ((1_500_000, 0.0), (2_500_000, 2.5), (1_000_000_000, 2.5)):
         world.advance(moment)
-        world.touch("table")
+        world.sync("table")
         assert state_of(device, moment).program.variables == {"COUNT": value}
     world.advance(3_000_000_000)
-    world.touch("table")
+    world.sync("table")
     assert state_of(device, world.now).program.variables == {}

@@ -176,7 +176,7 @@ def played(given_batches: list[Batch], *, shortcuts: bool, records: bool) -> See
         wall[0] += 50 * MILLISECOND
         realtime.enter()
         realtime.close()
-        world.settle_all()
+        world.sync_all()
         if records:
             assert session_of(world).replay().trace.digest() == world.trace.digest()
         state = repr([world.kind(name).state(controller, world.now) for name, controller in world.controllers.items()])

@@ -17,9 +17,9 @@ from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.server import EndPoint
 from steptwin.live.view import LiveView, page
 from steptwin.live.world import LiveWorld, PlacePort
-from steptwin.simulation.describe.small import LINE, Whole
-from steptwin.simulation.describe.small_m1486 import m1486_world
-from steptwin.simulation.describe.small_mic488 import mic488_world
+from steptwin.simulation.describe.generated import LINE, Whole
+from steptwin.simulation.describe.generated_m1486 import m1486_world
+from steptwin.simulation.describe.generated_mic488 import mic488_world
 
 Run = Callable[..., Any]
 

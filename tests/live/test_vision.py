@@ -14,8 +14,8 @@ from steptwin.files.world import World
 from steptwin.live.world import LiveWorld, PlacePort, VisionPort
 from steptwin.mic488.present import state_of
 from steptwin.mic488.vision import uses_vision
-from steptwin.simulation.describe.small import LINE, Whole
-from steptwin.simulation.describe.small_mic488 import mic488_world
+from steptwin.simulation.describe.generated import LINE, Whole
+from steptwin.simulation.describe.generated_mic488 import mic488_world
 from steptwin.wire.crc import crc16
 
 #: Copies each new record, with the number of records before it in $I0.
@@ -47,14 +47,14 @@ def running(units: tuple[int, ...] = (1,), timing: str = "off") -> LiveWorld:
     live = LiveWorld(World.from_toml(text, {"pick.prg": PICK.encode()}))
     for view in live.world.mic488.values():
         view.device.command(partial(view.device.program.command, 1), 0)
-    live.stale = True
+    live.is_dirty = True
     return live
 
 
 def records(live: LiveWorld) -> tuple[int, list[float]]:
     (view,) = live.world.mic488.values()
     live.advance(live.now + 100 * MILLISECOND)
-    live.world.settle_all()
+    live.world.sync_all()
     user = view.device.user
     return user[0], [struct.unpack("<f", user[n : n + 2])[0] for n in (2, 4, 6, 8)]
 
@@ -96,14 +96,14 @@ def test_a_vision_system_belongs_to_one_controller() -> None:
     live = running(units=(1, 2))
     PlacePort(live, LINE, "pty", "rtu").exchange(RECORD, live.now)
     live.advance(live.now + 100 * MILLISECOND)
-    live.world.settle_all()
+    live.world.sync_all()
     assert [view.device.user[0] for view in live.world.mic488.values()] == [0, 0]
 
 
 def test_the_state_tells_where_a_program_is() -> None:
     live = running()
     live.advance(50 * MILLISECOND)
-    live.world.settle_all()
+    live.world.sync_all()
     device = live.world.mic488["mic488"].device
     assert state_of(device, live.now).program == StateProgram(
         state=ProgramActivity.RUNNING,

@@ -120,7 +120,7 @@ def test_what_is_due_in_many_schedulers_is_done_when_it_is_due() -> None:
         live.advance(due)
         moments.append(due)
     live.advance(100 * MILLISECOND)
-    kept_up.settle_all()
+    kept_up.sync_all()
     alone.run(for_="100 ms")
     assert list(alone.trace) == list(kept_up.trace)
     edges = {record.time for record in alone.trace.edges() if record.time}

@@ -25,9 +25,9 @@ def value(bench: Bench, name: str) -> float:
     return read(bench.now)
 
 
-def turns(bench: Bench, name: str, most: int) -> list[int]:
+def turning_points(bench: Bench, name: str, most: int) -> list[int]:
     """The next moments at which the value may turn."""
-    found = point(bench, name).turns
+    found = point(bench, name).turning_points
     assert found is not None
     return list(islice(found(bench.now), most))
 
@@ -89,7 +89,7 @@ def test_values_on_the_way() -> None:
     assert before() != at_rest
     begin = bench.trains[-1][1].profile.start
     for name in ("position", "velocity"):
-        assert turns(bench, name, 5) == [begin + SECOND // 2]
+        assert turning_points(bench, name, 5) == [begin + SECOND // 2]
 
 
 @pytest.mark.parametrize(
@@ -108,7 +108,7 @@ def test_a_count_turns_where_it_begins_anew(name: str, start: int, way: str, end
     bench.do(f"={start}", "m64", "s200", "v80", way)
     bench.send("r")
     bench.run(ms=5)
-    before, after = turns(bench, name, 2)
+    before, after = turning_points(bench, name, 2)
     for moment, expected in ((before, ends[0]), (after, ends[1])):
         bench.run((moment - bench.now) / SECOND)
         assert bench.now == moment
@@ -117,7 +117,7 @@ def test_a_count_turns_where_it_begins_anew(name: str, start: int, way: str, end
 
 def test_what_stands_still_between_events_has_no_turns() -> None:
     bench = Bench("B")
-    following = [path for path in POINTS if point(bench, path).turns is not None]
+    following = [path for path in POINTS if point(bench, path).turning_points is not None]
     assert following == ["POSITION", "VELOCITY", "COUNTER", "REGISTER9", "U1", "U2", "U3"]
 
 

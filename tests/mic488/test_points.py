@@ -140,13 +140,13 @@ def test_a_value_goes_one_way_between_its_turns() -> None:
     assert before.version() != version
     for name in ("M2.velocity", "M2.position", "M2_POS_ACT", "M2.encoder"):
         found = point(rig, name)
-        assert found.turns is not None
+        assert found.turning_points is not None
         up, down = 0.25, 0.125
         even = (30.0 - 0.5 * 50.0 * (up + down)) / 50.0
-        turns = [turn / SECOND for turn in found.turns(rig.now)]
-        assert turns[:3] == pytest.approx([up, up + even, up + even + down], abs=1e-8)
-    assert point(rig, "IN4").turns is None
-    assert point(rig, "M2_ACC").turns is None
+        turning_points = [turn / SECOND for turn in found.turning_points(rig.now)]
+        assert turning_points[:3] == pytest.approx([up, up + even, up + even + down], abs=1e-8)
+    assert point(rig, "IN4").turning_points is None
+    assert point(rig, "M2_ACC").turning_points is None
 
 
 @pytest.mark.parametrize(
@@ -163,7 +163,9 @@ def test_marks_change_with_each_point_that_neither_moves_nor_is_only_kept() -> N
     device = rig.device
     named = {one.path: live_point(device, one.path) for one in points(device.registers, [""] * 4) if "USER_REG" not in one.path}
     others = {
-        path: one for path, one in named.items() if one and one.turns is None and not one.is_kept and path not in device.pins()
+        path: one
+        for path, one in named.items()
+        if one and one.turning_points is None and not one.is_kept and path not in device.pins()
     }
     watched = {path: one.read for path, one in others.items() if one.read is not None}
     changed: set[str] = set()

@@ -126,7 +126,7 @@ def test_a_position_error_stops_the_program_or_from_1_70_pauses_it(mode: int, fi
 
 Place = tuple[float, float]
 EQUAL = (100.0, 100.0)
-Course = Callable[[float], Place]
+Curve = Callable[[float], Place]
 
 
 def trapezoid(length: float, speed: float, acc: float, dec: float) -> Callable[[float], float]:
@@ -135,7 +135,7 @@ def trapezoid(length: float, speed: float, acc: float, dec: float) -> Callable[[
     up, down = peak / acc, peak / dec
     flat = (length - peak * (up + down) / 2) / peak if peak else 0.0
 
-    def way(t: float) -> float:
+    def travel(t: float) -> float:
         if t < up:
             return acc * t * t / 2
         if t < up + flat:
@@ -143,11 +143,11 @@ def trapezoid(length: float, speed: float, acc: float, dec: float) -> Callable[[
         rest = max(up + flat + down - t, 0.0)
         return length - dec * rest * rest / 2
 
-    return way
+    return travel
 
 
-def check_course(rig: Rig, begin_s: float, course: Course, way: Callable[[float], float], gears: Place = (100.0, 100.0)) -> None:
-    """From ``begin_s`` on, each axis' count is within a pulse of the course at every moment looked at, up to its end."""
+def check_curve(rig: Rig, begin_s: float, curve: Curve, travel: Callable[[float], float], gears: Place = (100.0, 100.0)) -> None:
+    """From ``begin_s`` on, each axis' count is within a pulse of the curve at every moment looked at, up to its end."""
     x, y = rig.device.axes[:2]
     end = max(x.profile.end or 0, y.profile.end or 0)
     begin = round(begin_s * SECOND)
@@ -155,25 +155,25 @@ def check_course(rig: Rig, begin_s: float, course: Course, way: Callable[[float]
     assert {x.profile.end, y.profile.end} <= {begin, end}
     for k in range(401):
         at = begin + (end - begin) * k // 400
-        ideal = course(way((at - begin) / SECOND))
+        ideal = curve(travel((at - begin) / SECOND))
         for axis, place, gear in zip((x, y), ideal, gears, strict=True):
             assert abs((axis.profile.count(at) + axis.offset_p) - place * gear) <= 1.0 + 1e-6
 
 
-def line(begin: Place, end: Place) -> tuple[float, Course]:
+def line(begin: Place, end: Place) -> tuple[float, Curve]:
     length = hypot(end[0] - begin[0], end[1] - begin[1])
     return length, lambda s: (begin[0] + (end[0] - begin[0]) * s / length, begin[1] + (end[1] - begin[1]) * s / length)
 
 
-def arc(centre: Place, radius: float, begin_rad: float, sweep_rad: float) -> tuple[float, Course]:
+def arc(centre: Place, radius: float, begin_rad: float, sweep_rad: float) -> tuple[float, Curve]:
     """``sweep_rad`` > 0 is counter-clockwise."""
     length = abs(sweep_rad) * radius
     turn = sweep_rad / length
 
-    def course(s: float) -> Place:
+    def curve(s: float) -> Place:
         return centre[0] + radius * cos(begin_rad + turn * s), centre[1] + radius * sin(begin_rad + turn * s)
 
-    return length, course
+    return length, curve
 
 
 # ---------------------------------------------------------------------- lines
@@ -188,9 +188,9 @@ def test_a_line_stays_within_a_pulse_and_ends_exactly(x: float, y: float, speed:
     end = (begin[0] + x, begin[1] + y) if relative else (x, y)
     rig = ready(f"PosM1 = -5\nPosM2 = 7\n{ON}{keyword} @A\n{DONE}", f"A;{x};{y};{speed};x\n")
     rig.wait(0.0051)
-    length, course = line(begin, end)
+    length, curve = line(begin, end)
     if round(length, 6):
-        check_course(rig, 0.005, course, trapezoid(length, speed, 400, 250))
+        check_curve(rig, 0.005, curve, trapezoid(length, speed, 400, 250))
     rig.pin_until("OUT1", 1.0, 1000)
     assert (rig.position(1), rig.position(2)) == pytest.approx(end, abs=1e-4)
     assert (rig.status(1), rig.status(2)) == (4, 4)
@@ -200,20 +200,20 @@ def test_a_line_stays_within_a_pulse_and_ends_exactly(x: float, y: float, speed:
 def test_a_line_is_straight_with_different_gears(gears: Place) -> None:
     rig = ready(f"{ON}MOVELIN @A\nWAIT 1 = 2\n", "A;30;-40;20;x\n", *(replace(XY, gear=gear) for gear in gears))
     rig.wait(0.0031)
-    length, course = line((0, 0), (30, -40))
-    check_course(rig, 0.003, course, trapezoid(length, 20, 400, 250), gears)
+    length, curve = line((0, 0), (30, -40))
+    check_curve(rig, 0.003, curve, trapezoid(length, 20, 400, 250), gears)
 
 
 def test_an_axis_left_alone_stays_and_wbc_11_vmax_of_m1_is_the_speed() -> None:
     rig = ready(f"{ON}AccM1 = 100\nVmaxM1 = 7\nMOVELIN @A\nWAIT 1 = 2\n", "A;x;30;x;x\n")
     rig.wait(0.0051)
-    check_course(rig, 0.005, line((0, 0), (0, 30))[1], trapezoid(30, 7, 100, 250))
+    check_curve(rig, 0.005, line((0, 0), (0, 30))[1], trapezoid(30, 7, 100, 250))
 
 
 def test_linacc_is_the_acceleration_of_lines_when_it_is_set() -> None:
     rig = ready(f"{ON}$R0 = LinAcc\nLinAcc = 50\n$R2 = LinAcc\nMOVELIN @A\nWAIT 1 = 2\n", "A;30;40;30;x\n")
     rig.wait(0.0061)
-    check_course(rig, 0.006, line((0, 0), (30, 40))[1], trapezoid(50, 30, 50, 50))
+    check_curve(rig, 0.006, line((0, 0), (30, 40))[1], trapezoid(50, 30, 50, 50))
     assert (rig.r(0), rig.r(2)) == (400, 50)
 
 
@@ -247,7 +247,7 @@ def test_wbc_26_a_path_begins_at_rest() -> None:
     rig = ready(f"{ON}VABS M1 50\nVABS M2 -20\nDELAY 1\nMOVELIN @A\nWAIT 1 = 2\n", "A;0;0;30;x\n")
     rig.wait(1.0051)
     before = rig.position(1), rig.position(2)
-    check_course(rig, 1.005, line(before, (0, 0))[1], trapezoid(hypot(*before), 30, 400, 250))
+    check_curve(rig, 1.005, line(before, (0, 0))[1], trapezoid(hypot(*before), 30, 400, 250))
 
 
 @pytest.mark.parametrize(
@@ -338,10 +338,10 @@ def test_a_circle_stays_within_a_pulse_and_ends_exactly(x: int, y: int, radius: 
     begin = rig.now / SECOND + 0.001
     rig.wait(0.0011)
     # Positive angles are clockwise.
-    length, course = arc((x, y), radius, begin_rad, -radians(angle))
-    check_course(rig, begin, course, trapezoid(length, 60, 400, 250))
+    length, curve = arc((x, y), radius, begin_rad, -radians(angle))
+    check_curve(rig, begin, curve, trapezoid(length, 60, 400, 250))
     rig.pin_until("OUT2", 1.0, 1000)
-    assert (rig.position(1), rig.position(2)) == pytest.approx(course(length), abs=0.0051)
+    assert (rig.position(1), rig.position(2)) == pytest.approx(curve(length), abs=0.0051)
     assert (rig.status(1), rig.status(2)) == (4, 4)
 
 
@@ -368,9 +368,9 @@ def test_an_arc_stays_within_a_pulse_and_ends_exactly(x: int, y: int, more: floa
     rise = sqrt(radius**2 - (chord / 2) ** 2) * (-1 if bulge_left else 1)
     centre = (middle[0] + left[0] * rise, middle[1] + left[1] * rise)
     sweep = 2 * atan2(chord / 2, abs(rise)) * (-1 if bulge_left else 1)
-    length, course = arc(centre, radius, atan2(begin[1] - centre[1], begin[0] - centre[0]), sweep)
-    assert course(length) == pytest.approx(end, abs=1e-6)
-    check_course(rig, 0.004, course, trapezoid(length, 60, 400, 250))
+    length, curve = arc(centre, radius, atan2(begin[1] - centre[1], begin[0] - centre[0]), sweep)
+    assert curve(length) == pytest.approx(end, abs=1e-6)
+    check_curve(rig, 0.004, curve, trapezoid(length, 60, 400, 250))
     rig.pin_until("OUT1", 1.0, 1000)
     assert (rig.position(1), rig.position(2)) == end
 
@@ -449,7 +449,7 @@ def test_mic_40_a_path_whose_limit_is_moved_out_of_the_way_again_goes_on(keyword
 
 
 @pytest.mark.parametrize("keyword", PATHS)
-def test_mic_40_a_path_that_cannot_brake_before_a_limit_overruns_on_its_course(keyword: str) -> None:
+def test_mic_40_a_path_that_cannot_brake_before_a_limit_overruns_on_its_curve(keyword: str) -> None:
     rig = on_path(keyword)
     here = rig.position(1)
     rig.set("POSLIM_R", here, 1)
@@ -574,7 +574,7 @@ def test_an_angle_of_0_moves_nothing_and_goes_on() -> None:
 
 
 def test_the_ideal_trapezoid_of_these_tests_is_one() -> None:
-    way = trapezoid(50, 20, 100, 50)
-    speeds = [(way(t / 1000 + 1e-6) - way(t / 1000)) / 1e-6 for t in range(3000)]
+    travel = trapezoid(50, 20, 100, 50)
+    speeds = [(travel(t / 1000 + 1e-6) - travel(t / 1000)) / 1e-6 for t in range(3000)]
     assert max(speeds) == pytest.approx(20, rel=1e-4)
-    assert way(inf) == 50
+    assert travel(inf) == 50

@@ -264,7 +264,7 @@ def test_a_wait_for_the_end_of_a_motion_ends_at_its_next_look() -> None:
 
 
 def test_a_drive_is_said_to_move_up_to_the_last_nanosecond_of_its_motion() -> None:
-    """What is foreseen of M1 is what is read of it: the stretch ends where the value is another in the next nanosecond."""
+    """What is foreseen of M1 is what is read of it: the interval ends where the value is another in the next nanosecond."""
     rig = programmed("M1 = ON\nPABS M1 1000\nWAIT 1 = 2\n")
     rig.start()
     rig.wait(0.1)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from steptwin.controller import SECOND
-from steptwin.motion.elastic import SETTLED_P, DriveStretch, Response, Spring
+from steptwin.motion.elastic import SETTLED_P, DriveInterval, Response, Spring
 
 Drive = Callable[[float], tuple[float, float]]
 MS = 1_000_000
@@ -37,11 +37,11 @@ def integrated(spring: Spring, drive: Drive, begin_s: float, end_s: float, x: fl
 
 
 MOVE = (
-    DriveStretch(0, 0.0, 0.0, 2000.0, 0.0),  # 0.1 s to 200 p/s
-    DriveStretch(100 * MS, 10.0, 200.0, 0.0, 0.0),
-    DriveStretch(250 * MS, 40.0, 200.0, 0.0, -20000.0),  # with jerk, to 100 p/s
-    DriveStretch(350 * MS, 40.0 + 20.0 - 20000.0 * 0.1**3 / 6, 100.0, 0.0, 0.0),
-    DriveStretch(400 * MS, 61.666666666666664, 0.0, 0.0, 0.0),  # stops at once
+    DriveInterval(0, 0.0, 0.0, 2000.0, 0.0),  # 0.1 s to 200 p/s
+    DriveInterval(100 * MS, 10.0, 200.0, 0.0, 0.0),
+    DriveInterval(250 * MS, 40.0, 200.0, 0.0, -20000.0),  # with jerk, to 100 p/s
+    DriveInterval(350 * MS, 40.0 + 20.0 - 20000.0 * 0.1**3 / 6, 100.0, 0.0, 0.0),
+    DriveInterval(400 * MS, 61.666666666666664, 0.0, 0.0, 0.0),  # stops at once
 )
 
 
@@ -76,7 +76,7 @@ def test_it_goes_as_the_differential_equation_says(spring: Spring) -> None:
 
 def test_a_jump_of_the_drive_is_the_limit_of_a_quick_move() -> None:
     spring = Spring(10.0, 0.2)
-    at_once = Response(spring, (DriveStretch(0, 0.0, 0.0, 0.0, 0.0), DriveStretch(1, 5.0, 0.0, 0.0, 0.0)), 0.0, 0.0)
+    at_once = Response(spring, (DriveInterval(0, 0.0, 0.0, 0.0, 0.0), DriveInterval(1, 5.0, 0.0, 0.0, 0.0)), 0.0, 0.0)
     quick_s = 1e-6
     x, v = integrated(spring, lambda t: (5 * t / quick_s, 5 / quick_s), 0.0, quick_s, 0.0, 0.0, 10)
     x, v = integrated(spring, lambda t: (5.0, 0.0), quick_s, 0.05, x, v, 4000)
@@ -84,7 +84,7 @@ def test_a_jump_of_the_drive_is_the_limit_of_a_quick_move() -> None:
 
 
 def test_it_is_settled_when_its_amplitude_is_small() -> None:
-    response = Response(Spring(10.0, 0.1), (DriveStretch(0, 0.0, 0.0, 0.0, 0.0),), 8.0, 0.0)
+    response = Response(Spring(10.0, 0.1), (DriveInterval(0, 0.0, 0.0, 0.0, 0.0),), 8.0, 0.0)
     (_, end) = response.ends()
     assert response.oscillates(end - 1)
     assert not response.oscillates(end)
@@ -122,9 +122,9 @@ def test_a_crossing_is_found_where_a_part_of_the_motion_ends(begin: int) -> None
 
 def test_turns_are_where_the_direction_changes() -> None:
     response = Response(Spring(12.0, 0.06), MOVE, 0.0, 0.0)
-    turns = [0, *response.turns(0)]
-    assert turns == sorted(set(turns))
-    for begin, end in zip(turns, [*turns[1:], 5 * SECOND], strict=True):
+    turning_points = [0, *response.turning_points(0)]
+    assert turning_points == sorted(set(turning_points))
+    for begin, end in zip(turning_points, [*turning_points[1:], 5 * SECOND], strict=True):
         values = [response.at(begin + (end - begin) * n // 50)[0] for n in range(51)]
         steps = [b - a for a, b in pairwise(values)]
         assert min(steps) >= -1e-9 or max(steps) <= 1e-9
@@ -132,12 +132,12 @@ def test_turns_are_where_the_direction_changes() -> None:
 
 def test_without_oscillation_it_turns_once_where_its_drive_does() -> None:
     """From 100 p/s to −100 p/s within 2 s; the spring is so stiff that it has settled long before."""
-    drives = (DriveStretch(0, 0.0, 100.0, -100.0, 0.0), DriveStretch(2 * SECOND, 0.0, 0.0, 0.0, 0.0))
+    drives = (DriveInterval(0, 0.0, 100.0, -100.0, 0.0), DriveInterval(2 * SECOND, 0.0, 0.0, 0.0, 0.0))
     response = Response(Spring(100.0, 0.5), drives, 0.0, 0.0)
     settled = next(begin for begin in response.ends() if begin > 0)
     assert settled < SECOND // 2
-    assert [turn for turn in response.turns(settled) if turn < 2 * SECOND] == [SECOND]
-    assert [turn for turn in response.turns(SECOND) if turn < 2 * SECOND] == []
+    assert [turn for turn in response.turning_points(settled) if turn < 2 * SECOND] == [SECOND]
+    assert [turn for turn in response.turning_points(SECOND) if turn < 2 * SECOND] == []
     assert response.at(SECOND)[1] == 0.0
 
 
@@ -149,7 +149,7 @@ def test_without_oscillation_it_turns_once_where_its_drive_does() -> None:
     level=st.integers(-60, 60),
 )
 def test_what_moves_endlessly_is_followed_for_ever(frequency: float, damping: float, x: float, v: float, level: int) -> None:
-    response = Response(Spring(frequency, damping), (DriveStretch(0, 0.0, 10.0, 0.0, 0.0),), x, v)
+    response = Response(Spring(frequency, damping), (DriveInterval(0, 0.0, 10.0, 0.0, 0.0),), x, v)
     far = response.reaches(1e8 - 0.5, 0, 1)
     assert far is not None
     assert far == pytest.approx((1e8 - 0.5) / 10.0 * SECOND, rel=1e-8)

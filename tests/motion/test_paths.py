@@ -20,7 +20,7 @@ from steptwin.motion.profile import cruise
 from steptwin.motion.pulses import positions, pulse_runs, pulse_times, velocities
 
 
-def way_of(length: float, acc: float, dec: float, speed: float, start: int = 0) -> Profile:
+def travel_of(length: float, acc: float, dec: float, speed: float, start: int = 0) -> Profile:
     return plan_position(MotionState(start, 0, 0.0, 0.0), length, acc, dec, speed)
 
 
@@ -28,32 +28,32 @@ class Run(NamedTuple):
     """Both axes along an arc in pulses (GEAR 1)."""
 
     arc: Arc
-    way: Profile
+    travel: Profile
     x: ArcProfile
     y: ArcProfile
 
     def ideal(self, now: int) -> tuple[float, float]:
         """Where the pen should be, by libm."""
-        angle = self.arc.begin_q + self.arc.sweep_q * self.way.position(now) / self.arc.length
+        angle = self.arc.begin_q + self.arc.sweep_q * self.travel.position(now) / self.arc.length
         radians = angle * pi / 2
         return self.arc.centre_x + self.arc.radius * cos(radians), self.arc.centre_y + self.arc.radius * sin(radians)
 
     def moments(self, number: int) -> list[int]:
-        assert self.way.end is not None
-        return [self.way.start + (self.way.end - self.way.start) * i // number for i in range(number + 1)]
+        assert self.travel.end is not None
+        return [self.travel.start + (self.travel.end - self.travel.start) * i // number for i in range(number + 1)]
 
 
 def run_arc(arc: Arc, acc: float, dec: float, speed: float, start: int = 0) -> Run:
-    way = way_of(arc.length, acc, dec, speed, start)
+    travel = travel_of(arc.length, acc, dec, speed, start)
     turn_q = arc.sweep_q / arc.length
     profiles = []
     for centre, begin, end, quarter in (
         (arc.centre_x, arc.begin[0], arc.end[0], 0.0),
         (arc.centre_y, arc.begin[1], arc.end[1], -1.0),
     ):
-        course = Circular(centre, arc.radius, arc.begin_q + quarter, turn_q)
-        profiles.append(course.profile(way, round(begin), round(end)))
-    return Run(arc, way, *profiles)
+        curve = Circular(centre, arc.radius, arc.begin_q + quarter, turn_q)
+        profiles.append(curve.profile(travel, round(begin), round(end)))
+    return Run(arc, travel, *profiles)
 
 
 class Walker:
@@ -96,14 +96,14 @@ def test_each_axis_is_within_one_pulse_of_the_arc_and_ends_exactly(
     for now in run.moments(400):
         ideal = run.ideal(now)
         for profile, exact in zip((run.x, run.y), ideal, strict=True):
-            assert profile.position(now) == pytest.approx(exact, abs=1e-6) or now == run.way.end
+            assert profile.position(now) == pytest.approx(exact, abs=1e-6) or now == run.travel.end
             assert abs(profile.count(now) - exact) < 1.0 + 1e-6
-    assert run.way.end is not None
+    assert run.travel.end is not None
     for profile, end in ((run.x, arc.end[0]), (run.y, arc.end[1])):
-        assert profile.end == run.way.end
-        assert profile.count(run.way.end) == round(end)
-        assert profile.phase(run.way.end) == 0.0
-        assert profile.velocity(run.way.end) == 0.0
+        assert profile.end == run.travel.end
+        assert profile.count(run.travel.end) == round(end)
+        assert profile.phase(run.travel.end) == 0.0
+        assert profile.velocity(run.travel.end) == 0.0
 
 
 @settings(max_examples=60)
@@ -111,14 +111,14 @@ def test_each_axis_is_within_one_pulse_of_the_arc_and_ends_exactly(
 def test_ramps_end_at_the_same_moments_on_both_axes(arc: Arc, acc: float, dec: float, speed: float) -> None:
     run = run_arc(arc, acc, dec, speed)
     for profile in (run.x, run.y):
-        assert {s.end_s for s in run.way.segments} <= {s.end_s for s in profile.segments}
+        assert {s.end_s for s in run.travel.segments} <= {s.end_s for s in profile.segments}
 
 
 @given(arc=circles, speed=speeds)
 def test_the_speed_along_an_arc_is_that_of_the_way(arc: Arc, speed: float) -> None:
     run = run_arc(arc, 50_000.0, 50_000.0, speed)
     for now in run.moments(50)[:-1]:
-        assert hypot(run.x.velocity(now), run.y.velocity(now)) == pytest.approx(run.way.velocity(now), abs=1e-6 * speed)
+        assert hypot(run.x.velocity(now), run.y.velocity(now)) == pytest.approx(run.travel.velocity(now), abs=1e-6 * speed)
         later = now + 1000
         if later < run.moments(50)[-1]:
             moved = run.x.position(later) - run.x.position(now)
@@ -142,13 +142,13 @@ def test_pulses_are_where_stepping_through_every_nanosecond_finds_them(
     assume(all(abs(turn - round(turn)) > 1e-3 for turn in turns))
     arc = arc._replace(centre_x=arc.centre_x + base)
     run = run_arc(arc, 1e13, 1e13, 1e7)
-    assert run.way.end is not None
+    assert run.travel.end is not None
     for profile in (run.x, run.y):
         walker = Walker(profile.base)
-        walker.walk(profile, run.way.end)
+        walker.walk(profile, run.travel.end)
         found: list[tuple[int, int]] = []
         count, now = profile.base, profile.start
-        for direction, times in pulse_runs(profile, profile.start, run.way.end):
+        for direction, times in pulse_runs(profile, profile.start, run.travel.end):
             for time in times:
                 count += direction
                 found.append((int(time), count))
@@ -159,24 +159,24 @@ def test_pulses_are_where_stepping_through_every_nanosecond_finds_them(
         assert [c for _, c in found] == [c for _, c in walker.pulses]
         for (time, _), (stepped, _) in zip(found, walker.pulses, strict=True):
             assert abs(time - stepped) <= 1 or isclose(profile.position(time), round(profile.position(time)), abs_tol=1e-7)
-        assert profile.count(run.way.end) == profile.base + sum(d * len(t) for d, t in pulse_runs(profile, 0, run.way.end))
+        assert profile.count(run.travel.end) == profile.base + sum(d * len(t) for d, t in pulse_runs(profile, 0, run.travel.end))
 
 
 @settings(max_examples=30)
 @given(arc=circles, acc=rates, speed=speeds)
 def test_lists_of_pulses_agree_with_single_looks(arc: Arc, acc: float, speed: float) -> None:
     run = run_arc(arc, acc, 2 * acc, speed, start=12345)
-    assert run.way.end is not None
+    assert run.travel.end is not None
     for profile in (run.x, run.y):
-        times = pulse_times(profile, 0, run.way.end)
+        times = pulse_times(profile, 0, run.travel.end)
         assert (np.diff(times) >= 0).all()
         count, now = profile.base, 0
-        for direction, stretch in pulse_runs(profile, 0, run.way.end):
-            for time in stretch[:: max(1, len(stretch) // 7)]:
+        for direction, interval in pulse_runs(profile, 0, run.travel.end):
+            for time in interval[:: max(1, len(interval) // 7)]:
                 assert profile.count(int(time)) - profile.count(int(time) - 1) in (direction, 2 * direction) or time == now
-            count += direction * len(stretch)
-        assert count == profile.count(run.way.end)
-        middle = np.linspace(12345, run.way.end + 10, 50).astype(np.int64)
+            count += direction * len(interval)
+        assert count == profile.count(run.travel.end)
+        middle = np.linspace(12345, run.travel.end + 10, 50).astype(np.int64)
         assert positions(profile, middle).tolist() == [profile.position(int(t)) for t in middle]
         assert velocities(profile, middle).tolist() == [profile.velocity(int(t)) for t in middle]
 
@@ -185,9 +185,9 @@ def test_a_circle_turns_on_whole_positions_without_double_pulses() -> None:
     arc = circle(0.0, 0.0, 10.0, -4.0)
     assert arc.begin == (10.0, 0.0)
     run = run_arc(arc, 1000.0, 1000.0, 50.0)
-    assert run.way.end is not None
-    assert [(d, len(t)) for d, t in pulse_runs(run.x, 0, run.way.end)] == [(-1, 20), (1, 20)]
-    assert [(d, len(t)) for d, t in pulse_runs(run.y, 0, run.way.end)] == [(-1, 10), (1, 20), (-1, 10)]
+    assert run.travel.end is not None
+    assert [(d, len(t)) for d, t in pulse_runs(run.x, 0, run.travel.end)] == [(-1, 20), (1, 20)]
+    assert [(d, len(t)) for d, t in pulse_runs(run.y, 0, run.travel.end)] == [(-1, 10), (1, 20), (-1, 10)]
     for profile, directions in ((run.x, [-1, 1]), (run.y, [-1, 1, -1])):
         assert [direction for direction, _ in groupby(direction for _, direction in profile.legs(0))] == directions
 
@@ -244,60 +244,60 @@ def test_an_arc_that_cannot_reach_says_how_large_its_radius_must_be() -> None:
 distances = st.integers(-20_000, 20_000)
 
 
-@given(way_p=st.tuples(distances, distances), speed=speeds, acc=rates, phase=st.floats(-0.5, 0.5), start=starts)
+@given(travel_p=st.tuples(distances, distances), speed=speeds, acc=rates, phase=st.floats(-0.5, 0.5), start=starts)
 def test_lines_start_and_finish_together_within_a_pulse(
-    way_p: tuple[int, int], speed: float, acc: float, phase: float, start: int
+    travel_p: tuple[int, int], speed: float, acc: float, phase: float, start: int
 ) -> None:
-    dx, dy = way_p
+    dx, dy = travel_p
     assume(dx or dy)
     length = hypot(dx, dy)
-    way = way_of(length, acc, 2 * acc, speed, start)
-    assert way.end is not None
+    travel = travel_of(length, acc, 2 * acc, speed, start)
+    assert travel.end is not None
     for delta, phase_p in ((dx, phase), (dy, 0.0)):
-        course = Straight(7.0 + phase_p, (delta - phase_p) / length)
-        profile = course.profile(way, 7, 7 + delta)
+        curve = Straight(7.0 + phase_p, (delta - phase_p) / length)
+        profile = curve.profile(travel, 7, 7 + delta)
         if delta:
-            assert profile.end == way.end
+            assert profile.end == travel.end
         for i in range(101):
-            now = start + (way.end - start) * i // 100
-            ideal = 7 + phase_p + (delta - phase_p) * way.position(now) / length
+            now = start + (travel.end - start) * i // 100
+            ideal = 7 + phase_p + (delta - phase_p) * travel.position(now) / length
             assert profile.position(now) == pytest.approx(ideal, abs=1e-6)
             assert abs(profile.count(now) - ideal) < 1.0 + 1e-9
-        assert profile.count(way.end) == 7 + delta
-        assert sum(d * len(t) for d, t in pulse_runs(profile, start, way.end)) == delta
+        assert profile.count(travel.end) == 7 + delta
+        assert sum(d * len(t) for d, t in pulse_runs(profile, start, travel.end)) == delta
 
 
 @given(arc=circles, speed=speeds, part=st.floats(0.0, 1.0))
 @example(arc=circle(0.0, 0.0, 9.0, 4.0), speed=166.0, part=0.9999999999999999)
 def test_braking_stays_on_the_path(arc: Arc, speed: float, part: float) -> None:
     run = run_arc(arc, 5000.0, 5000.0, speed, start=1000)
-    assert run.way.end is not None
-    now = 1000 + floor((run.way.end - 1000) * part)
-    way = plan_stop(MotionState.of(run.way, now), 8000.0)
+    assert run.travel.end is not None
+    now = 1000 + floor((run.travel.end - 1000) * part)
+    travel = plan_stop(MotionState.of(run.travel, now), 8000.0)
     turn_q = arc.sweep_q / arc.length
     for profile, centre, quarter in ((run.x, arc.centre_x, 0.0), (run.y, arc.centre_y, -1.0)):
         count = profile.count(now)
-        braked = Circular(centre, arc.radius, arc.begin_q + quarter, turn_q).profile(way, count, None)
-        if now < run.way.end:
+        braked = Circular(centre, arc.radius, arc.begin_q + quarter, turn_q).profile(travel, count, None)
+        if now < run.travel.end:
             assert braked.position(now) == pytest.approx(profile.position(now), abs=1e-6)
             assert braked.velocity(now) == pytest.approx(profile.velocity(now), abs=1e-3)
         assert braked.count(now) == count
-        assert braked.end == way.end
-        assert way.end is not None
-        radians = (arc.begin_q + quarter + turn_q * way.position(way.end)) * pi / 2
-        assert braked.position(way.end) == pytest.approx(centre + arc.radius * cos(radians), abs=1e-6)
-        assert abs(braked.phase(way.end)) < 1.0 + 1e-6
+        assert braked.end == travel.end
+        assert travel.end is not None
+        radians = (arc.begin_q + quarter + turn_q * travel.position(travel.end)) * pi / 2
+        assert braked.position(travel.end) == pytest.approx(centre + arc.radius * cos(radians), abs=1e-6)
+        assert abs(braked.phase(travel.end)) < 1.0 + 1e-6
 
 
 @given(arc=circles, edge=st.floats(-3000.0, 3000.0), side=st.sampled_from([-1, 1]), begin=st.floats(0.0, 0.9))
 def test_where_an_arc_first_goes_beyond_an_edge(arc: Arc, edge: float, side: int, begin: float) -> None:
-    course = Circular(arc.centre_x, arc.radius, arc.begin_q, arc.sweep_q / arc.length)
+    curve = Circular(arc.centre_x, arc.radius, arc.begin_q, arc.sweep_q / arc.length)
     begin_w = begin * arc.length
-    found = course.first_beyond(edge, side, begin_w, arc.length)
+    found = curve.first_beyond(edge, side, begin_w, arc.length)
     steps = [begin_w + (arc.length - begin_w) * i / 2000 for i in range(2001)]
     moving_out = [
         w for w, after in pairwise(steps)
-        if (course.position(after) - edge) * side > 1e-5 and (course.position(after) - course.position(w)) * side > 0.0
+        if (curve.position(after) - edge) * side > 1e-5 and (curve.position(after) - curve.position(w)) * side > 0.0
     ]  # fmt: skip
     if found is None:
         assert not moving_out
@@ -306,11 +306,11 @@ def test_where_an_arc_first_goes_beyond_an_edge(arc: Arc, edge: float, side: int
         if moving_out:
             assert found <= moving_out[0] + (arc.length - begin_w) / 2000 * 1.01
         ahead = min(found + arc.length * 1e-7, arc.length)
-        assert (course.position(ahead) - edge) * side >= -1e-3
+        assert (curve.position(ahead) - edge) * side >= -1e-3
         before = [w for w in steps if w < found - arc.length * 1e-9]
         rises = [
             w for w, after in pairwise(before)
-            if (course.position(after) - edge) * side > 1e-5 and (course.position(after) - course.position(w)) * side > 1e-9
+            if (curve.position(after) - edge) * side > 1e-5 and (curve.position(after) - curve.position(w)) * side > 1e-9
         ]  # fmt: skip
         assert not rises
 
@@ -366,15 +366,15 @@ def test_the_slack_of_a_radius_is_permitted_whole() -> None:
 
 
 def test_an_axis_along_a_line_that_stops_under_way_stops_with_it() -> None:
-    way = way_of(100.0, 1000.0, 1000.0, 50.0)
+    travel = travel_of(100.0, 1000.0, 1000.0, 50.0)
     now = 10**9
-    stop = plan_stop(MotionState.of(way, now), 500.0)
+    stop = plan_stop(MotionState.of(travel, now), 500.0)
     assert stop.end is not None
-    course = Straight(7.0, 2.5)
-    profile = course.profile(stop, round(course.position(way.position(now))), None)
+    curve = Straight(7.0, 2.5)
+    profile = curve.profile(stop, round(curve.position(travel.position(now))), None)
     assert profile.end == stop.end
-    assert profile.position(stop.end) == pytest.approx(course.position(stop.position(stop.end)))
-    assert profile.position(now) == pytest.approx(course.position(way.position(now)))
+    assert profile.position(stop.end) == pytest.approx(curve.position(stop.position(stop.end)))
+    assert profile.position(now) == pytest.approx(curve.position(travel.position(now)))
     still = Straight(7.5, 0.0).profile(stop, 8, None)
     assert (still.end, still.position(now), still.count(now)) == (now, 7.5, 8)
 
@@ -382,8 +382,8 @@ def test_an_axis_along_a_line_that_stops_under_way_stops_with_it() -> None:
 @pytest.mark.parametrize("turn_q", [0.01, -0.01])
 @pytest.mark.parametrize("length", [100.0, 150.0, 250.0, 350.0])
 def test_a_rest_at_the_end_of_a_way_keeps_the_direction_and_takes_its_time(turn_q: float, length: float) -> None:
-    """Half a second at the same place of a circle, in the same half of it as the stretch before."""
-    way = Profile(0, 0, (cruise(0.0, 1.0, 0.0, length), cruise(1.0, 1.5, length, 0.0)), length)
-    before, last = Circular(0.0, 1000.0, 0.3, turn_q).profile(way, 0, None).segments[-2:]
+    """Half a second at the same place of a circle, in the same half of it as the interval before."""
+    travel = Profile(0, 0, (cruise(0.0, 1.0, 0.0, length), cruise(1.0, 1.5, length, 0.0)), length)
+    before, last = Circular(0.0, 1000.0, 0.3, turn_q).profile(travel, 0, None).segments[-2:]
     assert (before.end_s, last.end_s) == (1.0, 1.5)
     assert (last.direction, last.half) == (before.direction, before.half)

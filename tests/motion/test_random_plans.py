@@ -75,13 +75,13 @@ class Plans:
         yield from (train, forced_stop(train, self.moment(train.profile), curve, self.chance.one((None, None, 64))))
 
     def paths(self) -> Iterator[Profile]:
-        way = plan_position(MotionState(self.chance.below(10**9), 0, 0.0, 0.0), self.whole("⟨#1..900⟩"), 900.0, 700.0, 400.0)
-        courses: list[Straight | Circular] = [Straight(self.real("⟨-50..50⟩"), self.real("⟨-1.0..1.0|0⟩"))]
+        travel = plan_position(MotionState(self.chance.below(10**9), 0, 0.0, 0.0), self.whole("⟨#1..900⟩"), 900.0, 700.0, 400.0)
+        curves: list[Straight | Circular] = [Straight(self.real("⟨-50..50⟩"), self.real("⟨-1.0..1.0|0⟩"))]
         arcs = [arc for arc in self.arcs() if arc.length]
-        courses += [Circular(arc.centre_x, arc.radius, arc.begin_q, arc.sweep_q / arc.length) for arc in arcs]
-        for course in courses:
-            last = round(course.position(way.final_p))
-            yield course.profile(way, round(course.position(0.0)), self.chance.one((None, last, last + 1)))
+        curves += [Circular(arc.centre_x, arc.radius, arc.begin_q, arc.sweep_q / arc.length) for arc in arcs]
+        for curve in curves:
+            last = round(curve.position(travel.final_p))
+            yield curve.profile(travel, round(curve.position(0.0)), self.chance.one((None, last, last + 1)))
 
     def arcs(self) -> Iterator[Arc]:
         yield circle(self.real("⟨0|-50..50⟩"), self.real("⟨0|-50..50⟩"), self.real("⟨1..90⟩"), self.real("⟨-9..9⟩"))
@@ -91,7 +91,7 @@ class Plans:
 
 
 def check_slope(profile: Profile, now: int) -> None:
-    """The velocity between two moments is that of the way between them, unless the acceleration changes there."""
+    """The velocity between two moments is that of the travel between them, unless the acceleration changes there."""
     a, b = now - 1000, now + 1000
     if a < profile.start or any(a <= profile.start + end <= b for end in profile.ends):
         return

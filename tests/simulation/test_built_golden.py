@@ -130,7 +130,7 @@ def described(world: World) -> Iterator[str]:
                 sources = " ".join(source.name for source in of.sources)
                 yield f"  {name}.{signal}: {of.unit} {of.bounds} of {sources}"
             if element.moved is not None:
-                yield from (f"  {name} is moved by {axis}: {lane}" for axis, lane in element.moved(built))
+                yield from (f"  {name} is moved by {axis}: {channel}" for axis, channel in element.moved(built))
     for scheduler in world.schedulers:
         for number, part in enumerate(scheduler.parts):
             watched = sorted(name for name, numbers in scheduler._parts.by_name.items() if number in numbers)

@@ -13,7 +13,7 @@ import pytest
 from steptwin.controller import SECOND
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
-from steptwin.simulation.mechanics.wells import Wells
+from steptwin.simulation.mechanics.potential import PeriodicPotential
 from steptwin.simulation.toml.reader import WorldError
 
 TORQUE, INERTIA, POLES = 1.0, 5e-5, 50
@@ -178,7 +178,7 @@ def test_without_the_model_the_field_holds_it() -> None:
 
 @pytest.mark.parametrize("resisting", [-0.9, -0.3, 0.0, 0.2, 0.7, 0.999])
 def test_the_energy_that_leaves_a_well_is_the_work_on_the_way_out(resisting: float) -> None:
-    wells, steps = Wells(1.0, 64.0), 40_000
+    wells, steps = PeriodicPotential(1.0, 64.0), 40_000
     low, high = -asin(resisting), pi + asin(resisting)
     width = (high - low) / steps
     work = sum(sin(low + (n + 0.5) * width) + resisting for n in range(steps)) * width * 64 / (2 * pi)

@@ -74,11 +74,11 @@ def missed(scheduler: Scheduler) -> list[object]:
     for part in scheduler.parts:
         before = repr(part.copy_state())
         part.update(scheduler.now)
-        if scheduler.stale or repr(part.copy_state()) != before:
+        if scheduler.is_dirty or repr(part.copy_state()) != before:
             found.append(part)
-    dues = [one.deadline() for one in (*scheduler.controllers.values(), *scheduler.parts)]
-    if scheduler.deadline() != min((due for due in dues if due is not None), default=None):
-        found.append(dues)
+    deadlines = [one.deadline() for one in (*scheduler.controllers.values(), *scheduler.parts)]
+    if scheduler.deadline() != min((due for due in deadlines if due is not None), default=None):
+        found.append(deadlines)
     return [*found, *(edge for controller in scheduler.controllers.values() for edge in controller.take_edges())]
 
 
@@ -127,12 +127,12 @@ def test_a_part_is_updated_for_what_it_watches_and_when_it_is_due() -> None:
 
     assert (usual.updates, other.updates, curious.updates) == (1, 1, 1)
     for changed in ("a", "b", "c"):
-        scheduler.mark(changed)
+        scheduler.notify(changed)
         scheduler.advance(0)
     assert (usual.updates, other.updates, curious.updates) == (3, 1, 4)
     scheduler.advance(20 * SECOND)
     assert (usual.updates, other.updates, curious.updates) == (23, 3, 24)
-    scheduler.mark()
+    scheduler.notify()
     scheduler.advance(20 * SECOND)
     assert (usual.updates, other.updates, curious.updates) == (24, 4, 25)
 

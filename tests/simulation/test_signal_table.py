@@ -31,9 +31,9 @@ def described(name: str, signal: SignalOf) -> str:
 
 def present(signal: SignalOf, now: Nanos) -> str:
     """Its value, and when it may turn next, in ns from now."""
-    signal.bring(now)
-    turns = ", ".join(str(moment - now) for moment in islice(signal.turns(now), TURNS))
-    return f"{signal.value(now):.9g}{f' ({turns})' if signal.continuous else ''}"
+    signal.sync(now)
+    turning_points = ", ".join(str(moment - now) for moment in islice(signal.turning_points(now), TURNS))
+    return f"{signal.value(now):.9g}{f' ({turning_points})' if signal.continuous else ''}"
 
 
 def signals(world: World) -> dict[str, SignalOf]:

@@ -14,8 +14,8 @@ from steptwin.errors import Misuse, TimeReversal
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.simulation.faults import Faults, read, rig
-from steptwin.simulation.mechanics.course import Build
 from steptwin.simulation.mechanics.mechanics import Mechanism
+from steptwin.simulation.mechanics.trajectory import Build
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 from steptwin.simulation.scheduler.wires import PinName, Wire
@@ -104,7 +104,7 @@ def test_a_snapshot_of_both_continues_as_the_scheduler_itself() -> None:
     toy.execute(GO, 0)
     scheduler.advance(50 * MILLISECOND)
     mic.execute(bytes.fromhex("05 1770 FF00"), 50 * MILLISECOND)
-    scheduler.settle()
+    scheduler.propagate()
     kept = pickle.loads(pickle.dumps(scheduler.snapshot()))
     others, other, _ = wired()
     others.restore(kept)

@@ -19,9 +19,9 @@ from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.live.world_frames import follow_frames
 from steptwin.m1486.events import EVENTS_KEPT
-from steptwin.simulation.describe.small import LINE, Whole
-from steptwin.simulation.describe.small_m1486 import m1486_world
-from steptwin.simulation.describe.small_mic488 import mic488_world
+from steptwin.simulation.describe.generated import LINE, Whole
+from steptwin.simulation.describe.generated_m1486 import m1486_world
+from steptwin.simulation.describe.generated_mic488 import mic488_world
 from steptwin.wire.crc import crc16
 
 REQUESTS = 1_000_000

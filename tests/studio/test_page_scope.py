@@ -75,6 +75,6 @@ def test_the_scope_has_frames_program_lines_and_phase_currents(start_studio: Cal
     currents = [float(row["drum phase current 1 [%]"]) for row in rows if row["drum phase current 1 [%]"]]
     assert max(map(abs, currents)) <= 100
     assert not any("frames" in name for name in rows[0])
-    page.screenshot(path=PICTURES / "scope-lanes.png")
+    page.screenshot(path=PICTURES / "scope-channels.png")
     studio.close()
     assert studio.complaints == []

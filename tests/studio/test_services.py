@@ -65,8 +65,8 @@ def gateways(process: Process) -> dict[str, Any]:
     return {one["kind"]: one for one in ok(process, "gateways")}
 
 
-def kept(process: Process, **stretch: float) -> Any:
-    (found,) = ok(process, "history_values", points=["table.M1.position"], **stretch)["series"]
+def kept(process: Process, **interval: float) -> Any:
+    (found,) = ok(process, "history_values", points=["table.M1.position"], **interval)["series"]
     return found
 
 

@@ -258,7 +258,7 @@ class _Bounds(Mock):
     ("name", "fields"),
     [("history_values", {"points": ["x"]}), ("history_writes", {}), ("compare_history", {"run": 1, "other": 2})],
 )
-def test_a_stretch_of_the_history_goes_from_its_beginning_to_its_end(name: str, fields: dict[str, Any]) -> None:
+def test_an_interval_of_the_history_goes_from_its_beginning_to_its_end(name: str, fields: dict[str, Any]) -> None:
     studio = Studio()
     studio.hub.around = replace(studio.hub.around, services=_Bounds())
     tab = studio.open()

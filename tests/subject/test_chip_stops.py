@@ -35,7 +35,7 @@ def chip(keys: str, *, variant: str = "B", line: str = "") -> WorldSubject:
 def settle(subject: WorldSubject, seconds: float) -> float:
     world = subject.world
     world.advance(world.now + round(seconds * SECOND))
-    world.settle_all()
+    world.sync_all()
     return world.read("chip.position")
 
 

@@ -36,7 +36,7 @@ def feeder() -> World:
 
 def test_events_name_what_led_to_them() -> None:
     subject = of(small())
-    subject.world.settle_all()
+    subject.world.sync_all()
     following = subject.follow(filter_of(), 99)
     number = subject.do(do.Press("go")).number
     pressed, *edges = following.take().events

@@ -115,11 +115,11 @@ def _by_command(family: str, asked: str, way: str, delay_s: float) -> tuple[Nano
         case _:
             subject.do(Download("drum", "program", PROGRAM))
     world.advance(world.now + round(delay_s * SECOND))
-    world.settle_all()
+    world.sync_all()
     subject.do(command.StopAll() if way == "stop_all" else command.StopAxes("drum"))
     stopped_at = world.now
     world.advance(stopped_at + round(QUIET_S * SECOND))
-    world.settle_all()
+    world.sync_all()
     events = followed.take().events
     begun = [event.time for event in events if isinstance(event.payload, StatusPayload) and event.payload.code in BEGINS]
     return stopped_at, begun, world.read("drum.moving") == 0.0

@@ -21,7 +21,7 @@ from steptwin.debug.debugger import Debugger
 from steptwin.debug.lookahead import Goal
 from steptwin.files.world import World
 from steptwin.simulation.kinds.mic488.build import _loaded
-from steptwin.simulation.mechanics.course import Course
+from steptwin.simulation.mechanics.trajectory import Trajectory
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.toml.reader import WorldError
@@ -395,23 +395,23 @@ def copies(composition: Composition) -> Iterator[Outcome]:
 
 @contextmanager
 def general_way() -> Generator[Callable[[World], World]]:
-    """Nothing saves work: everything is looked at after each change, every statement is executed by itself, and each course is
-    laid in pieces. What is given makes a world general that was made meanwhile."""
+    """Nothing saves work: everything is looked at after each change, every statement is executed by itself, and each trajectory
+    is laid in pieces. What is given makes a world general that was made meanwhile."""
 
     def general(world: World) -> World:
         for scheduler in world.schedulers:
             scheduler._join()
-            scheduler.is_attentive = True
-            mark = partial(Scheduler.mark, scheduler)
-            scheduler.mark = lambda name=None, mark=mark: mark()  # type: ignore[method-assign]
+            scheduler.is_step_exact = True
+            notify = partial(Scheduler.notify, scheduler)
+            scheduler.notify = lambda name=None, notify=notify: notify()  # type: ignore[method-assign]
             for controller in scheduler.controllers.values():
-                controller.changed = mark
+                controller.changed = notify
         for programs in world.programs.values():
             programs.execute_all(True, world.now)
         return world
 
     with ExitStack() as stack:
-        stack.enter_context(patch.object(Course, "_keeps_distance", lambda course, profile: False))
+        stack.enter_context(patch.object(Trajectory, "_keeps_distance", lambda trajectory, profile: False))
         stack.enter_context(patch("steptwin.wbc.compile.straight_of", lambda codes, steps, cell: [None] * len(steps)))
         stack.enter_context(patch("steptwin.simulation.kinds.mic488.build._loaded", _loaded.__wrapped__))
         yield general

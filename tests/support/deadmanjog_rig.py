@@ -59,10 +59,10 @@ class Rig:
         end = self.world.now + round(for_ms * MILLISECOND)
         while (due := self.jogs.deadline()) is not None and due <= end:
             self.world.advance(max(due, self.world.now))
-            self.world.settle_all()
+            self.world.sync_all()
             self.jogs.advance(self.world.now)
         self.world.advance(end)
-        self.world.settle_all()
+        self.world.sync_all()
 
     def stands_at(self) -> Nanos:
         """When the last plan ends or ended."""

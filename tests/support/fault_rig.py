@@ -86,14 +86,14 @@ class FaultRig:
     def add(self, *faults: str) -> list[ActiveFault]:
         self.scheduler.advance(self.now)
         added = [self.faults.add(read(fault), self.now) for fault in faults]
-        self.scheduler.settle()
+        self.scheduler.propagate()
         return added
 
     def send(self, data: bytes) -> bytes:
         """What comes at once."""
         self.scheduler.advance(self.now)
         answer = self.port.exchange(data, self.now)
-        self.scheduler.settle()
+        self.scheduler.propagate()
         return answer
 
     def ask(self, pdu: bytes = READ, unit: int = 1, ms: float = 10.0) -> bytes:
@@ -108,8 +108,8 @@ class FaultRig:
         end = self.now + round(seconds * SECOND)
         out = []
         while True:
-            dues = [due for due in (self.port.deadline(), self.scheduler.deadline()) if due is not None]
-            due = min(dues, default=end + 1)
+            deadlines = [due for due in (self.port.deadline(), self.scheduler.deadline()) if due is not None]
+            due = min(deadlines, default=end + 1)
             if due > end:
                 break
             self.now = max(due, self.now)
@@ -127,7 +127,7 @@ class FaultRig:
         """Something outside drives an input."""
         self.scheduler.advance(self.now)
         self.scheduler.drive(PinName(str(unit), pin), level)
-        self.scheduler.settle()
+        self.scheduler.propagate()
 
     def level(self, pin: str) -> float:
         return self.device.pins()[pin]

@@ -157,13 +157,13 @@ class Wire(VirtualWire):
             twin.advance(self.now)
 
     def _next_event(self, twin: Mic488Device) -> int | None:
-        dues = [twin.deadline()]
+        deadlines = [twin.deadline()]
         for axis, high in self._switches:
             profile = twin.axes[axis].profile
             if profile.moving(twin.now):
                 edges = (KR_P - 1, KR_P) if high else (KL_P, KL_P + 1)
-                dues += [profile.pulse_time(edge, twin.now) for edge in edges]
-        return min((due for due in dues if due is not None), default=None)
+                deadlines += [profile.pulse_time(edge, twin.now) for edge in edges]
+        return min((due for due in deadlines if due is not None), default=None)
 
     def _set_switches(self, twin: Mic488Device) -> None:
         for axis, high in self._switches:

@@ -107,7 +107,7 @@ def way_u(train: StepTrain, after: int, until: int) -> int:
     """Where the pulses of a train with ``after`` < time <= ``until`` lead: their number in each division by its grid."""
     times = step_times(train, after, until)
     total = done = 0
-    for begin, end, grid in train.stretches():
+    for begin, end, grid in train.intervals():
         change = None if end is None or end == begin else train.pulse_time(end, train.profile.start)
         upto = len(times) if end is None else done if change is None else int((times <= change).sum())
         total += (upto - done) * grid

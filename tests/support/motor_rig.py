@@ -7,8 +7,8 @@ from math import pi
 
 from steptwin.controller import SECOND
 from steptwin.motion import MotionState, Profile, plan_position
-from steptwin.simulation.mechanics.course import Build, Course, MechanicalState
 from steptwin.simulation.mechanics.motor import StepperMotor
+from steptwin.simulation.mechanics.trajectory import Build, MechanicalState, Trajectory
 
 PER_REV = 3200
 INERTIA = 1e-4 * 2 * pi / PER_REV
@@ -29,7 +29,7 @@ def motor(
 
 
 def final(build: Build, plan: Profile) -> MechanicalState:
-    return Course(build, plan, plan.start, MechanicalState(0, 0)).at(1000 * SECOND)
+    return Trajectory(build, plan, plan.start, MechanicalState(0, 0)).at(1000 * SECOND)
 
 
 def accelerated(rate: float, speed: float = 30_000.0) -> Profile:

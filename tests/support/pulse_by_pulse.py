@@ -1,11 +1,11 @@
-"""Where mechanics are pulse by pulse: an independent way to the courses that `steptwin.simulation.mechanics.course` has in
-closed form."""
+"""Where mechanics are pulse by pulse: an independent way to the trajectories that `steptwin.simulation.mechanics.trajectory` has
+in closed form."""
 
 from __future__ import annotations
 
 from steptwin.controller import Nanos
 from steptwin.motion.divisions import Plan
-from steptwin.simulation.mechanics.course import Build, MechanicalState
+from steptwin.simulation.mechanics.trajectory import Build, MechanicalState
 
 
 def changes(plan: Plan, after: Nanos, until: Nanos) -> list[tuple[Nanos, int]]:

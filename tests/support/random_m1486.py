@@ -148,7 +148,7 @@ class RandomChips:
         for path in POINTS:
             live = live_point(chip, path)
             assert live is not None
-            ahead = live.turns and list(islice(live.turns(now), 3))
+            ahead = live.turning_points and list(islice(live.turning_points(now), 3))
             yield f"{live.point} {live.read and live.read(now)} {ahead} {live.is_kept} {live.version and live.version()}"
 
     def run(self) -> None:
@@ -235,11 +235,11 @@ class RandomChips:
     def wait(self) -> None:
         chance = self.chance
         kind = chance.below(8)
-        dues = [due for chip in self.chips if (due := chip.deadline()) is not None]
+        deadlines = [due for chip in self.chips if (due := chip.deadline()) is not None]
         if kind == 0:
             return
-        if kind == 1 and dues:
-            self.now = max(min(dues) - chance.below(2), self.now)
+        if kind == 1 and deadlines:
+            self.now = max(min(deadlines) - chance.below(2), self.now)
         else:
             self.now += int(float(chance.filled("⟨1|1..9|5..60|20..400|200..900⟩")) * MILLISECOND)
         for chip in self.chips:
@@ -261,7 +261,7 @@ def shown_train(train: StepTrain) -> str:
         for one in profile.segments
     )
     ends = f"{profile.start} {profile.base} {profile.end} {profile.final_p:.9g}"
-    return f"{ends} [{parts}] {list(train.stretches())} {train.microstepping}"
+    return f"{ends} [{parts}] {list(train.intervals())} {train.microstepping}"
 
 
 def way_u(trains: list[tuple[int, StepTrain]], end: int) -> int:

@@ -164,10 +164,10 @@ class RandomMic488:
             if "USER" not in point.path:
                 live = live_point(device, point.path)
                 assert live is not None
-                read, turns = live.read, live.turns
+                read, turning_points = live.read, live.turning_points
                 frozen = read if live.freeze is None else live.freeze(now)
                 later = now + SECOND // 7
-                ahead = turns and list(islice(turns(now), 3))
+                ahead = turning_points and list(islice(turning_points(now), 3))
                 yield f"{point} {read and read(now)} {frozen and frozen(later)} {ahead} {live.is_kept}"
 
     # ------------------------------------------------------------------ what is done

@@ -178,7 +178,7 @@ def seen_of_controllers(world: Simulation) -> list[str]:
         axis = MechanicsView(world, fitted)
         found.append(f"{name} {axis.position:.9g} {axis.rotor:.9g} {axis.lost} {axis.stalled}")
     for name in world.controllers:
-        world.touch(name)
+        world.sync(name)
         found.append(repr(world.kind(name).state(world.controllers[name], world.now)))
     for programs in world.programs.values():
         found.append(repr((programs.stack(world.now), dict(programs.variables(world.now)), programs.depth())))
@@ -188,9 +188,9 @@ def seen_of_controllers(world: Simulation) -> list[str]:
 
 def told_of(name: str, signal: SignalOf, now: Nanos) -> str:
     """A signal: its value, unit and bounds, and where it may turn next."""
-    signal.bring(now)
-    turns = list(islice(signal.turning(now), TURNS)) if signal.turning is not None else []
-    return f"{name} {signal.value(now):.9g} {signal.unit} {signal.bounds} {turns}"
+    signal.sync(now)
+    turning_points = list(islice(signal.turning(now), TURNS)) if signal.turning is not None else []
+    return f"{name} {signal.value(now):.9g} {signal.unit} {signal.bounds} {turning_points}"
 
 
 VALUES = ("0", "-1", "1e300", "''", "'x'", "'c.IN1'", "'c.OUT1'", "'c.M1'", "[]", "[[0, 1]]", "true", "'10 ms'", "{}")

@@ -180,10 +180,10 @@ class Studio:
     def _advance(self, to: Nanos) -> None:
         while (due := self.jogs.deadline()) is not None and due <= to:
             self.world.advance(max(due, self.world.now))
-            self.world.settle_all()
+            self.world.sync_all()
             self.jogs.advance(self.world.now)
         self.world.advance(to)
-        self.world.settle_all()
+        self.world.sync_all()
 
     def value(self, point: str) -> float:
         (reading,) = self.subject.read(point)

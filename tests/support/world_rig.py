@@ -10,13 +10,13 @@ from typing import NamedTuple
 from mic488_rig import EN, OFFSETS, OUT, STOP, VALUES, coil_pdu, real_words, words_pdu
 
 from steptwin.controller import Nanos
-from steptwin.files.export import AxisLane, axis_views
+from steptwin.files.export import AxisChannel, axis_views
 from steptwin.files.session import load, save, session_of
 from steptwin.files.world import World
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
-from steptwin.simulation.describe.small import LINE, Whole
-from steptwin.simulation.describe.small_m1486 import m1486_world
-from steptwin.simulation.describe.small_mic488 import mic488_world
+from steptwin.simulation.describe.generated import LINE, Whole
+from steptwin.simulation.describe.generated_m1486 import m1486_world
+from steptwin.simulation.describe.generated_mic488 import mic488_world
 from steptwin.simulation.scheduler.trace import Trace
 from steptwin.simulation.world.inputs import Bytes
 
@@ -94,7 +94,7 @@ def moved(world: World, position: float) -> World:
 
 class Run(NamedTuple):
     trace: Trace
-    views: dict[tuple[str, str], AxisLane]
+    views: dict[tuple[str, str], AxisChannel]
     until: Nanos
 
     def origin_p(self, axis: str, now: Nanos) -> int:

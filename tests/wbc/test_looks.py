@@ -24,7 +24,7 @@ HORIZON = 10**6
 def test_wbc_18_the_first_look_that_differs_is_found(
     turns: list[tuple[int, int]], threshold: int, begin: int, period: int, *, endless: bool
 ) -> None:
-    # A function that rises or falls in stretches, and the side of a threshold it is on.
+    # A function that rises or falls in intervals, and the side of a threshold it is on.
     ends, values, value, at = [], [], 0, 0
     for length, slope in turns:
         at += length
@@ -39,10 +39,10 @@ def test_wbc_18_the_first_look_that_differs_is_found(
     def side(moment: int) -> float:
         return float(height(moment) > threshold)
 
-    stretches = [end - 1 for end in ends[bisect_right(ends, begin) :]] + ([FOREVER] if endless else [])
+    intervals = [end - 1 for end in ends[bisect_right(ends, begin) :]] + ([FOREVER] if endless else [])
     looks = range(begin + period, begin + period + 30_000 * period, period)
     expected = next((moment for moment in looks if side(moment) != side(begin)), None)
-    found = first_change(side, begin, period, stretches, HORIZON)
+    found = first_change(side, begin, period, intervals, HORIZON)
     assert found == expected or (expected is None and endless and found is not None and found > HORIZON)
 
 

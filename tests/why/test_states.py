@@ -12,7 +12,7 @@ from steptwin.files.world import World
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput
-from steptwin.why import courses, log, points, states
+from steptwin.why import log, points, replayed, states
 from steptwin.why.question import Why
 
 COUNTS = "n = 0\n$I5 = 0\nMAIN:\n    n = n + 1\n    $I4 = n\n    DELAY 0.3\n    IF n = 7\n        $I5 = 1\n    ENDIF\nJUMP MAIN\n"
@@ -79,7 +79,7 @@ def runs(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         found.append(end)
         return log.in_parts(world, inputs, end)
 
-    monkeypatch.setattr(courses, "in_parts", in_parts)
+    monkeypatch.setattr(replayed, "in_parts", in_parts)
     return found
 
 
@@ -102,7 +102,7 @@ def test_what_a_question_showed_is_remembered(first: str, then: str, lacking: in
 
 def test_what_is_remembered_is_bounded(runs: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
     past = counting()
-    monkeypatch.setattr(courses, "MOST_REMEMBERED", 5)
+    monkeypatch.setattr(replayed, "MOST_REMEMBERED", 5)
     first = past.ask("time > 9000")
     needed = len(runs)
     assert needed == 5  # of 16 intervals: 1, 1, 2, 4 and the rest
@@ -130,10 +130,10 @@ def test_what_is_noted_of_points_is_what_a_run_shows(program: str, wired: str, m
     moments = [number * 310 * MILLISECOND for number in range(1, 16)]
     past = whole_past(world)
     noted = [past.ask(question, at) for question in SEEN for at in moments]
-    monkeypatch.setattr(points, "MOST_TURNS", 0)
+    monkeypatch.setattr(points, "MOST_CHANGES", 0)
     past = whole_past(world)
     assert noted == [past.ask(question, at) for question in SEEN for at in moments]
-    assert past.log.points.turns("m.M2_ACC") is None
+    assert past.log.points.series("m.M2_ACC") is None
     assert len({answer.since for answer in noted}) > 5
 
 

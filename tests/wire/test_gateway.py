@@ -36,12 +36,12 @@ def run(until: int, *ports: GatewayPort | TimedRtuSlavePort) -> list[list[tuple[
     """As a shell does: call each port at its deadlines. What each has sent."""
     out: list[list[tuple[int, bytes]]] = [[] for _ in ports]
     while True:
-        dues = [due for port in ports if (due := port.deadline()) is not None and due <= until]
-        if not dues:
+        deadlines = [due for port in ports if (due := port.deadline()) is not None and due <= until]
+        if not deadlines:
             return out
         for port, sent in zip(ports, out, strict=True):
-            if port.deadline() == min(dues):
-                sent.extend(port.to_send(min(dues)))
+            if port.deadline() == min(deadlines):
+                sent.extend(port.to_send(min(deadlines)))
 
 
 def test_mic_32_a_request_takes_the_time_of_the_line_behind_the_gateway(bank: Any) -> None:

@@ -110,9 +110,9 @@ def test_mic_32_a_request_that_began_before_the_response_had_left_is_lost(bank: 
 def run_all(until: int, *ports: TimedRtuSlavePort) -> list[list[tuple[int, bytes]]]:
     """What each port has sent, all called at the deadlines of all."""
     out: list[list[tuple[int, bytes]]] = [[] for _ in ports]
-    while (dues := [due for port in ports if (due := port.deadline()) is not None]) and min(dues) <= until:
+    while (deadlines := [due for port in ports if (due := port.deadline()) is not None]) and min(deadlines) <= until:
         for number, port in enumerate(ports):
-            out[number] += port.to_send(min(dues))
+            out[number] += port.to_send(min(deadlines))
     return out
 
 

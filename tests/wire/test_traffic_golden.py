@@ -56,10 +56,10 @@ class Ports:
     def run(self, until: int) -> None:
         """Everything that is due, at its moment."""
         while True:
-            dues = [due for port in self.ports if (due := port.deadline()) is not None]
-            if not dues or min(dues) > until:
+            deadlines = [due for port in self.ports if (due := port.deadline()) is not None]
+            if not deadlines or min(deadlines) > until:
                 break
-            self.now = max(self.now, min(dues))
+            self.now = max(self.now, min(deadlines))
             self._send()
         self.now = until
 

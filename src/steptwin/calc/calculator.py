@@ -241,8 +241,8 @@ class Calculator:
         begin, at_p = 0.0, 0.0
         speed, pulses = self.quantities[VELOCITY].pulses, self.quantities[DISTANCE].pulses
         names = {"rises": ACCELERATION, "stays": "constant velocity", "falls": DECELERATION}
-        for segment, course in zip(profile.segments, _courses(profile), strict=True):
-            shape = f"parabolic {names[course]}" if segment.c3 else names[course]
+        for segment, phase in zip(profile.segments, _phases(profile), strict=True):
+            shape = f"parabolic {names[phase]}" if segment.c3 else names[phase]
             end_p = segment.position(segment.end_s)
             first, last = abs(segment.velocity(begin)) / speed, abs(segment.velocity(segment.end_s)) / speed
             parts.append(MovePart(shape, begin, segment.end_s - begin, first, last, (end_p - at_p) / pulses))
@@ -262,7 +262,7 @@ def _least(quantity: MoveQuantity) -> float:
     return low if low > 0.0 else LEAST_PART / quantity.pulses
 
 
-def _courses(profile: Profile) -> list[str]:
+def _phases(profile: Profile) -> list[str]:
     """Whether the speed rises, stays or falls, by segment."""
     return ["stays" if not one.c2 else "rises" if one.c2 * one.direction > 0.0 else "falls" for one in profile.segments]
 
@@ -270,8 +270,8 @@ def _courses(profile: Profile) -> list[str]:
 def _times(profile: Profile) -> dict[str, float]:
     times = dict.fromkeys(TIME_NAMES, 0.0)
     begin = 0.0
-    for segment, course in zip(profile.segments, _courses(profile), strict=True):
-        times[PARTS_OF[course]] += segment.end_s - begin
+    for segment, phase in zip(profile.segments, _phases(profile), strict=True):
+        times[PARTS_OF[phase]] += segment.end_s - begin
         begin = segment.end_s
     times[TIME] = begin
     return times

@@ -28,7 +28,7 @@ def solve(of: Callable[[float], float], wanted: float, low: float, high: float) 
         if not low < middle < high:
             break
         value = of(middle)
-        # What is alike counts as reached, so that the beginning of a stretch without change is found.
+        # What is alike counts as reached, so that the beginning of an interval without change is found.
         if is_same(value, wanted) or (value > wanted) is rises:
             high = middle
         else:

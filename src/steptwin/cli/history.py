@@ -119,7 +119,7 @@ class _Shown:
     def __init__(self, past: Any, options: HistoryOptions, out: Callable[[str], object]) -> None:
         from steptwin.controller import SECOND
         from steptwin.durations import duration
-        from steptwin.history.stretches import read_stretch
+        from steptwin.history.intervals import read_interval
 
         self._past = past
         self._options = options
@@ -128,11 +128,11 @@ class _Shown:
         if self._every == 0:
             raise Misuse(f"--every {options.every}: must be more than 0")
         is_open = not past.runs()
-        self._stretch = None if is_open else read_stretch(past, options.run, options.begin, options.end)
+        self._interval = None if is_open else read_interval(past, options.run, options.begin, options.end)
 
     def show(self) -> bool:
         options = self._options
-        if self._stretch is None:
+        if self._interval is None:
             self._out(f"{self._past.shown}: nothing has been kept yet")
             return True
         if options.events or options.writes:
@@ -166,9 +166,9 @@ class _Shown:
         return list(dict.fromkeys(found))
 
     def _series(self, point: str) -> Any:
-        stretch = self._stretch
-        assert stretch is not None  # noqa: S101
-        return self._past.series(point, stretch.begin, stretch.end, every_s=self._every, run=stretch.number)
+        interval = self._interval
+        assert interval is not None  # noqa: S101
+        return self._past.series(point, interval.begin, interval.end, every_s=self._every, run=interval.number)
 
     # ------------------------------------------------------------------ as text
 
@@ -206,9 +206,9 @@ class _Shown:
     def _events(self, kinds: Sequence[str] | None) -> None:
         from steptwin.controller import SECOND
 
-        stretch = self._stretch
-        assert stretch is not None  # noqa: S101
-        found = self._past.events(stretch.begin, stretch.end, run=stretch.number, kinds=kinds, most=MOST_LINES)
+        interval = self._interval
+        assert interval is not None  # noqa: S101
+        found = self._past.events(interval.begin, interval.end, run=interval.number, kinds=kinds, most=MOST_LINES)
         if self._options.as_json:
             plain = [{**event._asdict(), "at": event.at.isoformat(), "time": str(event.time)} for event in found]
             self._out(json.dumps(plain, ensure_ascii=False, indent=2))
@@ -224,19 +224,19 @@ class _Shown:
         for run, at, seconds, point, value, unit in rows[:MOST_LINES]:
             self._out(f"{_local(at)}  run {run}  {seconds:12.6f} s  {point}  {_text(value, unit)}")
         if len(rows) > MOST_LINES:
-            self._out(f"... and {len(rows) - MOST_LINES} more: choose a shorter stretch, or write them to a file with --output")
+            self._out(f"... and {len(rows) - MOST_LINES} more: choose a shorter interval, or write them to a file with --output")
 
     def _compare(self, points: Sequence[str]) -> bool:
-        from steptwin.history.stretches import compare, read_stretch
+        from steptwin.history.intervals import compare, read_interval
 
-        options, stretch = self._options, self._stretch
-        assert stretch is not None  # noqa: S101
-        if stretch.run is None:
-            stretch = read_stretch(self._past, -1, options.begin, options.end)
-        other = read_stretch(self._past, options.other, options.begin, options.end)
+        options, interval = self._options, self._interval
+        assert interval is not None  # noqa: S101
+        if interval.run is None:
+            interval = read_interval(self._past, -1, options.begin, options.end)
+        other = read_interval(self._past, options.other, options.begin, options.end)
         if options.output is not None:
-            self._export_pairs(options.output, points, stretch, other)
-        found = compare(self._past, points, stretch, other, self._every)
+            self._export_pairs(options.output, points, interval, other)
+        found = compare(self._past, points, interval, other, self._every)
         if options.as_json:
             plain = [{**one._asdict(), "most": _finite(one.most), "values": list(map(_finite, one.values))} for one in found]
             self._out(json.dumps(plain, ensure_ascii=False, indent=2))

@@ -59,7 +59,7 @@ def describe_m1486(served: Served, chips: ChipOptions, named: Named = str) -> st
     from steptwin.m1486.lines import interface
     from steptwin.m1486.pins import baud_pins
     from steptwin.m1486.variants import variant
-    from steptwin.simulation.describe.small_m1486 import m1486_world
+    from steptwin.simulation.describe.generated_m1486 import m1486_world
 
     check_line_timing(served.line.line_timing, "real")
     kind = variant(chips.variant)

@@ -104,7 +104,7 @@ def describe_mic488(served: Served, controllers: Mic488Options, named: Named = s
     from steptwin.live.serving import check_line_timing
     from steptwin.mic488.config import BAUDS
     from steptwin.mic488.registers import firmware as known_firmware
-    from steptwin.simulation.describe.small_mic488 import mic488_world
+    from steptwin.simulation.describe.generated_mic488 import mic488_world
     from steptwin.wbc.interpreter import STATEMENT_TIME
 
     line = served.line

@@ -13,7 +13,7 @@ from steptwin.options import Option, OptionGroup
 
 if TYPE_CHECKING:
     from steptwin.languages.descriptions import Named
-    from steptwin.simulation.describe.small import Whole
+    from steptwin.simulation.describe.generated import Whole
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,7 +91,7 @@ class Served:
 
     def whole(self, **line: object) -> Whole:
         """The parts of the description that all twins have. Raises `Misuse`."""
-        from steptwin.simulation.describe.small import Whole
+        from steptwin.simulation.describe.generated import Whole
         from steptwin.simulation.faults import read as read_fault
 
         timing = None if self.line.line_timing == "off" else self.line.line_timing

@@ -47,7 +47,7 @@ class ResolvedExpression:
 
         self._value = value_of(node.in_unit(unit_of_all(node, unit_of), unit_of), reads, _checked)
         self._own = world.parts.scheduler_of[controller]
-        schedulers = {source.scheduler: None for signal in signals.values() for source in signal.bring(world.now)}
+        schedulers = {source.scheduler: None for signal in signals.values() for source in signal.sync(world.now)}
         self._others = [scheduler for scheduler in schedulers if scheduler is not self._own]
 
     def check_names(self) -> None:

@@ -81,7 +81,7 @@ class Debugger:
         self._statement = min(programs.statement_time for programs in debugged.values())
         self._apply_input = apply_input or world.apply_input
         self._go_back = go_back or self._take_back
-        world.settle_all()
+        world.sync_all()
         for programs in world.programs.values():
             programs.execute_all(True, world.now)
         self._is_own_history = history is None
@@ -95,7 +95,7 @@ class Debugger:
         """Debug no more; the world goes on as ever."""
         if self._is_own_history:
             self._history.close()
-        self._world.settle_all()
+        self._world.sync_all()
         for programs in self._world.programs.values():
             programs.execute_all(False, self._world.now)
 

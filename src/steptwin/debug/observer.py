@@ -92,7 +92,7 @@ class Observer:
                 programs.hook(self._hooks[controller], places)
                 self._hooked[controller] = places
         scheduler_of = self.world.parts.scheduler_of
-        self.world.settled_first = [scheduler_of[controller] for controller in self.points.reading_others()]
+        self.world.synced_first = [scheduler_of[controller] for controller in self.points.reading_others()]
 
     def release(self) -> None:
         """Have no hooks: breakpoints or texts may be others by the next `observe`."""

@@ -27,7 +27,7 @@ UNKNOWN_GROUP = Message("debug.unknown-group", "no group of values is called {na
 
 def scope(world: Simulation, controller: str, name: str) -> Scope:
     """One of `SCOPES` of a controller, at the present moment of its world. Raises `Misuse`."""
-    world.touch(controller)
+    world.sync(controller)
     if name not in SCOPES:
         raise Misuse(UNKNOWN_GROUP(name=name, names=list(SCOPES)))
     return Scope(
@@ -120,7 +120,7 @@ _VALUES = {
 
 def evaluate(world: Simulation, controller: str, text: str) -> ShownValue:
     """The value of an expression. Raises `Misuse`."""
-    world.touch(controller)
+    world.sync(controller)
     name = text.strip()
     number = ResolvedExpression(world, controller, name).value(world.now)
     return ShownValue(name, number_text(number), number, is_settable=False)

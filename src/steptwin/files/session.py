@@ -97,7 +97,7 @@ class Session:
 def _settle(world: World) -> None:
     """A session ends when everything of its last moment has happened."""
     world.advance(world.now)
-    world.settle_all()
+    world.sync_all()
 
 
 def _firmwares(world: World) -> dict[str, str]:

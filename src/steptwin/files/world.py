@@ -267,9 +267,9 @@ class World(Simulation):
 
     def due(self) -> Nanos | None:
         """The next moment (ns) at which anything happens without input; None if nothing will."""
-        dues = [due for scheduler in self.schedulers if (due := scheduler.deadline()) is not None]
+        deadlines = [due for scheduler in self.schedulers if (due := scheduler.deadline()) is not None]
         own = self.next()
-        return min(dues if own is None else [*dues, own], default=None)
+        return min(deadlines if own is None else [*deadlines, own], default=None)
 
     def step(self) -> Nanos | None:
         """Run to the next moment (ns) at which anything happens without input, and return it; None if nothing will."""
@@ -326,7 +326,7 @@ class World(Simulation):
         if not self.keeps_inputs:
             raise Misuse("this world does not keep its inputs, so its past is not known: make it with keep_inputs=True")
         self.advance(self.now)
-        self.settle_all()
+        self.sync_all()
         return RepeatedPast(lambda: type(self)(self.blueprint, failing=self.failed_saves), self.inputs, self.now)
 
     def why(self, question: str, at: Duration | None = None) -> Answer:

@@ -421,7 +421,7 @@ def _of_samples(point: str, rows: list[_Row], runs: Mapping[int, KeptRun], bound
 
 
 TOO_MANY_VALUES = Message(
-    "history.too-many-values", "{point} has more than {most} values here: take a shorter stretch, or one value in a longer time"
+    "history.too-many-values", "{point} has more than {most} values here: take a shorter interval, or one value in a longer time"
 )
 
 

@@ -11,7 +11,7 @@ from steptwin.errors import Misuse
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.m1486.pins import OPEN_ADDRESS, known_pin, refuse_taken
 from steptwin.m1486.variants import DEFAULT, Variant
-from steptwin.simulation.describe.small_m1486 import chip_name
+from steptwin.simulation.describe.generated_m1486 import chip_name
 from steptwin.simulation.scheduler.wires import PinName, Wire
 
 _WIRE = re.compile(r"\s*([0-9A-Fa-f])\.([^.=]+)=\s*([0-9A-Fa-f])\.([^.=]+)\Z")

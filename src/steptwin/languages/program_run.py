@@ -1,4 +1,4 @@
-"""Run a single program in a small world to its end: the parts common to `run_wbc` and `run_m1486`."""
+"""Run a single program in a generated world to its end: the parts common to `run_wbc` and `run_m1486`."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from steptwin.files.coverage import CoverageReports
 from steptwin.files.export import axis_views, bar, write_trace
 from steptwin.files.timedinputs import TimedInput
 from steptwin.files.world import World
+from steptwin.simulation.describe.generated import InputChange
 from steptwin.simulation.describe.overrides import NO_OVERRIDES, Overrides
-from steptwin.simulation.describe.small import InputChange
 from steptwin.wbc.real import real_text
 
 USUAL_LIMIT_NS: Nanos = 60 * SECOND

@@ -47,8 +47,8 @@ from steptwin.m1486.pins import OPEN_ADDRESS, refuse_taken, settable_pin
 from steptwin.m1486.present import program_words, velocity
 from steptwin.m1486.unit import counter_text
 from steptwin.m1486.variants import DEFAULT, Store, Variant, variant
-from steptwin.simulation.describe.small import InputChange, Whole
-from steptwin.simulation.describe.small_m1486 import chip_name, m1486_world
+from steptwin.simulation.describe.generated import InputChange, Whole
+from steptwin.simulation.describe.generated_m1486 import chip_name, m1486_world
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.kinds.m1486.memory import PLACE
 from steptwin.simulation.kinds.programs import StatementFollower

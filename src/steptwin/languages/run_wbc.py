@@ -45,9 +45,9 @@ from steptwin.mic488.inputs import index_input
 from steptwin.mic488.present import place_of, state_of
 from steptwin.mic488.program import RUNNING
 from steptwin.mic488.status import AxisStatus, ProgramState
+from steptwin.simulation.describe.generated import Whole
+from steptwin.simulation.describe.generated_mic488 import mic488_world
 from steptwin.simulation.describe.overrides import NO_OVERRIDES
-from steptwin.simulation.describe.small import Whole
-from steptwin.simulation.describe.small_mic488 import mic488_world
 from steptwin.simulation.kinds.mic488.program_watch import ProgramEvent, ProgramWatch
 from steptwin.simulation.kinds.programs import StatementFollower
 from steptwin.simulation.scheduler.trace import TraceRecord

@@ -9,7 +9,7 @@ from steptwin.errors import Misuse
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.registers import AXES, INPUTS
 from steptwin.numerals import read_number, read_whole
-from steptwin.simulation.describe.small_mic488 import AxisSwitches
+from steptwin.simulation.describe.generated_mic488 import AxisSwitches
 from steptwin.wbc.real import real_text
 
 ASSUMED_TRAVEL_S = 0.1

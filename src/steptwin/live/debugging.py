@@ -269,7 +269,7 @@ class _OpenDebugger:
         self._live.world.input_watchers.remove(self._given)
         self.debugger.close()
         self._end_lookback()
-        self._live.stale = True
+        self._live.is_dirty = True
         self._realtime.leave()
 
     def _end_lookback(self) -> None:

@@ -40,7 +40,7 @@ class Feed:
         answer = self._port.exchange(data, realtime.enter())
         if answer:
             self._writer.write(answer)
-        if realtime.scheduler.stale:
+        if realtime.scheduler.is_dirty:
             realtime.leave()
         if self._talks is None:
             due = self._port.deadline()

@@ -46,7 +46,7 @@ class Lookback:
     def _keep(self) -> None:
         self._realtime.enter()
         self._history.take()
-        self._live.stale = True
+        self._live.is_dirty = True
         self._realtime.leave()
         self._timer = asyncio.get_running_loop().call_later(STATE_S, self._keep)
 

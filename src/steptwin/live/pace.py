@@ -212,8 +212,8 @@ class Pace:
                     return False
                 if moves and (perf_counter() > until or len(following) >= MOST_SHOWN // 2):
                     return None
-                dues = [end, live.deadline(), None if condition is None else condition.due(live.now)]
-                live.advance(max(live.now, min(due for due in dues if due is not None)))
+                deadlines = [end, live.deadline(), None if condition is None else condition.due(live.now)]
+                live.advance(max(live.now, min(due for due in deadlines if due is not None)))
                 if self._is_held:
                     return False
                 moves = True

@@ -22,7 +22,7 @@ class Advanceable(Protocol):
     """Subject of a real-time driver, which advances it in real time: a scheduler or a whole world. The methods are those of
     `Scheduler`."""
 
-    stale: bool
+    is_dirty: bool
 
     @property
     def now(self) -> Nanos: ...
@@ -72,7 +72,7 @@ class RealTimeDriver:
 
     def leave(self) -> None:
         """Let signals settle after an input, and set the timer for the next deadline."""
-        if self.scheduler.stale:
+        if self.scheduler.is_dirty:
             self._batch = 0  # something may be due at once
             self._arm(self.scheduler.deadline())
 

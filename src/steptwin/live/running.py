@@ -195,7 +195,7 @@ def _keep(
     """Write session, trace and coverage at the end: the session first, because a trace can be made from it. Raises `Misuse`."""
     world = live.world
     world.advance(world.now)
-    world.settle_all()
+    world.sync_all()
     failures: list[str] = []
     session = options.run.session
     writing: list[Callable[[], list[Path]]] = [] if session is None else [partial(_write_session, session, live)]

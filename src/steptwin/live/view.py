@@ -95,7 +95,7 @@ class LiveView:
     def _blocks(self, width: int) -> list[list[Text]]:
         """The lines of each controller, then those of the axes of the world."""
         world = self._live.world
-        world.settle_all()
+        world.sync_all()
         return [*(self._controller(name, width) for name in world.controllers), *self._axes()]
 
     def _controller(self, name: str, width: int) -> list[Text]:

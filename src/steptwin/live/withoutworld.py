@@ -17,7 +17,7 @@ from steptwin.live.server import Server, clear_ready_file
 class _Nothing:
     """A world without contents, for a real-time driver. See `steptwin.live.realtimedriver.Advanceable`."""
 
-    stale = False
+    is_dirty = False
 
     def __init__(self) -> None:
         self.now: Nanos = 0

@@ -18,8 +18,8 @@ from steptwin.live.tracedport import traced
 from steptwin.messages import Message
 from steptwin.simulation.kinds.lines import LineEndPoint
 from steptwin.simulation.kinds.registry import line_kinds
+from steptwin.simulation.scheduler.runqueue import Deadlines
 from steptwin.simulation.scheduler.scheduler import Scheduler
-from steptwin.simulation.scheduler.turns import Dues
 from steptwin.simulation.world.history import History
 from steptwin.simulation.world.inputs import Bytes, ExternalInput, Leave, See, size_of
 from steptwin.simulation.world.model import WORLD
@@ -109,11 +109,11 @@ class LiveWorld:
         """Called with notices for the user."""
         self._recorded_bytes = sum(size_of(given.what) for given in world.inputs)
         self._full: sessions.Session | None = None
-        self.stale = True
+        self.is_dirty = True
         """Whether the deadline must be computed again, because something may have happened."""
         self._next: Nanos | None = None
         """The deadline computed last, ns."""
-        self._dues = _Dues(world.schedulers)
+        self._deadlines = _Deadlines(world.schedulers)
         world.watch_schedulers(self._changed)
         self.ring: Ring | None = None
         """The ring of last records, if kept."""
@@ -125,7 +125,7 @@ class LiveWorld:
         self.ports: set[PlacePort] = set()
         """Programs that are connected to lines."""
         self.external_actor: ExternalActor | None = None
-        """``stale`` is to be set when its deadline has changed."""
+        """``is_dirty`` is to be set when its deadline has changed."""
         self.on_stop: Callable[[], None] | None = None
         """Called when a script has stopped the world. None: that is reported, and the world goes on."""
         self.run_control: RunControl | None = None
@@ -185,7 +185,7 @@ class LiveWorld:
             raise Refusal(AXIS_IS_JOGGED())
         self.subject.go_back(snapshot, name)
         self._recorded_bytes = sum(size_of(given.what) for given in world.inputs)
-        self._dues = _Dues(world.schedulers)
+        self._deadlines = _Deadlines(world.schedulers)
         if self.ring is not None:
             self.ring.clear()
         for line in world.spec.lines:
@@ -198,7 +198,7 @@ class LiveWorld:
             self.history.gone_back()
         if self.run_control is not None:
             self.run_control.restored()
-        self.stale = True
+        self.is_dirty = True
 
     def session(self) -> sessions.Session:
         """The session up to now, or to the moment at which it was full. Raises `Misuse` if none is recorded."""
@@ -225,14 +225,14 @@ class LiveWorld:
     # ------------------------------------------------------------------ time
 
     def _changed(self, scheduler: Scheduler) -> None:
-        self.stale = True
-        self._dues.changed[scheduler] = None
+        self.is_dirty = True
+        self._deadlines.changed[scheduler] = None
 
     def advance(self, now: Nanos) -> None:
         world = self.world
         if self.run_control is not None:
             self._advance_controlled(self.run_control, now)
-        elif not self.stale and (self._next is None or now < self._next) and world.stopped is None and now >= world.now:
+        elif not self.is_dirty and (self._next is None or now < self._next) and world.stopped is None and now >= world.now:
             world.now, world.is_settled = now, True  # as `Simulation.advance` where nothing is due
         else:
             self._advance(now)
@@ -258,10 +258,10 @@ class LiveWorld:
                 world.advance(due)
                 if world.stopped is not None:
                     break
-                self._dues.advance(due)
+                self._deadlines.advance(due)
                 if self.external_actor is not None:
                     self.external_actor.advance(due)
-            self.stale = True
+            self.is_dirty = True
             world.advance(now)
             if world.stopped is None:
                 return
@@ -282,19 +282,19 @@ class LiveWorld:
 
     def deadline(self) -> Nanos | None:
         self._next = self._due()
-        self.stale = False
+        self.is_dirty = False
         return self._next
 
     def _due(self) -> Nanos | None:
         if self.world.stopped is not None:
             return None
-        due, own = self._dues.first(), self.world.next()
+        due, own = self._deadlines.first(), self.world.next()
         due = due if own is None else own if due is None else min(due, own)
         other = None if self.external_actor is None else self.external_actor.deadline()
         return due if other is None else max(other, self.now) if due is None else min(due, max(other, self.now))
 
 
-class _Dues:
+class _Deadlines:
     """The next deadline of many schedulers, kept without a scan of all of them.
 
     ``changed``: schedulers in which something has happened since.
@@ -304,19 +304,19 @@ class _Dues:
         self.changed = dict.fromkeys(schedulers)
         self._schedulers = schedulers
         self._number_of = {scheduler: number for number, scheduler in enumerate(schedulers)}
-        self._dues = Dues()
+        self._deadlines = Deadlines()
 
     def first(self) -> Nanos | None:
         while self.changed:
             scheduler, _ = self.changed.popitem()
             due = scheduler.deadline()  # signals may settle: it has changed again then
-            self._dues.put(self._number_of[scheduler], due)
-        return self._dues.first()
+            self._deadlines.put(self._number_of[scheduler], due)
+        return self._deadlines.first()
 
     def advance(self, now: Nanos) -> None:
         """Advance the schedulers with deadlines up to ``now``, in order."""
         while (due := self.first()) is not None and due <= now:
-            for number in self._dues.take(due):
+            for number in self._deadlines.take(due):
                 scheduler = self._schedulers[number]
                 scheduler.advance(now)
                 self.changed[scheduler] = None
@@ -335,7 +335,7 @@ class VisionPort:
     def exchange(self, data: bytes, now: Nanos) -> bytes:
         for record in self._records(data):
             self._live.apply_input(See(self._controller, *record))
-            self._live.stale = True
+            self._live.is_dirty = True
         return b""
 
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
@@ -370,7 +370,7 @@ class PlacePort:
         """Where a line is shared it receives what others are sent, from now on."""
         if self._line.is_shared:
             self._live.apply_input(Bytes(self._line.name, self._name, self._kind, b""))
-            self._live.stale = True
+            self._live.is_dirty = True
             self._connected()
 
     def used_by(self, source: str) -> None:
@@ -389,7 +389,7 @@ class PlacePort:
     def exchange(self, data: bytes, now: Nanos) -> bytes:
         world, scheduler = self._world, self._scheduler
         now = world.now  # a world that was stopped stands
-        if scheduler.now != now or scheduler.stale:
+        if scheduler.now != now or scheduler.is_dirty:
             scheduler.advance(now)
         place = self._places.get(self._name)
         if place is None or place.on_output is None:
@@ -398,7 +398,7 @@ class PlacePort:
             answer = self._recorded(place, data, now)
         else:
             answer = self._line.exchange(self._name, place, data, now)
-        if scheduler.stale or place.received:
+        if scheduler.is_dirty or place.received:
             answer = self._with_the_rest(place, answer, now)
         self.broken = place.inner.broken
         return answer
@@ -419,8 +419,8 @@ class PlacePort:
         """The answer between what came before and what has come with it."""
         before = place.take(now) if place.received else []
         place.on_output = None  # what comes at once is given back at once
-        if self._scheduler.stale:
-            self._scheduler.settle()
+        if self._scheduler.is_dirty:
+            self._scheduler.propagate()
         place.on_output = self._came
         if not before and not place.received:
             return answer

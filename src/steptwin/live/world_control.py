@@ -68,5 +68,5 @@ class WorldControl:
         try:
             return action()
         finally:
-            self._live.stale = True
+            self._live.is_dirty = True
             self._realtime.leave()

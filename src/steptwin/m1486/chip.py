@@ -165,7 +165,7 @@ class M1486Chip(Stateful):
         self._waveform = 1
         """The characteristic of the phase currents that was reported last."""
         self._rst_high_since: Nanos | None = None
-        self._touch()
+        self._find_deadline()
 
     @property
     def axes(self) -> tuple[ChipDrive]:
@@ -209,7 +209,7 @@ class M1486Chip(Stateful):
                 self._run_program(at, until)
             elif (byte := self.uart.arrived(at)) is not None:
                 self.receiver.character(byte, at)
-        self._touch()
+        self._find_deadline()
 
     def _run_hardware(self, at: Nanos) -> bool:
         due = self.motor.deadline()
@@ -235,13 +235,13 @@ class M1486Chip(Stateful):
         self.receiver.compress(self.now)
 
     def _hardware_deadline(self) -> Nanos | None:
-        dues = (self.motor.deadline(), self.receiver.busy_until, self.uart.arrival(), self.uart.departure())
-        return min((due for due in dues if due is not None), default=None)
+        deadlines = (self.motor.deadline(), self.receiver.busy_until, self.uart.arrival(), self.uart.departure())
+        return min((due for due in deadlines if due is not None), default=None)
 
     def deadline(self) -> Nanos | None:
         return self._due
 
-    def _touch(self) -> None:
+    def _find_deadline(self) -> None:
         """Compute the next deadline after a change of state."""
         if self.is_shut_down:
             since = self._rst_high_since
@@ -253,9 +253,9 @@ class M1486Chip(Stateful):
                 self._due = self.program.ready  # the end of the last command, since when it is idle
         self.changed()
 
-    def _settle(self) -> None:
+    def _propagate(self) -> None:
         """Execute the consequences of an input at this moment."""
-        self._touch()
+        self._find_deadline()
         self.advance(self.now)
 
     def is_busy(self, now: Nanos) -> bool:
@@ -279,7 +279,7 @@ class M1486Chip(Stateful):
         if self.is_shut_down:
             return
         self.uart.receive(data, now)
-        self._settle()
+        self._propagate()
 
     def halt(self, now: Nanos) -> None:
         """A stop of its world: the motor goes down its ramp, and nothing else of what it was given before is executed.
@@ -299,7 +299,7 @@ class M1486Chip(Stateful):
         self.motor.kill(now)
         self.program.abandon(now)
         self.program.is_killed = False
-        self._settle()
+        self._propagate()
 
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
         """Characters that have left by ``now``, each with the moment of its end."""
@@ -318,7 +318,7 @@ class M1486Chip(Stateful):
         elif self.io[name] != level:
             self.io.others[name] = level
             self._control_changed(name, level, now)
-        self._settle()
+        self._propagate()
 
     def _control_changed(self, name: str, level: int, now: Nanos) -> None:
         if name == "RST":
@@ -357,7 +357,7 @@ class M1486Chip(Stateful):
         self.advance(now)
         self._fall_silent(now)
         self.io.release_outputs(now)
-        self._settle()
+        self._propagate()
 
     def power_cycle(self, now: Nanos) -> None:
         """Switch off and on again. Pins stay tied as they are, and the motor stays where it is."""
@@ -366,7 +366,7 @@ class M1486Chip(Stateful):
         self.event("power-on", POWER_ON(), now)
         self._read_pins()
         self._start_anew(now)
-        self._settle()
+        self._propagate()
 
     def _start_anew(self, now: Nanos) -> None:
         """Defaults; an E type runs its stored file. M-30: with all address pins low it is only reset, and keeps the file."""

@@ -88,8 +88,8 @@ class SerialChain(Stateful):
 
     def departure(self) -> Nanos | None:
         """The end of the next character from a chip."""
-        dues = (chip.uart.departure() for chip in self.chips.values())
-        return min((due for due in dues if due is not None), default=None)
+        deadlines = (chip.uart.departure() for chip in self.chips.values())
+        return min((due for due in deadlines if due is not None), default=None)
 
     def _merged(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
         together: dict[tuple[Nanos, int], int] = {}

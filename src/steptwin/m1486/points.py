@@ -14,7 +14,7 @@ from steptwin.m1486.io_effects import UPLOADED
 from steptwin.m1486.microsteps import UNIT
 from steptwin.m1486.registers import POSITION_REGISTER, REGISTERS, REMAINDER_REGISTER, UPLOADS
 from steptwin.motion import Profile
-from steptwin.points import LivePoint, TurningPoints, turns_of, turns_of_round
+from steptwin.points import LivePoint, TurningPoints, turning_points_of, turning_points_of_round
 
 POSITION_BITS = 24
 FLAGS_UPLOAD = 14
@@ -165,17 +165,17 @@ def live_point(chip: M1486Chip, text: str) -> LivePoint | None:
         return None
     version = partial(_version, chip) if row.has_version else None
     read = partial(row.read, chip)
-    return LivePoint(point=row.point, read=read, turns=_turns(chip, row), version=version, is_kept=row.is_kept)
+    return LivePoint(point=row.point, read=read, turning_points=_turning_points(chip, row), version=version, is_kept=row.is_kept)
 
 
-def _turns(chip: M1486Chip, row: _PointRow) -> TurningPoints | None:
+def _turning_points(chip: M1486Chip, row: _PointRow) -> TurningPoints | None:
     if not row.follows:
         return None
     profile = partial(_profile, chip)
     if row.bits is None:
-        return turns_of(profile)
+        return turning_points_of(profile)
     # During a move the counter shows its end (M-16): there are then turns at which nothing changes.
-    return turns_of_round(profile, lambda now: chip.drive.true_u(now) + chip.drive.offset_u, 2**row.bits)
+    return turning_points_of_round(profile, lambda now: chip.drive.true_u(now) + chip.drive.offset_u, 2**row.bits)
 
 
 def _profile(chip: M1486Chip) -> Profile:

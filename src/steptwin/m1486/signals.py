@@ -41,11 +41,11 @@ def step_pulses(train: StepTrain, after: Nanos, until: Nanos) -> PulseTimes:
 def strobes(train: StepTrain, characteristic: int, after: Nanos, until: Nanos) -> Iterator[Strobe]:
     """Strobes of the Dual DAC interface for the steps with ``after`` < time <= ``until``: both channels for each, in turn."""
     position = train.count(after)
-    stretches = train.stretches()
-    _, end, grid = next(stretches)
+    intervals = train.intervals()
+    _, end, grid = next(intervals)
     for moment in step_pulses(train, after, until).tolist():
         while end is not None and (end - position) * train.direction <= 0:
-            _, end, grid = next(stretches)
+            _, end, grid = next(intervals)
         position += grid * train.direction
         for channel, current in enumerate(currents(characteristic, position), start=1):
             yield Strobe(moment + (2 * channel - 1) * DATA_VALID_NS, channel, abs(current), phase_level(current))

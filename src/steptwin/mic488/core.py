@@ -185,7 +185,7 @@ class ControllerCore(Stateful):
         self.user = array("H", bytes(2 * self.firmware.user_registers))
         self.written = {}
         self.program.power_on(self.now)
-        self._settle()
+        self._propagate()
 
     def power_cycle(self, now: Nanos) -> None:
         """Off and on again: registers as after power-on; terminals, shafts and the non-volatile memory stay as they are."""
@@ -207,7 +207,7 @@ class ControllerCore(Stateful):
             self.set_output(number, False, now)
         for axis in self.axes:
             axis.disable(now)
-        self._settle()
+        self._propagate()
 
     # ------------------------------------------------------------------ time
 
@@ -273,9 +273,9 @@ class ControllerCore(Stateful):
         """Apply ``action``, which commands axes or the program, at ``now``, after all deadlines of that moment."""
         self.advance(now)
         action(now)
-        self._settle()
+        self._propagate()
 
-    def _settle(self) -> None:
+    def _propagate(self) -> None:
         """After a change from outside: notify the program, compute the next deadline and the ERR output."""
         self.program.disturbed(self.now, inside=False)
         self._plan_ahead(self._due_without_program(), lamp=True)
@@ -319,7 +319,7 @@ class ControllerCore(Stateful):
     def write_coil(self, action: CoilAction, number: int, on: bool) -> None:
         """Write a coil of axis or output ``number`` (from 0) at the present moment."""
         action(self, number, on, self.now)
-        self._settle()
+        self._propagate()
 
     def write_registers(self, actions: Sequence[RegisterAction], values: Sequence[float], *, quiet: bool) -> None:
         """Write registers, in the order of their addresses, at the present moment.
@@ -330,14 +330,14 @@ class ControllerCore(Stateful):
         for action, value in zip(actions, values, strict=True):
             action(self, value, now)
         if not quiet or self.program.state:
-            self._settle()
+            self._propagate()
 
     def user_registers_written(self) -> None:
         """Notify a running program of user registers written over Modbus."""
         if self.program.state:
-            self._settle()
+            self._propagate()
             self.program.registers_written(self.now)
-            self._settle()
+            self._propagate()
 
     # ------------------------------------------------------------------ pins
 
@@ -350,7 +350,7 @@ class ControllerCore(Stateful):
             self._set_input(INPUT_PINS[name], value == 1.0, now)
         else:
             self.analog_v[ANALOG_PINS[name]] = value
-        self._settle()
+        self._propagate()
 
     def _set_input(self, number: int, high: bool, now: Nanos) -> None:
         if self.inputs.set_pin(number, high, now):
@@ -388,7 +388,7 @@ class ControllerCore(Stateful):
         """Take a record of the vision system into the registers Vision… of programs."""
         self.advance(now)
         self.program.registers.take_record(record)
-        self._settle()
+        self._propagate()
 
     # ------------------------------------------------------------------ a hand on the shaft
 
@@ -399,7 +399,7 @@ class ControllerCore(Stateful):
         self.advance(now)
         chosen.encoder.turn(counts)
         chosen.control.encoder_moved(chosen, now)
-        self._settle()
+        self._propagate()
 
     def couple_encoder(self, axis: int, coupling: Coupling, now: Nanos) -> None:
         """Select what turns the shaft of ``axis`` (from 1): the drive, nothing, or a blocked drive."""
@@ -407,7 +407,7 @@ class ControllerCore(Stateful):
         self.advance(now)
         chosen.encoder.couple(coupling, chosen.profile.count(now), now)
         chosen.control.encoder_moved(chosen, now)
-        self._settle()
+        self._propagate()
 
     def follow_shaft(self, axis: int, motion: ShaftMotion | None, now: Nanos) -> None:
         """Mechanics turn the encoder's shaft of ``axis`` (from 1) by ``motion``; None: exactly as the drive."""
@@ -415,7 +415,7 @@ class ControllerCore(Stateful):
         self.advance(now)
         chosen.encoder.follow(motion)
         chosen.control.encoder_moved(chosen, now)
-        self._settle()
+        self._propagate()
 
     def gear_encoder(self, axis: int, counts: int, pulses: int, now: Nanos) -> None:
         """Set ``counts`` of the encoder of ``axis`` (from 1) per ``pulses`` of the drive, instead of the configured ones."""
@@ -424,7 +424,7 @@ class ControllerCore(Stateful):
         chosen = self._axis(axis)
         self.advance(now)
         chosen.encoder.gear(counts, pulses, chosen.profile.count(now), now)
-        self._settle()
+        self._propagate()
 
     def _axis(self, number: int) -> Axis:
         if not 1 <= number <= AXES:
@@ -467,7 +467,7 @@ class ControllerCore(Stateful):
         """Set or clear the Modbus master error in M_STATUS."""
         self.advance(now)
         self.master_error = shown
-        self._settle()
+        self._propagate()
 
     def status(self) -> ControllerStatus:
         """M_STATUS. A position error is shown before a program error, and that before an error of the Modbus master."""

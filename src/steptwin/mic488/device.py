@@ -106,7 +106,7 @@ class Mic488Device(ControllerCore):
             at = traceback.extract_tb(error.__traceback__)[-1]
             what = f"{type(error).__name__}: {error} ({at.filename}:{at.lineno})"
             self.event("internal-error", REQUEST_FAILED(request=pdu.hex(" "), what=what), now)
-            self._settle()
+            self._propagate()
             return exception_pdu(pdu[0] if pdu else 0, DEVICE_FAILURE)
 
     # ------------------------------------------------------------------ snapshots

@@ -14,7 +14,7 @@ from steptwin.motion import MotionState, Profile, plan_position, plan_stop
 from steptwin.motion.paths import Circular, Straight
 
 NEAR_W = 1e-6
-"""A braking that would end this close behind the end of the way ends on it."""
+"""A braking that would end this close behind the end of the travel ends on it."""
 
 
 class PathAxis(Protocol):
@@ -44,9 +44,9 @@ class Edge(NamedTuple):
 class Path(NamedTuple):
     """The path as it was commanded, with its speed and ramps, and how far it goes at present; both axes have the same one."""
 
-    courses: tuple[Straight, ...] | tuple[Circular, ...]
+    curves: tuple[Straight, ...] | tuple[Circular, ...]
     """Those of M1 and M2."""
-    way_w: float
+    travel_w: float
     """The length of the whole path."""
     targets_p: tuple[int, ...]
     """Motor positions at its end."""
@@ -55,7 +55,7 @@ class Path(NamedTuple):
     down_w: float
     is_corrected: bool
     """Whether encoder correction is on (WBC-17): on lines that no limit ends."""
-    way: Profile = Profile(0, 0, (), 0.0)
+    travel: Profile = Profile(0, 0, (), 0.0)
     """The position on the path."""
     end_w: float = 0.0
     met: tuple[tuple[int, Edge], ...] = ()
@@ -84,7 +84,7 @@ def keep_within_limits(axes: Sequence[PathAxis], now: Nanos) -> None:
     path = axes[0].path if axes else None
     if path is None:
         return
-    state = MotionState.of(path.way, now)
+    state = MotionState.of(path.travel, now)
     end_w, met = _permitted(path, axes, state.count + state.phase)
     if (end_w, met) != (path.end_w, path.met):
         _follow(path._replace(end_w=end_w, met=met), axes, state)
@@ -92,13 +92,13 @@ def keep_within_limits(axes: Sequence[PathAxis], now: Nanos) -> None:
 
 def _permitted(path: Path, axes: Sequence[PathAxis], begin_w: float) -> tuple[float, tuple[tuple[int, Edge], ...]]:
     """Up to where a path may go that is at ``begin_w``, and the soft limits there."""
-    end_w = path.way_w
+    end_w = path.travel_w
     met: dict[int, Edge] = {}
     for axis in axes:
-        course = path.courses[axis.number - 1]
+        curve = path.curves[axis.number - 1]
         for side in (-1, 1):
             edge = axis.edge(side)
-            beyond_w = None if edge is None else course.first_beyond(float(edge), side, begin_w, path.way_w)
+            beyond_w = None if edge is None else curve.first_beyond(float(edge), side, begin_w, path.travel_w)
             if edge is None or beyond_w is None or beyond_w > end_w:
                 continue
             if beyond_w < end_w:
@@ -120,10 +120,10 @@ def _follow(path: Path, axes: Sequence[PathAxis], state: MotionState) -> None:
     if rest_w(down_w) - end_w > NEAR_W:
         down_w = max(path.up_w, path.down_w)
     is_late = rest_w(down_w) - end_w > NEAR_W
-    way = plan_stop(state, down_w) if is_late else plan_position(state, end_w, path.up_w, down_w, path.speed_w)
-    path = path._replace(way=way)
+    travel = plan_stop(state, down_w) if is_late else plan_position(state, end_w, path.up_w, down_w, path.speed_w)
+    path = path._replace(travel=travel)
     for axis in axes:
-        course, target_p = path.courses[axis.number - 1], path.targets_p[axis.number - 1]
+        curve, target_p = path.curves[axis.number - 1], path.targets_p[axis.number - 1]
         count = axis.profile.count(now)
         edge = met.get(axis.number)
         if is_late and edge is not None:
@@ -135,4 +135,4 @@ def _follow(path: Path, axes: Sequence[PathAxis], state: MotionState) -> None:
             # An axis that is behind the limit already stays where it is.
             final_p = max(edge.position_p * edge.side, count * edge.side) * edge.side
         arrival = AxisStatus.REACHED if not met else AxisStatus.ON if edge is None else LIMIT[edge.side]
-        axis.follow_path(path, course.profile(way, count, final_p), arrival)
+        axis.follow_path(path, curve.profile(travel, count, final_p), arrival)

@@ -25,7 +25,7 @@ from steptwin.mic488.registers import AXES, CONTROLLER_STATUS_TEXTS
 from steptwin.mic488.status import AXIS_CONDITIONS, CONTROLLER_CONDITIONS
 from steptwin.mic488.values import RegisterItem, UserFormat, named
 from steptwin.motion import Profile
-from steptwin.points import LivePoint, MemoryCells, TurningPoints, end_of, turns_of, turns_of_round
+from steptwin.points import LivePoint, MemoryCells, TurningPoints, end_of, turning_points_of, turning_points_of_round
 from steptwin.tables import complete
 
 EFFECTS: Mapping[registermap.WriteEffect, PointEffect] = complete(
@@ -249,14 +249,16 @@ def _live(point: Point, owner: Any, key: str, read: Callable[[Any, Nanos], float
     follows = _FOLLOWING.get(key)
     if follows is None:
         return LivePoint(point=point, read=partial(read, owner), is_kept=is_kept)
-    turns, has_version = follows(owner)
+    turning_points, has_version = follows(owner)
     if not has_version:
-        return LivePoint(point=point, read=partial(read, owner), turns=turns)
+        return LivePoint(point=point, read=partial(read, owner), turning_points=turning_points)
 
     def freeze(now: Nanos) -> Callable[[Nanos], float]:
-        return partial(read, _AxisCourse(owner.profile, owner.offset_p, owner.gear))
+        return partial(read, _AxisTrajectory(owner.profile, owner.offset_p, owner.gear))
 
-    return LivePoint(point=point, read=partial(read, owner), turns=turns, version=partial(_version, owner), freeze=freeze)
+    return LivePoint(
+        point=point, read=partial(read, owner), turning_points=turning_points, version=partial(_version, owner), freeze=freeze
+    )
 
 
 def _bit(device: Mic488Device, read: Callable[[Mic488Device], bool]) -> Callable[[Nanos], float]:
@@ -284,7 +286,7 @@ def _user_words(device: Mic488Device, item: RegisterItem) -> MemoryCells:
 # ---------------------------------------------------------------------- between events
 
 
-class _AxisCourse(NamedTuple):
+class _AxisTrajectory(NamedTuple):
     """All that points with a version read of an axis."""
 
     profile: Profile
@@ -301,7 +303,7 @@ def _version(axis: Axis) -> object:
 
 
 def _as_profile(axis: Axis) -> tuple[TurningPoints, bool]:
-    return turns_of(partial(_profile, axis)), True
+    return turning_points_of(partial(_profile, axis)), True
 
 
 def _as_moving(axis: Axis) -> tuple[TurningPoints, bool]:
@@ -310,12 +312,14 @@ def _as_moving(axis: Axis) -> tuple[TurningPoints, bool]:
 
 def _as_coordinate(axis: Axis) -> tuple[TurningPoints, bool]:
     """A DINT of pulses (MIC-42)."""
-    return turns_of_round(partial(_profile, axis), lambda now: axis.profile.count(now) + axis.offset_p - DINT_MIN, 2**32), True
+    return turning_points_of_round(
+        partial(_profile, axis), lambda now: axis.profile.count(now) + axis.offset_p - DINT_MIN, 2**32
+    ), True
 
 
 def _as_encoder(axis: Axis) -> tuple[TurningPoints, bool]:
-    """The point of an encoder, without turns and version: its shaft may be turned from outside."""
-    return turns_of(partial(_profile, axis)), False
+    """The point of an encoder, without turning points and version: its shaft may be turned from outside."""
+    return turning_points_of(partial(_profile, axis)), False
 
 
 _FOLLOWING: Mapping[str, Callable[[Axis], tuple[TurningPoints, bool]]] = {

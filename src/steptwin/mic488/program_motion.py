@@ -110,7 +110,7 @@ def row_motion(device: ProgramDevice, row: ChosenRow, lin_acc_u: float | None, n
 
 
 class _Pace(NamedTuple):
-    """Speed and acceleration along a path, as far as they are given; ``steepest``: most pulses per unit of the way."""
+    """Speed and acceleration along a path, as far as they are given; ``steepest``: most pulses per unit of the travel."""
 
     speed_u: float | None
     acc_u: float | None
@@ -148,33 +148,33 @@ class _Plane:
 
     def line(self, targets_p: list[int], speed_u: float | None) -> bool:
         x, y = self.axes
-        ways_p = [target - count for target, count in zip(targets_p, self.counts, strict=True)]
-        way_u = length(ways_p[0] / x.gear, ways_p[1] / y.gear)
-        slopes = [way_p / way_u if way_u else 0.0 for way_p in ways_p]
-        courses = tuple(Straight(float(count), slope) for count, slope in zip(self.counts, slopes, strict=True))
+        travels_p = [target - count for target, count in zip(targets_p, self.counts, strict=True)]
+        travel_u = length(travels_p[0] / x.gear, travels_p[1] / y.gear)
+        slopes = [travel_p / travel_u if travel_u else 0.0 for travel_p in travels_p]
+        curves = tuple(Straight(float(count), slope) for count, slope in zip(self.counts, slopes, strict=True))
         pace = _Pace(speed_u, self.lin_acc_u, max(map(abs, slopes)))
-        return self._follow(courses, way_u, targets_p, pace, corrected=True)
+        return self._follow(curves, travel_u, targets_p, pace, corrected=True)
 
     def arc(self, arc: Arc, targets_p: list[int]) -> bool:
         x, y = self.axes
-        way_u = arc.length
-        turn_q = arc.sweep_q / way_u if way_u else 0.0
-        courses = (
+        travel_u = arc.length
+        turn_q = arc.sweep_q / travel_u if travel_u else 0.0
+        curves = (
             Circular(arc.centre_x * x.gear - x.offset_p, arc.radius * x.gear, arc.begin_q, turn_q),
             Circular(arc.centre_y * y.gear - y.offset_p, arc.radius * y.gear, arc.begin_q - 1.0, turn_q),
         )
-        return self._follow(courses, way_u, targets_p, _Pace(None, None, max(x.gear, y.gear)), corrected=False)
+        return self._follow(curves, travel_u, targets_p, _Pace(None, None, max(x.gear, y.gear)), corrected=False)
 
     def _follow(
         self,
-        courses: tuple[Straight, ...] | tuple[Circular, ...],
-        way_u: float,
+        curves: tuple[Straight, ...] | tuple[Circular, ...],
+        travel_u: float,
         targets_p: list[int],
         pace: _Pace,
         *,
         corrected: bool,
     ) -> bool:
-        """Run ``way_u`` along the courses, at most to the first soft limit; whether both axes move.
+        """Run ``travel_u`` along the curves, at most to the first soft limit; whether both axes move.
 
         WBC-11: what is not given of ``pace`` is M1's.
         """
@@ -187,7 +187,7 @@ class _Plane:
         slowest_u = SLOWEST_RAMP_P / first.gear
         up_u = max(pace.acc_u or first.acc_p / first.gear, slowest_u)
         down_u = max(pace.acc_u or first.dec_p / first.gear, slowest_u)
-        whole = Path(courses, way_u, tuple(targets_p), speed_u, up_u, down_u, corrected)
+        whole = Path(curves, travel_u, tuple(targets_p), speed_u, up_u, down_u, corrected)
         return path.begin(whole, self.axes, self.now)
 
 
@@ -196,10 +196,11 @@ def _line(plane: _Plane, row: RowValues) -> bool:
 
 
 def _line_by(plane: _Plane, row: RowValues) -> bool:
-    ways_p = [
-        position_p(axis, way_u or 0.0, f"MOVELIN_REL M{axis.number}") for axis, way_u in zip(plane.axes, row[:2], strict=True)
+    travels_p = [
+        position_p(axis, travel_u or 0.0, f"MOVELIN_REL M{axis.number}")
+        for axis, travel_u in zip(plane.axes, row[:2], strict=True)
     ]
-    return plane.line([count + way_p for count, way_p in zip(plane.counts, ways_p, strict=True)], row[2])
+    return plane.line([count + travel_p for count, travel_p in zip(plane.counts, travels_p, strict=True)], row[2])
 
 
 def _to_circle(plane: _Plane, row: RowValues) -> bool:

@@ -133,10 +133,10 @@ def _axis_writer(put: Callable[[Axis, float, Nanos], bool]) -> Callable[[int], R
     return of
 
 
-def _axis_tendency(stretches: Callable[[Axis, Nanos], Iterable[Nanos] | None]) -> Callable[[int], Tendency]:
+def _axis_tendency(intervals: Callable[[Axis, Nanos], Iterable[Nanos] | None]) -> Callable[[int], Tendency]:
     def of(number: int) -> Tendency:
         index = number - 1
-        return lambda control, at: stretches(control.device.axes[index], at)
+        return lambda control, at: intervals(control.device.axes[index], at)
 
     return of
 
@@ -148,7 +148,7 @@ def _segments(axis: Axis, at: Nanos) -> list[Nanos]:
     return [end for end in ends if end >= at]
 
 
-def _position_stretches(axis: Axis, at: Nanos) -> list[Nanos]:
+def _position_intervals(axis: Axis, at: Nanos) -> list[Nanos]:
     ends = _segments(axis, at)
     if ends:
         for edge_p in (DINT_MAX + 1, DINT_MIN - 1):
@@ -159,19 +159,19 @@ def _position_stretches(axis: Axis, at: Nanos) -> list[Nanos]:
     return ends
 
 
-def _velocity_stretches(axis: Axis, at: Nanos) -> list[Nanos] | None:
+def _velocity_intervals(axis: Axis, at: Nanos) -> list[Nanos] | None:
     # Along an arc the velocity of an axis also turns within segments.
     return None if axis.path is not None and isinstance(axis.profile, ArcProfile) else _segments(axis, at)
 
 
-def _encoder_stretches(axis: Axis, at: Nanos) -> list[Nanos] | None:
+def _encoder_intervals(axis: Axis, at: Nanos) -> list[Nanos] | None:
     if axis.encoder.turned_by is not Coupling.DRIVE:
         return None if axis.encoder.turned_by is None else []
     farthest = abs(axis.encoder_counts(at)) + abs(axis.encoder.counts(MAX_SPEED_P * HORIZON / SECOND))
     return _segments(axis, at) if axis.encoder.agrees and farthest < DINT_MAX else None
 
 
-def _motion_stretches(axis: Axis, at: Nanos) -> list[Nanos]:
+def _motion_intervals(axis: Axis, at: Nanos) -> list[Nanos]:
     end = axis.profile.end
     return [] if end is None else [end - 1]
 
@@ -340,11 +340,11 @@ def _timer(name: str) -> RegisterFamily:
         return put
 
     def tendency(number: int) -> Tendency:
-        def stretches(control: RegisterHost, at: Nanos) -> list[Nanos]:
+        def intervals(control: RegisterHost, at: Nanos) -> list[Nanos]:
             missing = _TIMER_MOST - control.registers.timer(name, number - 1, at)
             return [at + missing * TIMER_PERIODS[name]] if missing else []
 
-        return stretches
+        return intervals
 
     return RegisterFamily(read, write, tendency)
 
@@ -438,18 +438,18 @@ ACCESS: Mapping[str, RegisterFamily] = complete_access(
         "M": RegisterFamily(
             _axis_reader(lambda axis, at: axis.profile.moving(at)),
             _axis_writer(_set_drive),
-            _axis_tendency(_motion_stretches),
+            _axis_tendency(_motion_intervals),
             quiet=False,
         ),
         "STATM": RegisterFamily(_axis_reader(lambda axis, at: axis.status)),
         "VACTM": RegisterFamily(
             _axis_reader(lambda axis, at: axis.profile.velocity(at) / axis.gear),
-            tendency=_axis_tendency(_velocity_stretches),
+            tendency=_axis_tendency(_velocity_intervals),
         ),
         "POSM": RegisterFamily(
             _axis_reader(lambda axis, at: axis.coordinate_p(at) / axis.gear),
             _axis_writer(_set_position),
-            _axis_tendency(_position_stretches),
+            _axis_tendency(_position_intervals),
             quiet=False,
         ),
         "ACCM": RegisterFamily(_axis_reader(lambda axis, at: axis.acc_p / axis.gear), _axis_writer(_set_acc)),
@@ -460,9 +460,9 @@ ACCESS: Mapping[str, RegisterFamily] = complete_access(
         "ENC": RegisterFamily(
             _axis_reader(lambda axis, at: axis.encoder_counts(at)),
             _axis_writer(_set_encoder),
-            _axis_tendency(_encoder_stretches),
+            _axis_tendency(_encoder_intervals),
         ),
-        "XENC": RegisterFamily(_axis_reader(_xenc), tendency=_axis_tendency(_encoder_stretches)),
+        "XENC": RegisterFamily(_axis_reader(_xenc), tendency=_axis_tendency(_encoder_intervals)),
         **{name: _timer(name) for name in TIMER_PERIODS},
         **{name: _switch(name) for name in ("CFGINT_IN", "CFGINT_MODBUS", "CFGINT_M")},
         **{name: _switch(name) for name in ("CFGINT_TICK", "CFGINT_TICK100", "CFGINT_TICK1000")},

@@ -58,7 +58,7 @@ class StepTrain:
     def __hash__(self) -> int:
         return hash((self.profile, self.divisions))
 
-    def stretches(self) -> Iterator[tuple[int, int | None, int]]:
+    def intervals(self) -> Iterator[tuple[int, int | None, int]]:
         """(begin, end, grid) of each division in turn; the last has no end."""
         for i, (begin, grid) in enumerate(self.divisions):
             yield begin, self.divisions[i + 1].begin if i + 1 < len(self.divisions) else None, grid
@@ -75,15 +75,15 @@ class StepTrain:
     def count(self, now: Nanos) -> int:
         """Counted position at ``now``, after the last pulse due by ``now``."""
         begin, grid = self.division(now)
-        way = (self.profile.count(now) - begin) * self.direction
-        return begin + way // grid * grid * self.direction
+        distance = (self.profile.count(now) - begin) * self.direction
+        return begin + distance // grid * grid * self.direction
 
     def pulse_time(self, position: int, after: Nanos) -> Nanos | None:
         """Moment of the first pulse later than ``after`` that reaches or passes ``position``; None if there is none."""
-        for begin, end, grid in self.stretches():
-            way = (position - begin) * self.direction
-            reached = begin - (-way // grid) * grid * self.direction
-            if way > 0 and (end is None or (end - reached) * self.direction >= 0):
+        for begin, end, grid in self.intervals():
+            distance = (position - begin) * self.direction
+            reached = begin - (-distance // grid) * grid * self.direction
+            if distance > 0 and (end is None or (end - reached) * self.direction >= 0):
                 return self.profile.pulse_time(reached, after)
         return None
 
@@ -115,7 +115,7 @@ def step_train(profile: Profile, begin: int, microstepping: Microstepping, grid:
     if coarse == fine or not directions:
         return StepTrain(profile, microstepping, (Division(begin, fine),))
     direction = directions.pop()
-    up, down = _fast_stretch(profile, limit * _ROUNDING, is_fast=grid == coarse)
+    up, down = _fast_interval(profile, limit * _ROUNDING, is_fast=grid == coarse)
     if up is None and grid != coarse:
         return StepTrain(profile, microstepping, (Division(begin, fine),))
     origin = begin % fine
@@ -162,7 +162,7 @@ def forced_stop(train: StepTrain, now: Nanos, curve: SpeedCurve, landing: int | 
     return step_train(profile, counted, train.microstepping, grid)
 
 
-def _fast_stretch(profile: Profile, limit: float, *, is_fast: bool) -> tuple[float | None, float | None]:
+def _fast_interval(profile: Profile, limit: float, *, is_fast: bool) -> tuple[float | None, float | None]:
     """Positions at which the speed, which rises and then falls, exceeds ``limit`` and returns to it; None where it does not.
 
     ``is_fast``: the speed exceeded the limit before this profile began.

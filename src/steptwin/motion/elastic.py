@@ -1,11 +1,11 @@
 """A mass that a drive moves through a spring and a damper, in closed form.
 
-The drive is at u(t), a polynomial of time in each stretch; the mass is at x = u + e, where
+The drive is at u(t), a polynomial of time in each interval; the mass is at x = u + e, where
 
     e″ + 2·ζ·ω·e′ + ω²·e = −u″,
 
-with the angular frequency ω and the damping ratio ζ < 1 of the mass on a drive at rest. Within a stretch e is a polynomial and an
-oscillation that decays. Position and velocity of the mass are continuous; where the drive jumps, the damper gives it a blow.
+with the angular frequency ω and the damping ratio ζ < 1 of the mass on a drive at rest. Within an interval e is a polynomial and
+an oscillation that decays. Position and velocity of the mass are continuous; where the drive jumps, the damper gives it a blow.
 
 Suffixes as in `steptwin.motion.profile`. Only + − × ÷ √, also in `decay` and `sine`. Deviations from the exact solution are
 below 1e-9 of the amplitude.
@@ -50,7 +50,7 @@ class Spring(NamedTuple):
         return self.omega * sqrt(1.0 - self.damping * self.damping)
 
 
-class DriveStretch(NamedTuple):
+class DriveInterval(NamedTuple):
     """A drive from ``begin`` on: at ``p`` with velocity ``v``, acceleration ``a`` and jerk ``j`` there (pulses, s)."""
 
     begin: Nanos
@@ -66,20 +66,20 @@ class DriveStretch(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class ResponseStretch:
-    """The mass in one stretch of its drive. ``cosine_p`` and ``sine_p``: amplitudes of its oscillation at the beginning."""
+class ResponseInterval:
+    """The mass in one interval of its drive. ``cosine_p`` and ``sine_p``: amplitudes of its oscillation at the beginning."""
 
     spring: Spring
-    drive: DriveStretch
+    drive: DriveInterval
     cosine_p: float
     sine_p: float
 
     @staticmethod
-    def of(spring: Spring, drive: DriveStretch, x: float, v: float) -> ResponseStretch:
+    def of(spring: Spring, drive: DriveInterval, x: float, v: float) -> ResponseInterval:
         """With the mass at ``x`` pulses with ``v`` pulses/s at the beginning."""
         even, slope = _forced(spring, drive.a, drive.j)
         a = x - drive.p - even
-        return ResponseStretch(spring, drive, a, (v - drive.v - slope + spring.rate * a) / spring.damped)
+        return ResponseInterval(spring, drive, a, (v - drive.v - slope + spring.rate * a) / spring.damped)
 
     @property
     def amplitude(self) -> float:
@@ -123,71 +123,74 @@ def _forced(spring: Spring, a: float, j: float) -> tuple[float, float]:
 class Response:
     """The motion of the mass from a moment on, while its drive goes through ``drives``; immutable."""
 
-    __slots__ = ("stretches",)
+    __slots__ = ("intervals",)
 
-    def __init__(self, spring: Spring, drives: Iterable[DriveStretch], x: float, v: float) -> None:
-        """The mass is at ``x`` with ``v`` when the first stretch begins. The last one has no end."""
-        self.stretches: list[ResponseStretch] = []
-        before: DriveStretch | None = None
+    def __init__(self, spring: Spring, drives: Iterable[DriveInterval], x: float, v: float) -> None:
+        """The mass is at ``x`` with ``v`` when the first interval begins. The last one has no end."""
+        self.intervals: list[ResponseInterval] = []
+        before: DriveInterval | None = None
         for drive in drives:
-            if self.stretches and before is not None:
-                last = self.stretches[-1]
+            if self.intervals and before is not None:
+                last = self.intervals[-1]
                 x, v = last.at(drive.begin)
                 v += 2.0 * spring.rate * (drive.p - before.at(drive.begin)[0])
             before = drive
-            self.stretches.append(ResponseStretch.of(spring, drive, x, v))
+            self.intervals.append(ResponseInterval.of(spring, drive, x, v))
         self._let_settle()
 
     def _let_settle(self) -> None:
         """Leave oscillations out from when on they are over."""
-        found: list[ResponseStretch] = []
-        for number, stretch in enumerate(self.stretches):
-            end = self.stretches[number + 1].drive.begin if number + 1 < len(self.stretches) else None
-            over = stretch.settled()
+        found: list[ResponseInterval] = []
+        for number, interval in enumerate(self.intervals):
+            end = self.intervals[number + 1].drive.begin if number + 1 < len(self.intervals) else None
+            over = interval.settled()
             if end is not None and over >= end:
-                found.append(stretch)
+                found.append(interval)
                 continue
-            if over > stretch.drive.begin:
-                found.append(stretch)
-            s = (over - stretch.drive.begin) / SECOND
-            p, v = stretch.drive.at(over)
+            if over > interval.drive.begin:
+                found.append(interval)
+            s = (over - interval.drive.begin) / SECOND
+            p, v = interval.drive.at(over)
             found.append(
-                ResponseStretch(
-                    stretch.spring, DriveStretch(over, p, v, stretch.drive.a + stretch.drive.j * s, stretch.drive.j), 0.0, 0.0
+                ResponseInterval(
+                    interval.spring,
+                    DriveInterval(over, p, v, interval.drive.a + interval.drive.j * s, interval.drive.j),
+                    0.0,
+                    0.0,
                 )
             )
-        self.stretches = found
+        self.intervals = found
 
-    def stretch(self, now: Nanos) -> ResponseStretch:
-        return self.stretches[max(bisect_right(self.stretches, now, key=lambda one: one.drive.begin) - 1, 0)]
+    def interval(self, now: Nanos) -> ResponseInterval:
+        return self.intervals[max(bisect_right(self.intervals, now, key=lambda one: one.drive.begin) - 1, 0)]
 
     def at(self, now: Nanos) -> tuple[float, float]:
         """Position and velocity of the mass."""
-        return self.stretch(now).at(now)
+        return self.interval(now).at(now)
 
     def oscillates(self, now: Nanos) -> bool:
-        found = self.stretch(now)
+        found = self.interval(now)
         return bool(found.cosine_p or found.sine_p)
 
     def ends(self) -> Iterator[Nanos]:
-        """When its stretches begin."""
-        return (stretch.drive.begin for stretch in self.stretches)
+        """When its intervals begin."""
+        return (interval.drive.begin for interval in self.intervals)
 
-    def _parts(self, after: Nanos) -> Iterator[tuple[ResponseStretch, Nanos, Nanos]]:
-        """Each stretch that ends after a moment, with its beginning, not before that moment, and its end."""
-        for number, stretch in enumerate(self.stretches):
-            last = number + 1 == len(self.stretches)
-            end = after + FARTHEST_NS if last else self.stretches[number + 1].drive.begin - 1
+    def _parts(self, after: Nanos) -> Iterator[tuple[ResponseInterval, Nanos, Nanos]]:
+        """Each interval that ends after a moment, with its beginning, not before that moment, and its end."""
+        for number, interval in enumerate(self.intervals):
+            last = number + 1 == len(self.intervals)
+            end = after + FARTHEST_NS if last else self.intervals[number + 1].drive.begin - 1
             if end > after:
-                yield stretch, max(stretch.drive.begin, after), end
+                yield interval, max(interval.drive.begin, after), end
 
     def reaches(self, level: float, after: Nanos, direction: int) -> Nanos | None:
         """First moment > ``after`` at which the mass is at ``level`` pulses or beyond it in ``direction``."""
-        for stretch, begin, end in self._parts(after):
+        for interval, begin, end in self._parts(after):
             first = begin + 1 if begin == after else begin
             found = _first(
-                lambda now, of=stretch: (of.at(now)[0] - level) * direction,
-                lambda a, b, of=stretch: of.bounds(a, b)[0],
+                lambda now, of=interval: (of.at(now)[0] - level) * direction,
+                lambda a, b, of=interval: of.bounds(a, b)[0],
                 first,
                 end,
             )
@@ -195,24 +198,24 @@ class Response:
                 return found
         return None
 
-    def turns(self, after: Nanos) -> Iterator[Nanos]:
+    def turning_points(self, after: Nanos) -> Iterator[Nanos]:
         """Moments after one between which the mass goes one way, but for less than a nanosecond."""
-        for stretch, begin, end in self._parts(after):
+        for interval, begin, end in self._parts(after):
             if begin > after:
                 yield begin
-            if not stretch.cosine_p and not stretch.sine_p and not stretch.drive.j:
+            if not interval.cosine_p and not interval.sine_p and not interval.drive.j:
                 # A parabola turns once at most.
-                if stretch.drive.a and (s := -stretch.drive.v / stretch.drive.a) > 0.0:
-                    moment = stretch.drive.begin + ceil(s * SECOND)
+                if interval.drive.a and (s := -interval.drive.v / interval.drive.a) > 0.0:
+                    moment = interval.drive.begin + ceil(s * SECOND)
                     if begin < moment <= end:
                         yield moment
                 continue
             now = begin
             while now < end:
-                way = 1 if stretch.at(now)[1] >= 0.0 else -1
+                direction = 1 if interval.at(now)[1] >= 0.0 else -1
                 found = _first(
-                    lambda moment, of=stretch, way=way: -of.at(moment)[1] * way,
-                    lambda a, b, of=stretch: of.bounds(a, b)[1],
+                    lambda moment, of=interval, direction=direction: -of.at(moment)[1] * direction,
+                    lambda a, b, of=interval: of.bounds(a, b)[1],
                     now + 1,
                     end,
                 )

@@ -1,10 +1,10 @@
 """Straight lines and circular arcs of two axes: a path profile drives both, and each follows a profile of its own.
 
-The *way* is a profile of the position along the path, in any unit of length; it only goes forward. A course gives
-the place of one axis at every position of the way. Axes along a line follow ordinary profiles; along an arc they follow an
+The *travel* is a profile of the position along the path, in any unit of length; it only goes forward. A curve gives
+the place of one axis at every position of the travel. Axes along a line follow ordinary profiles; along an arc they follow an
 `ArcProfile`.
 
-Suffixes as in `steptwin.motion.profile`; ``_q`` quarter turns, counted from +X towards +Y; ``w`` positions of the way.
+Suffixes as in `steptwin.motion.profile`; ``_q`` quarter turns, counted from +X towards +Y; ``w`` positions of the travel.
 """
 
 from __future__ import annotations
@@ -109,12 +109,12 @@ def _check(radius: float, sweep_q: float = 0.0) -> None:
         raise Misuse(WRONG_ANGLE(angle=90 * sweep_q, most=360 * MOST_TURNS))
 
 
-# ---------------------------------------------------------------------- courses of one axis
+# ---------------------------------------------------------------------- curves of one axis
 
 
 @dataclass(frozen=True, slots=True)
 class Straight:
-    """One axis along a line. It is at ``origin_p`` where the way begins and moves ``slope`` pulses per unit of the way."""
+    """One axis along a line. It is at ``origin_p`` where the travel begins and moves ``slope`` pulses per unit of the travel."""
 
     origin_p: float
     slope: float
@@ -123,26 +123,26 @@ class Straight:
         return self.origin_p + self.slope * w
 
     def first_beyond(self, edge_p: float, side: int, begin_w: float, end_w: float) -> float | None:
-        """Position of the way at which the axis first goes beyond ``edge_p`` towards ``side`` (±1); None if it does not."""
+        """Position of the travel at which the axis first goes beyond ``edge_p`` towards ``side`` (±1); None if it does not."""
         if self.slope * side <= 0.0 or (self.position(end_w) - edge_p) * side <= BEYOND_P:
             return None
         return max((edge_p - self.origin_p) / self.slope, begin_w)
 
-    def profile(self, way: Profile, count: int, final: int | None) -> Profile:
-        """The profile of the axis that stands at ``count`` when the way begins; it ends at ``final``, if that is given."""
-        origin = self.origin_p - count + self.slope * way.base
-        end_p = origin + self.slope * way.final_p if final is None else float(final - count)
+    def profile(self, travel: Profile, count: int, final: int | None) -> Profile:
+        """The profile of the axis that stands at ``count`` when the travel begins; it ends at ``final``, if that is given."""
+        origin = self.origin_p - count + self.slope * travel.base
+        end_p = origin + self.slope * travel.final_p if final is None else float(final - count)
         if self.slope == 0.0:
-            return Profile(way.start, count, (), end_p)
+            return Profile(travel.start, count, (), end_p)
         k = self.slope
         sign = 1 if k > 0.0 else -1
         segments = [
             Segment(s.end_s, s.anchor_s, origin + k * s.c0, k * s.c1, k * s.c2, k * s.c3, sign * s.direction)
-            for s in way.segments
+            for s in travel.segments
         ]
         if segments and segments[-1].anchor_s == segments[-1].end_s:
             segments[-1].c0 = end_p
-        return Profile(way.start, count, tuple(segments), end_p)
+        return Profile(travel.start, count, tuple(segments), end_p)
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +168,7 @@ class Circular:
         return None
 
     def parts(self, begin_w: float, end_w: float) -> Iterator[CircularPart]:
-        """The stretches in which the axis moves in one direction, in order."""
+        """The intervals in which the axis moves in one direction, in order."""
         forward = self.turn_q > 0.0
         angle_q = self.angle_q + self.turn_q * begin_w
         half = floor(0.5 * angle_q)
@@ -188,35 +188,35 @@ class Circular:
             begin_w = until_w
             half += 1 if forward else -1
 
-    def profile(self, way: Profile, count: int, final: int | None) -> ArcProfile:
+    def profile(self, travel: Profile, count: int, final: int | None) -> ArcProfile:
         """As `Straight.profile`."""
-        local = Circular(self.centre_p - count, self.radius_p, self.angle_q + self.turn_q * way.base, self.turn_q)
+        local = Circular(self.centre_p - count, self.radius_p, self.angle_q + self.turn_q * travel.base, self.turn_q)
         segments: list[ArcSegment] = []
-        begin_w = way.segments[0].position(0.0) if way.segments else way.final_p
-        for i, s in enumerate(way.segments):
-            end_w = way.final_p if i == len(way.segments) - 1 else s.position(s.end_s)
+        begin_w = travel.segments[0].position(0.0) if travel.segments else travel.final_p
+        for i, s in enumerate(travel.segments):
+            end_w = travel.final_p if i == len(travel.segments) - 1 else s.position(s.end_s)
             for part in local.parts(begin_w, end_w):
                 end_s = s.end_s if part.end_w >= end_w else s.when(part.end_w)
                 segments.append(ArcSegment(end_s, part.direction, s, local, part.half, part.end_p))
             begin_w = end_w
-        if way.segments and (not segments or segments[-1].end_s < way.segments[-1].end_s):
-            # The last stretch is too short to lead anywhere, but it takes its time.
-            s = way.segments[-1]
+        if travel.segments and (not segments or segments[-1].end_s < travel.segments[-1].end_s):
+            # The last interval is too short to lead anywhere, but it takes its time.
+            s = travel.segments[-1]
             half = floor(0.5 * (local.angle_q + local.turn_q * begin_w))
             falls = (half & 1 == 0) is (local.turn_q > 0.0)
             segments.append(ArcSegment(s.end_s, -1 if falls else 1, s, local, half, local.position(begin_w)))
-        profile = ArcProfile(way.start, count, tuple(segments), local.position(way.final_p))
+        profile = ArcProfile(travel.start, count, tuple(segments), local.position(travel.final_p))
         if final is None:
             return profile
         missing = final - count - profile.counts[-1]
         if segments and missing * segments[-1].direction < 0:
             # The axis has just turned round and lacks a pulse, which comes at the very end.
             segments.append(replace(segments[-1], direction=-segments[-1].direction))
-        return ArcProfile(way.start, count, tuple(segments), float(final - count))
+        return ArcProfile(travel.start, count, tuple(segments), float(final - count))
 
 
 class CircularPart(NamedTuple):
-    """A stretch of a `Circular` course in which the axis does not turn round.
+    """An interval of a `Circular` curve in which the axis does not turn round.
 
     The angle is between ``2 · half`` and ``2 · half + 2`` quarter turns; the axis goes in ``direction`` to ``end_p``.
     """
@@ -228,12 +228,12 @@ class CircularPart(NamedTuple):
     end_p: float
 
 
-def _angle_q(course: Circular, half: int, position: float) -> float:
+def _angle_q(curve: Circular, half: int, position: float) -> float:
     """The angle within ``half`` (as in `CircularPart`) at which the axis is at ``position``; beyond a turning point, that point.
 
     `steptwin.motion.pulses` does the same operations in the same order.
     """
-    x = (position - course.centre_p) / course.radius_p
+    x = (position - curve.centre_p) / curve.radius_p
     x = min(max(x, -1.0), 1.0)
     angle_q = 2.0 * arcsine_below_45(sqrt(0.5 * (1.0 - abs(x))), sqrt)
     if (x < 0.0) is (half & 1 == 0):
@@ -243,31 +243,31 @@ def _angle_q(course: Circular, half: int, position: float) -> float:
 
 @dataclass(slots=True)
 class ArcSegment:
-    """A stretch of an arc in which neither the axis turns round nor the acceleration of the way changes. Immutable.
+    """An interval of an arc in which neither the axis turns round nor the acceleration of the travel changes. Immutable.
 
     Answers as a `Segment` does.
     """
 
     end_s: float
     direction: int
-    way: Segment
-    course: Circular
+    travel: Segment
+    curve: Circular
     half: int
     """As in `CircularPart`."""
     end_p: float
 
     def position(self, t_s: float) -> float:
-        return self.course.position(self.way.position(t_s))
+        return self.curve.position(self.travel.position(t_s))
 
     def velocity(self, t_s: float) -> float:
-        course = self.course
-        angle_q = course.angle_q + course.turn_q * self.way.position(t_s)
-        return -course.radius_p * sine(angle_q) * QUARTER * course.turn_q * self.way.velocity(t_s)
+        curve = self.curve
+        angle_q = curve.angle_q + curve.turn_q * self.travel.position(t_s)
+        return -curve.radius_p * sine(angle_q) * QUARTER * curve.turn_q * self.travel.velocity(t_s)
 
     def when(self, position: float) -> float:
         """Seconds at which the axis is at ``position``."""
-        course = self.course
-        return self.way.when((_angle_q(course, self.half, position) - course.angle_q) / course.turn_q)
+        curve = self.curve
+        return self.travel.when((_angle_q(curve, self.half, position) - curve.angle_q) / curve.turn_q)
 
 
 class ArcProfile(Profile):

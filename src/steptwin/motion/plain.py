@@ -57,10 +57,10 @@ def _plain_segment(s: Segment | ArcSegment) -> object:
     end_s = None if s.end_s == inf else s.end_s
     if isinstance(s, Segment):
         return [end_s, s.anchor_s, s.c0, s.c1, s.c2, s.c3, s.direction]
-    c = s.course
-    course = [c.centre_p, c.radius_p, c.angle_q, c.turn_q]
-    way = _plain_segment(s.way)
-    return {"end_s": end_s, "direction": s.direction, "way": way, "course": course, "half": s.half, "end_p": s.end_p}
+    c = s.curve
+    curve = [c.centre_p, c.radius_p, c.angle_q, c.turn_q]
+    travel = _plain_segment(s.travel)
+    return {"end_s": end_s, "direction": s.direction, "way": travel, "course": curve, "half": s.half, "end_p": s.end_p}
 
 
 def _profile(data: Mapping[str, Any]) -> Profile:
@@ -85,7 +85,7 @@ def _segment(data: Sequence[Any]) -> Segment:
 
 def _arc(data: Mapping[str, Any]) -> ArcSegment:
     end_s = fitting("end_s", data["end_s"], float | None)
-    course = Circular(*fitting("course", tuple(data["course"]), tuple[float, float, float, float]))
+    curve = Circular(*fitting("course", tuple(data["course"]), tuple[float, float, float, float]))
     direction, half = fitting("direction", data["direction"], int), fitting("half", data["half"], int)
-    way, end_p = _segment(data["way"]), fitting("end_p", data["end_p"], float)
-    return ArcSegment(inf if end_s is None else end_s, direction, way, course, half, end_p)
+    travel, end_p = _segment(data["way"]), fitting("end_p", data["end_p"], float)
+    return ArcSegment(inf if end_s is None else end_s, direction, travel, curve, half, end_p)

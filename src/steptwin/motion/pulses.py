@@ -42,17 +42,17 @@ def pulse_times(profile: Profile, after: Nanos, until: Nanos) -> PulseTimes:
 
 
 def pulse_runs(profile: Profile, after: Nanos, until: Nanos) -> list[tuple[int, PulseTimes]]:
-    """Moments as in `pulse_times`, one pair (direction, times) for each stretch of one direction."""
+    """Moments as in `pulse_times`, one pair (direction, times) for each interval of one direction."""
     runs = _runs(profile, after, until)
     times = _times(profile, runs)
-    stretches: list[tuple[int, PulseTimes]] = []
+    intervals: list[tuple[int, PulseTimes]] = []
     begin = end = 0
     for i, run in enumerate(runs):
         end += run.size
         if i + 1 == len(runs) or runs[i + 1].step != run.step:
-            stretches.append((run.step, times[begin:end]))
+            intervals.append((run.step, times[begin:end]))
             begin = end
-    return stretches
+    return intervals
 
 
 def step_times(train: StepTrain, after: Nanos, until: Nanos) -> PulseTimes:
@@ -61,7 +61,7 @@ def step_times(train: StepTrain, after: Nanos, until: Nanos) -> PulseTimes:
     runs: list[_PulseRun] = []
     for segment, first, step, size in _runs(profile, after, until):
         last = first + step * (size - 1)
-        for begin, end, grid in train.stretches():
+        for begin, end, grid in train.intervals():
             # Positions relative to the base, counted along the direction of motion from where the division begins.
             origin = (begin - profile.base) * step
             low = max(first * step - origin, 1)
@@ -135,9 +135,9 @@ def _fill(profile: Profile, run: _PulseRun, out: PulseTimes) -> None:
 
 
 def _along_arc(s: ArcSegment, u: Reals, buffers: Reals) -> None:
-    course = s.course
-    u -= course.centre_p
-    u /= course.radius_p
+    curve = s.curve
+    u -= curve.centre_p
+    u /= curve.radius_p
     # No pulse inside a run is beyond a turning point; the profile gives its first and last pulses.
     folded = (u < 0.0) if s.half & 1 == 0 else (u >= 0.0)
     np.abs(u, out=u)
@@ -148,9 +148,9 @@ def _along_arc(s: ArcSegment, u: Reals, buffers: Reals) -> None:
     u *= 2.0
     np.subtract(2.0, u, out=u, where=folded)
     u += 2.0 * s.half
-    u -= course.angle_q
-    u /= course.turn_q
-    _solve(s.way, u, buffers)
+    u -= curve.angle_q
+    u /= curve.turn_q
+    _solve(s.travel, u, buffers)
 
 
 def _solve(s: Segment, u: Reals, buffers: Reals) -> None:
@@ -237,7 +237,7 @@ def _evaluate(profile: Profile, times: PulseTimes, *, derivative: bool) -> Reals
         begin = end
         t = n[chosen] / 1e9
         if isinstance(s, ArcSegment):
-            out[chosen] = _arc_velocity(s, t) if derivative else profile.base + _arc_position(s.course, _polynomial(s.way, t))
+            out[chosen] = _arc_velocity(s, t) if derivative else profile.base + _arc_position(s.curve, _polynomial(s.travel, t))
         else:
             out[chosen] = _slope(s, t) if derivative else profile.base + _polynomial(s, t)
     return out
@@ -253,14 +253,14 @@ def _slope(s: Segment, t: Reals) -> Reals:
     return s.c1 + u * (2.0 * s.c2 + u * (3.0 * s.c3))
 
 
-def _arc_position(course: Circular, w: Reals) -> Reals:
-    return course.centre_p + course.radius_p * _sine(course.angle_q + course.turn_q * w, quarters=1)
+def _arc_position(curve: Circular, w: Reals) -> Reals:
+    return curve.centre_p + curve.radius_p * _sine(curve.angle_q + curve.turn_q * w, quarters=1)
 
 
 def _arc_velocity(s: ArcSegment, t: Reals) -> Reals:
-    course = s.course
-    angle_q = course.angle_q + course.turn_q * _polynomial(s.way, t)
-    return -course.radius_p * _sine(angle_q) * QUARTER * course.turn_q * _slope(s.way, t)
+    curve = s.curve
+    angle_q = curve.angle_q + curve.turn_q * _polynomial(s.travel, t)
+    return -curve.radius_p * _sine(angle_q) * QUARTER * curve.turn_q * _slope(s.travel, t)
 
 
 def _sine(angle_q: Reals, quarters: int = 0) -> Reals:

@@ -96,7 +96,7 @@ _DIFFERENCE = members(
         "point": TEXT,
         "unit": TEXT,
         "most": {**_NUMBER_OR_NULL, "description": "How far the two are apart at most; null for texts and unknown values."},
-        "at_s": {**NUMBER, "description": "Since the begin of the stretch."},
+        "at_s": {**NUMBER, "description": "Since the begin of the interval."},
         "values": list_of(_VALUE),
     }
 )
@@ -121,8 +121,8 @@ MOST_WRITES = 200
 _RUN_NUMBER = whole(-(2**31), 2**31)
 LONGEST_S = LONGEST_NS / SECOND
 _SECONDS = number(0.0, LONGEST_S)
-_Begin: TypeAlias = Annotated[float, Meaning("Begin of the stretch, since that of the run.", _SECONDS, unit="s")]
-_End: TypeAlias = Annotated[float | None, Meaning("End of the stretch; that of the run without.", _SECONDS, unit="s")]
+_Begin: TypeAlias = Annotated[float, Meaning("Begin of the interval, since that of the run.", _SECONDS, unit="s")]
+_End: TypeAlias = Annotated[float | None, Meaning("End of the interval; that of the run without.", _SECONDS, unit="s")]
 
 
 @request("gateways", LOOK, "The gateways of the world, and who uses them.", list_of(_GATEWAY))
@@ -145,7 +145,7 @@ class ReadHistory:
 @request(
     "history_values",
     LOOK,
-    "Values of points in a stretch of a run that has been kept, for a picture: of motions the ends of their parts, and about "
+    "Values of points in an interval of a run that has been kept, for a picture: of motions the ends of their parts, and about "
     "800 positions between; at most 4000 of each point.",
     _VALUES,
 )
@@ -160,7 +160,7 @@ class ReadHistoryValues:
 @request(
     "compare_history",
     LOOK,
-    "The points that differ between the same stretch of two runs, the greatest difference first.",
+    "The points that differ between the same interval of two runs, the greatest difference first.",
     list_of(_DIFFERENCE),
 )
 @dataclass(frozen=True, slots=True)
@@ -175,7 +175,7 @@ class CompareHistory:
 @request(
     "history_writes",
     LOOK,
-    f"What programs have written over lines and clients have commanded in a stretch of a run; the last {MOST_WRITES}.",
+    f"What programs have written over lines and clients have commanded in an interval of a run; the last {MOST_WRITES}.",
     list_of(_WRITE),
 )
 @dataclass(frozen=True, slots=True)

@@ -62,7 +62,7 @@ def end_of(world: Simulation, wanted: Advance, due: Nanos | None) -> Nanos | Non
 
 def next_due(world: Simulation) -> Nanos | None:
     """The next moment at which anything happens by itself; None when nothing will."""
-    dues = [due for scheduler in world.schedulers if (due := scheduler.deadline()) is not None]
+    deadlines = [due for scheduler in world.schedulers if (due := scheduler.deadline()) is not None]
     own = world.next()
-    due = min(dues if own is None else [*dues, own], default=None)
+    due = min(deadlines if own is None else [*deadlines, own], default=None)
     return None if due is None else max(due, world.now)

@@ -136,13 +136,13 @@ class WorldSubject:
     def _begin(self) -> int:
         """Process all due events first, so that the command is not their cause."""
         if self.followers:
-            self.world.settle_all()
+            self.world.sync_all()
         return self.numbering.command(self.world.now)
 
     def _end(self) -> Nanos:
         """Process its effects at the same moment, so that the command is their cause."""
         if self.followers:
-            self.world.settle_all()
+            self.world.sync_all()
         self.numbering.done()
         return self.world.now
 
@@ -203,7 +203,7 @@ class WorldSubject:
         """A jog that lasts only while it is extended; it has not started yet. Raises `Misuse` and `Refusal`."""
         world, name = self.world, wanted.controller
         kind, controller = world.kind(name), world.controller(name)
-        world.touch(name)
+        world.sync(name)
         on = world.parts.line_of.get(name)
         held = kind.dead_man_jog(controller, None if on is None else on[0].name, wanted)
         self._jogs = [(one, jog) for one, jog in self._jogs if jog.over is None] + [(wanted, held)]
@@ -240,12 +240,12 @@ class WorldSubject:
 
     def _levels(self, name: str) -> Mapping[str, float]:
         controller = self.world.controller(name)
-        self.world.touch(name)
+        self.world.sync(name)
         return self.world.kind(name).state.pins(controller, self.world.now)
 
     def _state(self, wanted: command.ReadState) -> object:
         controller = self.world.controller(wanted.controller)
-        self.world.touch(wanted.controller)
+        self.world.sync(wanted.controller)
         reader = self.world.kind(wanted.controller).state
         if wanted.parts is not None:
             return reader.parts(controller, self.world.now, wanted.parts)
@@ -253,7 +253,7 @@ class WorldSubject:
 
     def _encoders(self, wanted: command.Encoders) -> object:
         encoders = self.world.encoders(wanted.controller)
-        self.world.touch(wanted.controller)
+        self.world.sync(wanted.controller)
         return encoders.shown(self.world.controller(wanted.controller), self.world.now)
 
     def _advance(self, wanted: command.Advance) -> object:
@@ -296,7 +296,7 @@ class WorldSubject:
         world = self.world
         found: list[Event] = []
         for part in self.description.controllers:
-            world.touch(part.name)
+            world.sync(part.name)
             for axis, drive in zip(part.datasheet.axes, world.controllers[part.name].axes, strict=True):
                 event = Event(0, world.now, part.name, PlanPayload(str(axis.number), drive.plan, drive.offset_p))
                 if what.wants(event):

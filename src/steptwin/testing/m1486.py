@@ -23,8 +23,8 @@ from steptwin.live.world import LiveWorld
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.pins import OPEN_ADDRESS
 from steptwin.m1486.variants import DEFAULT
-from steptwin.simulation.describe.small import Whole
-from steptwin.simulation.describe.small_m1486 import chip_name, m1486_world
+from steptwin.simulation.describe.generated import Whole
+from steptwin.simulation.describe.generated_m1486 import chip_name, m1486_world
 from steptwin.testing.realtime import RealTime, WallTime
 from steptwin.testing.rig import LineRig, Observe, check_time, check_word
 from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, connected_chip

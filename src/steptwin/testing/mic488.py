@@ -25,8 +25,8 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE, register_map
 from steptwin.mic488.registers import firmware as known_firmware
 from steptwin.mic488.status import AxisStatus
-from steptwin.simulation.describe.small import Whole
-from steptwin.simulation.describe.small_mic488 import mic488_world
+from steptwin.simulation.describe.generated import Whole
+from steptwin.simulation.describe.generated_mic488 import mic488_world
 from steptwin.simulation.script import steps as do
 from steptwin.testing.devices import driver_of
 from steptwin.testing.realtime import RealTime, WallTime

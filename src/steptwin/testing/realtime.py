@@ -123,7 +123,7 @@ class RealTime:
         try:
             return act(self.realtime.enter())
         finally:
-            self.controllers.stale = True
+            self.controllers.is_dirty = True
             self.realtime.leave()
 
     def later(self, seconds: float, act: Callable[[], object]) -> None:

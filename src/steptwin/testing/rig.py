@@ -19,7 +19,7 @@ from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.live.world_frames import follow_frames
-from steptwin.simulation.describe.small import LINE
+from steptwin.simulation.describe.generated import LINE
 from steptwin.simulation.faults import read as read_fault
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.script import steps as do
@@ -214,12 +214,14 @@ class LineRig(Rig):
         live = self._live or self.twin_only(what)
 
         def at(_: Nanos) -> T:
-            scheduler = live.world.touch(self._controller)
+            scheduler = live.world.sync(self._controller)
             try:
                 return act(live.world)
             finally:
-                scheduler.mark(self._controller)  # what acted on the controller itself has changed it behind the scheduler's back
-                live.stale = True
+                scheduler.notify(
+                    self._controller
+                )  # what acted on the controller itself has changed it behind the scheduler's back
+                live.is_dirty = True
 
         return self._at_present(at)
 

@@ -120,8 +120,8 @@ class MemoryChannel:
             if self._received or time.now() >= end:
                 received, self._received = self._received, b""
                 return received
-            dues = (time.deadline(), port.deadline())
-            due = min((due for due in dues if due is not None), default=end)
+            deadlines = (time.deadline(), port.deadline())
+            due = min((due for due in deadlines if due is not None), default=end)
             time.advance(min(max(due, time.now() + 1), end))
 
     def close(self) -> None:

@@ -196,7 +196,7 @@ class WorldRig(Rig):
             try:
                 return act(self._live.world)
             finally:
-                self._live.stale = True
+                self._live.is_dirty = True
 
         return self._at_present(at)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-_MOTION = "needs motions whose course is measured at STEP and DIR, or at the phases"
+_MOTION = "needs motions whose trajectory is measured at STEP and DIR, or at the phases"
 _HOMING = "needs a homing run with switches"
 _PROGRAM = "needs a program in the controller, and its download protocol is not documented"
 _CHIP_PROGRAM = "needs a program of its own in the memory of the chip, which would replace the present one"

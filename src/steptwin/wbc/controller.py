@@ -17,8 +17,9 @@ RegisterWriter: TypeAlias = Callable[[Any, float, Nanos], bool]
 """(controller, REAL, moment) → whether that changed anything."""
 
 Tendency: TypeAlias = Callable[[Any, Nanos], Iterable[Nanos] | None]
-"""(controller, moment) → the course of a register as long as no event occurs: the ends, in order, of the stretches
-in which it only rises or only falls; after the last one it is constant. `FOREVER` ends a stretch without end. None: not known."""
+"""(controller, moment) → the trajectory of a register as long as no event occurs: the ends, in order, of the intervals
+in which it only rises or only falls; after the last one it is constant. `FOREVER` ends an interval without end. None: not
+known."""
 
 FOREVER: Nanos = 2**62
 

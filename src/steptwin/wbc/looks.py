@@ -7,18 +7,18 @@ from collections.abc import Callable, Iterable
 from steptwin.controller import Nanos
 
 Side = Callable[[Nanos], float]
-"""The value at a moment. Within each stretch it only rises or only falls."""
+"""The value at a moment. Within each interval it only rises or only falls."""
 
 
-def first_change(side: Side, begin: Nanos, period: Nanos, stretches: Iterable[Nanos], horizon: Nanos) -> Nanos | None:
+def first_change(side: Side, begin: Nanos, period: Nanos, intervals: Iterable[Nanos], horizon: Nanos) -> Nanos | None:
     """The first of the moments ``begin + period``, ``begin + 2 period``, … at which the value differs from that at ``begin``.
 
-    ``stretches`` are the ends of the stretches, in order; after the last one nothing changes any more. None if nothing else is
+    ``intervals`` are the ends of the intervals, in order; after the last one nothing changes any more. None if nothing else is
     ever seen; the first of the moments after ``horizon`` if not up to there.
     """
     seen = side(begin)
     at = begin + period
-    for end in stretches:
+    for end in intervals:
         if end < at:
             continue
         if at > horizon or side(at) != seen:
@@ -32,9 +32,9 @@ def first_change(side: Side, begin: Nanos, period: Nanos, stretches: Iterable[Na
 
 
 def _within(side: Side, seen: float, at: Nanos, period: Nanos, last: int) -> Nanos | None:
-    """Moments of ``at + k · period`` up to k = ``last``, all in one stretch, where ``seen`` is seen at ``at``."""
+    """Moments of ``at + k · period`` up to k = ``last``, all in one interval, where ``seen`` is seen at ``at``."""
     same, step = 0, 1
-    # Most changes are near, and some stretches have no end: steps of growing size first, then halving.
+    # Most changes are near, and some intervals have no end: steps of growing size first, then halving.
     while same < last:
         k = min(same + step, last)
         if side(at + k * period) != seen:

@@ -65,10 +65,10 @@ class RestingLoop(NamedTuple):
             cells = visit.values()
             at = self.base + visit.offset
             for seen, tendency in watches:
-                stretches = None if tendency is None else tendency(controller, at)
-                if stretches is None:
+                intervals = None if tendency is None else tendency(controller, at)
+                if intervals is None:
                     return None
-                change = first_change(partial(seen, controller, cells), at, self.period, stretches, at + HORIZON)
+                change = first_change(partial(seen, controller, cells), at, self.period, intervals, at + HORIZON)
                 if change is not None and (soonest == NEVER or change < soonest):
                     soonest = change
         return soonest

@@ -193,7 +193,7 @@ class Causes:
         """The signals that drive an input: an output at the other end of a wire, or contacts."""
         circuit = self._world.parts.circuits.get(target)
         if circuit is not None:
-            yield from (contact.lane for contact in circuit.contacts if contact.lane)
+            yield from (contact.channel for contact in circuit.contacts if contact.channel)
         for scheduler in (self._world.parts.scheduler_of[target.controller],):
             wire = scheduler.wire_to(target)
             if wire is not None:
@@ -209,11 +209,11 @@ class Causes:
             found = self._before(self._name(wire.source), change, change.time - wire.delay)
             if found is not None and found[0].time == change.time - wire.delay:
                 return self.change(found[1], found[0], IS_WIRED_TO(pin=str(pin)))
-        lanes = [found for lane in self._sources(pin) if (found := self._before(lane, change, change.time))]
-        at_once = [found for found in lanes if found[0].time == change.time]
+        channels = [found for channel in self._sources(pin) if (found := self._before(channel, change, change.time))]
+        at_once = [found for found in channels if found[0].time == change.time]
         if at_once:
-            latest, lane = max(at_once, key=lambda found: found[0].position)
-            return self.change(lane, latest, CONTACT_OF(pin=str(pin)))
+            latest, channel = max(at_once, key=lambda found: found[0].position)
+            return self.change(channel, latest, CONTACT_OF(pin=str(pin)))
         act = next((act for act in self._log.acts_at(change.time) if _sets(act, pin)), None)
         if act is not None:
             return _acted(act)

@@ -128,7 +128,7 @@ class CauseLog:
             for signal, held in parts.faults.held(owner).items():
                 self._holds[signal].append(Hold(began.get(held.fault, self.begin), held))
         self._built = {group: len(records) for group, records in self.records.items()}
-        self.points = points.PointTurns(world)
+        self.points = points.NotedPoints(world)
         world.trace.watchers.append(self._take)
         world.act_watchers.append(self._act)
         for name, programs in world.programs.items():
@@ -187,7 +187,7 @@ class CauseLog:
 
     def _act(self, script: str, what: ExternalInput) -> None:
         self._count()
-        self.world.settle_all()
+        self.world.sync_all()
         self.acts.append(Act(self.world.now, script, what))
         match what:
             case Download(controller=controller):
@@ -231,14 +231,14 @@ class CauseLog:
     # ------------------------------------------------------------------ questions
 
     def signal_of(self, record: TraceRecord) -> str:
-        """The name of what has an edge: ``table.OUT1``, ``valve.out``, or the lane of a contact."""
+        """The name of what has an edge: ``table.OUT1``, ``valve.out``, or the channel of a contact."""
         is_pin = record.subject in self._pins.get(record.controller, ())
         return f"{record.controller}.{record.subject}" if is_pin else record.subject
 
     def is_recorded(self, signal: str) -> bool:
         """Whether every change of a signal is noted."""
         owner, _, pin = signal.partition(".")
-        return pin in self._pins.get(owner, ()) or self.has(signal) or self.points.turns(signal) is not None
+        return pin in self._pins.get(owner, ()) or self.has(signal) or self.points.series(signal) is not None
 
     def has(self, signal: str) -> bool:
         """Whether it is the name of something with edges."""
@@ -246,9 +246,9 @@ class CauseLog:
 
     def level(self, signal: str, now: Nanos) -> float:
         """The level of a signal at a moment."""
-        turns = self.points.turns(signal)
-        if turns is not None:
-            return points.level(turns, now)
+        series = self.points.series(signal)
+        if series is not None:
+            return points.level(series, now)
         last = self.last_change(signal, now)
         return self.first_levels.get(signal, 0.0) if last is None else last.value
 
@@ -267,9 +267,9 @@ class CauseLog:
 
     def changes_in(self, signal: str, after: Nanos, until: Nanos) -> Iterator[Nanos]:
         """The moments at which a signal took another value, after one until another."""
-        turns = self.points.turns(signal)
-        if turns is not None:
-            return points.changes(turns, after, until)
+        series = self.points.series(signal)
+        if series is not None:
+            return points.changes(series, after, until)
         changes = self.changes.get(signal, [])
         first, last = (bisect_right(changes, moment, key=lambda change: change.time) for moment in (after, until))
         return (change.time for change in changes[first:last] if not self.is_first(signal, change))
@@ -285,9 +285,9 @@ class CauseLog:
 
     def since(self, signal: str, until: Nanos) -> Nanos | None:
         """Since when a signal has the level of a moment; None: from the beginning."""
-        turns = self.points.turns(signal)
-        if turns is not None:
-            return points.since(turns, until)
+        series = self.points.series(signal)
+        if series is not None:
+            return points.since(series, until)
         last = self.last_change(signal, until)
         return None if last is None or self.is_first(signal, last) else last.time
 
@@ -346,8 +346,8 @@ def levels_of(world: Simulation) -> dict[str, float]:
         if ELEMENTS[kind].terminals is not None:
             for name, part in parts.items():
                 found |= {f"{name}.{output.lower()}": part.board.levels[output] for output in part.board.outputs}
-    contacts = [contact for circuit in world.parts.circuits.values() for contact in circuit.contacts if contact.lane]
-    return found | {contact.lane: float(contact.level) for contact in contacts}
+    contacts = [contact for circuit in world.parts.circuits.values() for contact in circuit.contacts if contact.channel]
+    return found | {contact.channel: float(contact.level) for contact in contacts}
 
 
 def _plans(world: Simulation) -> Iterator[TraceRecord]:

@@ -13,17 +13,17 @@ from steptwin.points import LivePoint, MemoryCells
 from steptwin.simulation.world.eventpoints import EventPoints, points_of, stays_between_events
 from steptwin.simulation.world.simulation import Simulation
 
-MOST_TURNS = 1_000_000
+MOST_CHANGES = 1_000_000
 """Limit of the changes that are noted, which are kept in memory."""
 MOST_LOOKS = 100_000
 """Limit of the events and statements after which the points are compared: a run takes some 2 s longer by it. Where there is
 more of either, nothing is noted any more, and all is forgotten."""
 
-PointTurn: TypeAlias = tuple[Nanos, float]
+TimedValue: TypeAlias = tuple[Nanos, float]
 """A moment, and the value from then on."""
 
 
-class PointTurns:
+class NotedPoints:
     """Notes the changes of all such points of ``world`` from now on: after each event of their controller, and after each
     statement of which `executes` is notified."""
 
@@ -46,12 +46,12 @@ class PointTurns:
         """A reader has noted so many changes."""
         self._noted += noted
         self._looks += 1
-        if self._noted > MOST_TURNS or self._looks > MOST_LOOKS:
+        if self._noted > MOST_CHANGES or self._looks > MOST_LOOKS:
             for owner, reader in self._readers.items():
                 self._world.parts.scheduler_of[owner].unfollow(reader)
             self._readers.clear()
 
-    def turns(self, name: str) -> Sequence[PointTurn] | None:
+    def series(self, name: str) -> Sequence[TimedValue] | None:
         """The values of a point, ``table.M1_ACC`` or ``table.USER_REGISTER[12]:real``, the first one from the beginning on; None
         for what is not noted."""
         owner, _, path = name.partition(".")
@@ -61,23 +61,23 @@ class PointTurns:
         if path in reader.points:
             return reader.points[path]
         memory = _memory(self._world, owner, path)
-        return None if memory is None or reader.cells is None else reader.cells.turns(memory)
+        return None if memory is None or reader.cells is None else reader.cells.series(memory)
 
 
 class _Reader:
-    """Reader of the points of one controller. ``points``: the turns of each.
+    """Reader of the points of one controller. ``points``: the series of each.
 
     As `steptwin.simulation.scheduler.followers.SchedulerFollower`.
     """
 
-    def __init__(self, noted: PointTurns, world: Simulation, owner: str) -> None:
+    def __init__(self, noted: NotedPoints, world: Simulation, owner: str) -> None:
         self._all = noted
         points = dict(points_of(world, owner))
         found = {path: point for path, point in points.items() if point is not None and stays_between_events(point)}
         now = world.now
         self._kept = _Compared({path: point for path, point in found.items() if point.is_kept}, now)
         self._others = EventPoints(world, owner, {path: point for path, point in found.items() if not point.is_kept})
-        self.points = self._kept.turns | {path: [(now, float(value))] for path, value in self._others.read(now).items()}
+        self.points = self._kept.series | {path: [(now, float(value))] for path, value in self._others.read(now).items()}
         rows = (_memory(world, owner, f"{path}[0]") for path, point in points.items() if point is None)
         memory = next((row for row in rows if row is not None), None)
         self.cells = None if memory is None else _Cells(memory, now)
@@ -98,7 +98,7 @@ class _Reader:
         self._keeping = None
         changed = self._others.changed(now)
         for path, value in changed.items():
-            note_turn(self.points[path], now, float(value))
+            note_value(self.points[path], now, float(value))
         self._all.looked(noted + len(changed))
 
     def _look_at_kept(self, now: Nanos) -> int:
@@ -111,7 +111,7 @@ class _Compared:
     def __init__(self, found: Mapping[str, LivePoint], now: Nanos) -> None:
         self._reads = [point.read for point in found.values() if point.read is not None]
         self._values = [float(read(now)) for read in self._reads]
-        self.turns: dict[str, list[PointTurn]] = {path: [(now, value)] for path, value in zip(found, self._values, strict=True)}
+        self.series: dict[str, list[TimedValue]] = {path: [(now, value)] for path, value in zip(found, self._values, strict=True)}
 
     def look(self, now: Nanos) -> int:
         """Note what has another value at the present moment; how many changes that are."""
@@ -119,9 +119,9 @@ class _Compared:
         if values == self._values:
             return 0
         noted = 0
-        for turns, value, before in zip(self.turns.values(), values, self._values, strict=True):
+        for series, value, before in zip(self.series.values(), values, self._values, strict=True):
             if value != before:
-                note_turn(turns, now, float(value))
+                note_value(series, now, float(value))
                 noted += 1
         self._values = values
         return noted
@@ -134,7 +134,7 @@ class _Cells:
         self._words = memory.words
         self._first = self._last = memory.words()[:]
         self._begin = now
-        self._turns: dict[int, list[PointTurn]] = {}
+        self._series: dict[int, list[TimedValue]] = {}
 
     def look(self, now: Nanos) -> int:
         words = self._words()
@@ -142,30 +142,30 @@ class _Cells:
             return 0
         changed = [cell for cell, (word, before) in enumerate(zip(words, self._last, strict=True)) if word != before]
         for cell in changed:
-            note_turn(self._of(cell), now, words[cell])
+            note_value(self._of(cell), now, words[cell])
         self._last = words[:]
         return len(changed)
 
-    def _of(self, cell: int) -> list[PointTurn]:
-        return self._turns.setdefault(cell, [(self._begin, self._first[cell])])
+    def _of(self, cell: int) -> list[TimedValue]:
+        return self._series.setdefault(cell, [(self._begin, self._first[cell])])
 
-    def turns(self, memory: MemoryCells) -> list[PointTurn]:
-        """Turns of a value in it."""
+    def series(self, memory: MemoryCells) -> list[TimedValue]:
+        """Series of a value in it."""
         words = [int(self._first[cell]) for cell in memory.cells]
         found = [(self._begin, float(memory.value(words)))]
-        changes = [(time, number, word) for number, cell in enumerate(memory.cells) for time, word in self._turns.get(cell, ())]
+        changes = [(time, number, word) for number, cell in enumerate(memory.cells) for time, word in self._series.get(cell, ())]
         for time, number, word in sorted(changes):
             words[number] = int(word)
-            note_turn(found, time, float(memory.value(words)))
+            note_value(found, time, float(memory.value(words)))
         return found
 
 
-def note_turn(turns: list[PointTurn], now: Nanos, value: float) -> None:
-    """Add a turn. What lasts for no time is no value."""
-    if turns[-1][0] == now:
-        turns.pop()
-    if not turns or turns[-1][1] != value:
-        turns.append((now, value))
+def note_value(series: list[TimedValue], now: Nanos, value: float) -> None:
+    """Add a value. What lasts for no time is no value."""
+    if series[-1][0] == now:
+        series.pop()
+    if not series or series[-1][1] != value:
+        series.append((now, value))
 
 
 def _point(world: Simulation, owner: str, path: str) -> LivePoint | None:
@@ -180,25 +180,25 @@ def _memory(world: Simulation, owner: str, path: str) -> MemoryCells | None:
     return None if found is None else found.memory
 
 
-def since(turns: Sequence[PointTurn], now: Nanos) -> Nanos | None:
+def since(series: Sequence[TimedValue], now: Nanos) -> Nanos | None:
     """Since when it has the value of a moment; None: from the beginning."""
-    index = _index(turns, now)
-    return turns[index][0] if index > 0 else None
+    index = _index(series, now)
+    return series[index][0] if index > 0 else None
 
 
-def level(turns: Sequence[PointTurn], now: Nanos) -> float:
+def level(series: Sequence[TimedValue], now: Nanos) -> float:
     """The value at a moment."""
-    return turns[max(0, _index(turns, now))][1]
+    return series[max(0, _index(series, now))][1]
 
 
-def changes(turns: Sequence[PointTurn], after: Nanos, until: Nanos) -> Iterator[Nanos]:
+def changes(series: Sequence[TimedValue], after: Nanos, until: Nanos) -> Iterator[Nanos]:
     """The moments of the changes after a moment until another."""
-    return (turns[index][0] for index in range(max(_index(turns, after) + 1, 1), _index(turns, until) + 1))
+    return (series[index][0] for index in range(max(_index(series, after) + 1, 1), _index(series, until) + 1))
 
 
-def _index(turns: Sequence[PointTurn], now: Nanos) -> int:
-    return bisect_right(turns, now, key=_moment) - 1
+def _index(series: Sequence[TimedValue], now: Nanos) -> int:
+    return bisect_right(series, now, key=_moment) - 1
 
 
-def _moment(turn: PointTurn) -> Nanos:
-    return turn[0]
+def _moment(one: TimedValue) -> Nanos:
+    return one[0]

@@ -22,8 +22,8 @@ from steptwin.simulation.world.snapshot import RecordedInput
 from steptwin.why import points
 from steptwin.why.answer import MOST_LINKS, Answer, ChainLink, since_before
 from steptwin.why.causes import IS, IS_SINCE, Cause, Causes, nothing
-from steptwin.why.courses import Courses, CourseTurns, watch_truth, watch_value
 from steptwin.why.log import MOST_NOTED, CauseLog, in_parts
+from steptwin.why.replayed import ReplayedSignals, TimeSeries, watch_truth, watch_value
 from steptwin.why.search import Asked
 from steptwin.why.sentences import statement
 from steptwin.why.states import Interval, StatesOnTheWay, rest_of
@@ -52,19 +52,19 @@ def finish(asking: Asking) -> Answer:
 
 @dataclass(frozen=True, slots=True)
 class _Level:
-    """A signal whose course is known. As `steptwin.simulation.logic.condition.Signal`."""
+    """A signal whose values are known. As `steptwin.simulation.logic.condition.Signal`."""
 
     level: Callable[[Nanos], float]
     unit: str
     continuous: bool = False
 
-    def bring(self, now: Nanos) -> tuple[()]:
+    def sync(self, now: Nanos) -> tuple[()]:
         return ()
 
     def value(self, now: Nanos) -> float:
         return self.level(now)
 
-    def turns(self, now: Nanos) -> Iterator[Nanos]:
+    def turning_points(self, now: Nanos) -> Iterator[Nanos]:
         yield from ()
 
     def version(self) -> object:
@@ -125,7 +125,7 @@ class Why:
         self.log = CauseLog(make(), most)
         self._causes = Causes(self.log)
         self._on_the_way = StatesOnTheWay(self.log.world)
-        self._courses = Courses(make, self._inputs)
+        self._replayed = ReplayedSignals(make, self._inputs)
 
     def go_on(self, inputs: Iterable[RecordedInput], end: Nanos) -> None:
         """The present is a later one: what came from outside since."""
@@ -176,12 +176,12 @@ class Why:
         # Elements know their signals by the names in the question only.
         signals = {name: full if full in edges or self._is_signal(full) else name for name, full in canonical.items()}
 
-        def flip(turns: Mapping[str, CourseTurns], at: Nanos) -> Nanos | None:
-            courses = {name: turns[signal] for name, signal in signals.items()}
+        def flip(noted: Mapping[str, TimeSeries], at: Nanos) -> Nanos | None:
+            series = {name: noted[signal] for name, signal in signals.items()}
             if is_bare:
-                return points.since(courses[text], at)
-            condition = SignalCondition(text, lambda name: _Level(partial(points.level, courses[name]), self._unit(name)))
-            times = {time for course in courses.values() for time in points.changes(course, -1, at)}
+                return points.since(series[text], at)
+            condition = SignalCondition(text, lambda name: _Level(partial(points.level, series[name]), self._unit(name)))
+            times = {time for one in series.values() for time in points.changes(one, -1, at)}
             return _last_flip(condition, times, at)
 
         moving = frozenset(signals[name] for name in moving)
@@ -291,9 +291,9 @@ class Why:
         return float(condition.holds(at)), _last_flip(condition, times, at)
 
     def _from_run(self, text: str, canonical: dict[str, str], at: Nanos, *, is_bare: bool) -> FoundValue:
-        """As `_from_log`, from courses that are in no trace: from interval to interval back to the last change."""
-        log, courses, controllers = self.log, self._courses, self.log.world.controllers
-        courses.begin()
+        """As `_from_log`, from values that are in no trace: from interval to interval back to the last change."""
+        log, replayed, controllers = self.log, self._replayed, self.log.world.controllers
+        replayed.begin()
         if any(log.world.signal(name).continuous for name in canonical if not log.has(name)):
             recorded, watched = dict[str, str](), {text: text}
             watch, is_followed = watch_truth, True
@@ -308,16 +308,16 @@ class Why:
             self._remember_rests(text, canonical, intervals)
         for number, interval in enumerate(intervals):
             # As many as have shown no change: what lasts for long is found with few states to restore.
-            yield from courses.bring(watched.values(), watch, intervals[number : number + max(1, number)], at)
+            yield from replayed.prepare(watched.values(), watch, intervals[number : number + max(1, number)], at)
 
             def level(moment: Nanos, interval: Interval = interval) -> float:
                 if is_followed:
-                    return courses.level(watched[text], interval, moment)
+                    return replayed.level(watched[text], interval, moment)
                 signals = partial(self._level_in, interval, recorded, watched)
                 return float(SignalCondition(text, signals).holds(moment))
 
             value = level(at) if value is None else value
-            times = {time for full in watched.values() for time in courses.changes(full, interval, at)}
+            times = {time for full in watched.values() for time in replayed.changes(full, interval, at)}
             for full in recorded.values():
                 times.update(log.changes_in(full, interval.state.snapshot.now, min(at, interval.end)))
             for time in sorted(times, reverse=True):
@@ -342,13 +342,13 @@ class Why:
                     levels[name] = log.level(full, begin)
             else:
                 at_rest = SignalCondition(text, lambda name, levels=levels: _Level(lambda now: levels[name], self._unit(name)))
-                self._courses.remember(text, interval, float(at_rest.holds(begin)))
+                self._replayed.remember(text, interval, float(at_rest.holds(begin)))
 
     def _level_in(self, interval: Interval, recorded: Mapping[str, str], watched: Mapping[str, str], name: str) -> Signal:
         """A signal of a condition in an interval."""
         if name in recorded:
             return _Level(partial(self.log.level, recorded[name]), self._unit(name))
-        return _Level(partial(self._courses.level, watched[name], interval), self._unit(name))
+        return _Level(partial(self._replayed.level, watched[name], interval), self._unit(name))
 
     def _changed(self, signals: Sequence[str], time: Nanos) -> Cause | None:
         """Cause of a change of one of these signals at a moment."""
@@ -366,8 +366,8 @@ class Why:
             drive = world.axes[owner].spec.drive
             return causes.motion(drive[0], drive[1].removeprefix("M"), time, owner)
         if owner not in world.controllers:
-            lanes = [name for name in self.log.changes if name == owner or name.startswith(f"{owner}.")]
-            return causes.last(lanes, time)
+            channels = [name for name in self.log.changes if name == owner or name.startswith(f"{owner}.")]
+            return causes.last(channels, time)
         axis = _AXIS.match(rest)
         is_of_axis = axis is not None or (self._is_signal(signal) and world.signal(signal).continuous)
         wanted = Resource(ResourceKind.AXIS, (axis and axis[1]) or "") if is_of_axis else None

@@ -19,8 +19,8 @@ from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
 from steptwin.statements import StatementHook
 from steptwin.why import points
-from steptwin.why.courses import CourseTurns, watch_truth
 from steptwin.why.log import in_parts, levels_of
+from steptwin.why.replayed import TimeSeries, watch_truth
 from steptwin.why.states import rest_of
 
 MOST_PARTS = 20_000
@@ -28,7 +28,7 @@ MOST_PARTS = 20_000
 
 
 class Asked(NamedTuple):
-    """A signal or condition. ``flip``: since when it is what it is at a moment, by the turns of its signals; None: in all of
+    """A signal or condition. ``flip``: since when it is what it is at a moment, by the series of its signals; None: in all of
     them."""
 
     text: str
@@ -37,7 +37,7 @@ class Asked(NamedTuple):
     """Those of the signals that change by edges only."""
     moving: frozenset[str]
     """Those that also change between events."""
-    flip: Callable[[Mapping[str, CourseTurns], Nanos], Nanos | None]
+    flip: Callable[[Mapping[str, TimeSeries], Nanos], Nanos | None]
 
 
 class Found(NamedTuple):
@@ -61,7 +61,7 @@ class PastStates(Protocol):
 
 
 Searching: TypeAlias = Generator[None, None, Found]
-FoundTurn: TypeAlias = Generator[None, None, "Nanos | None"]
+FoundChange: TypeAlias = Generator[None, None, "Nanos | None"]
 
 
 class LastChanges:
@@ -147,7 +147,7 @@ class LastChanges:
             return True
         present = self._history.world
         point = present.kind(owner).point(present.controller(owner), path) if owner in present.controllers else None
-        if point is None or point.read is None or point.turns is not None:
+        if point is None or point.read is None or point.turning_points is not None:
             return True
         if not point.is_kept:
             return all(one.path != path for one in present.kind(owner).datasheet(present.controller(owner)).points)
@@ -193,7 +193,7 @@ class LastChanges:
         """Whether all that may move stands at the moment of a state, and nothing begins to move until the next one."""
         world = self._at(state)
         signals = [signal for name in asked.moving if isinstance(signal := world.signal(name), SignalOf)]
-        schedulers = {source.scheduler for signal in signals for source in signal.bring(world.now)}
+        schedulers = {source.scheduler for signal in signals for source in signal.sync(world.now)}
         moved = {controller for controller, subject in after.changed if subject == MOVED}
         if (
             len(signals) < len(asked.moving)
@@ -209,56 +209,56 @@ class LastChanges:
         world.restore(state.snapshot)
         return world
 
-    def _run(self, asked: Asked, state: PastState, end: Nanos) -> FoundTurn:
+    def _run(self, asked: Asked, state: PastState, end: Nanos) -> FoundChange:
         """The last change from a state to a moment."""
         history = self._history
         world = self._at(state)
         inputs = list(history.inputs_from(state.inputs))
         if asked.moving:
-            turns: CourseTurns = []
-            world.start("why", partial(watch_truth, world, asked.text, turns), is_external=True)
+            series: TimeSeries = []
+            world.start("why", partial(watch_truth, world, asked.text, series), is_external=True)
             for _ in in_parts(world, inputs, end):
                 yield
-            return turns[-1][0] if len(turns) > 1 else None
+            return series[-1][0] if len(series) > 1 else None
         with ExitStack() as stack:
             noted = _Noted(world, asked, stack, is_replaced=any(isinstance(one.what, Download | Bytes) for one in inputs))
             for _ in in_parts(world, inputs, end):
                 yield
-        return asked.flip(noted.turns, end)
+        return asked.flip(noted.series, end)
 
 
 class _Noted:
-    """The turns of some signals of ``world`` from now on, until ``stack`` is closed."""
+    """The series of some signals of ``world`` from now on, until ``stack`` is closed."""
 
     def __init__(self, world: Simulation, asked: Asked, stack: ExitStack, *, is_replaced: bool) -> None:
         levels = levels_of(world) if asked.edges else {}
-        self.turns: dict[str, CourseTurns] = {name: [(world.now, levels.get(name, 0.0))] for name in asked.edges}
+        self.series: dict[str, TimeSeries] = {name: [(world.now, levels.get(name, 0.0))] for name in asked.edges}
         if asked.edges:
             world.trace.watchers.append(self._take)
             stack.callback(world.trace.watchers.remove, self._take)
         for name in asked.signals:
-            if name not in self.turns:
+            if name not in self.series:
                 follower = _Follower(world, name)
-                self.turns[name] = follower.turns
+                self.series[name] = follower.series
                 follower.follow(stack, is_replaced=is_replaced)
 
     def _take(self, record: TraceRecord) -> None:
         if record.kind == "edge":
-            turns = self.turns.get(record.subject) or self.turns.get(f"{record.controller}.{record.subject}")
-            if turns is not None:
-                points.note_turn(turns, record.time, record.level())
+            series = self.series.get(record.subject) or self.series.get(f"{record.controller}.{record.subject}")
+            if series is not None:
+                points.note_value(series, record.time, record.level())
 
 
 class _Follower:
-    """Notes the turns of a signal that has no edges. As `steptwin.simulation.scheduler.followers.SchedulerFollower`."""
+    """Notes the series of a signal that has no edges. As `steptwin.simulation.scheduler.followers.SchedulerFollower`."""
 
     def __init__(self, world: Simulation, name: str) -> None:
         signal = world.signal(name)
         self._world, self._read = world, signal.value
-        self._sources = signal.bring(world.now)
+        self._sources = signal.sync(world.now)
         self._owner, _, rest = name.partition(".")
         self._value = self._read(world.now)
-        self.turns: CourseTurns = [(world.now, self._value)]
+        self.series: TimeSeries = [(world.now, self._value)]
         controller = world.controllers.get(self._owner)
         point = None if controller is None else world.kind(self._owner).point(controller, rest)
         self._is_kept = point is not None and point.is_kept
@@ -301,7 +301,7 @@ class _Follower:
         value = self._read(now)
         if value != self._value:
             self._value = value
-            points.note_turn(self.turns, now, value)
+            points.note_value(self.series, now, value)
 
 
 def _acting(programs: Programs) -> Iterator[tuple[Place, bool]]:

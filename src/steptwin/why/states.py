@@ -76,7 +76,7 @@ class StatesOnTheWay:
 
 
 def _moving(world: Simulation) -> Iterator[tuple[str, SignalOf]]:
-    """The quantities that move, and can tell when their course is another one."""
+    """The quantities that move, and can tell when their trajectory is another one."""
     elements = (name for built in world.parts.elements.values() for name in built)
     names = [f"{name}.{signal}" for name in elements for signal in world.parts.element_signals(name) or ()]
     for owner, controller in world.controllers.items():
@@ -84,7 +84,7 @@ def _moving(world: Simulation) -> Iterator[tuple[str, SignalOf]]:
         for point in kind.datasheet(controller).points:
             with suppress(Misuse):  # of a row of registers one must be chosen
                 live = kind.point(controller, point.path)
-                if live is not None and live.turns is not None and live.version is not None:
+                if live is not None and live.turning_points is not None and live.version is not None:
                     names.append(f"{owner}.{point.path}")
     for name in names:
         found = world.signal(name)
@@ -94,7 +94,7 @@ def _moving(world: Simulation) -> Iterator[tuple[str, SignalOf]]:
 
 def rest_of(signal: SignalOf, now: Nanos) -> Standing | None:
     """Value at which it stands; None while it moves."""
-    if next(signal.turns(now), None) is not None:
+    if next(signal.turning_points(now), None) is not None:
         return None
     value = signal.value(now)
     return Standing(value, signal.version()) if signal.value(now + FARTHEST_NS) == value else None

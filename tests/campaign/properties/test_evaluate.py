@@ -149,7 +149,7 @@ BOTH = st.integers(1, 12).flatmap(lambda n: st.tuples(*[st.lists(VALUES, min_siz
 def test_the_sign_of_a_value_is_the_truth_at_every_moment(text: str, both: tuple[Values, Values]) -> None:
     formula = parse_property(text)
     signals = signals_of(formula, *both)
-    found = Evaluation({atom: steps_of(values) for atom, values in signals.items()}).course(formula)
+    found = Evaluation({atom: steps_of(values) for atom, values in signals.items()}).shape(formula)
     for t in range(len(both[0])):
         assert (value_at(found, t) > 0) is truth(formula, signals, t, open_is=True), t
 
@@ -159,7 +159,7 @@ def test_the_sign_of_a_value_is_the_truth_at_every_moment(text: str, both: tuple
 def test_without_windows_the_value_is_that_of_signal_temporal_logic(text: str, both: tuple[Values, Values]) -> None:
     formula = parse_property(text)
     signals = signals_of(formula, *both)
-    found = Evaluation({atom: steps_of(values) for atom, values in signals.items()}).course(formula)
+    found = Evaluation({atom: steps_of(values) for atom, values in signals.items()}).shape(formula)
     for t in range(len(both[0])):
         assert value_at(found, t) == float(distance(formula, signals, t))
 
@@ -187,15 +187,15 @@ KNOTS = st.lists(VALUES, min_size=3, max_size=3).map(lambda some: [(7, one) for 
 
 @settings(max_examples=200)
 @given(formulas(windows=True), KNOTS, KNOTS)
-def test_straight_stretches_are_true_and_false_where_their_moments_are(text: str, a: Any, b: Any) -> None:
+def test_straight_intervals_are_true_and_false_where_their_moments_are(text: str, a: Any, b: Any) -> None:
     formula = parse_property(text)
     (slopes_a, values_a), (slopes_b, values_b) = line_of(a), line_of(b)
     signals = signals_of(formula, values_a, values_b)
-    courses = {}
+    shapes = {}
     for atom in signals:
         slopes = slopes_a if "a.x" in tuple(atom.comparison.names()) else slopes_b
-        courses[atom] = slopes if atom.comparison.sign == ">" else [Slope(s, e, -f, -g) for s, e, f, g in slopes]
-    found = Evaluation(courses).course(formula)
+        shapes[atom] = slopes if atom.comparison.sign == ">" else [Slope(s, e, -f, -g) for s, e, f, g in slopes]
+    found = Evaluation(shapes).shape(formula)
     for t in range(len(values_a)):
         assert (value_at(found, t) > 0) is truth(formula, signals, t, open_is=True), t
 
@@ -207,15 +207,15 @@ def meeting_at_a_moment(*eighths: int) -> list[tuple[int, Fraction]]:
 @settings(max_examples=200)
 @given(formulas(windows=False), KNOTS, KNOTS)
 @example("(a.x > 0) implies (b.x > 0)", meeting_at_a_moment(3, 1, 1), meeting_at_a_moment(-7, 2, 1))
-def test_straight_stretches_have_the_distances_of_their_moments(text: str, a: Any, b: Any) -> None:
+def test_straight_intervals_have_the_distances_of_their_moments(text: str, a: Any, b: Any) -> None:
     formula = parse_property(text)
     (slopes_a, values_a), (slopes_b, values_b) = line_of(a), line_of(b)
     signals = signals_of(formula, values_a, values_b)
-    courses = {}
+    shapes = {}
     for atom in signals:
         slopes = slopes_a if "a.x" in tuple(atom.comparison.names()) else slopes_b
-        courses[atom] = slopes if atom.comparison.sign == ">" else [Slope(s, e, -f, -g) for s, e, f, g in slopes]
-    found = Evaluation(courses).course(formula)
+        shapes[atom] = slopes if atom.comparison.sign == ">" else [Slope(s, e, -f, -g) for s, e, f, g in slopes]
+    found = Evaluation(shapes).shape(formula)
     for t in range(len(values_a)):
         assert value_at(found, t) == pytest.approx(float(distance(formula, signals, t)), abs=1e-9)
 
@@ -226,7 +226,7 @@ def test_straight_stretches_have_the_distances_of_their_moments(text: str, a: An
 def value(text: str, **signals: list[int]) -> float:
     formula = parse_property(text)
     atoms = [node for node in nodes(formula) if isinstance(node, Atom)]
-    courses = {
+    shapes = {
         atom: steps_of(
             [
                 Fraction(1) if (one > 0) is (atom.comparison.sign in (">", "!=")) else Fraction(-1)
@@ -235,8 +235,8 @@ def value(text: str, **signals: list[int]) -> float:
         )
         for atom in atoms
     }
-    evaluation = Evaluation(courses)
-    return value_at(evaluation.course(formula), 0)
+    evaluation = Evaluation(shapes)
+    return value_at(evaluation.shape(formula), 0)
 
 
 def test_what_comes_late_is_true_by_the_share_of_its_window_that_is_left() -> None:
@@ -306,7 +306,7 @@ def test_what_is_violated_at_a_moment_stays_so_whatever_comes_later(
 ) -> None:
     def value(a: Values, b: Values) -> tuple[float, int]:
         found = Evaluation({atom: steps_of(values) for atom, values in signals_of(formula, a, b).items()})
-        return value_at(found.course(formula), 0), found.decided(formula, 0)[0]
+        return value_at(found.shape(formula), 0), found.decided(formula, 0)[0]
 
     formula = parse_property(text)
     (present, at), end = value(*both), len(both[0])

@@ -13,7 +13,7 @@ WORLD = slide(travel=(-50.0, 50.0))
 TRAVEL = 100.0  # mm
 SPEED = 50.0  # mm/s
 STEP = 0.005  # s
-NEAR = SPEED * STEP / TRAVEL + 0.00125 / TRAVEL + 0.001  # between two samples, a pulse, and the deviation of straight stretches
+NEAR = SPEED * STEP / TRAVEL + 0.00125 / TRAVEL + 0.001  # between two samples, a pulse, and the deviation of straight intervals
 
 
 @settings(max_examples=30, deadline=None)

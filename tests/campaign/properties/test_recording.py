@@ -1,4 +1,4 @@
-"""Courses of comparisons beside what is read at each moment: programs that calculate ahead, several schedulers, several
+"""Values of comparisons beside what is read at each moment: programs that calculate ahead, several schedulers, several
 motions."""
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from slides import slide
 from steptwin.campaign.properties import Verdict, read_property
 from steptwin.files.world import World
 from steptwin.motion import Profile
-from steptwin.simulation.mechanics.course import Course
+from steptwin.simulation.mechanics.trajectory import Trajectory
 
 TWO = slide("left", "left_x") + slide("right", "right_x", ramps=120.0, vel=80.0)
 JOINED = '\n[[wire]]\nfrom = "left.OUT8"\nto = "right.IN8"\n'
@@ -81,7 +81,7 @@ def test_each_motion_is_read_a_few_times_only(text: str, most: int, monkeypatch:
     """At its beginning, where it turns, at its end and once before the next one."""
     moves = 40
     reads: list[str] = []
-    for kind, name in ((Course, "load_at"), (Profile, "moving")):
+    for kind, name in ((Trajectory, "load_at"), (Profile, "moving")):
         counted = getattr(kind, name)
         monkeypatch.setattr(kind, name, lambda self, now, counted=counted: reads.append("") or counted(self, now))
     counts: list[int] = []

@@ -16,7 +16,7 @@ from steptwin.errors import Misuse
 from steptwin.files.export import axis_views, read_trace, write_trace
 from steptwin.files.export.recording import sort_out
 from steptwin.files.world import World
-from steptwin.simulation.mechanics.lanes import MovedLane
+from steptwin.simulation.mechanics.channels import MovedChannel
 
 MACHINE = dedent("""
     [world]
@@ -119,7 +119,7 @@ FAULTS = dedent("""
 """)
 PULSE = 1.0 / 640
 # Where the load is at whole pulses in the world and between them in a trace, by a pulse; the carriage by that of a cubic.
-LANES = {
+CHANNELS = {
     "tool.position": PULSE / 25,
     "cams.angle": 360 * 0.05 * PULSE * 1.05,
     "knife.position": 360 * 0.05 * PULSE * 12 / 50,
@@ -138,9 +138,9 @@ def world(request: pytest.FixtureRequest) -> World:
     return World.from_toml("".join(WORLDS[request.param]))
 
 
-def test_lanes_say_what_the_world_said(world: World) -> None:
+def test_channels_say_what_the_world_said(world: World) -> None:
     chance = Random(3)
-    said = {name: list[tuple[int, float]]() for name in LANES}
+    said = {name: list[tuple[int, float]]() for name in CHANNELS}
     for now in sorted({chance.randrange(1, 6 * SECOND) for _ in range(1500)}):
         world.run(until=now / SECOND)
         for name, values in said.items():
@@ -148,15 +148,15 @@ def test_lanes_say_what_the_world_said(world: World) -> None:
     world.run(until=6)
     recording = sort_out(world.trace, axis_views(world), 0, world.now)
     tracks = {track.view.name.replace(" ", "."): track for track in recording.moved}
-    assert set(tracks) == set(LANES)
+    assert set(tracks) == set(CHANNELS)
     for name, values in said.items():
         for now, value in values:
             plan = tracks[name].plan(now)
-            assert plan.position(now) == pytest.approx(value, abs=LANES[name]), (name, now)  # type: ignore[union-attr]
+            assert plan.position(now) == pytest.approx(value, abs=CHANNELS[name]), (name, now)  # type: ignore[union-attr]
         assert max(value for _, value in values) - min(value for _, value in values) > 5
 
 
-def test_a_window_and_a_file_have_the_same_lanes(tmp_path: Path) -> None:
+def test_a_window_and_a_file_have_the_same_channels(tmp_path: Path) -> None:
     world = World.from_toml("".join(WORLDS["faults"]))
     world.run(until=4)
     write_trace(world.trace, tmp_path, views=axis_views(world), title="moved", ended=world.now)
@@ -208,7 +208,7 @@ def test_a_picture_ends_after_the_swing() -> None:
         {"unknown": 1},
     ],
 )
-def test_a_lane_that_nobody_can_compute_is_refused(tmp_path: Path, wrong: dict[str, object]) -> None:
+def test_a_channel_that_nobody_can_compute_is_refused(tmp_path: Path, wrong: dict[str, object]) -> None:
     world = World.from_toml(MACHINE.replace("SIGN", ""))
     world.run(until=1)
     place = tmp_path / "t.jsonl"
@@ -216,7 +216,7 @@ def test_a_lane_that_nobody_can_compute_is_refused(tmp_path: Path, wrong: dict[s
     head, *rest = place.read_text().splitlines(keepends=True)
     data = json.loads(head)
     axis = next(one for one in data["axes"] if one.get("mechanics", {}).get("moved"))
-    axis["mechanics"]["moved"][0] = MovedLane("tool", "position", "mm", 0.001)._asdict() | wrong
+    axis["mechanics"]["moved"][0] = MovedChannel("tool", "position", "mm", 0.001)._asdict() | wrong
     place.write_text(json.dumps(data) + "\n" + "".join(rest))
     with pytest.raises(Misuse, match="not the first line of a trace"):
         read_trace(place)

@@ -17,10 +17,10 @@ from steptwin.motion import MotionState, plan_position, plan_velocity
 from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 
 
-def test_a_picture_names_every_lane(mic488: Run, tmp_path: Path) -> None:
+def test_a_picture_names_every_channel(mic488: Run, tmp_path: Path) -> None:
     write_trace(mic488.trace, tmp_path / "one.svg", views=mic488.views, until=mic488.until)
     text = (tmp_path / "one.svg").read_text()
-    for lane in (
+    for channel in (
         "m.M1 position",
         "m.M4 velocity",
         "m.IN20",
@@ -31,14 +31,14 @@ def test_a_picture_names_every_lane(mic488: Run, tmp_path: Path) -> None:
         "bus.tcp-1",
         "m.events",
     ):
-        assert f">{lane}<" in text, lane
+        assert f">{channel}<" in text, channel
     assert ">mm/s<" in text
     assert ">max<" in text
     assert ">time (s)<" in text
     assert "IN9<" not in text
 
 
-def test_lanes_of_the_only_controller_need_no_prefix(tmp_path: Path) -> None:
+def test_channels_of_the_only_controller_need_no_prefix(tmp_path: Path) -> None:
     trace = Trace()
     trace.add(TraceRecord(0, "m", "plan", "1", plan_position(MotionState(0, 0, 0.0, 0.0), 100, 100.0, 100.0, 100.0)))
     trace.add(TraceRecord(0, "m", "edge", "IN20", 1.0))
@@ -79,7 +79,7 @@ def test_more_than_can_be_read_is_said_to_be_left_out(tmp_path: Path) -> None:
     for n in range(18):
         trace.add(TraceRecord(0, f"m{n}", "plan", "1", plan_position(MotionState(0, 0, 0.0, 0.0), 100, 100.0, 100.0, 100.0)))
     write_trace(trace, tmp_path / "run.svg")
-    assert "not shown: 2 axes, 0 lanes" in (tmp_path / "run.svg").read_text()
+    assert "not shown: 2 axes, 0 channels" in (tmp_path / "run.svg").read_text()
 
 
 def test_nothing_at_all_is_a_picture_too(tmp_path: Path) -> None:

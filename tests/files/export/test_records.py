@@ -49,14 +49,14 @@ def test_every_kind_of_value_comes_back(tmp_path: Path) -> None:
 
 def test_arcs_come_back() -> None:
     arc = circle(500.0, 0.0, 500.0, 4.0)
-    course = Circular(arc.centre_x, arc.radius, arc.begin_q, arc.sweep_q / arc.length)
-    way = plan_position(REST, round(arc.length), 1000.0, 1000.0, 400.0)
-    profile = course.profile(way, 0, None)
+    curve = Circular(arc.centre_x, arc.radius, arc.begin_q, arc.sweep_q / arc.length)
+    travel = plan_position(REST, round(arc.length), 1000.0, 1000.0, 400.0)
+    profile = curve.profile(travel, 0, None)
     back = _from_json(json.loads(json.dumps(_to_json(profile))))
     assert isinstance(back, ArcProfile)
     assert back == profile
-    assert [back.position(t) for t in range(0, way.end or 0, 10**8)] == [
-        profile.position(t) for t in range(0, way.end or 0, 10**8)
+    assert [back.position(t) for t in range(0, travel.end or 0, 10**8)] == [
+        profile.position(t) for t in range(0, travel.end or 0, 10**8)
     ]
 
 

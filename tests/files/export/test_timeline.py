@@ -116,8 +116,8 @@ def test_pulses_can_be_found_from_the_pieces(m1486: Run) -> None:
 
 def test_arcs_are_exact() -> None:
     arc = circle(5000.0, 0.0, 5000.0, 4.0)
-    course = Circular(arc.centre_x, arc.radius, arc.begin_q, arc.sweep_q / arc.length)
-    profile = course.profile(plan_position(MotionState(0, 0, 0.0, 0.0), round(arc.length), 1e4, 1e4, 4e3), 0, None)
+    curve = Circular(arc.centre_x, arc.radius, arc.begin_q, arc.sweep_q / arc.length)
+    profile = curve.profile(plan_position(MotionState(0, 0, 0.0, 0.0), round(arc.length), 1e4, 1e4, 4e3), 0, None)
     trace = Trace()
     trace.add(TraceRecord(0, "a", "plan", "1", profile))
     (axis,) = data_of(page_of(trace))["axes"]
@@ -183,23 +183,24 @@ def shown(browser: str, page: Path) -> str:
     return ran.stdout
 
 
-def test_lanes_in_a_browser(require_peer: Callable[[str], str], tmp_path: Path) -> None:
-    """Axes that never move share a row; commanded and true position share a lane; an axis that has homed shows its count too."""
+def test_channels_in_a_browser(require_peer: Callable[[str], str], tmp_path: Path) -> None:
+    """Axes that never move share a row; commanded and true position share a channel; an axis that has homed shows its count
+    too."""
     world = World.load(WORLDS / "feeder.toml")
     world.run(for_=8)
     page = tmp_path / "t.html"
     write_trace(world.trace, page, views=axis_views(world))
-    lanes = re.findall(r'class="name"[^>]*>([^<]*)<', shown(require_peer("chromium"), page))
-    assert lanes[:3] == ["table", "M1 position, x true", "M1 since power-on"]
-    assert lanes[3:6] == ["M1 velocity", "M1 pulses", "no motion: M2, M3, M4"]
-    assert not [name for name in lanes if name.startswith("M2 ")]
+    channels = re.findall(r'class="name"[^>]*>([^<]*)<', shown(require_peer("chromium"), page))
+    assert channels[:3] == ["table", "M1 position, x true", "M1 since power-on"]
+    assert channels[3:6] == ["M1 velocity", "M1 pulses", "no motion: M2, M3, M4"]
+    assert not [name for name in channels if name.startswith("M2 ")]
 
 
 def test_the_page_computes_the_motion_in_a_browser(require_peer: Callable[[str], str], tmp_path: Path) -> None:
-    """Position, velocity and count of a move along an arc, and the range of its lane, as the scripts of the page have them."""
+    """Position, velocity and count of a move along an arc, and the range of its channel, as the scripts of the page have them."""
     arc = circle(5000.0, 0.0, 5000.0, 4.0)
-    course = Circular(arc.centre_x, arc.radius, arc.begin_q, arc.sweep_q / arc.length)
-    profile = course.profile(plan_position(MotionState(0, 0, 0.0, 0.0), round(arc.length), 1e4, 1e4, 4e3), 0, None)
+    curve = Circular(arc.centre_x, arc.radius, arc.begin_q, arc.sweep_q / arc.length)
+    profile = curve.profile(plan_position(MotionState(0, 0, 0.0, 0.0), round(arc.length), 1e4, 1e4, 4e3), 0, None)
     trace = Trace()
     trace.add(TraceRecord(0, "a", "plan", "1", profile))
     assert profile.end is not None

@@ -138,7 +138,7 @@ def test_signals_have_it_as_a_real_number(stalled: Ran, tmp_path: Path) -> None:
     assert (float(values[0]), float(values[-1])) == (20.0, stalled.positions[-1])
 
 
-def test_a_picture_and_a_page_have_a_lane_of_it(stalled: Ran, tmp_path: Path) -> None:
+def test_a_picture_and_a_page_have_a_channel_of_it(stalled: Ran, tmp_path: Path) -> None:
     write_trace(stalled.world.trace, tmp_path / "run.svg", views=stalled.views, title="press", ended=stalled.world.now)
     picture = (tmp_path / "run.svg").read_text()
     assert ">press<" in picture

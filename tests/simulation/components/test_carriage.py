@@ -219,18 +219,18 @@ def test_the_moments_at_which_it_may_settle_are_after_the_present_one() -> None:
     start(found)
     found.run(until=0.1)
     settled = found.signal("tool.settled")
-    settled.bring(found.now)
-    moments = sorted(settled.turns(found.now))
+    settled.sync(found.now)
+    moments = sorted(settled.turning_points(found.now))
     assert moments
     assert moments[0] > found.now
     for n, moment in enumerate(moments):
-        assert sorted(settled.turns(moment - 1)) == moments[n:]
-        assert sorted(settled.turns(moment)) == moments[n + 1 :]
+        assert sorted(settled.turning_points(moment - 1)) == moments[n:]
+        assert sorted(settled.turning_points(moment)) == moments[n + 1 :]
     found.advance(moments[-1] - 1)
-    settled.bring(found.now)
+    settled.sync(found.now)
     assert settled.value(found.now) == 0.0
     found.advance(moments[-1])
-    settled.bring(found.now)
+    settled.sync(found.now)
     assert settled.value(found.now) == 1.0
 
 
@@ -242,7 +242,7 @@ def test_a_stiff_belt_is_settled_while_its_axis_stands() -> None:
 
     def at(t: float) -> float:
         found.run(until=t)
-        settled.bring(found.now)
+        settled.sync(found.now)
         return settled.value(found.now)
 
     assert [at(t) for t in (0.0, 0.04, 0.08, 0.1, 0.25, 0.3, 0.34)] == [0.0] * 6 + [1.0]

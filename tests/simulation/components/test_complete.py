@@ -1,5 +1,5 @@
 """What every element has, from the list of elements itself: faults, signals, a drawing, a section with a picture, tests of its
-own, and its lanes in exports. A new element that lacks one fails here."""
+own, and its channels in exports. A new element that lacks one fails here."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from steptwin.files.export import axis_views, plot, write_trace
 from steptwin.files.export.recording import sort_out
 from steptwin.motion.divisions import profile_of
 from steptwin.simulation.components.registry import ELEMENTS
-from steptwin.simulation.mechanics.lanes import AxisViews
+from steptwin.simulation.mechanics.channels import AxisViews
 from steptwin.simulation.world.simulation import Simulation
 
 ROOT = Path(__file__).parents[3]
@@ -85,7 +85,8 @@ Recorded: TypeAlias = "tuple[Simulation, AxisViews, set[str], set[str]]"
 
 @pytest.fixture(scope="module")
 def recorded() -> Recorded:
-    """The world of all elements after 0.6 s, its views, lanes of terminals, contacts and faults, and what axes move besides."""
+    """The world of all elements after 0.6 s, its views, channels of terminals, contacts and faults, and what axes move
+    besides."""
     with lamp.registered():
         world = everything()
         world.run(for_=0.6)
@@ -99,26 +100,26 @@ def recorded() -> Recorded:
         return world, axis_views(world), {record.subject for record in world.trace.edges()} - pins, moved
 
 
-def lacking(text: str, lanes: set[str], moved: set[str]) -> set[str]:
-    """The lanes that a text does not have."""
-    return {lane for lane in lanes if lane not in text and lane.replace(".", "_") not in text} | {
+def lacking(text: str, channels: set[str], moved: set[str]) -> set[str]:
+    """The channels that a text does not have."""
+    return {channel for channel in channels if channel not in text and channel.replace(".", "_") not in text} | {
         name for name in moved if not re.search(rf"{name}[ _](position|angle|x)|\"{name}\"", text)
     }
 
 
 @pytest.mark.parametrize("form", ["jsonl", "html", "vcd", "csv", "parquet"])
-def test_every_lane_is_in_every_export(recorded: Recorded, form: str, tmp_path: Path) -> None:
-    world, views, lanes, moved = recorded
+def test_every_channel_is_in_every_export(recorded: Recorded, form: str, tmp_path: Path) -> None:
+    world, views, channels, moved = recorded
     (file,) = write_trace(world.trace, tmp_path / f"t.{form}", views=views, ended=world.now)
     text = "\n".join(parquet.read_schema(file).names) if form == "parquet" else file.read_text("utf-8")
-    assert lacking(text, lanes, moved) == set()
+    assert lacking(text, channels, moved) == set()
 
 
 @pytest.mark.parametrize("form", ["svg", "png"])
-def test_every_lane_that_changes_is_in_the_pictures(
+def test_every_channel_that_changes_is_in_the_pictures(
     recorded: Recorded, form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    world, views, lanes, moved = recorded
+    world, views, channels, moved = recorded
     monkeypatch.setattr(plot, "MOST_ROWS", 1000)
     drawn: list[str] = []
     saved = Figure.savefig
@@ -129,12 +130,12 @@ def test_every_lane_that_changes_is_in_the_pictures(
 
     monkeypatch.setattr(Figure, "savefig", save)
     (file,) = write_trace(world.trace, tmp_path / f"t.{form}", views=views, ended=world.now)
-    changed = {record.subject for record in world.trace.edges() if record.time > 0} & lanes
+    changed = {record.subject for record in world.trace.edges() if record.time > 0} & channels
     recording = sort_out(world.trace, views, until=world.now)
     moving = {
         track.view.name.split()[0]
         for track in recording.moved
-        if any(profile_of(plan).moving(after) for plan, after, _ in track.stretches(0, world.now))
+        if any(profile_of(plan).moving(after) for plan, after, _ in track.intervals(0, world.now))
     } & moved
     assert len(changed) > 3
     assert lacking("\n".join(drawn), changed, moving) == set()

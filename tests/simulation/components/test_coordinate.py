@@ -10,37 +10,37 @@ import pytest
 from steptwin.controller import SECOND
 from steptwin.motion import MotionState, Profile, at_rest, plan_velocity
 from steptwin.simulation.components.coordinate import PLACES, Coordinate, Pulled
-from steptwin.simulation.mechanics.course import Build, Course, MechanicalState
-from steptwin.simulation.mechanics.free import FreeMotion
+from steptwin.simulation.mechanics.coasting import CoastingRotor
+from steptwin.simulation.mechanics.trajectory import Build, MechanicalState, Trajectory
 
 RAMP = plan_velocity(MotionState(0, 0, 0.0, 0.0), 100.0, 100.0, 100.0)
 """At 100 pulses/s after 1 s, for ever."""
 CRUISE = plan_velocity(MotionState(0, 0, 0.0, 120.0), 120.0, 100.0, 100.0)
-FALL = FreeMotion(inertia=0.001, load=0.1, friction=0.0, low=None, high=None).profile(0, 0, 0.0, 0.0)
+FALL = CoastingRotor(inertia=0.001, load=0.1, friction=0.0, low=None, high=None).profile(0, 0, 0.0, 0.0)
 """With 100 pulses/s², for ever."""
 
 
-def axis(plan: Profile, free: Profile | None = None) -> Any:
-    course = Course(Build(), plan, 0, MechanicalState(0, 0), free=free)
-    return SimpleNamespace(scale=SimpleNamespace(pulses_per_unit=1), mechanism=SimpleNamespace(course=lambda now: course))
+def axis(plan: Profile, coasting: Profile | None = None) -> Any:
+    trajectory = Trajectory(Build(), plan, 0, MechanicalState(0, 0), coasting=coasting)
+    return SimpleNamespace(scale=SimpleNamespace(pulses_per_unit=1), mechanism=SimpleNamespace(trajectory=lambda now: trajectory))
 
 
 def coordinate(one: Any, other: Any) -> Coordinate:
     return Coordinate((one, other), (1.0, 1.0), (Pulled(), Pulled()))
 
 
-@pytest.mark.parametrize(("before", "turns"), [(1, [0]), (2, [-1, 0]), (3, [-1, 0]), (SECOND, [-1, 0])])
-def test_it_may_turn_where_the_motion_of_an_axis_changes_and_just_before(before: int, turns: list[int]) -> None:
+@pytest.mark.parametrize(("before", "turning_points"), [(1, [0]), (2, [-1, 0]), (3, [-1, 0]), (SECOND, [-1, 0])])
+def test_it_may_turn_where_the_motion_of_an_axis_changes_and_just_before(before: int, turning_points: list[int]) -> None:
     """In the moments after the one that is asked for."""
     its = coordinate(axis(RAMP), axis(at_rest(0, 0)))
-    assert [turn - SECOND for turn in its.turns(SECOND - before)] == turns
-    assert list(its.turns(SECOND)) == []
+    assert [turn - SECOND for turn in its.turning_points(SECOND - before)] == turning_points
+    assert list(its.turning_points(SECOND)) == []
 
 
 def test_it_turns_also_where_no_motion_changes_any_more() -> None:
     """120 - 100 t = 0; its place then is 120 · 1.2 - 50 · 1.2² = 72."""
     its = coordinate(axis(CRUISE), axis(at_rest(0, 0), FALL))
-    (turn,) = its.turns(0)
+    (turn,) = its.turning_points(0)
     assert abs(turn - 1_200_000_000) <= 1
     assert its.place(turn) == 72 * PLACES
     assert its.reaches(72 * PLACES + 1, 0, 1) is None

@@ -39,9 +39,9 @@ to = "a.IN2"
 DOUBLE = TEXT.replace('extend = "a.OUT1"', 'extend = "a.OUT1"\nretract = "a.OUT2"\nvalve = "double"')
 
 
-def edges(world: World, lane: str) -> list[tuple[float, object]]:
+def edges(world: World, channel: str) -> list[tuple[float, object]]:
     """Milliseconds and levels."""
-    return [(record.time / MILLISECOND, record.value) for record in world.trace.edges() if record.subject == lane]
+    return [(record.time / MILLISECOND, record.value) for record in world.trace.edges() if record.subject == channel]
 
 
 def test_it_extends_and_retracts_in_its_times() -> None:

@@ -75,8 +75,8 @@ def lamps() -> Iterator[None]:
         yield
 
 
-def edges(world: World, lane: str) -> list[tuple[int, object]]:
-    return [(record.time, record.value) for record in world.trace.edges() if record.subject == lane]
+def edges(world: World, channel: str) -> list[tuple[int, object]]:
+    return [(record.time, record.value) for record in world.trace.edges() if record.subject == channel]
 
 
 def test_it_is_described_built_recorded_and_asked_for() -> None:

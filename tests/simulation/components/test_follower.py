@@ -67,8 +67,8 @@ def start(world: World, to: float = 250.0) -> World:
     return world
 
 
-def edges(world: World, lane: str) -> list[tuple[float, object]]:
-    return [(record.time / SECOND, record.value) for record in world.trace.edges() if record.subject == lane]
+def edges(world: World, channel: str) -> list[tuple[float, object]]:
+    return [(record.time / SECOND, record.value) for record in world.trace.edges() if record.subject == channel]
 
 
 def counted(is_on: object, until: int) -> list[tuple[float, object]]:
@@ -92,11 +92,11 @@ def test_it_is_where_the_table_lifts_it() -> None:
 def test_its_switches_switch_at_the_pulse() -> None:
     world = start(World.from_toml(TEXT))
     world.run(until=1.2)
-    for lane, is_on in (
+    for channel, is_on in (
         ("knife.switch1", lambda pulse: lift(pulse) >= 11.0 - 5e-7),
         ("knife.switch2", lambda pulse: 5.5 - 5e-7 <= lift(pulse) <= 6.5 + 5e-7),
     ):
-        found = edges(world, lane)[1:]
+        found = edges(world, channel)[1:]
         expected = [one for one in counted(is_on, 160 * 220) if one[0] < 1.2]
         assert len(found) == len(expected) >= 6
         for (time, level), (when, what) in zip(found, expected, strict=True):
@@ -202,7 +202,7 @@ def test_switches_of_a_stuck_follower_stay_as_they_are() -> None:
     assert edges(world, "knife.switch1") == switched
     now = world.now / SECOND
     world.clear_fault("stuck")
-    world.settle_all()
+    world.sync_all()
     assert edges(world, "knife.switch1")[len(switched) :] == [(now, 0)]
 
 
@@ -213,10 +213,10 @@ def test_a_cam_that_wears_at_rest_changes_switches_at_once() -> None:
     world.run(for_=0.1)
     now = world.now / SECOND
     world.fault("worn-cam element=knife share=0.5 name=worn")
-    world.settle_all()
+    world.sync_all()
     assert edges(world, "knife.switch1")[-1] == (now, 0)
     world.clear_fault("worn")
-    world.settle_all()
+    world.sync_all()
     assert edges(world, "knife.switch1")[-1] == (now, 1)
 
 
@@ -236,7 +236,7 @@ def test_where_it_may_turn_is_after_the_present_moment() -> None:
     world = start(World.from_toml(TEXT))
     world.run(for_=0.01)
     follower = world.parts.built(FOLLOWER)["knife"]
-    turns = [*follower.turns(world.now)]
-    assert len(turns) > 4
-    for turn in turns:
-        assert all(other > turn - 1 for other in follower.turns(turn - 1))
+    turning_points = [*follower.turning_points(world.now)]
+    assert len(turning_points) > 4
+    for turn in turning_points:
+        assert all(other > turn - 1 for other in follower.turning_points(turn - 1))

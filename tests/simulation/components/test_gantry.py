@@ -11,7 +11,7 @@ from world_rig import check_it_can_be_restored
 from steptwin.controller import SECOND
 from steptwin.files.world import World
 from steptwin.simulation.components.gantry import GANTRY as ELEMENT
-from steptwin.simulation.mechanics.lanes import MovedLane
+from steptwin.simulation.mechanics.channels import MovedChannel
 from steptwin.simulation.toml.reader import WorldError
 
 CONTROLLER = """
@@ -235,10 +235,10 @@ def test_its_beam_is_drawn_from_both_ends() -> None:
     found = World.from_toml(text().replace('drive = "b.M1"', 'drive = "b.M1"\ninverted = true'))
     (gantry,) = found.parts.built(ELEMENT).values()
     assert ELEMENT.moved is not None
-    ((end, lane),) = ELEMENT.moved(gantry)
+    ((end, channel),) = ELEMENT.moved(gantry)
     assert end == "ya"
     half = 1 / 1280
-    assert lane == MovedLane("beam", "position", "mm", half, other=("b", "1"), other_per_pulse=-half)
+    assert channel == MovedChannel("beam", "position", "mm", half, other=("b", "1"), other_per_pulse=-half)
 
 
 def test_there_may_be_several() -> None:

@@ -63,9 +63,9 @@ torque = [[0, 1.0]]
 """
 
 
-def edges(world: World, lane: str) -> list[tuple[float, object]]:
+def edges(world: World, channel: str) -> list[tuple[float, object]]:
     """Milliseconds and levels, without the first one."""
-    return [(record.time / MILLISECOND, record.value) for record in world.trace.edges() if record.subject == lane][1:]
+    return [(record.time / MILLISECOND, record.value) for record in world.trace.edges() if record.subject == channel][1:]
 
 
 def brought(text: str = TEXT) -> World:

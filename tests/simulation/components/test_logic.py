@@ -42,9 +42,9 @@ def press(there: World, name: str, level: bool) -> None:
     there.run(for_=0)
 
 
-def edges(there: World, lane: str) -> list[tuple[float, object]]:
+def edges(there: World, channel: str) -> list[tuple[float, object]]:
     """Milliseconds and levels."""
-    return [(record.time / MILLISECOND, record.value) for record in there.trace.edges() if record.subject == lane]
+    return [(record.time / MILLISECOND, record.value) for record in there.trace.edges() if record.subject == channel]
 
 
 TRUTH = {
@@ -105,7 +105,7 @@ delay = "5 ms"
     there.mic488["a"].write("OUT1", 1)
     there.run(for_=0.01)
     assert (there.read("a.IN3"), there.read("b.IN4")) == (0, 0)
-    # Both are in one scheduler, and lanes are under its first machine.
+    # Both are in one scheduler, and channels are under its first machine.
     assert {record.controller for record in there.trace.edges() if record.subject == "both.out"} == {"a"}
 
 
@@ -144,11 +144,11 @@ def test_a_timer_whose_time_is_broken_off_is_not_due() -> None:
     text = '[[mic488]]\nname = "a"\n[[button]]\nname = "one"\nto = "it.in"\n[[timer]]\nname = "it"\n'
     there = World.from_toml(text + 'kind = "on-delay"\ntime = "100 ms"\n[[wire]]\nfrom = "it.out"\nto = "a.IN1"\n')
     timer = there.parts.built(TIMER)["it"]
-    dues = []
+    deadlines = []
     for pressed in (True, False):
         press(there, "one", pressed)
-        dues.append(timer.deadline())
-    assert dues == [100 * MILLISECOND, None]
+        deadlines.append(timer.deadline())
+    assert deadlines == [100 * MILLISECOND, None]
 
 
 @pytest.mark.parametrize(("up", "down", "count"), [(True, False, 1), (False, True, 0), (True, True, 0)])
@@ -229,7 +229,7 @@ def test_an_emergency_stop_chain_over_two_controllers() -> None:
     there.run(until=0.4)
     assert edges(there, "safety.no") == [(0, 0), (15, 1), (108, 0), (315, 1)]
     assert edges(there, "safety.nc") == [(0, 1), (15, 0), (108, 1), (315, 0)]
-    # The name of a contact is a lane of its own, under a controller.
+    # The name of a contact is a channel of its own, under a controller.
     assert edges(there, "stop2") == [(0, 1), (100, 0), (200, 1)]
     assert {record.controller for record in there.trace.edges() if record.subject == "stop2"} == {"a"}
 

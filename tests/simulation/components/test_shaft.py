@@ -43,8 +43,8 @@ contact = "NC"
 """
 
 
-def edges(world: World, lane: str) -> list[tuple[int, object]]:
-    return [(record.time, record.value) for record in world.trace.edges() if record.subject == lane]
+def edges(world: World, channel: str) -> list[tuple[int, object]]:
+    return [(record.time, record.value) for record in world.trace.edges() if record.subject == channel]
 
 
 def nearest(exact: Fraction) -> int:

@@ -64,26 +64,26 @@ def test_turns_are_the_ends_of_segments_that_are_still_to_come() -> None:
         signal = find_signal(world.parts, name)
         assert signal.continuous, name
         ends = [1.025] if name == "a.M1.moving" else [0.4, 0.625, 1.025]
-        assert list(signal.turns(world.now)) == pytest.approx([end * SECOND for end in ends if end > 0.5], abs=2), name
-        assert list(signal.turns(0)) == pytest.approx([end * SECOND for end in ends], abs=2), name
-        (first, *_) = signal.turns(world.now)
-        assert first not in signal.turns(first), "a turn at the moment itself is not to come"
+        assert list(signal.turning_points(world.now)) == pytest.approx([end * SECOND for end in ends if end > 0.5], abs=2), name
+        assert list(signal.turning_points(0)) == pytest.approx([end * SECOND for end in ends], abs=2), name
+        (first, *_) = signal.turning_points(world.now)
+        assert first not in signal.turning_points(first), "a turn at the moment itself is not to come"
     for name in ("x.position", "x.lost", "x.stalled"):
-        turns = list(find_signal(world.parts, name).turns(world.now))
-        assert turns == sorted(set(turns)), name
-        assert turns[:1] == pytest.approx([0.625 * SECOND], abs=2), name
+        turning_points = list(find_signal(world.parts, name).turning_points(world.now))
+        assert turning_points == sorted(set(turning_points)), name
+        assert turning_points[:1] == pytest.approx([0.625 * SECOND], abs=2), name
     for name in ("a.M1.status", "a.M1.enabled", "a.status", "a.program", "a.IN1", "d.variable", "d.moving", "go.pressed"):
         signal = find_signal(world.parts, name)
-        assert (signal.continuous, list(signal.turns(0)), signal.version()) == (False, [], None), name
+        assert (signal.continuous, list(signal.turning_points(0)), signal.version()) == (False, [], None), name
     time = find_signal(world.parts, "time")
-    assert (time.continuous, list(time.turns(0)), time.bring(0), time.version()) == (True, [], (), "time")
+    assert (time.continuous, list(time.turning_points(0)), time.sync(0), time.version()) == (True, [], (), "time")
 
 
 def test_an_endless_motion_has_no_last_turn() -> None:
     world = small()
     world.mic488["a"].write("M1_EN", 1)
     world.mic488["a"].write("M1_VEL_ABS", -40.0)
-    assert list(find_signal(world.parts, "a.M1.velocity").turns(0)) == pytest.approx([0.4 * SECOND], abs=2)
+    assert list(find_signal(world.parts, "a.M1.velocity").turning_points(0)) == pytest.approx([0.4 * SECOND], abs=2)
 
 
 def test_a_version_changes_with_the_plan_and_with_the_coordinate() -> None:
@@ -118,11 +118,11 @@ def test_a_chip_has_signals_of_its_own() -> None:
     assert (idle, world.read("idle"), world.read("d.moving")) == (1.0, 0.0, 1.0)
     assert world.read("d.velocity") == chip.drive.profile.velocity(now) > 0.0
     assert 0.0 < world.read("d.position") < 12800.0
-    turns = [chip.drive.profile.start + int(end) for end in chip.drive.profile.ends]
+    turning_points = [chip.drive.profile.start + int(end) for end in chip.drive.profile.ends]
     for name in ("position", "velocity", "counter"):
         assert signals[name].continuous, name
-        assert list(signals[name].turns(0)) == turns, name
-        assert list(signals[name].turns(turns[-1] - 1)) == turns[-1:], name
+        assert list(signals[name].turning_points(0)) == turning_points, name
+        assert list(signals[name].turning_points(turning_points[-1] - 1)) == turning_points[-1:], name
     for name, version in versions.items():
         assert signals[name].version() == chip.drive.revision != version, name
     world.run(until="idle")
@@ -141,38 +141,38 @@ def test_controllers_have_status_program_and_pins() -> None:
     assert world.read("go.pressed") == 0.0
 
 
-def test_to_bring_a_signal_is_to_bring_the_scheduler_of_its_source() -> None:
+def test_to_sync_a_signal_is_to_advance_the_scheduler_of_its_source() -> None:
     world = small()
     signal = find_signal(world.parts, "c.status")
     assert isinstance(signal, SignalOf)
-    assert signal.bring(SECOND) == ((world.parts.scheduler_of["c"], "c"),)
+    assert signal.sync(SECOND) == ((world.parts.scheduler_of["c"], "c"),)
     assert [scheduler.now for scheduler in world.schedulers] == [0, SECOND]
 
 
-def test_a_condition_makes_no_scheduler_attentive_unless_requests_change_its_signal() -> None:
+def test_a_condition_makes_no_scheduler_step_exact_unless_requests_change_its_signal() -> None:
     """What a controller counts changes with events; what a master stores does not."""
     for is_kept in (False, True):
         scheduler = small().parts.scheduler_of["c"]
         options = {"is_kept": True} if is_kept else {}
         SignalOf((scheduler.source("c"),), lambda now: 0.0, **options).watch("c.status")  # type: ignore[arg-type]
-        assert scheduler.is_attentive is is_kept
+        assert scheduler.is_step_exact is is_kept
 
 
 def test_idle_looks_at_what_was_busy_last_and_at_all_when_nothing_is() -> None:
     world = moving()
     idle = find_signal(world.parts, "idle")
     assert isinstance(idle, Idle)
-    assert (idle.continuous, list(idle.turns(0)), idle.version()) == (False, [], None)
-    assert idle.bring(world.now) == (world.parts.scheduler_of["a"].source("a"),)
+    assert (idle.continuous, list(idle.turning_points(0)), idle.version()) == (False, [], None)
+    assert idle.sync(world.now) == (world.parts.scheduler_of["a"].source("a"),)
     assert idle.value(world.now) == 0.0
     assert [scheduler.now for scheduler in world.schedulers] == [0, 0, 0]
     world.run(for_=1.1)
-    assert idle.bring(world.now) == tuple(world.parts.scheduler_of[name].source(name) for name in world.controllers)
+    assert idle.sync(world.now) == tuple(world.parts.scheduler_of[name].source(name) for name in world.controllers)
     assert idle.value(world.now) == 1.0
     assert [scheduler.now for scheduler in world.schedulers] == [world.now] * 3
     world.mic488["c"].axis[1].enable()
     world.mic488["c"].axis[1].move_to(100.0)
-    assert idle.bring(world.now) == (world.parts.scheduler_of["c"].source("c"),)
+    assert idle.sync(world.now) == (world.parts.scheduler_of["c"].source("c"),)
     assert world.read("idle") == 0.0
 
 

@@ -41,9 +41,9 @@ run = "a.OUT4"
 """
 
 
-def edges(world: World, lane: str) -> list[tuple[float, object]]:
+def edges(world: World, channel: str) -> list[tuple[float, object]]:
     """Milliseconds and levels."""
-    return [(record.time / MILLISECOND, record.value) for record in world.trace.edges() if record.subject == lane]
+    return [(record.time / MILLISECOND, record.value) for record in world.trace.edges() if record.subject == channel]
 
 
 def happened(world: World, name: str) -> list[tuple[float, str]]:

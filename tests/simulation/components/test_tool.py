@@ -144,14 +144,14 @@ def test_switches_and_conditions_are_where_an_integration_has_them(a: float, b: 
     def y(t: float) -> float:
         return (one(t) - other(t) - 10.0) / 2.0
 
-    def edges(lane: str) -> list[tuple[float, bool]]:
-        return [(one.time / SECOND, bool(one.value)) for one in world.trace.edges() if one.subject == lane][1:]
+    def edges(channel: str) -> list[tuple[float, bool]]:
+        return [(one.time / SECOND, bool(one.value)) for one in world.trace.edges() if one.subject == channel][1:]
 
-    for lane, expected in (
+    for channel, expected in (
         ("head.x_switch1", switched(x, (40.0 - 5e-7, 1e9), 0.0, 6.0)),
         ("head.y_switch1", switched(y, (6.0 - 5e-7, 10.0 + 5e-7), 0.5, 6.0)),
     ):
-        found = edges(lane)
+        found = edges(channel)
         assert [level for _, level in found] == [level for _, level in expected]
         # At 1 mm/s a nanometre takes 1 µs; at a turn it takes longer.
         assert [at for at, _ in found] == pytest.approx([at for at, _ in expected], abs=2e-5)
@@ -181,7 +181,7 @@ def test_a_belt_that_slips_stands_and_goes_on_behind() -> None:
     assert [one.value for one in world.trace.edges() if one.subject == "head.axis.slips"] == [1.0, 0.0]
 
 
-def test_it_has_lanes_in_exports_that_are_where_it_is(tmp_path: object) -> None:
+def test_it_has_channels_in_exports_that_are_where_it_is(tmp_path: object) -> None:
     world = World.from_toml(TEXT + SCRIPT.format(a=100.0, b=80.0, later=200))
     world.fault("slipping-belt element=head belt=other from_s=0.9 until_s=1.1")
     read: dict[int, tuple[float, float]] = {}

@@ -30,9 +30,9 @@ to = "a.IN1"
 """
 
 
-def edges(world: World, lane: str) -> list[tuple[float, object]]:
+def edges(world: World, channel: str) -> list[tuple[float, object]]:
     """Milliseconds and levels."""
-    return [(record.time / MILLISECOND, record.value) for record in world.trace.edges() if record.subject == lane]
+    return [(record.time / MILLISECOND, record.value) for record in world.trace.edges() if record.subject == channel]
 
 
 def test_the_pressure_builds_up_and_goes() -> None:

@@ -26,8 +26,8 @@ def world_of(text: str, **values: object) -> World:
     return World.from_toml(text)
 
 
-def edges(world: World, lane: str, controller: str = "m") -> list[tuple[int, float]]:
-    return [(record.time, float(str(record.value))) for record in world.trace.edges(controller) if record.subject == lane]
+def edges(world: World, channel: str, controller: str = "m") -> list[tuple[int, float]]:
+    return [(record.time, float(str(record.value))) for record in world.trace.edges(controller) if record.subject == channel]
 
 
 # ---------------------------------------------------------------------- levels at the beginning
@@ -277,7 +277,7 @@ def test_end_switches_and_a_button_share_an_input(contact: str, join: str, rest:
     world.run(for_=15)
     levels = [level for _, level in edges(world, "IN1")]
     assert levels == [rest] + [1.0 - rest, rest] * 3
-    moments = sorted(time for lane in ("x.switch1", "x.switch2", "hand") for time, _ in edges(world, lane) if time > 0)
+    moments = sorted(time for channel in ("x.switch1", "x.switch2", "hand") for time, _ in edges(world, channel) if time > 0)
     assert [time for time, _ in edges(world, "IN1")][1:] == moments
 
 

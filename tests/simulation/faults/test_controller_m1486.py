@@ -30,7 +30,7 @@ def download(chip: M1486Chip, scheduler: Scheduler, text: str, seconds: float) -
     for line in ("[", text, "]"):
         scheduler.advance(scheduler.now + SECOND)
         chip.receive(f"{line}\r".encode(), scheduler.now)
-        scheduler.settle()
+        scheduler.propagate()
     scheduler.advance(scheduler.now + round(seconds * SECOND))
 
 
@@ -61,7 +61,7 @@ def test_a_chip_without_supply_is_deaf() -> None:
     for moment in (0.2, 1.2, 2.2):
         scheduler.advance(round(moment * SECOND))
         one.receive(b"X1\rU20\r", scheduler.now)
-        scheduler.settle()
+        scheduler.propagate()
         scheduler.advance(scheduler.now + 700 * MILLISECOND)
         heard.append(b"".join(data for _, data in one.to_send(scheduler.now)))
     assert [bool(data) for data in heard] == [True, False, True]
@@ -83,7 +83,7 @@ def test_stuck_and_bouncing_pins_of_a_chip_by_either_name() -> None:
     assert one.pins()["JOG"] == 0
     scheduler.controllers["1"].set_pin("JOG", 1, SECOND)
     scheduler.controllers["1"].set_pin("B3", 0, SECOND)
-    scheduler.settle()
+    scheduler.propagate()
     assert (one.pins()["JOG"], one.pins()["B3"]) == (0, 0)
     levels = set()
     while (due := scheduler.deadline()) is not None and due < 2 * SECOND:

@@ -22,13 +22,13 @@ class Level:
         self.level = value
         self.continuous = False
 
-    def bring(self, now: Nanos) -> tuple[object, ...]:
+    def sync(self, now: Nanos) -> tuple[object, ...]:
         return (self,)
 
     def value(self, now: Nanos) -> float:
         return self.level
 
-    def turns(self, now: Nanos) -> Iterator[Nanos]:
+    def turning_points(self, now: Nanos) -> Iterator[Nanos]:
         return iter(())
 
     def version(self) -> object:
@@ -53,13 +53,13 @@ class Moving:
         self.profile = plan_position(MotionState.of(out, SECOND // 2), then, 200.0, 300.0, 80.0)
         self.velocity = velocity
 
-    def bring(self, now: Nanos) -> tuple[object, ...]:
+    def sync(self, now: Nanos) -> tuple[object, ...]:
         return (self,)
 
     def value(self, now: Nanos) -> float:
         return self.profile.velocity(now) if self.velocity else float(self.profile.count(now))
 
-    def turns(self, now: Nanos) -> Iterator[Nanos]:
+    def turning_points(self, now: Nanos) -> Iterator[Nanos]:
         return (self.profile.start + int(end) for end in self.profile.ends if self.profile.start + end > now)
 
     def version(self) -> object:
@@ -218,14 +218,14 @@ class Rising:
         self.later = later
         self.reads = 0
 
-    def bring(self, now: Nanos) -> tuple[object, ...]:
+    def sync(self, now: Nanos) -> tuple[object, ...]:
         return (self,)
 
     def value(self, now: Nanos) -> float:
         self.reads += 1
         return min(max(now - self.later, 0), SECOND) / 1e6
 
-    def turns(self, now: Nanos) -> Iterator[Nanos]:
+    def turning_points(self, now: Nanos) -> Iterator[Nanos]:
         return iter([moment for moment in (self.later, self.later + SECOND) if moment > now])
 
     def version(self) -> object:
@@ -313,9 +313,9 @@ class Replanned(Moving):
         super().__init__()
         self.looked = 0
 
-    def turns(self, now: Nanos) -> Iterator[Nanos]:
+    def turning_points(self, now: Nanos) -> Iterator[Nanos]:
         self.looked += 1
-        return super().turns(now)
+        return super().turning_points(now)
 
     def replace(self) -> None:
         self.profile = plan_position(MotionState(0, 0, 0.0, 0.0), 100, 200.0, 300.0, 40.0)
@@ -335,7 +335,7 @@ def test_a_crossing_is_found_once_while_the_signal_goes_on_as_it_did() -> None:
 
 
 def test_a_condition_depends_on_what_its_signals_depend_on_each_once() -> None:
-    assert SignalCondition("b or x.position > 5 and b == 0", SIGNALS.__getitem__).bring(5) == (
+    assert SignalCondition("b or x.position > 5 and b == 0", SIGNALS.__getitem__).sync(5) == (
         SIGNALS["b"],
         SIGNALS["x.position"],
     )

@@ -78,7 +78,7 @@ def test_contacts_of_one_input_are_joined(in_series: bool) -> None:
     scheduler.add("m", device)
     circuit = Circuit(scheduler, PinName("m", "IN3"), in_series=in_series)
     buttons = [
-        Button(circuit, normally_closed=closed, bounce_ns=0, bounces=0, chance=Chance(0, "b"), lane=f"b{closed:d}")
+        Button(circuit, normally_closed=closed, bounce_ns=0, bounces=0, chance=Chance(0, "b"), channel=f"b{closed:d}")
         for closed in (False, True)
     ]
     for button in buttons:
@@ -88,7 +88,7 @@ def test_contacts_of_one_input_are_joined(in_series: bool) -> None:
     for now, (which, pressed) in enumerate([(0, True), (1, True), (0, False), (1, False), (0, True), (0, False)], start=1):
         scheduler.advance(now)
         buttons[which].press(pressed, now)
-        scheduler.settle()
+        scheduler.propagate()
         closed = [buttons[0].pressed, not buttons[1].pressed]
         assert device.pins()["IN3"] == float(all(closed) if in_series else any(closed))
     levels = [record.value for record in edges if record.subject == "IN3"]
@@ -171,21 +171,21 @@ def test_a_contact_bounces_so_often(bounces: int, levels: list[float]) -> None:
     scheduler.advance(SECOND)
     edges.clear()
     button.press(True, SECOND)
-    scheduler.settle()
+    scheduler.propagate()
     scheduler.advance(SECOND + MILLISECOND)
     assert [record.value for record in edges if record.subject == "IN3"] == levels
 
 
 def test_the_bouncing_of_a_contact_that_changes_nothing_for_its_input_is_awaited_all_the_same() -> None:
-    """Beside a closed contact: the input stays 1, and the lane of the contact shows it."""
+    """Beside a closed contact: the input stays 1, and the channel of the contact shows it."""
     edges: list[TraceRecord] = []
     scheduler = Scheduler(record=edges.append)
     device = Mic488Device(controller())
     scheduler.add("m", device)
     circuit = Circuit(scheduler, PinName("m", "IN3"))
     closed, bouncing = (
-        Button(circuit, normally_closed=nc, bounce_ns=MILLISECOND, bounces=2, chance=Chance(0, "b"), lane=lane)
-        for nc, lane in ((True, "closed"), (False, "bouncing"))
+        Button(circuit, normally_closed=nc, bounce_ns=MILLISECOND, bounces=2, chance=Chance(0, "b"), channel=channel)
+        for nc, channel in ((True, "closed"), (False, "bouncing"))
     )
     for button in (closed, bouncing):
         scheduler.add_part(button)
@@ -214,7 +214,7 @@ def test_the_level_of_an_input_is_that_of_its_contacts_at_rest_and_of_the_switch
         )
         scheduler.add_part(switch)
         circuit.close()
-        scheduler.settle()
+        scheduler.propagate()
         assert (scheduler.controllers["m"].pins()[pin], switch.on, switch.deadline()) == (level, True, None)
 
 

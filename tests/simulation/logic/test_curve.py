@@ -18,13 +18,13 @@ class Rising:
     def __init__(self, end: Nanos) -> None:
         self._end = end
 
-    def bring(self, now: Nanos) -> tuple[object, ...]:
+    def sync(self, now: Nanos) -> tuple[object, ...]:
         return ()
 
     def value(self, now: Nanos) -> float:
         return now / SECOND if now < self._end else nan
 
-    def turns(self, now: Nanos) -> Iterator[Nanos]:
+    def turning_points(self, now: Nanos) -> Iterator[Nanos]:
         return iter(())
 
     def version(self) -> object:

@@ -178,14 +178,14 @@ def test_signals_of_a_quantity_and_their_unit() -> None:
 class Line:
     """A signal on a straight line, with turns."""
 
-    def __init__(self, slope: float, at_0: float, turns: list[int]) -> None:
-        self.slope, self.at_0, self._turns = slope, at_0, turns
+    def __init__(self, slope: float, at_0: float, turning_points: list[int]) -> None:
+        self.slope, self.at_0, self._turning_points = slope, at_0, turning_points
 
     def value(self, now: int) -> float:
         return self.at_0 + self.slope * now
 
-    def turns(self, now: int) -> Iterator[int]:
-        return (turn for turn in self._turns if turn > now)
+    def turning_points(self, now: int) -> Iterator[int]:
+        return (turn for turn in self._turning_points if turn > now)
 
 
 @pytest.mark.parametrize(

@@ -28,26 +28,26 @@ def test_the_lift_is_linear_between_points_and_through_the_end_of_a_revolution()
 @given(cam=cams(), level=st.integers(-1, 61), place=st.integers(-300, 300))
 def test_the_next_place_is_the_first_that_a_walk_finds(cam: Cam, level: int, place: int) -> None:
     for direction in (1, -1):
-        for way in (1, -1):
-            walk = range(place + way, place + 2000 * way, way)
+        for heading in (1, -1):
+            walk = range(place + heading, place + 2000 * heading, heading)
             expected = next((at for at in walk if (cam.lift(at) - Fraction(level, 2)) * direction >= 0), None)
-            assert cam.next(Fraction(level, 2), place, direction, way) == expected
+            assert cam.next(Fraction(level, 2), place, direction, heading) == expected
 
 
-@given(cam=cams(), place=st.integers(-300, 300), way=st.sampled_from([1, -1]))
-def test_between_corners_it_goes_one_way(cam: Cam, place: int, way: int) -> None:
+@given(cam=cams(), place=st.integers(-300, 300), heading=st.sampled_from([1, -1]))
+def test_between_corners_it_goes_one_way(cam: Cam, place: int, heading: int) -> None:
     before = place
-    for corner in cam.corners(place, way):
+    for corner in cam.corners(place, heading):
         if abs(corner - place) > 2 * cam.turn:
             break
-        steps = [b - a for a, b in pairwise(cam.lift(at) for at in range(before, corner, way))]
+        steps = [b - a for a, b in pairwise(cam.lift(at) for at in range(before, corner, heading))]
         assert not (any(step > 0 for step in steps) and any(step < 0 for step in steps))
-        assert (corner - before) * way > 0
+        assert (corner - before) * heading > 0
         before = corner
     assert abs(before - place) > cam.turn / 2
 
 
-@given(cam=cams(), place=st.integers(-300, 300), way=st.sampled_from([1, -1]))
-def test_corners_go_through_all_revolutions_that_differ(cam: Cam, place: int, way: int) -> None:
-    *_, last = cam.corners(place, way)
-    assert (last - place) * way >= cam.turn * cam.turn.denominator
+@given(cam=cams(), place=st.integers(-300, 300), heading=st.sampled_from([1, -1]))
+def test_corners_go_through_all_revolutions_that_differ(cam: Cam, place: int, heading: int) -> None:
+    *_, last = cam.corners(place, heading)
+    assert (last - place) * heading >= cam.turn * cam.turn.denominator

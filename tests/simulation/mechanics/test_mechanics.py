@@ -18,9 +18,9 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.status import AxisStatus
 from steptwin.motion import MotionState, plan_position
 from steptwin.simulation.faults import read
-from steptwin.simulation.mechanics.course import Build, LoadPiece, MechanicalState
 from steptwin.simulation.mechanics.mechanics import EncoderBuild, Mechanism
 from steptwin.simulation.mechanics.motor import StepperMotor
+from steptwin.simulation.mechanics.trajectory import Build, LoadPiece, MechanicalState
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.script import steps as do
@@ -241,7 +241,7 @@ def test_a_mechanism_follows_replaced_plans_as_a_simulation_does(moves: list[tup
     state, now = MechanicalState(5, 5), 0
     for target, pause in moves:
         motor.go(target, now)
-        scheduler.settle()
+        scheduler.propagate()
         way = pulse_by_pulse(build, motor.axis.plan, state, now, now + pause)
         now += pause
         scheduler.advance(now)
@@ -312,7 +312,7 @@ def test_pulses_are_taken_away_as_far_as_stops_permit(taken: int) -> None:
     load = min(max(100, rotor), rotor + 5)
     assert mechanism.at(scheduler.now)[:2] == (rotor, load)
     assert mechanism.lost(scheduler.now) == 100 - rotor
-    assert scheduler.stale, "what stands on the load looks again"
+    assert scheduler.is_dirty, "what stands on the load looks again"
     drive.go(60, scheduler.now)
     scheduler.advance(40 * SECOND)
     assert mechanism.at(scheduler.now).rotor == min(max(rotor - 40, -35), 120)
@@ -323,13 +323,13 @@ def test_an_ideal_axis_that_lost_pulses_keeps_the_loss_through_a_snapshot_and_a_
     drive.go(100, 0)
     scheduler.advance(20 * SECOND)
     mechanism.lose(7, scheduler.now)
-    scheduler.settle()
+    scheduler.propagate()
     state = mechanism.copy_state()
     mechanism.lose(3, scheduler.now)
     mechanism.set_state(state)
     assert mechanism.lost(scheduler.now) == 7
     drive.go(50, scheduler.now)
-    scheduler.settle()
+    scheduler.propagate()
     later = mechanism.copy_state()
     scheduler.advance(40 * SECOND)
     assert (mechanism.place(scheduler.now), mechanism.lost(scheduler.now)) == (43, 7)
@@ -363,7 +363,7 @@ def test_a_motor_without_torque_is_told_when_it_loses_the_field_and_when_it_is_c
     scheduler, drive, mechanism, told = rigged(build)
     assert mechanism.deadline() is None
     drive.go(200, 0)
-    scheduler.settle()
+    scheduler.propagate()
     assert mechanism.deadline() == pytest.approx(0.2 * SECOND, abs=1000)
     assert scheduler.deadline() == mechanism.deadline()
     scheduler.advance(SECOND // 2)
@@ -454,7 +454,7 @@ def test_an_encoder_elsewhere_is_told_every_10_ms_while_the_axis_moves() -> None
     mechanism.fit(EncoderBuild("other", other, 2, counts=-3, pulses=2), 0)
     assert mechanism.deadline() is None
     drive.go(100, 0)
-    scheduler.settle()
+    scheduler.propagate()
     assert mechanism.deadline() == 10 * MILLISECOND
     scheduler.advance(10 * MILLISECOND)
     assert mechanism.deadline() == 20 * MILLISECOND
@@ -463,7 +463,7 @@ def test_an_encoder_elsewhere_is_told_every_10_ms_while_the_axis_moves() -> None
     assert other.axes[1].encoder_counts(20 * SECOND) == -150
     assert other.axes[0].encoder_counts(20 * SECOND) == 0
     mechanism.slip(5, 20 * SECOND)
-    assert (other.axes[1].encoder_counts(20 * SECOND), scheduler.stale) == (-145, True)
+    assert (other.axes[1].encoder_counts(20 * SECOND), scheduler.is_dirty) == (-145, True)
 
 
 @pytest.mark.parametrize(("on_load", "counts"), [(False, [0, 100, 60]), (True, [0, 100, 65])])

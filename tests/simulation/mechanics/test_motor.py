@@ -15,8 +15,8 @@ from steptwin.controller import SECOND
 from steptwin.errors import Misuse
 from steptwin.motion import MotionState, Segment, plan_position, plan_velocity
 from steptwin.motion.ramps import SpeedCurve, plan_endless
-from steptwin.simulation.mechanics.course import Build, Course, MechanicalState
 from steptwin.simulation.mechanics.motor import FASTEST, Burden, StepperMotor, _first_below_0, _first_not_below_0, _roots
+from steptwin.simulation.mechanics.trajectory import Build, MechanicalState, Trajectory
 
 # ---------------------------------------------------------------------- thresholds
 
@@ -36,10 +36,10 @@ def test_the_speed_at_which_steps_are_lost_is_where_the_curve_meets_the_need() -
     plan = plan_velocity(MotionState(0, 0, 0.0, 0.0), 30_000.0, rate, rate)
     lost = motor().loses(plan.segments[0], 0.0, plan.segments[0].end_s, 1)
     assert lost == pytest.approx(20_000.0 / rate, rel=1e-12)
-    course = Course(Build(period_p=64, motor=motor()), plan, 0, MechanicalState(0, 0))
+    trajectory = Trajectory(Build(period_p=64, motor=motor()), plan, 0, MechanicalState(0, 0))
     moment = round(20_000.0 / rate * SECOND)
-    assert not course.at(moment - 10).stalled
-    assert course.at(moment + 10).stalled
+    assert not trajectory.at(moment - 10).stalled
+    assert trajectory.at(moment + 10).stalled
 
 
 def test_friction_is_needed_at_speed_and_helps_to_brake() -> None:
@@ -69,8 +69,8 @@ def test_a_start_above_the_start_speed_is_not_followed() -> None:
     plan = plan_endless(0, 0, 1, SpeedCurve(500.0, 1000.0, 2000.0, 2000.0))
     for start, follows in ((499.0, False), (500.0, True), (None, True)):
         build = Build(period_p=64, motor=motor(inertia=0.0, start=start))
-        course = Course(build, plan, 0, MechanicalState(0, 0), jump=500.0)
-        assert (course.at(SECOND).rotor > 0) is follows
+        trajectory = Trajectory(build, plan, 0, MechanicalState(0, 0), jump=500.0)
+        assert (trajectory.at(SECOND).rotor > 0) is follows
 
 
 def test_what_is_lost_is_a_whole_number_of_electrical_periods() -> None:
@@ -84,11 +84,11 @@ def test_a_stalled_rotor_is_caught_below_the_start_speed() -> None:
     slow, fast = Build(period_p=64, motor=motor(start=2000.0)), Build(period_p=64, motor=motor())
     plan = accelerated(0.9 / INERTIA)
     assert final(slow, plan).rotor > final(fast, plan).rotor
-    course = Course(slow, plan, 0, MechanicalState(0, 0))
+    trajectory = Trajectory(slow, plan, 0, MechanicalState(0, 0))
     end = plan.end or 0
     caught = end - round(2000.0 / 1000.0 * SECOND)
-    assert course.at(caught - 1000).stalled
-    assert not course.at(caught + 1000).stalled
+    assert trajectory.at(caught - 1000).stalled
+    assert not trajectory.at(caught + 1000).stalled
 
 
 def test_a_rotor_is_caught_when_speed_and_torque_both_allow_it() -> None:
@@ -101,13 +101,13 @@ def test_a_rotor_is_caught_when_speed_and_torque_both_allow_it() -> None:
     curve = ((0.0, 1.0), (300 * per_rpm, 0.2), (1200 * per_rpm, 0.2))
     build = Build(period_p=64, motor=motor(curve, inertia=8.8e-4 * 2 * pi / PER_REV, start=280 * per_rpm))
     plan = plan_position(MotionState(0, 0, 0.0, 0.0), 20_000, 50_000.0, 300_000.0, 600 * per_rpm)
-    course = Course(build, plan, 0, MechanicalState(0, 0))
-    assert 20_000 - course.at(1000 * SECOND).rotor == 24 * 64
+    trajectory = Trajectory(build, plan, 0, MechanicalState(0, 0))
+    assert 20_000 - trajectory.at(1000 * SECOND).rotor == 24 * 64
     speed = next(n for n in range(28_000, 0, -1) if at_speed(curve, n / 100 * per_rpm) >= 300_000 * build.motor.inertia) / 100  # type: ignore[union-attr]
     assert speed == pytest.approx(180.6, abs=0.1)
     caught = (plan.end or 0) - round(speed * per_rpm / 300_000 * SECOND)
-    assert course.at(caught - 100_000).stalled
-    assert not course.at(caught + 100_000).stalled
+    assert trajectory.at(caught - 100_000).stalled
+    assert not trajectory.at(caught + 100_000).stalled
 
 
 @settings(max_examples=60, deadline=None)
@@ -321,12 +321,12 @@ def test_burdens_add_up() -> None:
 def test_what_moves_freely_is_not_faster_than_can_be_calculated() -> None:
     """Load, friction and brake together, against the limit of acceleration."""
     body = motor(inertia=1.0, friction=0.25 * FASTEST, load=-0.25 * FASTEST)
-    body.check_free(0.5 * FASTEST)
+    body.check_coasting(0.5 * FASTEST)
     with pytest.raises(Misuse, match="on so small an inertia accelerates by more than"):
-        body.check_free(0.500001 * FASTEST)
-    motor(inertia=0.0).check_free()
+        body.check_coasting(0.500001 * FASTEST)
+    motor(inertia=0.0).check_coasting()
     with pytest.raises(Misuse):
-        motor(inertia=0.0, load=1e-9).check_free()
+        motor(inertia=0.0, load=1e-9).check_coasting()
 
 
 def test_a_rotor_is_caught_below_its_start_speed_or_at_rest() -> None:

@@ -6,13 +6,13 @@ from math import acos, exp, log, pi, sqrt
 
 import pytest
 
-from steptwin.simulation.mechanics.resonance import MotionPart, Resonance, Spell, limit, spells
+from steptwin.simulation.mechanics.resonance import MotionPart, Resonance, ResonanceInterval, limit, resonance_intervals
 
 BAND = Resonance(1000.0, 2000.0, 12.0, 8.0, 0.1)
 
 
 def test_amplitudes() -> None:
-    growing, fading = Spell(2.0, 0.5, 12.0), Spell(2.0, 0.5, -8.0)
+    growing, fading = ResonanceInterval(2.0, 0.5, 12.0), ResonanceInterval(2.0, 0.5, -8.0)
     assert growing.at(2.25, 0.1) == pytest.approx(0.5 * exp(3.0))
     assert fading.at(2.1, 0.1) == pytest.approx(0.5 * exp(-0.8))
     assert fading.at(3.0, 0.1) == 0.1
@@ -33,17 +33,17 @@ def test_without_torque_to_spare_it_is_lost_at_once() -> None:
     ("speed", "grows"), [(999.0, False), (1000.0, False), (1000.1, True), (1999.9, True), (2000.0, False), (2001.0, False)]
 )
 def test_it_grows_between_the_ends_of_the_band(speed: float, grows: bool) -> None:
-    ((spell, lost),) = spells(BAND, [MotionPart(1.0, 1.01, speed, 0.0)], 0.2)
-    assert spell == Spell(1.0, 0.2, 12.0 if grows else -8.0)
+    ((interval, lost),) = resonance_intervals(BAND, [MotionPart(1.0, 1.01, speed, 0.0)], 0.2)
+    assert interval == ResonanceInterval(1.0, 0.2, 12.0 if grows else -8.0)
     assert lost is None
 
 
 def test_the_moment_at_which_the_field_is_lost() -> None:
     """Two parts: the amplitude fades in the first one, and grows in the second to its limit."""
     parts = [MotionPart(0.0, 0.05, 500.0, 0.0), MotionPart(0.05, 1.0, 1500.0, 0.5), MotionPart(1.0, 2.0, 500.0, 0.0)]
-    first, second = spells(BAND, parts, 0.4)
+    first, second = resonance_intervals(BAND, parts, 0.4)
     at = 0.4 * exp(-0.4)
-    assert first == (Spell(0.0, 0.4, -8.0), None)
+    assert first == (ResonanceInterval(0.0, 0.4, -8.0), None)
     assert second[0].amplitude == pytest.approx(at)
     assert second[1] == pytest.approx(0.05 + log(limit(0.5) / at) / 12.0)
 
@@ -52,14 +52,14 @@ def test_a_part_that_ends_before_is_survived() -> None:
     needed = log(limit(0.5) / 0.2) / 12.0
     for share, count in ((0.999, 2), (1.001, 1)):
         parts = [MotionPart(0.0, needed * share, 1500.0, 0.5), MotionPart(needed * share, 9.0, 500.0, 0.0)]
-        assert len(list(spells(BAND, parts, 0.2))) == count
+        assert len(list(resonance_intervals(BAND, parts, 0.2))) == count
 
 
 def test_an_amplitude_above_the_limit_loses_the_field_at_once() -> None:
-    ((_, lost),) = spells(BAND, [MotionPart(3.0, 4.0, 1500.0, 0.5)], 2.0 * limit(0.5))
+    ((_, lost),) = resonance_intervals(BAND, [MotionPart(3.0, 4.0, 1500.0, 0.5)], 2.0 * limit(0.5))
     assert lost == 3.0
 
 
 def test_after_a_part_without_end_there_is_the_least_vibration() -> None:
     parts = [MotionPart(0.0, float("inf"), 500.0, 0.0), MotionPart(1.0, 2.0, 500.0, 0.0)]
-    assert [spell.amplitude for spell, _ in spells(BAND, parts, 0.4)] == [0.4, 0.1]
+    assert [interval.amplitude for interval, _ in resonance_intervals(BAND, parts, 0.4)] == [0.4, 0.1]

@@ -13,22 +13,22 @@ from steptwin.simulation.scheduler.wires import PinName, Wire
 class Clock(Bare):
     """Switches B at each of its moments."""
 
-    __slots__ = ("dues", "levels")
+    __slots__ = ("deadlines", "levels")
 
-    def __init__(self, *dues: Nanos) -> None:
+    def __init__(self, *deadlines: Nanos) -> None:
         super().__init__()
-        self.dues = list(dues)
+        self.deadlines = list(deadlines)
         self.levels = {"A": 0.0, "B": 0.0}
 
     def advance(self, now: Nanos) -> None:
         super().advance(now)
-        while self.dues and self.dues[0] <= now:
+        while self.deadlines and self.deadlines[0] <= now:
             self.levels["B"] = 1.0 - self.levels["B"]
-            self.edges.append(PinEdge(self.dues.pop(0), "B", self.levels["B"]))
+            self.edges.append(PinEdge(self.deadlines.pop(0), "B", self.levels["B"]))
             self.changed()
 
     def deadline(self) -> Nanos | None:
-        return self.dues[0] if self.dues else None
+        return self.deadlines[0] if self.deadlines else None
 
     def set_pin(self, pin: str, value: float, now: Nanos) -> None:
         self.advance(now)
@@ -61,12 +61,12 @@ class Told:
         return found
 
 
-@pytest.mark.parametrize("attentive", [False, True])
-def test_of_a_controller_alone(attentive: bool) -> None:
+@pytest.mark.parametrize("step_exact", [False, True])
+def test_of_a_controller_alone(step_exact: bool) -> None:
     scheduler, plain, leaving, other = Scheduler(), Told(), Told(), Told()
     scheduler.add("m", Clock(10, 20, 20, 30))
-    scheduler.is_attentive = attentive
-    scheduler.settle()
+    scheduler.is_step_exact = step_exact
+    scheduler.propagate()
     scheduler.follow(plain, ["m"])
     scheduler.follow(leaving, ["m", "x"], leaves=True)
     scheduler.follow(other, ["x"])
@@ -76,7 +76,7 @@ def test_of_a_controller_alone(attentive: bool) -> None:
     scheduler.advance(25)
     assert leaving.take() == ([], [])
     scheduler.controllers["m"].set_pin("A", 1.0, 25)
-    scheduler.settle()
+    scheduler.propagate()
     assert (plain.take(), leaving.take()) == (([25], []), ([25], []))
     scheduler.unfollow(plain)
     scheduler.unfollow(other)
@@ -93,7 +93,7 @@ def test_of_controllers_that_are_joined() -> None:
     scheduler.add("b", Clock(20))
     scheduler.add("c", Clock(60, 70))
     scheduler.connect(Wire(PinName("a", "B"), PinName("b", "A")))
-    scheduler.settle()
+    scheduler.propagate()
     scheduler.follow(one, ["a"])
     scheduler.follow(two, ["b"], leaves=True)
     scheduler.follow(both, ["a", "b"])
@@ -103,7 +103,7 @@ def test_of_controllers_that_are_joined() -> None:
     assert both.take() == ([10, 20, 30], [])
     scheduler.unfollow(two)
     scheduler.controllers["b"].set_pin("A", 0.0, 50)
-    scheduler.settle()
+    scheduler.propagate()
     assert (one.take(), two.take(), both.take()) == (([], []), ([], []), ([50], []))
     scheduler.advance(80)
     assert both.take() == ([], [])
@@ -112,7 +112,7 @@ def test_of_controllers_that_are_joined() -> None:
 def test_who_is_gone_is_not_told_what_is_new_already() -> None:
     scheduler, one, other = Scheduler(), Told(), Told()
     scheduler.add("m", Clock())
-    scheduler.settle()
+    scheduler.propagate()
     scheduler.follow(one, ["m"])
     scheduler.follow(other, ["m"])
     assert scheduler.followers is not None
@@ -123,8 +123,8 @@ def test_who_is_gone_is_not_told_what_is_new_already() -> None:
     assert scheduler.followers.news == {}
 
 
-@pytest.mark.parametrize("attentive", [False, True])
-def test_two_that_are_due_together_do_not_run_ahead_of_each_other(attentive: bool) -> None:
+@pytest.mark.parametrize("step_exact", [False, True])
+def test_two_that_are_due_together_do_not_run_ahead_of_each_other(step_exact: bool) -> None:
     """What one switches reaches the other before that goes on."""
     seen: list[tuple[Nanos, float]] = []
 
@@ -140,9 +140,9 @@ def test_two_that_are_due_together_do_not_run_ahead_of_each_other(attentive: boo
     scheduler = Scheduler()
     scheduler.add("a", Clock(10, 20))
     scheduler.add("b", Ahead(10))
-    scheduler.is_attentive = attentive
+    scheduler.is_step_exact = step_exact
     scheduler.connect(Wire(PinName("a", "B"), PinName("b", "A")))
-    scheduler.settle()
+    scheduler.propagate()
     scheduler.advance(30)
     assert seen == [(0, 0.0), (10, 1.0), (20, 0.0)]
 

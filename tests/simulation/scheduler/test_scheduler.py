@@ -118,7 +118,7 @@ def test_a_wire_carries_the_level_there_is_when_it_is_connected() -> None:
     scheduler.connect(wire("one.OUT2", "other.IN6", inverted=True))
     assert (other.pins()["IN5"], other.pins()["IN6"]) == (1.0, 1.0)
     one.execute(bytes.fromhex("05 1771 FF00"), 0)
-    scheduler.settle()
+    scheduler.propagate()
     assert other.pins()["IN6"] == 0.0
 
 
@@ -200,13 +200,13 @@ def test_the_deadline_is_the_earliest_of_all() -> None:
     assert scheduler.deadline() is None
     for relay in relays:
         relay.set_pin("A", 1.0, 0)
-    assert scheduler.stale
-    dues = []
+    assert scheduler.is_dirty
+    deadlines = []
     while (due := scheduler.deadline()) is not None:
-        assert not scheduler.stale
-        dues.append(due)
+        assert not scheduler.is_dirty
+        deadlines.append(due)
         scheduler.advance(due)
-    assert dues == [3, 5, 9]
+    assert deadlines == [3, 5, 9]
 
 
 def test_a_controller_takes_the_place_of_another_with_what_it_has_to_do() -> None:
@@ -383,7 +383,7 @@ def test_names_are_given_once() -> None:
 
 def test_a_scheduler_in_which_nothing_has_changed_is_settled() -> None:
     scheduler = Scheduler()
-    assert not scheduler.stale
+    assert not scheduler.is_dirty
     assert scheduler.deadline() is None
     with pytest.raises(Misuse, match="no controller 'x': there are none"):
         scheduler.replace("x", Relay())
@@ -403,12 +403,12 @@ def test_each_event_is_told_with_its_scheduler() -> None:
         joined.add(name, Relay(10))
     joined.connect(wire("a.B", "b.A"))
     for scheduler in (alone, joined):
-        scheduler.settle()
+        scheduler.propagate()
         scheduler.on_change = lambda one: told.append((one, one.now))
         scheduler.controllers["a"].set_pin("A", 1.0, scheduler.now)
         assert told == [(scheduler, scheduler.now)]
         told.clear()
-        scheduler.settle()
+        scheduler.propagate()
         assert told == [(scheduler, 0)]
         told.clear()
         scheduler.advance(15)
@@ -437,7 +437,7 @@ def test_a_controller_that_says_nothing_of_its_edges_is_looked_at() -> None:
     scheduler.add("a", Silent(10))
     scheduler.add("b", Relay(5))
     scheduler.connect(wire("a.B", "b.A"))
-    scheduler.settle()
+    scheduler.propagate()
     for name in ("loud", "a"):
         scheduler.controllers[name].set_pin("A", 1.0, 0)
     scheduler.advance(30)
@@ -465,7 +465,7 @@ def test_a_snapshot_has_what_a_change_leads_to() -> None:
     for name in ("a", "b"):
         scheduler.add(name, Relay())
     scheduler.connect(wire("a.B", "b.A"))
-    scheduler.settle()
+    scheduler.propagate()
     scheduler.controllers["a"].set_pin("A", 1.0, 0)
     assert scheduler.snapshot().levels == {PinName("b", "A"): 0.0}
 
@@ -475,11 +475,11 @@ def test_who_looks_at_each_event_is_told_of_each() -> None:
     told: list[Nanos] = []
     scheduler, relay = Scheduler(), Relay(10)
     scheduler.add("a", relay)
-    scheduler.is_attentive = True
+    scheduler.is_step_exact = True
     for moment, level in ((0, 1.0), (5, 0.0)):
         scheduler.advance(moment)
         relay.set_pin("A", level, moment)
-    scheduler.settle()
+    scheduler.propagate()
     relay.changed = lambda: None
     scheduler.on_change = lambda one: told.append(one.now)
     scheduler.advance(40)

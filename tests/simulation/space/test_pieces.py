@@ -14,8 +14,8 @@ from steptwin.motion.elastic import Response, Spring
 from steptwin.motion.paths import Circular
 from steptwin.motion.profile import cruise, ramp
 from steptwin.simulation.mechanics.cam import Cam
-from steptwin.simulation.mechanics.course import Build, Course, MechanicalState
-from steptwin.simulation.mechanics.loadmotion import load_stretches
+from steptwin.simulation.mechanics.loadmotion import load_intervals
+from steptwin.simulation.mechanics.trajectory import Build, MechanicalState, Trajectory
 from steptwin.simulation.mechanics.travel import Travel
 from steptwin.simulation.space.pieces import (
     Gear,
@@ -41,8 +41,8 @@ CUBIC = Profile(0, 0, (Segment(0.4, 0.0, 0.0, 10.0, 500.0, -300.0, 1),), 64.8)
 WAY = Profile(0, 0, (ramp(0.0, 0.0, 0.0, 50.0, 200.0), cruise(0.25, 1.0, 6.25, 50.0)), 43.75)
 ARC = Circular(0.0, 1000.0, 0.3, 0.1).profile(WAY, 890, None)
 END: Nanos = SECOND + 200 * MILLISECOND
-COURSE = Course(Build(high=300, play=7, period_p=16, zero=4), THERE, 0, MechanicalState(4, 4))
-RESPONSE = Response(Spring(17.0, 0.08), load_stretches(COURSE, 0), 0.0, 0.0)
+COURSE = Trajectory(Build(high=300, play=7, period_p=16, zero=4), THERE, 0, MechanicalState(4, 4))
+RESPONSE = Response(Spring(17.0, 0.08), load_intervals(COURSE, 0), 0.0, 0.0)
 CAM = Cam([(Fraction(0), Fraction(0)), (Fraction(50), Fraction(9)), (Fraction(120), Fraction(3))], Fraction(160))
 
 
@@ -61,7 +61,7 @@ MOTIONS: dict[str, tuple[Callable[[Nanos], Iterator[Piece]], Callable[[Nanos], f
     "profile": (lambda now: pieces_of_profile(THERE, now), THERE.position, 1e-9),
     "cubic": (lambda now: pieces_of_profile(CUBIC, now), CUBIC.position, 1e-9),
     "arc": (lambda now: pieces_of_profile(ARC, now), ARC.position, 1e-9),
-    "course": (lambda now: pieces_of_course(COURSE, now), COURSE.position, 1e-9),
+    "trajectory": (lambda now: pieces_of_course(COURSE, now), COURSE.position, 1e-9),
     "response": (lambda now: pieces_of_response(RESPONSE, now), lambda now: RESPONSE.at(now)[0], 1e-9),
     "travel": (lambda now: pieces_of_travel(TRAVEL, now), lambda now: float(TRAVEL.place(now)), 0.0),
     "cam": (
@@ -129,7 +129,7 @@ def test_an_endless_cam_has_endless_pieces() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "expected"), [("profile", (0.0, 520.0)), ("course", (4.0, 300.0)), ("travel", (0.0, float(TRAVEL.full)))]
+    ("name", "expected"), [("profile", (0.0, 520.0)), ("trajectory", (4.0, 300.0)), ("travel", (0.0, float(TRAVEL.full)))]
 )
 def test_a_span_holds_all_positions_and_hardly_more(name: str, expected: tuple[float, float]) -> None:
     low, high = span(MOTIONS[name][0](0))

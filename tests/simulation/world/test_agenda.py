@@ -97,7 +97,7 @@ def joined(*names: str) -> Scheduler:
     scheduler = Scheduler()
     for name in names:
         scheduler.add(name, Bare())
-    scheduler.settle()
+    scheduler.propagate()
     return scheduler
 
 
@@ -110,33 +110,33 @@ def test_scripts_are_evaluated_when_what_they_depend_on_has_changed() -> None:
     watchers.set(scripts[2], (a, c))
     watchers.set(scripts[0], (b, c))
     watchers.set(scripts[1], ())
-    one.mark()
+    one.notify()
     assert watchers.take() == [scripts[0], scripts[2]]
     assert watchers.take() == []
-    one.mark("a")
+    one.notify("a")
     assert watchers.take() == [scripts[2]]
     assert watchers.take() == []
-    other.mark("c")
-    one.mark("b")
-    third.mark("d")
+    other.notify("c")
+    one.notify("b")
+    third.notify("d")
     assert watchers.take() == [scripts[0], scripts[2]], "each once, in the order of their numbers"
     watchers.again(scripts[1])
-    other.mark()
+    other.notify()
     assert watchers.take() == scripts
     assert watchers.take() == []
     watchers.set(scripts[2], (a,))
-    other.mark("c")
-    one.mark("b")
+    other.notify("c")
+    one.notify("b")
     assert watchers.take() == [scripts[0]]
     watchers.set(scripts[0], ())
     assert (other.on_change, scripts[0].sources) == (None, ())
-    other.mark("c")
-    one.mark("b")
+    other.notify("c")
+    one.notify("b")
     assert watchers.take() == []
     assert one.on_change is not None
     watchers.set(scripts[1], (a,))
     watchers.set(scripts[2], ())
-    one.mark("a")
+    one.notify("a")
     assert watchers.take() == [scripts[1]]
     watchers.set(scripts[1], ())
     assert one.on_change is None

@@ -76,7 +76,7 @@ def test_every_moment_is_as_it_was(acts: list[tuple[int, str]], chance: object) 
         else:
             level = 1.0 - level
             world.apply_input(Set((("m", "IN3", level),)))
-        world.settle_all()
+        world.sync_all()
         seen[world.now] = shown(world)
     past = Past(history)
     moments = list(seen)
@@ -258,7 +258,7 @@ def test_what_a_snapshot_that_goes_had_seen_changed_stays_with_the_next(monkeypa
     for count in range(20):
         world.run(for_=0.01)
         world.apply_input(Set((("m", f"IN{count + 1}", 1.0),)))
-        world.settle_all()
+        world.sync_all()
         history.take()
     assert len(history) == 16
     changed = [name for state in states(history) for controller, name in state.changed if name.startswith("IN")]

@@ -347,7 +347,7 @@ def test_scripts_of_the_description_come_before_those_from_python() -> None:
 
 def test_what_is_not_there_is_named() -> None:
     with pytest.raises(Misuse) as caught:
-        small("").touch("nix")
+        small("").sync("nix")
     assert str(caught.value) == "no controller or line is called 'nix'; there are a, b, c"
 
 

@@ -163,7 +163,7 @@ def test_random_worlds_do_the_same_again_in_pieces_and_from_a_snapshot(parts: li
     for cut in cuts:
         second.run(for_=cut / 1000)
         second.restore(second.snapshot())
-        second.settle_all()
+        second.sync_all()
     second.run(until=first.time)
     assert second.trace.digest() == first.trace.digest()
     third = first.branch(snapshot)

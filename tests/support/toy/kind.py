@@ -10,7 +10,7 @@ from steptwin.controller import ControllerEvent, Nanos
 from steptwin.controllerstate import DetailRow, StateAxis, StateProgram, StateReader, StateStatus
 from steptwin.datasheet import Access, AxisDescription, Datasheet, Detail, FactType, Pin, PinDirection, Point, PointEffect
 from steptwin.errors import Misuse, Refusal
-from steptwin.points import LivePoint, turns_of
+from steptwin.points import LivePoint, turning_points_of
 from steptwin.simulation.faults import AxisLoad, Faults
 from steptwin.simulation.kinds.controllerview import ControllerView
 from steptwin.simulation.kinds.kind import (
@@ -26,7 +26,7 @@ from steptwin.simulation.kinds.kind import (
 )
 from steptwin.simulation.kinds.links import LineSpec
 from steptwin.simulation.kinds.registry import KINDS, register
-from steptwin.simulation.mechanics.lanes import AxisLane, plain_view
+from steptwin.simulation.mechanics.channels import AxisChannel, plain_view
 from steptwin.simulation.mechanics.scale import FULL_STEPS, DriveScale, GivenScale
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
@@ -53,7 +53,7 @@ class ToyView(ControllerView):
 
     @property
     def position(self) -> int:
-        self._touch()
+        self._sync()
         return self._toy.axis.plan.count(self._toy.now)
 
 
@@ -176,7 +176,7 @@ class ToyKind(ControllerKind[ToySpec, Toy, ToyView]):
     def scale(self, given: GivenScale, toy: Toy, axis: int) -> DriveScale:
         return DriveScale(pulses_per_rev=given.pulses_per_rev or 200, full_steps=FULL_STEPS, text="counts pulses")
 
-    def lanes(self, toy: Toy) -> Mapping[str, AxisLane]:
+    def channels(self, toy: Toy) -> Mapping[str, AxisChannel]:
         return {"1": plain_view("1")}
 
     def body(self, toy: Toy, service: LineUnit, shafts: Mapping[int, AxisLoad]) -> ToyBody:
@@ -205,7 +205,10 @@ class ToyKind(ControllerKind[ToySpec, Toy, ToyView]):
             return None
         axis = toy.axis
         return LivePoint(
-            point=POSITION, read=partial(_position, toy), turns=turns_of(lambda: axis.plan), version=lambda: axis.revision
+            point=POSITION,
+            read=partial(_position, toy),
+            turning_points=turning_points_of(lambda: axis.plan),
+            version=lambda: axis.revision,
         )
 
     def is_idle(self, toy: Toy, now: Nanos) -> bool:

@@ -83,7 +83,7 @@ def _signals(lamp: Lamp) -> Mapping[str, SignalOf]:
 
 def _burn(active: ActiveFault, lamp: Lamp, begins: bool, now: Nanos) -> str:
     lamp.burnt = begins
-    lamp.scheduler.mark()
+    lamp.scheduler.notify()
     return "it is burnt out" if begins else "it has been replaced"
 
 

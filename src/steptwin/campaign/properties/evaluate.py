@@ -48,7 +48,7 @@ def forced(value: float, *, holds: bool) -> float:
 
 
 class Evaluation:
-    """Evaluation of the courses of all comparisons, over one time."""
+    """Evaluation of all comparisons, over one time."""
 
     def __init__(self, atoms: Mapping[Atom, Shape]) -> None:
         self._atoms = atoms
@@ -56,33 +56,33 @@ class Evaluation:
         self.begin, self.end = some[0].begin, some[-1].end
         self._known: dict[tuple[int, bool], Shape] = {}
 
-    def course(self, node: PropertyFormula, *, undecided: bool = True) -> Shape:
+    def shape(self, node: PropertyFormula, *, undecided: bool = True) -> Shape:
         """``undecided``: what a window counts as that is not decided when the run ends."""
         key = id(node), undecided
         found = self._known.get(key)
         if found is None:
-            found = self._known[key] = self._course(node, undecided)
+            found = self._known[key] = self._shape(node, undecided)
         return found
 
-    def _course(self, node: PropertyFormula, undecided: bool) -> Shape:
+    def _shape(self, node: PropertyFormula, undecided: bool) -> Shape:
         match node:
             case Atom():
                 return self._atoms[node]
             case Combination(word, inner):
-                parts = [self.course(one, undecided=undecided) for one in inner]
+                parts = [self.shape(one, undecided=undecided) for one in inner]
                 return reduce(least if word == "and" else greatest, parts)
             case Lasting():
                 return self._lasting(node, undecided)
             case Delayed(length, inner):
-                return later(self.course(inner, undecided=undecided), length, 1.0 if undecided else -1.0)
+                return later(self.shape(inner, undecided=undecided), length, 1.0 if undecided else -1.0)
             case Holding(first, then, released):
-                a, b = self.course(first, undecided=not released), self.course(then, undecided=released)
+                a, b = self.shape(first, undecided=not released), self.shape(then, undecided=released)
                 return negative(held_until(negative(a), negative(b))) if released else held_until(a, b)
             case Becoming(inner, never):
-                found = self._rise(self.course(inner, undecided=False))
+                found = self._rise(self.shape(inner, undecided=False))
                 return negative(found) if never else found
             case Tally(inner, sign, number):
-                moments = rises(self.course(inner, undecided=False))
+                moments = rises(self.shape(inner, undecided=False))
                 return steps(moments, self.begin, self.end, lambda count: _tallied(count, sign, number))
             case CycleTime():
                 return constant(self.begin, self.end, self._cycles(node))
@@ -91,20 +91,20 @@ class Evaluation:
     def _lasting(self, node: Lasting, undecided: bool) -> Shape:
         length, is_once = node.length, node.word == "eventually"
         if length is None:
-            course = self.course(node.inner, undecided=not is_once)
-            return from_on(course) if is_once else negative(from_on(negative(course)))
-        course = self.course(node.inner, undecided=undecided)
+            shape = self.shape(node.inner, undecided=not is_once)
+            return from_on(shape) if is_once else negative(from_on(negative(shape)))
+        shape = self.shape(node.inner, undecided=undecided)
         if is_once:
-            return self._open(within(course, length), length, undecided)
-        return negative(self._open(within(negative(course), length), length, not undecided))
+            return self._open(within(shape, length), length, undecided)
+        return negative(self._open(within(negative(shape), length), length, not undecided))
 
-    def _open(self, course: Shape, length: Nanos, undecided: bool) -> Shape:
+    def _open(self, shape: Shape, length: Nanos, undecided: bool) -> Shape:
         """Windows that end after the run: as they are where true, otherwise true if that is what undecided counts as."""
         last = self.end - length
         if not undecided or last >= self.end:
-            return course
+            return shape
         found: Shape = []
-        for slope in course:
+        for slope in shape:
             if slope.end <= last or slope.first > 0.0:
                 found.append(slope)
                 continue
@@ -113,11 +113,11 @@ class Evaluation:
             found.append(Slope(max(slope.begin, last + 1), slope.end, 1.0, 1.0))
         return found
 
-    def _rise(self, course: Shape) -> Shape:
+    def _rise(self, shape: Shape) -> Shape:
         """1 at its moments; elsewhere as far as it is away, -1 where it has been."""
         found: Shape = []
-        at = set(rises(course))
-        for slope in course:
+        at = set(rises(shape))
+        for slope in shape:
             if slope.first <= 0.0:
                 found.append(slope)
                 continue
@@ -133,8 +133,8 @@ class Evaluation:
 
     def cycles(self, node: CycleTime) -> tuple[list[tuple[Nanos, Nanos]], Nanos | None]:
         """Begin and end of each, and the begin of one that has not ended."""
-        begins = rises(self.course(node.begin, undecided=False))
-        ends = rises(self.course(node.end, undecided=False))
+        begins = rises(self.shape(node.begin, undecided=False))
+        ends = rises(self.shape(node.end, undecided=False))
         found: list[tuple[Nanos, Nanos]] = []
         n = 0
         for begin in begins:
@@ -170,39 +170,39 @@ class Evaluation:
                 return self.decided(inner, moment + length, undecided=undecided)
             case Delayed():
                 return self.end, node
-            case Holding() if value_at(self.course(node), moment) <= 0.0:
+            case Holding() if value_at(self.shape(node), moment) <= 0.0:
                 return self._not_held(node, moment)
             case CycleTime(begin, end):
                 return self._known_by(self._cycle_decided(node), begin, end), node
-            case Tally() if value_at(self.course(node), moment) <= 0.0:
+            case Tally() if value_at(self.shape(node), moment) <= 0.0:
                 return self._miscounted(node, moment), node
             case Becoming(inner):
                 return self._known_by(moment, inner), node
         return moment, node
 
     def _joined(self, node: Combination, moment: Nanos, undecided: bool) -> tuple[Nanos, PropertyFormula]:
-        value = value_at(self.course(node, undecided=undecided), moment)
+        value = value_at(self.shape(node, undecided=undecided), moment)
         if node.word == "or" and value <= 0.0:  # once the last of them is false
             every = [self.decided(one, moment, undecided=undecided) for one in node.inner]
             return max(reversed(every), key=itemgetter(0))
-        close = [one for one in node.inner if abs(value_at(self.course(one, undecided=undecided), moment) - value) < TINY]
+        close = [one for one in node.inner if abs(value_at(self.shape(one, undecided=undecided), moment) - value) < TINY]
         return self.decided((close or list(node.inner))[-1], moment, undecided=undecided)
 
     def _lasted(self, node: Lasting, moment: Nanos, undecided: bool) -> tuple[Nanos, PropertyFormula]:
-        value = value_at(self.course(node, undecided=undecided), moment)
+        value = value_at(self.shape(node, undecided=undecided), moment)
         word, length, inner = node.word, node.length, node.inner
         below = undecided if length is not None else word == "always"
         end = self.end if length is None else min(self.end, moment + length)
-        course = self.course(inner, undecided=below)
+        shape = self.shape(inner, undecided=below)
         if word == "eventually":
-            reached = _first(course, moment, end, lambda one: one > 0.0) if value > 0.0 else None
+            reached = _first(shape, moment, end, lambda one: one > 0.0) if value > 0.0 else None
             return (self._known_by(end, inner), node) if reached is None else self.decided(inner, reached, undecided=below)
-        failed = _first(course, moment, end, lambda one: one <= 0.0) if value <= 0.0 else None
-        return self.decided(inner, _lowest(course, moment, end) if failed is None else failed, undecided=below)
+        failed = _first(shape, moment, end, lambda one: one <= 0.0) if value <= 0.0 else None
+        return self.decided(inner, _lowest(shape, moment, end) if failed is None else failed, undecided=below)
 
     def _miscounted(self, node: Tally, moment: Nanos) -> Nanos:
         """When it came once too often; if too seldom, that is sure at the end."""
-        moments = [one for one in rises(self.course(node.inner, undecided=False)) if one >= moment]
+        moments = [one for one in rises(self.shape(node.inner, undecided=False)) if one >= moment]
         most = {"<": ceil(node.number) - 1, "<=": floor(node.number), "==": floor(node.number)}.get(node.sign)
         if most is None or len(moments) <= most:
             return self.end
@@ -212,7 +212,7 @@ class Evaluation:
         """Where ``until`` failed: its first part did too early; or what it is the opposite of came true."""
         way = node.released
         failing, other = (node.then, node.first) if way else (node.first, node.then)
-        failed = _first(self.course(failing, undecided=True), moment, self.end, lambda one: one <= 0.0)
+        failed = _first(self.shape(failing, undecided=True), moment, self.end, lambda one: one <= 0.0)
         if failed is None:
             return self.end, node
         at, by = self.decided(failing, failed)
@@ -249,16 +249,16 @@ def _ahead(node: PropertyFormula) -> Nanos | None:
     return most
 
 
-def _first(course: Shape, begin: Nanos, end: Nanos, test: Callable[[float], bool]) -> Nanos | None:
-    for slope in course:
+def _first(shape: Shape, begin: Nanos, end: Nanos, test: Callable[[float], bool]) -> Nanos | None:
+    for slope in shape:
         if slope.end >= begin and slope.begin <= end and test(slope.first):
             return max(slope.begin, begin)
     return None
 
 
-def _lowest(course: Shape, begin: Nanos, end: Nanos) -> Nanos:
+def _lowest(shape: Shape, begin: Nanos, end: Nanos) -> Nanos:
     best: tuple[float, Nanos] | None = None
-    for slope in course:
+    for slope in shape:
         if best is not None and slope.first >= best[0] <= slope.last:
             continue
         if slope.end >= begin and slope.begin <= end:

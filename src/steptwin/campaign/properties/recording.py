@@ -1,4 +1,4 @@
-"""The course of one comparison in a running world, exact at every event, turn and crossing.
+"""The values of one comparison in a running world over time, exact at every event, turn and crossing.
 
 While signals go on as they did, nothing is computed: a way is looked at as a whole once another one follows. Signals of one
 scheduler are followed by that scheduler (`steptwin.simulation.scheduler.followers`).
@@ -37,12 +37,12 @@ from steptwin.simulation.world.simulation import Simulation
 _SIGNS = {"<": -1.0, "<=": -1.0, ">": 1.0, ">=": 1.0, "==": 0.0, "!=": 0.0}
 """Whether more of the left side is nearer to the truth, or less; 0: neither."""
 FINEST_NS: Nanos = 1000
-"""Stretches are not divided further."""
+"""Intervals are not divided further."""
 DEVIATION = 0.001
-"""By how much of the scale a straight stretch may deviate from what moves, where its shape counts."""
+"""By how much of the scale a straight interval may deviate from what moves, where its shape counts."""
 SHARES = (0.25, 0.5, 0.75)
 PROBES = (0.0625, *SHARES, 0.9375)
-"""Where a stretch is looked at for a place where it turns back: one that these miss is less than a hundredth of `DEVIATION`."""
+"""Where an interval is looked at for a place where it turns back: one that these miss is less than a hundredth of `DEVIATION`."""
 
 
 class ComparisonRecord:
@@ -72,14 +72,14 @@ class ComparisonRecord:
         self._stays = all(signal.freeze is not None for signal in self._moving.values())
         """Whether a way can be read after another one has followed."""
         self._is_monotonic = len(self._moving) == 1 and _is_alone(self.node.left, self.node.right, *self._moving)
-        """Whether it goes one way between turns, so that its extremes are there."""
+        """Whether it goes one way between turning points, so that its extremes are there."""
         self._is_fine = is_fine or not self._is_monotonic
         self.scheduler, self.names = self._followed()
         self._closed: Shape = []
         self._known: object = None
         """Version of the sources of the present way."""
         self._begin: Nanos | None = None
-        """Begin of the stretch that is not closed."""
+        """Begin of the interval that is not closed."""
         self._first = 0.0
         """The value at `_begin`."""
         self._seen: Nanos = 0
@@ -89,8 +89,8 @@ class ComparisonRecord:
         self._left: Nanos = -1
         """The moment before which `_last` was read."""
         self._last = 0.0
-        self._turns: Iterator[Nanos] = iter(())
-        self._turn: Nanos | None = None
+        self._turning_points: Iterator[Nanos] = iter(())
+        self._turning_point: Nanos | None = None
 
     def _followed(self) -> tuple[Scheduler | None, tuple[str, ...]]:
         """The only scheduler on which it depends, and the names there."""
@@ -110,16 +110,16 @@ class ComparisonRecord:
         if scheduler.now < world.now:
             scheduler.advance(world.now)
         if not all(_is_event(world, name, signal) for name, signal in self._signals.items()):
-            scheduler.is_attentive = True
+            scheduler.is_step_exact = True
         scheduler.follow(self, self.names, leaves=not self._stays)
 
     def unfollow(self) -> None:
         if self.scheduler is not None and self.scheduler.followers is not None:
             self.scheduler.followers.remove(self)
 
-    def bring(self, now: Nanos) -> tuple[Source, ...]:
+    def sync(self, now: Nanos) -> tuple[Source, ...]:
         """Advance its schedulers to ``now`` and return what it depends on."""
-        return tuple(dict.fromkeys(source for signal in self._signals.values() for source in signal.bring(now)))
+        return tuple(dict.fromkeys(source for signal in self._signals.values() for source in signal.sync(now)))
 
     # ------------------------------------------------------------------ values
 
@@ -173,7 +173,7 @@ class ComparisonRecord:
             return
         if begin is not None and now > begin:
             last = self._last if self._left == now else self._go_to(now - 1)
-            self._closed += self._stretch(now - 1, last)
+            self._closed += self._interval(now - 1, last)
         self._known = known
         self._go_on(now)
 
@@ -198,19 +198,19 @@ class ComparisonRecord:
         """Begin another way."""
         for name, signal in self._standing.items():
             self._reads[name] = _constant(signal.value(now))
-        turns: Iterator[Nanos] | None = None
+        turning_points: Iterator[Nanos] | None = None
         for name, signal in self._moving.items():
             if signal.freeze is not None:
                 self._reads[name] = signal.freeze(now)
-            ahead = signal.turns(now)
-            turns = ahead if turns is None else merge(turns, ahead)
+            ahead = signal.turning_points(now)
+            turning_points = ahead if turning_points is None else merge(turning_points, ahead)
         if self._limit is not None:
             (self._left_at,) = self._reads.values()
         else:
             self._read()
-        if turns is not None:
-            self._turns = iter(tuple(turns)) if self._stays else turns
-        self._turn = next(self._turns, None)
+        if turning_points is not None:
+            self._turning_points = iter(tuple(turning_points)) if self._stays else turning_points
+        self._turning_point = next(self._turning_points, None)
         self._begin_at(now)
 
     def _begin_at(self, now: Nanos) -> None:
@@ -219,25 +219,25 @@ class ComparisonRecord:
         self._first = self._there
 
     def _go_to(self, last: Nanos) -> float:
-        """Close all stretches that end before ``last`` on the present way. Returns the value there, to which it has come or
+        """Close all intervals that end before ``last`` on the present way. Returns the value there, to which it has come or
         further."""
         if last < self._seen:
             return self._value(last)
         while self._seen < last:
-            while self._turn is not None and self._turn <= self._seen:
-                self._turn = next(self._turns, None)
-            end = last if self._turn is None else min(self._turn, last)
+            while self._turning_point is not None and self._turning_point <= self._seen:
+                self._turning_point = next(self._turning_points, None)
+            end = last if self._turning_point is None else min(self._turning_point, last)
             there, side = self._look_at(end)
             change = None if side == self._side and self._is_monotonic else self._change(end, side)
             if change is not None:
-                self._closed += self._stretch(change - 1, self._value(change - 1))
+                self._closed += self._interval(change - 1, self._value(change - 1))
                 self._begin_at(change)
-            elif self._is_fine and end == self._turn:
-                self._closed += self._stretch(end - 1, self._value(end - 1))
+            elif self._is_fine and end == self._turning_point:
+                self._closed += self._interval(end - 1, self._value(end - 1))
                 self._begin_at(end)
             else:
                 if (there - self._there) * (self._there - self._first) < 0.0:  # it turned back where it was seen last
-                    self._closed += self._stretch(self._seen, self._there)
+                    self._closed += self._interval(self._seen, self._there)
                     self._begin_at(self._seen + 1)
                 self._seen, self._there, self._side = end, there, side
         return self._there
@@ -252,8 +252,8 @@ class ComparisonRecord:
             low, high = (middle, high) if self._look_at(middle)[1] == self._side else (low, middle)
         return high
 
-    def _stretch(self, end: Nanos, last: float) -> Shape:
-        """The stretch that is not closed, up to ``end``."""
+    def _interval(self, end: Nanos, last: float) -> Shape:
+        """The interval that is not closed, up to ``end``."""
         begin, first = self._begin or 0, self._first
         if not self._is_fine or end - begin < FINEST_NS or (self._is_monotonic and abs(first - last) <= DEVIATION):
             return [Slope(begin, end, first, last)]
@@ -267,7 +267,7 @@ class ComparisonRecord:
         return found if self._is_monotonic else list(self._with_extremes(found))
 
     def _straight(self, begin: Nanos, first: float, end: Nanos, last: float) -> tuple[Nanos, float]:
-        """The end of a stretch that is as good as straight, and the value there."""
+        """The end of an interval that is as good as straight, and the value there."""
         while end - begin > FINEST_NS:
             length = end - begin
             at = [(share, self._value(begin + int(length * share))) for share in SHARES]
@@ -277,9 +277,9 @@ class ComparisonRecord:
             last = self._value(end)
         return end, last
 
-    def _with_extremes(self, course: Shape) -> Iterator[Slope]:
-        """With joints where it turns back within a stretch."""
-        for slope in course:
+    def _with_extremes(self, shape: Shape) -> Iterator[Slope]:
+        """With joints where it turns back within an interval."""
+        for slope in shape:
             begin, end, first, last = slope
             length = end - begin
             if length > FINEST_NS:
@@ -300,7 +300,7 @@ class ComparisonRecord:
             low, high = (low + third, high) if (one < other) is is_highest else (low, high - third)
         return (low + high) // 2
 
-    def course(self, now: Nanos) -> Shape:
+    def shape(self, now: Nanos) -> Shape:
         """Up to ``now``, to which the world has come."""
         if self._begin is None:
             raise Misuse("nothing was watched yet")
@@ -310,7 +310,7 @@ class ComparisonRecord:
         if now == self._begin:
             return [*self._closed, Slope(now, now, here, here)]
         last = self._go_to(now - 1)
-        return [*self._closed, *self._stretch(now - 1, last), Slope(now, now, here, here)]
+        return [*self._closed, *self._interval(now - 1, last), Slope(now, now, here, here)]
 
     # ------------------------------------------------------------------ the past
 
@@ -321,26 +321,26 @@ class ComparisonRecord:
             self._closed.pop()
         if self._begin is not None and self._begin < now:
             last = self._go_to(now - 1)
-            self._closed += self._stretch(now - 1, forced(last, holds=self._first > 0.0))
+            self._closed += self._interval(now - 1, forced(last, holds=self._first > 0.0))
         elif self._closed and self._closed[-1].end >= now:
             begin, _, first, last = self._closed[-1]
             self._closed[-1] = Slope(begin, now - 1, first, last if first == last else self._here(now, first))
         self._begin = None
 
     def _here(self, now: Nanos, first: float) -> float:
-        """The end of a stretch that now goes no further."""
+        """The end of an interval that now goes no further."""
         self._reads |= {name: signal.value for name, signal in self._signals.items()}
         self._read()
-        self.bring(now)
+        self.sync(now)
         return forced(self._value(now), holds=first > 0.0)
 
     def state(self, now: Nanos) -> Shape:
         """All before ``now``."""
-        return [one.cut(one.begin, min(one.end, now - 1)) for one in self.course(now) if one.begin < now]
+        return [one.cut(one.begin, min(one.end, now - 1)) for one in self.shape(now) if one.begin < now]
 
-    def begin_after(self, course: Shape) -> None:
+    def begin_after(self, shape: Shape) -> None:
         """Go on after what another one has recorded."""
-        self._closed = list(course)
+        self._closed = list(shape)
 
 
 def _moves(signal: SignalOf | Idle) -> TypeGuard[SignalOf]:

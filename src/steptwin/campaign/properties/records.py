@@ -28,8 +28,8 @@ class SharedRecord:
         node = self.record.node
         return replace(node, sign=OPPOSITE[node.sign]) if self._is_opposite else node
 
-    def course(self, now: Nanos) -> Shape:
-        found = self.record.course(now)
+    def shape(self, now: Nanos) -> Shape:
+        found = self.record.shape(now)
         return negative(found) if self._is_opposite else found
 
 
@@ -80,9 +80,9 @@ class ComparisonRecords:
                 record.unfollow()
             self._world.unobserve(self)
 
-    def bring(self, now: Nanos) -> None:
+    def sync(self, now: Nanos) -> None:
         for record in self._known.values():
-            record.bring(now)
+            record.sync(now)
 
     # ------------------------------------------------------------------ as an observer
 
@@ -94,7 +94,7 @@ class ComparisonRecords:
         """All look where the watch begins; later only those that no scheduler follows."""
         found: dict[Source, None] = {}
         for record in self._known.values() if self._begins else self._spread:
-            sources = record.bring(now)
+            sources = record.sync(now)
             if record.scheduler is None:
                 found.update(dict.fromkeys(sources))
             record.look(now)

@@ -1,4 +1,4 @@
-"""Functions of time on whole nanoseconds, made of straight stretches: least and greatest, over windows, from a moment on."""
+"""Functions of time on whole nanoseconds, made of straight intervals: least and greatest, over windows, from a moment on."""
 
 from __future__ import annotations
 
@@ -38,27 +38,27 @@ Shape: TypeAlias = "list[Slope]"
 """Without gaps, in order."""
 
 
-def value_at(course: Shape, moment: Nanos) -> float:
-    low, high = 0, len(course) - 1
+def value_at(shape: Shape, moment: Nanos) -> float:
+    low, high = 0, len(shape) - 1
     while low < high:
         middle = (low + high) // 2
-        low, high = (middle + 1, high) if course[middle].end < moment else (low, middle)
-    return course[low].at(moment)
+        low, high = (middle + 1, high) if shape[middle].end < moment else (low, middle)
+    return shape[low].at(moment)
 
 
 def constant(begin: Nanos, end: Nanos, value: float) -> Shape:
     return [Slope(begin, end, value, value)]
 
 
-def negative(course: Shape) -> Shape:
-    return [Slope(begin, end, -first, -last) for begin, end, first, last in course]
+def negative(shape: Shape) -> Shape:
+    return [Slope(begin, end, -first, -last) for begin, end, first, last in shape]
 
 
-def shortest(course: Iterable[Slope]) -> Shape:
+def shortest(shape: Iterable[Slope]) -> Shape:
     """With neighbours of one constant value as one."""
     found: Shape = []
     flat: float | None = None  # the value of the last one, if it is constant
-    for slope in course:
+    for slope in shape:
         _, end, first, last = slope
         if flat is None or not flat == first == last:
             found.append(slope)
@@ -69,7 +69,7 @@ def shortest(course: Iterable[Slope]) -> Shape:
 
 
 def together(one: Shape, other: Shape) -> Iterator[tuple[Slope, Slope]]:
-    """Both in the same stretches, in each of which the same one is not below the other, but for rounding where they meet."""
+    """Both in the same intervals, in each of which the same one is not below the other, but for rounding where they meet."""
     i = j = 0
     while i < len(one) and j < len(other):
         a, b = one[i], other[j]
@@ -93,11 +93,11 @@ def greatest(one: Shape, other: Shape) -> Shape:
     return shortest(a if a.first + a.last >= b.first + b.last else b for a, b in together(one, other))
 
 
-def from_on(course: Shape) -> Shape:
+def from_on(shape: Shape) -> Shape:
     """At each moment the greatest value from then on."""
     found: Shape = []
     most = BOTTOM
-    for slope in reversed(course):
+    for slope in reversed(shape):
         begin, end, first, last = slope
         most = max(most, last)
         if first <= most:
@@ -108,19 +108,19 @@ def from_on(course: Shape) -> Shape:
     return shortest(reversed(found))
 
 
-def within(course: Shape, length: Nanos) -> Shape:
-    """At each moment the greatest value in the ``length`` ns after it, both ends included, as far as the course goes; what is
+def within(shape: Shape, length: Nanos) -> Shape:
+    """At each moment the greatest value in the ``length`` ns after it, both ends included, as far as the shape goes; what is
     true by no more than the share of the window that is left when it becomes true."""
-    begin, end = course[0].begin, course[-1].end
+    begin, end = shape[0].begin, shape[-1].end
     is_all = length >= end - begin
-    values = from_on(course) if is_all else _highest([_reached(slope, length, begin, end) for slope in course])
-    if length == 0 or not any(slope.first > 0.0 for slope in course):
+    values = from_on(shape) if is_all else _highest([_reached(slope, length, begin, end) for slope in shape])
+    if length == 0 or not any(slope.first > 0.0 for slope in shape):
         return values
-    return least(values, _left(course, length))
+    return least(values, _left(shape, length))
 
 
 def _reached(slope: Slope, length: Nanos, begin: Nanos, end: Nanos) -> Shape:
-    """Contribution of one stretch to each moment."""
+    """Contribution of one interval to each moment."""
     if slope.last >= slope.first:
         parts = [Slope(slope.begin - length, slope.end - length, slope.first, slope.last)]
         parts.append(Slope(slope.end - length + 1, slope.end, slope.last, slope.last))
@@ -130,11 +130,11 @@ def _reached(slope: Slope, length: Nanos, begin: Nanos, end: Nanos) -> Shape:
     return _filled(parts, begin, end, BOTTOM)
 
 
-def _left(course: Shape, length: Nanos) -> Shape:
-    """The share of the window from each moment on that is left when the next stretch that is true comes."""
-    begin = course[0].begin
+def _left(shape: Shape, length: Nanos) -> Shape:
+    """The share of the window from each moment on that is left when the next interval that is true comes."""
+    begin = shape[0].begin
     found: Shape = []
-    for slope in course:
+    for slope in shape:
         if slope.first <= 0.0:
             continue
         ramp = Slope(slope.begin - length, slope.begin, TINY, 1.0)
@@ -146,7 +146,7 @@ def _left(course: Shape, length: Nanos) -> Shape:
         if slope.end > slope.begin:
             found += constant(slope.begin + 1, slope.end, 1.0)
         begin = slope.end + 1
-    return found if begin > course[-1].end else [*found, *constant(begin, course[-1].end, TINY)]
+    return found if begin > shape[-1].end else [*found, *constant(begin, shape[-1].end, TINY)]
 
 
 def _filled(parts: Iterable[Slope], begin: Nanos, end: Nanos, value: float) -> Shape:
@@ -165,20 +165,20 @@ def _filled(parts: Iterable[Slope], begin: Nanos, end: Nanos, value: float) -> S
     return found
 
 
-def _highest(courses: list[Shape]) -> Shape:
-    while len(courses) > 1:
-        pairs = [greatest(*courses[n : n + 2]) if n + 1 < len(courses) else courses[n] for n in range(0, len(courses), 2)]
-        courses = pairs
-    return courses[0]
+def _highest(shapes: list[Shape]) -> Shape:
+    while len(shapes) > 1:
+        pairs = [greatest(*shapes[n : n + 2]) if n + 1 < len(shapes) else shapes[n] for n in range(0, len(shapes), 2)]
+        shapes = pairs
+    return shapes[0]
 
 
-def later(course: Shape, length: Nanos, open_value: float) -> Shape:
+def later(shape: Shape, length: Nanos, open_value: float) -> Shape:
     """At each moment the value ``length`` ns after it, by no more than the share of this time for which it has been true, or
     false, by then; ``open_value`` where that is after the end."""
-    begin, end = course[0].begin, course[-1].end
+    begin, end = shape[0].begin, shape[-1].end
     found: Shape = []
-    since, before = begin, course[0].first > 0.0
-    for slope in course:
+    since, before = begin, shape[0].first > 0.0
+    for slope in shape:
         is_true = slope.first > 0.0
         if is_true is not before:
             since, before = slope.begin, is_true
@@ -210,10 +210,10 @@ def held_until(first: Shape, then: Shape) -> Shape:
     return shortest(reversed(found))
 
 
-def rises(course: Shape) -> list[Nanos]:
+def rises(shape: Shape) -> list[Nanos]:
     """The moments at which it becomes positive, its beginning included."""
-    begin = [course[0].begin] if course[0].first > 0.0 else []
-    return begin + [here.begin for before, here in pairwise(course) if before.last <= 0.0 < here.first]
+    begin = [shape[0].begin] if shape[0].first > 0.0 else []
+    return begin + [here.begin for before, here in pairwise(shape) if before.last <= 0.0 < here.first]
 
 
 def steps(moments: list[Nanos], begin: Nanos, end: Nanos, value: Callable[[int], float]) -> Shape:

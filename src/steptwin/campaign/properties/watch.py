@@ -26,7 +26,7 @@ class WatchState:
 
     text: str
     now: Nanos
-    courses: tuple[tuple[tuple[Nanos, Nanos, float, float], ...], ...]
+    shapes: tuple[tuple[tuple[Nanos, Nanos, float, float], ...], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,8 +82,8 @@ class PropertyWatch:
             raise Misuse(
                 f"what was seen up to {earlier.now / SECOND:g} s does not serve a world at {self._world.now / SECOND:g} s"
             )
-        for recording, course in zip(self._recordings.values(), earlier.courses, strict=True):
-            recording.record.begin_after([Slope(*one) for one in course])
+        for recording, shape in zip(self._recordings.values(), earlier.shapes, strict=True):
+            recording.record.begin_after([Slope(*one) for one in shape])
 
     def close(self) -> None:
         """The world is no longer watched."""
@@ -91,26 +91,26 @@ class PropertyWatch:
 
     # ------------------------------------------------------------------ what it says
 
-    def _courses(self) -> dict[Atom, Shape]:
+    def _shapes(self) -> dict[Atom, Shape]:
         world = self._at_present()
-        return {atom: shortest(recording.course(world.now)) for atom, recording in self._recordings.items()}
+        return {atom: shortest(recording.shape(world.now)) for atom, recording in self._recordings.items()}
 
     def _at_present(self) -> Simulation:
         """The world, all of which has come to its present moment."""
         self._world.advance(self._world.now)
-        self._records.bring(self._world.now)
+        self._records.sync(self._world.now)
         return self._world
 
     def state(self) -> WatchState:
         """For a branch from the present moment."""
         world = self._at_present()
-        courses: Any = tuple(tuple(map(tuple, one.record.state(world.now))) for one in self._recordings.values())
-        return WatchState(self.which.text, world.now, courses)
+        shapes: Any = tuple(tuple(map(tuple, one.record.state(world.now))) for one in self._recordings.values())
+        return WatchState(self.which.text, world.now, shapes)
 
     def verdict(self) -> Verdict:
         """Verdict on the run up to now, as if it ended."""
-        found = Evaluation(self._courses())
-        value = value_at(found.course(self._formula), found.begin)
+        found = Evaluation(self._shapes())
+        value = value_at(found.shape(self._formula), found.begin)
         moment, by = found.decided(self._formula, found.begin)
         holds = value > 0.0
         robustness = 0.0 if abs(value) <= TINY else value
@@ -120,7 +120,7 @@ class PropertyWatch:
         at = f"{moment / SECOND:.9g} s"
         if isinstance(by, Atom):
             recording = self._recordings[by]
-            value = value_at(found.course(by), moment)
+            value = value_at(found.shape(by), moment)
             record = recording.record
             return f"{found_text(recording.node, value, record.scale, record.unit)} at {at}"
         text = formula_text(by)
@@ -133,7 +133,7 @@ class PropertyWatch:
         several = list(dict.fromkeys(measured(self._formula)))
         if not several:
             return {}
-        evaluation = Evaluation(self._courses())
+        evaluation = Evaluation(self._shapes())
         found: dict[str, float] = {}
         for n, node in enumerate(several, 1):
             lengths = [(end - begin) / SECOND for begin, end in evaluation.cycles(node)[0]]
@@ -152,8 +152,8 @@ def _parsed(text: str) -> tuple[PropertyFormula, tuple[Atom, ...], frozenset[Ato
 
 
 def _shaped(formula: PropertyFormula) -> frozenset[Atom]:
-    """The comparisons whose value between turns matters, because they meet others or a window. Counts and cycle times need only
-    the moments at which they change."""
+    """The comparisons whose value between turning points matters, because they meet others or a window. Counts and cycle times
+    need only the moments at which they change."""
     counted = {one for node in nodes(formula) if isinstance(node, CycleTime | Tally) for one in nodes(node)}
     atoms = {node for node in nodes(formula) if isinstance(node, Atom)} - counted
     windows = any(isinstance(node, Delayed) or (isinstance(node, Lasting) and node.length is not None) for node in nodes(formula))

@@ -162,10 +162,10 @@ class AsyncM1486Jog:
         return self.end is None
 
     async def _go(self, permission: Permission) -> None:
-        way_u = self._direction * self._distance_u
-        self._counter = self._counter + way_u & MASK
-        await self._unit.send(f"{'f' if way_u > 0 else 'b'}{self._distance_u}")
-        duration_s = self._chip.settings.travel_s(way_u, self._chip.variant)
+        move_u = self._direction * self._distance_u
+        self._counter = self._counter + move_u & MASK
+        await self._unit.send(f"{'f' if move_u > 0 else 'b'}{self._distance_u}")
+        duration_s = self._chip.settings.travel_s(move_u, self._chip.variant)
         await begin(self._unit, "r", ChipMotion.MOVE, permission, target_u=self._counter, duration_s=duration_s)
         permission.extend()  # the move has begun
 

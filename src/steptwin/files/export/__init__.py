@@ -30,13 +30,13 @@ from steptwin.files.export.records import SavedTrace, read_records, write_record
 from steptwin.files.textfiles import check_writable, new_file
 from steptwin.files.writing import as_text, is_written_directly
 from steptwin.inputfiles import open_regular
-from steptwin.simulation.mechanics.lanes import AxisLane, AxisViews
+from steptwin.simulation.mechanics.channels import AxisChannel, AxisViews
 from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 from steptwin.wire.pcapng import CapturedFrame, capture
 
 __all__ = [
     "FORMATS",
-    "AxisLane",
+    "AxisChannel",
     "AxisViews",
     "SavedTrace",
     "axis_views",

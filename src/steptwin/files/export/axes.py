@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from steptwin.motioncontroller import MotionController
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.kinds.kind import AnyKind
-from steptwin.simulation.mechanics.lanes import AxisLane, AxisViews, Mechanics, MovedLane
+from steptwin.simulation.mechanics.channels import AxisChannel, AxisViews, Mechanics, MovedChannel
 
 if TYPE_CHECKING:
     from steptwin.simulation.components.axis import BuiltAxis
@@ -16,24 +16,24 @@ if TYPE_CHECKING:
 
 def axis_views(world: Simulation) -> AxisViews:
     """The views of all axes of the controllers in a world, with the mechanics that they move."""
-    views: dict[tuple[str, str], AxisLane] = {}
+    views: dict[tuple[str, str], AxisChannel] = {}
     for name, controller in world.controllers.items():
         views |= controller_views(name, world.kind(name), controller)
-    moved: dict[str, list[MovedLane]] = {}
+    moved: dict[str, list[MovedChannel]] = {}
     for element in ELEMENTS.values():
         if element.moved is not None:
             for built in world.parts.built(element).values():
-                for axis, lane in element.moved(built):
-                    moved.setdefault(axis, []).append(lane)
+                for axis, channel in element.moved(built):
+                    moved.setdefault(axis, []).append(channel)
     for name, fitted in world.axes.items():
         place = fitted.mechanism.controller, str(fitted.mechanism.number)
         views[place] = views[place]._replace(mechanics=_mechanics(fitted)._replace(moved=tuple(moved.get(name, ()))))
     return views
 
 
-def controller_views(name: str, kind: AnyKind, controller: MotionController) -> dict[tuple[str, str], AxisLane]:
+def controller_views(name: str, kind: AnyKind, controller: MotionController) -> dict[tuple[str, str], AxisChannel]:
     """The views of the axes of one controller, for traces in which it is called ``name``."""
-    return {(name, axis): view for axis, view in kind.lanes(controller).items()}
+    return {(name, axis): view for axis, view in kind.channels(controller).items()}
 
 
 def _mechanics(fitted: BuiltAxis) -> Mechanics:

@@ -1,7 +1,7 @@
 """Tracks of what axes move besides their loads, such as shafts and tools, from the true positions of the axes.
 
-A trace does not have their motion, because it follows from that of the loads, as `steptwin.simulation.mechanics.lanes.MovedLane`
-says, and from the edges that faults record.
+A trace does not have their motion, because it follows from that of the loads, as
+`steptwin.simulation.mechanics.channels.MovedChannel` says, and from the edges that faults record.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from steptwin.controller import SECOND, Nanos
 from steptwin.files.export.tracks import AxisTrack, PinTrack
 from steptwin.motion import Profile, Segment, at_rest
 from steptwin.motion.divisions import profile_of
-from steptwin.motion.elastic import DriveStretch, Response, ResponseStretch, Spring
-from steptwin.simulation.mechanics.lanes import LIFT_SHARE, SLIPS, SPRING_SHARE, STUCK, AxisLane, MovedLane
+from steptwin.motion.elastic import DriveInterval, Response, ResponseInterval, Spring
+from steptwin.simulation.mechanics.channels import LIFT_SHARE, SLIPS, SPRING_SHARE, STUCK, AxisChannel, MovedChannel
 from steptwin.simulation.mechanics.loadmotion import polynomials
 
 SLACK_P = 0.02
@@ -41,23 +41,26 @@ class MovedPart(NamedTuple):
 
 
 def moved_track(
-    lane: MovedLane, load: AxisTrack, other: AxisTrack | None, pins: Mapping[str, PinTrack], until: Nanos
+    channel: MovedChannel, load: AxisTrack, other: AxisTrack | None, pins: Mapping[str, PinTrack], until: Nanos
 ) -> AxisTrack:
-    """The motion from the first moment of ``load`` to ``until``, in the unit of the lane. ``load`` and ``other`` are those of
+    """The motion from the first moment of ``load`` to ``until``, in the unit of the channel. ``load`` and ``other`` are those of
     `AxisTrack.load`; ``pins`` the edges of its controller, by subject."""
-    if lane.spring is not None:
-        parts = _swinging(lane, load, pins.get(f"{lane.name}.{SPRING_SHARE}"), until)
+    if channel.spring is not None:
+        parts = _swinging(channel, load, pins.get(f"{channel.name}.{SPRING_SHARE}"), until)
     elif other is not None:
-        one = _driven(load, lane.per_pulse, pins.get(f"{lane.coupling}.{SLIPS}"), until)
-        parts = _summed(one, _driven(other, lane.other_per_pulse, pins.get(f"{lane.other_coupling}.{SLIPS}"), until), lane.offset)
+        one = _driven(load, channel.per_pulse, pins.get(f"{channel.coupling}.{SLIPS}"), until)
+        parts = _summed(
+            one, _driven(other, channel.other_per_pulse, pins.get(f"{channel.other_coupling}.{SLIPS}"), until), channel.offset
+        )
     else:
         parts = [
-            _scaled(part, 1.0, lane.offset) for part in _driven(load, lane.per_pulse, pins.get(f"{lane.coupling}.{SLIPS}"), until)
+            _scaled(part, 1.0, channel.offset)
+            for part in _driven(load, channel.per_pulse, pins.get(f"{channel.coupling}.{SLIPS}"), until)
         ]
-        if lane.points:
-            parts = _stuck([*_lifted(parts, lane.points, lane.turn)], lane.name, pins)
-    track = AxisTrack(load.controller, AxisLane(f"{lane.name} {lane.signal}", lane.unit))
-    slack = SLACK_P * max(abs(lane.per_pulse), abs(lane.other_per_pulse)) * lane.steepest
+        if channel.points:
+            parts = _stuck([*_lifted(parts, channel.points, channel.turn)], channel.name, pins)
+    track = AxisTrack(load.controller, AxisChannel(f"{channel.name} {channel.signal}", channel.unit))
+    slack = SLACK_P * max(abs(channel.per_pulse), abs(channel.other_per_pulse)) * channel.steepest
     for part in parts:
         for begin, profile in _cubics(part, slack):
             track.times.append(begin)
@@ -75,7 +78,7 @@ def _driven(load: AxisTrack, per_pulse: float, coupling: PinTrack | None, until:
 
 def _parts(load: AxisTrack, until: Nanos) -> Iterator[MovedPart]:
     """The load, in pulses."""
-    for plan, after, end in load.stretches(load.times[0], until):
+    for plan, after, end in load.intervals(load.times[0], until):
         profile = profile_of(plan)
         cuts = [profile.start + int(one) for one in profile.ends if after < profile.start + one < end]
         for begin, last in pairwise([after, *cuts, end]):
@@ -187,38 +190,40 @@ def _summed(load: Iterable[MovedPart], other: Iterable[MovedPart], offset: float
         yield part._replace(look=look)
 
 
-def _swinging(lane: MovedLane, load: AxisTrack, share: PinTrack | None, until: Nanos) -> Iterator[MovedPart]:
+def _swinging(channel: MovedChannel, load: AxisTrack, share: PinTrack | None, until: Nanos) -> Iterator[MovedPart]:
     """A carriage behind its axis, from rest; where the belt changes, it goes on as it moves there."""
-    if lane.spring is None:
+    if channel.spring is None:
         return
-    changes = [] if share is None else [(time, lane.spring[0] * level) for time, level in share.changes(load.times[0] - 1, until)]
+    changes = (
+        [] if share is None else [(time, channel.spring[0] * level) for time, level in share.changes(load.times[0] - 1, until)]
+    )
     drives = [*_drives(load, until)]
     x, v = drives[0].p, 0.0
     ends = [load.times[0], *(time for time, _ in changes), until]
-    for (begin, end), frequency in zip(pairwise(ends), [lane.spring[0], *(one for _, one in changes)], strict=True):
-        spring = Spring(frequency, lane.spring[1])
+    for (begin, end), frequency in zip(pairwise(ends), [channel.spring[0], *(one for _, one in changes)], strict=True):
+        spring = Spring(frequency, channel.spring[1])
         first = max(bisect_right(drives, begin, key=lambda drive: drive.begin) - 1, 0)
         now = drives[first]
         s = (begin - now.begin) / SECOND
-        here = DriveStretch(begin, *now.at(begin), now.a + now.j * s, now.j)
+        here = DriveInterval(begin, *now.at(begin), now.a + now.j * s, now.j)
         response = Response(spring, [here, *drives[first + 1 :]], x, v)
-        begins = [stretch.drive.begin for stretch in response.stretches]
-        for stretch, last in zip(response.stretches, [*begins[1:], until], strict=True):
-            if stretch.drive.begin < end:
-                yield _scaled(_swing(stretch, min(last, end)), lane.per_pulse, 0.0)
+        begins = [interval.drive.begin for interval in response.intervals]
+        for interval, last in zip(response.intervals, [*begins[1:], until], strict=True):
+            if interval.drive.begin < end:
+                yield _scaled(_swing(interval, min(last, end)), channel.per_pulse, 0.0)
         x, v = response.at(end)
 
 
-def _swing(stretch: ResponseStretch, end: Nanos) -> MovedPart:
-    swings = stretch.cosine_p or stretch.sine_p
-    longest = floor(SECOND / stretch.spring.frequency / _PER_SWING) if swings else None
-    return MovedPart(stretch.drive.begin, end, stretch.at, longest)
+def _swing(interval: ResponseInterval, end: Nanos) -> MovedPart:
+    swings = interval.cosine_p or interval.sine_p
+    longest = floor(SECOND / interval.spring.frequency / _PER_SWING) if swings else None
+    return MovedPart(interval.drive.begin, end, interval.at, longest)
 
 
-def _drives(load: AxisTrack, until: Nanos) -> Iterator[DriveStretch]:
-    for plan, after, end in load.stretches(load.times[0], until):
+def _drives(load: AxisTrack, until: Nanos) -> Iterator[DriveInterval]:
+    for plan, after, end in load.intervals(load.times[0], until):
         for at, p, v, a, j in polynomials(profile_of(plan), after, end):
-            yield DriveStretch(at, p, v, a, j)
+            yield DriveInterval(at, p, v, a, j)
 
 
 # ---------------------------------------------------------------------- cubics

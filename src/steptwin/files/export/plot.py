@@ -60,7 +60,7 @@ STYLE = {
 
 
 class _PlotRow(NamedTuple):
-    """A thin lane: levels of a pin, or marks."""
+    """A thin channel: levels of a pin, or marks."""
 
     label: str
     color: str
@@ -98,11 +98,11 @@ def write_plot(recording: Recording, file: IO[bytes], form: str, progress: TimeP
             panel.plot(*_thinned(times, positions), color=_TRUE, linewidth=1.1)
             _scale(panel, f"{_label(track, recording)}\n{track.view.unit}", _TRUE)
         if rows:
-            _lanes(panels[-1], rows, recording)
+            _channels(panels[-1], rows, recording)
         if not panels:
             figure.text(left / _WIDTH_IN, 0.5, "nothing moved or changed", color=_FRAME)
         if any(left_out):
-            note = f"not shown: {left_out[0]} axes, {left_out[1]} lanes"
+            note = f"not shown: {left_out[0]} axes, {left_out[1]} channels"
             figure.text(1 - _RIGHT_IN / _WIDTH_IN, 0.12 / figure.get_figheight(), note, ha="right", color=_FRAME)
         figure.savefig(file, format=form, dpi=150, metadata={"Date": None} if form == "svg" else {"Software": None})
     progress(until)
@@ -110,7 +110,7 @@ def write_plot(recording: Recording, file: IO[bytes], form: str, progress: TimeP
 
 def _moves(track: AxisTrack, recording: Recording) -> bool:
     return len(track.loads) > 0 or any(
-        profile_of(plan).moving(after) for plan, after, _ in track.stretches(recording.begin, recording.until)
+        profile_of(plan).moving(after) for plan, after, _ in track.intervals(recording.begin, recording.until)
     )
 
 
@@ -235,7 +235,7 @@ def _scale(panel: Axes, label: str, color: str) -> None:
         panel.set_ylim(panel.dataLim.y0 - 1, panel.dataLim.y0 + 1)
 
 
-def _lanes(panel: Axes, rows: list[_PlotRow], recording: Recording) -> None:
+def _channels(panel: Axes, rows: list[_PlotRow], recording: Recording) -> None:
     panel.set_ylim(len(rows), 0)
     panel.set_yticks([i + 0.5 for i in range(len(rows))], [row.label for row in rows], fontsize=8)
     for i, row in enumerate(rows):

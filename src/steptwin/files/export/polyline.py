@@ -47,7 +47,7 @@ class PolylinePiece(NamedTuple):
 
 def curve(track: AxisTrack, begin: Nanos, until: Nanos, resolution: Nanos = 0) -> PolylineCurve:
     """The motion of ``track`` from ``begin`` to ``until``. What happens within ``resolution`` gets no points between."""
-    pieces = [piece for plan, a, b in track.stretches(begin, until) for piece in pieces_of(profile_of(plan), a, b)]
+    pieces = [piece for plan, a, b in track.intervals(begin, until) for piece in pieces_of(profile_of(plan), a, b)]
     ends = [(piece.look(piece.begin), piece.look(piece.end)) for piece in pieces]
     positions = [p for pair in ends for p, _ in pair]
     speeds = [v for pair in ends for _, v in pair]
@@ -81,12 +81,12 @@ def pieces_of(profile: Profile, begin: Nanos, until: Nanos) -> list[PolylinePiec
     return pieces
 
 
-def _points(piece: PolylinePiece, *courses: tuple[float, float, float]) -> int:
-    """In how many equal parts to divide; each course is the value at the beginning, at the end, and what may be missed."""
+def _points(piece: PolylinePiece, *curves: tuple[float, float, float]) -> int:
+    """In how many equal parts to divide; each curve is the value at the beginning, at the end, and what may be missed."""
     most = 0.0
     for quarter in (1, 2, 3):
         values = piece.look(piece.begin + (piece.end - piece.begin) * quarter // 4)
-        for value, (first, last, slack) in zip(values, courses, strict=True):
+        for value, (first, last, slack) in zip(values, curves, strict=True):
             if slack > 0.0:
                 most = max(most, abs(value - first - (last - first) * quarter / 4) / slack)
     return min(max(ceil(sqrt(most)), 1), _MOST_POINTS)

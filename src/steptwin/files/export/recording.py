@@ -12,8 +12,8 @@ from steptwin.files.export.moved import moved_track
 from steptwin.files.export.tracks import AxisTrack, PinTrack
 from steptwin.motion import Profile, at_rest
 from steptwin.motion.divisions import StepTrain, profile_of
-from steptwin.simulation.mechanics.course import LoadPiece
-from steptwin.simulation.mechanics.lanes import AxisViews, plain_view
+from steptwin.simulation.mechanics.channels import AxisViews, plain_view
+from steptwin.simulation.mechanics.trajectory import LoadPiece
 from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 
 
@@ -139,17 +139,20 @@ class _Sorting:
         loads = {place: track.load(its) for place, track in self._axes.items() if (its := track.view.mechanics) is not None}
         for (controller, subject), track in self._axes.items():
             pins = {pin: one for (of, pin), one in self._pins.items() if of == controller}
-            for lane in () if track.view.mechanics is None else track.view.mechanics.moved:
-                other = None if lane.other is None else loads.get(lane.other)
-                if until > self._begin and (lane.other is None or other is not None):
-                    found.append(moved_track(lane, loads[controller, subject], other, pins, until))
+            for channel in () if track.view.mechanics is None else track.view.mechanics.moved:
+                other = None if channel.other is None else loads.get(channel.other)
+                if until > self._begin and (channel.other is None or other is not None):
+                    found.append(moved_track(channel, loads[controller, subject], other, pins, until))
         return found
 
     def _rests(self) -> list[Nanos | None]:
         """When each axis, and each load that moves without its drive, comes to rest; None: never."""
         drives = [profile_of(track.plans[-1]).end for track in self._axes.values()]
         return drives + [
-            free.end for track in self._axes.values() for begin, free in track.free.items() if begin == track.loads[-1].begin
+            coasting.end
+            for track in self._axes.values()
+            for begin, coasting in track.coasting.items()
+            if begin == track.loads[-1].begin
         ]
 
 

@@ -22,7 +22,7 @@ from steptwin.motion import Profile
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.plain import plain_plan, read_plan
 from steptwin.plaintypes import fields_fit, fits, fitting, shown
-from steptwin.simulation.mechanics.lanes import AxisLane, AxisViews, Mechanics, MovedLane, PhaseOutputs, StepOutputs
+from steptwin.simulation.mechanics.channels import AxisChannel, AxisViews, Mechanics, MovedChannel, PhaseOutputs, StepOutputs
 from steptwin.simulation.scheduler.trace import KINDS, Trace, TraceRecord
 
 FORMAT = 2
@@ -37,7 +37,7 @@ class SavedTrace(NamedTuple):
     """The content of a file of JSON lines."""
 
     trace: Trace
-    views: dict[tuple[str, str], AxisLane]
+    views: dict[tuple[str, str], AxisChannel]
     until: Nanos
     """When the run ended."""
     digest: str
@@ -128,7 +128,7 @@ def _line(data: dict[str, Any]) -> str:
 def _head(data: dict[str, Any]) -> SavedTrace:
     if data["steptwin_trace"] != FORMAT:
         raise Misuse(f"a trace of format {shown(data['steptwin_trace'])}: this version reads format {FORMAT}")
-    views: dict[tuple[str, str], AxisLane] = {}
+    views: dict[tuple[str, str], AxisChannel] = {}
     for axis in data["axes"]:
         view = _view_from_json(axis)
         if not (fields_fit(view) and fields_fit(view.outputs) and view.pulses_per_unit):
@@ -198,16 +198,16 @@ def _from_json(value: Any) -> object:
     return bytes.fromhex(value["hex"]) if "hex" in value else read_plan(value)
 
 
-def _view_to_json(view: AxisLane) -> dict[str, object]:
+def _view_to_json(view: AxisChannel) -> dict[str, object]:
     data = {**view._asdict(), "outputs": view.outputs._asdict()}
     del data["mechanics"]
     if view.mechanics is None:
         return data
-    mechanics = {**view.mechanics._asdict(), "moved": [lane._asdict() for lane in view.mechanics.moved]}
+    mechanics = {**view.mechanics._asdict(), "moved": [channel._asdict() for channel in view.mechanics.moved]}
     return {**data, "mechanics": mechanics}
 
 
-def _view_from_json(data: dict[str, Any]) -> AxisLane:
+def _view_from_json(data: dict[str, Any]) -> AxisChannel:
     outputs = dict(data["outputs"])
     made: StepOutputs | PhaseOutputs
     if "phases" in outputs:
@@ -218,23 +218,23 @@ def _view_from_json(data: dict[str, Any]) -> AxisLane:
     mechanics: Mechanics | None = None
     if "mechanics" in data:
         its = {**data["mechanics"]}
-        moved = tuple(_moved_from_json(lane) for lane in its.pop("moved", ()))
+        moved = tuple(_moved_from_json(channel) for channel in its.pop("moved", ()))
         mechanics = Mechanics(**its, moved=moved)
-    return AxisLane(data["name"], data["unit"], data["pulses_per_unit"], made, mechanics)
+    return AxisChannel(data["name"], data["unit"], data["pulses_per_unit"], made, mechanics)
 
 
-def _moved_from_json(data: dict[str, Any]) -> MovedLane:
+def _moved_from_json(data: dict[str, Any]) -> MovedChannel:
     plain = {key: _tuples(value) for key, value in data.items()}
-    return MovedLane(**plain)
+    return MovedChannel(**plain)
 
 
 def _tuples(value: Any) -> Any:
     return tuple(map(_tuples, value)) if isinstance(value, list) else value
 
 
-def _is_moved(lane: MovedLane) -> bool:
-    """Whether a lane from a file is one that can be computed."""
-    angles = [angle for angle, _ in lane.points] if fields_fit(lane) else []
-    rises = all(a < b for a, b in pairwise(angles)) and (not angles or angles[-1] - angles[0] < lane.turn)
-    swings = lane.spring is None or (lane.spring[0] > 0.0 and 0.0 < lane.spring[1] < 1.0)
-    return fields_fit(lane) and (lane.per_pulse != 0.0 or lane.other_per_pulse != 0.0) and rises and swings
+def _is_moved(channel: MovedChannel) -> bool:
+    """Whether a channel from a file is one that can be computed."""
+    angles = [angle for angle, _ in channel.points] if fields_fit(channel) else []
+    rises = all(a < b for a, b in pairwise(angles)) and (not angles or angles[-1] - angles[0] < channel.turn)
+    swings = channel.spring is None or (channel.spring[0] > 0.0 and 0.0 < channel.spring[1] < 1.0)
+    return fields_fit(channel) and (channel.per_pulse != 0.0 or channel.other_per_pulse != 0.0) and rises and swings

@@ -70,7 +70,7 @@ def _motion(track: AxisTrack, recording: Recording) -> dict[str, object]:
     """
     plans: list[dict[str, object]] = []
     pieces: list[int] = []
-    for plan, after, until in track.stretches(recording.begin, recording.until):
+    for plan, after, until in track.intervals(recording.begin, recording.until):
         profile = profile_of(plan)
         for piece, grid, count in _divided(plan, after, until):
             number, direction = -1, 0
@@ -89,7 +89,7 @@ def _moved(track: AxisTrack, recording: Recording) -> dict[str, object]:
     """As `_motion`, without pulses."""
     plans: list[dict[str, object]] = []
     pieces: list[int] = []
-    for plan, after, _ in track.stretches(recording.begin, recording.until):
+    for plan, after, _ in track.intervals(recording.begin, recording.until):
         pieces += [after - recording.begin, len(plans), 0 if profile_of(plan).segments else -1, 0, 0, 1]
         plans.append(plain_plan(plan))
     view = track.view

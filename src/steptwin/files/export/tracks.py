@@ -10,8 +10,8 @@ from operator import attrgetter
 from steptwin.controller import Nanos
 from steptwin.motion import Profile, at_rest
 from steptwin.motion.divisions import Plan, profile_of
-from steptwin.simulation.mechanics.course import LoadPiece
-from steptwin.simulation.mechanics.lanes import AxisLane, Mechanics
+from steptwin.simulation.mechanics.channels import AxisChannel, Mechanics
+from steptwin.simulation.mechanics.trajectory import LoadPiece
 
 
 @dataclass(slots=True)
@@ -19,12 +19,12 @@ class AxisTrack:
     """The plans of an axis: each counts from its moment to that of the next. There is one at the beginning of the window."""
 
     controller: str
-    view: AxisLane
+    view: AxisChannel
     times: list[Nanos] = field(default_factory=list)
     plans: list[Plan] = field(default_factory=list)
     loads: list[LoadPiece] = field(default_factory=list)
     """Positions of the load by moment, if it does not follow the pulses throughout."""
-    free: dict[Nanos, Profile] = field(default_factory=dict)
+    coasting: dict[Nanos, Profile] = field(default_factory=dict)
     """Motions of the load without current, by the moments of ``loads`` in whose place they are."""
     origins: list[tuple[Nanos, int]] = field(default_factory=list)
     """By how many pulses the coordinate is above the count, by moments."""
@@ -41,7 +41,7 @@ class AxisTrack:
     def plan(self, now: Nanos) -> Plan:
         return self.plans[max(bisect_right(self.times, now) - 1, 0)]
 
-    def stretches(self, after: Nanos, until: Nanos) -> Iterator[tuple[Plan, Nanos, Nanos]]:
+    def intervals(self, after: Nanos, until: Nanos) -> Iterator[tuple[Plan, Nanos, Nanos]]:
         """(plan, after, until) of every plan in force between; pulses at ``until`` belong to the plan before it."""
         for i in range(max(bisect_right(self.times, after) - 1, 0), len(self.plans)):
             end = min(self.times[i + 1], until) if i + 1 < len(self.times) else until
@@ -67,13 +67,13 @@ class AxisTrack:
         self.times.append(begin)
         self.plans.append(type(profile)(profile.start, profile.base + above_p, profile.segments, profile.final_p))
 
-    def place(self, time: Nanos, loads: list[LoadPiece], free: Profile | None = None) -> None:
+    def place(self, time: Nanos, loads: list[LoadPiece], coasting: Profile | None = None) -> None:
         """From ``time`` on the load is otherwise than was known before: at ``loads``, or it moves freely."""
         while self.loads and self.loads[-1].begin >= time:
-            self.free.pop(self.loads.pop().begin, None)
+            self.coasting.pop(self.loads.pop().begin, None)
         self.loads += loads
-        if free is not None:
-            self.free[time] = free
+        if coasting is not None:
+            self.coasting[time] = coasting
 
     def true(self) -> AxisTrack | None:
         """The motion of the load, ``zero_p`` included; None where it is not known, or can only be that of the drive."""
@@ -82,19 +82,19 @@ class AxisTrack:
 
     def load(self, mechanics: Mechanics) -> AxisTrack:
         """The motion of the load, ``zero_p`` included."""
-        view = AxisLane(f"{mechanics.name} true", mechanics.unit, mechanics.pulses_per_unit)
+        view = AxisChannel(f"{mechanics.name} true", mechanics.unit, mechanics.pulses_per_unit)
         track = AxisTrack(self.controller, view)
         for begin in sorted({*self.times, *(load.begin for load in self.loads if load.begin >= self.times[0])}):
             past = bisect_right(self.loads, begin, key=attrgetter("begin")) - 1
             since, follows, pulses = self.loads[past] if past >= 0 else LoadPiece(begin, True, 0)
-            profile = profile_of(self.plan(begin)) if follows else self.free.get(since) or at_rest(begin, pulses)
+            profile = profile_of(self.plan(begin)) if follows else self.coasting.get(since) or at_rest(begin, pulses)
             off = mechanics.zero_p + (pulses if follows else 0)
             track.add(begin, profile, off)
         return track
 
     def most_pulses(self, after: Nanos, until: Nanos) -> int:
         """How many pulses there are, or more: the whole positions passed."""
-        return sum(_passed(profile_of(plan), begin, end) for plan, begin, end in self.stretches(after, until))
+        return sum(_passed(profile_of(plan), begin, end) for plan, begin, end in self.intervals(after, until))
 
 
 def _passed(profile: Profile, after: Nanos, until: Nanos) -> int:

@@ -27,7 +27,7 @@ from steptwin.motion import Profile
 from steptwin.motion.divisions import Plan, StepTrain, profile_of
 from steptwin.motion.pulses import pulse_runs, step_times
 from steptwin.motion.waveforms import PERIOD, currents
-from steptwin.simulation.mechanics.lanes import PhaseOutputs, StepOutputs
+from steptwin.simulation.mechanics.channels import PhaseOutputs, StepOutputs
 
 _WINDOW_CHANGES = 1 << 20
 """About how many changes are in memory at a time."""
@@ -123,11 +123,11 @@ class _Dump:
             self._trains.append(_Train(track, first, outputs.width_ns))
             if outputs.dir is not None:
                 code = self._declare(track.controller, "wire", 1, outputs.dir)
-                turns = _turns(track, recording.until, outputs.width_ns)
-                done = bisect_right(turns, recording.begin, key=itemgetter(0))
-                direction = turns[max(done - 1, 0)][1] if turns else 1
+                reversals = _reversals(track, recording.until, outputs.width_ns)
+                done = bisect_right(reversals, recording.begin, key=itemgetter(0))
+                direction = reversals[max(done - 1, 0)][1] if reversals else 1
                 self._initial.append(_bit(direction > 0, code))
-                quiet += [(time, _bit(direction > 0, code)) for time, direction in turns[max(done, 1) :]]
+                quiet += [(time, _bit(direction > 0, code)) for time, direction in reversals[max(done, 1) :]]
         else:
             for phase in outputs.phases:
                 code = self._declare(track.controller, "integer", 8, phase)
@@ -216,7 +216,7 @@ class _Train(NamedTuple):
 
     def changes(self, after: Nanos, until: Nanos) -> Iterator[tuple[Times, Tokens]]:
         """A pulse ends after its width, or half-way to the next one. So pulses before and after the window matter too."""
-        lists = [_pulses(plan, a, b) for plan, a, b in self.track.stretches(after - self.width_ns, until + 2 * self.width_ns)]
+        lists = [_pulses(plan, a, b) for plan, a, b in self.track.intervals(after - self.width_ns, until + 2 * self.width_ns)]
         begins = np.concatenate(lists) if lists else np.empty(0, dtype=np.int64)
         if not len(begins):
             return
@@ -240,7 +240,7 @@ class _Phases(NamedTuple):
         cuts = [] if self.chosen is None else [time for time, _ in self.chosen.changes(after, until)]
         for i, (begin, end) in enumerate(zip([after, *cuts], [*cuts, until], strict=True)):
             table = self._table(begin)
-            for plan, a, b in self.track.stretches(begin, end):
+            for plan, a, b in self.track.intervals(begin, end):
                 times = _pulses(plan, a, b)
                 before = plan.count(max(a, profile_of(plan).start))
                 angles = np.append(before, _positions(plan, a, b)) % PERIOD
@@ -285,7 +285,7 @@ def _positions(plan: Plan, after: Nanos, until: Nanos) -> Tokens:
     if isinstance(plan, StepTrain):
         begin, end = plan.count(after) * plan.direction, plan.count(until) * plan.direction
         parts = [np.empty(0, dtype=np.int64)]
-        for first, last, grid in plan.stretches():
+        for first, last, grid in plan.intervals():
             low, high = first * plan.direction, end if last is None else min(last * plan.direction, end)
             reached = np.arange(low + grid, high + 1, grid)
             parts.append(reached[reached > begin] * plan.direction)
@@ -298,25 +298,25 @@ def _positions(plan: Plan, after: Nanos, until: Nanos) -> Tokens:
     return np.concatenate(parts)
 
 
-def _turns(track: AxisTrack, until: Nanos, width_ns: Nanos) -> list[tuple[Nanos, int]]:
+def _reversals(track: AxisTrack, until: Nanos, width_ns: Nanos) -> list[tuple[Nanos, int]]:
     """Changes of direction from the first plan on: as the motion that way begins, but not within a pulse."""
-    turns: list[tuple[Nanos, int]] = []
-    for plan, after, end in track.stretches(track.times[0], until):
+    reversals: list[tuple[Nanos, int]] = []
+    for plan, after, end in track.intervals(track.times[0], until):
         profile = profile_of(plan)
         for begin, last, direction in _ways(profile, after, end):
-            if turns and turns[-1][1] == direction:
+            if reversals and reversals[-1][1] == direction:
                 continue
             following = profile.pulse_time(profile.count(begin) + direction, begin)
             if following is None or following > last:
                 continue
-            before = [time for p, a, b in track.stretches(begin - width_ns, begin) for time in _pulses(p, a, b).tolist()]
+            before = [time for p, a, b in track.intervals(begin - width_ns, begin) for time in _pulses(p, a, b).tolist()]
             at = max(begin, min(before[-1] + width_ns, (before[-1] + following) // 2)) if before else begin
-            turns.append((at, direction))
-    return turns
+            reversals.append((at, direction))
+    return reversals
 
 
 def _ways(profile: Profile, after: Nanos, until: Nanos) -> Iterator[tuple[Nanos, Nanos, int]]:
-    """(begin, end, direction) of every stretch of one direction."""
+    """(begin, end, direction) of every interval of one direction."""
     legs = list(profile.legs(max(after, profile.start)))
     for i, (begin, direction) in enumerate(legs):
         following = legs[i + 1][0] if i + 1 < len(legs) else until

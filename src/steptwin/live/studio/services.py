@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 STEPS = 800
-"""Positions of a motion that are given for a stretch, beside the ends of its parts."""
+"""Positions of a motion that are given for an interval, beside the ends of its parts."""
 MOST_VALUES = 4000
 """Most values of a point; where there are more, it is read in equal steps."""
 MOST_RUNS = 500
@@ -138,9 +138,9 @@ def _series(past: HistoryDatabase, point: str, run: KeptRun, begin_s: float, end
 def _compare(
     past: HistoryDatabase, points: Sequence[str], runs: tuple[int, int], begin_s: float, end_s: float | None
 ) -> Sequence[Mapping[str, object]]:
-    from steptwin.history.stretches import Stretch, compare
+    from steptwin.history.intervals import Interval, compare
 
-    one, other = (Stretch(begin_s, end_s, past.run(number)) for number in runs)
+    one, other = (Interval(begin_s, end_s, past.run(number)) for number in runs)
     chosen = points or sorted({point.name for point in past.points()})
     return [
         {

@@ -15,13 +15,13 @@ from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, 
 from steptwin.simulation.components.encoder import EncoderSpec
 from steptwin.simulation.components.motor import MotorSpec, motor_of
 from steptwin.simulation.components.site import Site
-from steptwin.simulation.components.switch import SwitchSpec, lane_of, put_switch, zone_of
+from steptwin.simulation.components.switch import SwitchSpec, channel_of, put_switch, zone_of
 from steptwin.simulation.kinds.kind import EncoderInputs
 from steptwin.simulation.logic.contacts import Switch, Zone
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.mechanics.course import Build, Course
 from steptwin.simulation.mechanics.mechanics import EncoderBuild, Mechanism, RotorMark
 from steptwin.simulation.mechanics.scale import GivenScale, Scale, exact_fraction, scale_of
+from steptwin.simulation.mechanics.trajectory import Build, Trajectory
 from steptwin.simulation.scheduler.scheduler import Scheduler, Source
 from steptwin.simulation.toml.names import Unknown, WrongTerminal
 from steptwin.simulation.toml.reader import TomlText
@@ -135,7 +135,7 @@ def _build(spec: AxisSpec, site: Site) -> BuiltAxis:
     scheduler.add_part(mechanism, (controller,), spec.name)
     fitted = BuiltAxis(spec, scheduler, mechanism, scale)
     for n, switch in enumerate(spec.switches, start=1):
-        site.text.unless_wrong(switch.path, partial(_put_switch, fitted, switch, lane_of(spec.name, n), site))
+        site.text.unless_wrong(switch.path, partial(_put_switch, fitted, switch, channel_of(spec.name, n), site))
     return fitted
 
 
@@ -160,20 +160,20 @@ def _checked(spec: AxisSpec, site: Site) -> tuple[int, Scale, Build]:
         play=pulses(spec.backlash),
         period_p=scale.period_p,
         motor=None if spec.motor is None else motor_of(spec.motor, scale),
-        is_free=spec.motor is not None and spec.motor.when_off == "free",
+        coasts_unpowered=spec.motor is not None and spec.motor.when_off == "free",
     )
-    if build.is_free and build.motor is not None:
-        build.motor.check_free()
+    if build.coasts_unpowered and build.motor is not None:
+        build.motor.check_coasting()
     return number, scale, build
 
 
-def _put_switch(axis: BuiltAxis, spec: SwitchSpec, lane: str, site: Site) -> None:
+def _put_switch(axis: BuiltAxis, spec: SwitchSpec, channel: str, site: Site) -> None:
     def zone() -> Zone:
         usual = axis.scale.turn if axis.spec.kind == "rotary" else None
         period = usual if spec.period is None else axis.scale.pulses(spec.period)
         return zone_of(spec, axis.scale.nearest, period)
 
-    put_switch(axis.scheduler, axis.mechanism, axis.spec.drive[0], site.memo.once(spec.path, zone), spec, lane, site)
+    put_switch(axis.scheduler, axis.mechanism, axis.spec.drive[0], site.memo.once(spec.path, zone), spec, channel, site)
 
 
 def _connect(spec: AxisSpec, fitted: BuiltAxis, site: Site) -> None:
@@ -237,29 +237,29 @@ def find_axis(name: str, site: Site) -> BuiltAxis:
     return found
 
 
-def turns_of_axis(fitted: BuiltAxis, now: Nanos) -> Iterator[Nanos]:
+def turning_points_of_axis(fitted: BuiltAxis, now: Nanos) -> Iterator[Nanos]:
     """Moments after ``now`` between which its load moves one way."""
-    return iter(fitted.mechanism.course(now).turns(now))
+    return iter(fitted.mechanism.trajectory(now).turning_points(now))
 
 
 def _signals(fitted: BuiltAxis) -> Mapping[str, SignalOf]:
-    mechanism, turning = fitted.mechanism, partial(turns_of_axis, fitted)
+    mechanism, turning = fitted.mechanism, partial(turning_points_of_axis, fitted)
     up, down = fitted.scale.pulses_per_unit.as_integer_ratio()
     source, version = (fitted.source,), mechanism.version
 
-    def signal(of: Callable[[Course, Nanos], float], unit: str = "") -> SignalOf:
+    def signal(of: Callable[[Trajectory, Nanos], float], unit: str = "") -> SignalOf:
         return SignalOf(
             source,
-            lambda now: of(mechanism.course(now), now),
+            lambda now: of(mechanism.trajectory(now), now),
             turning,
             version,
             unit,
-            freeze=lambda now: partial(of, mechanism.course(now)),
+            freeze=lambda now: partial(of, mechanism.trajectory(now)),
         )
 
-    position = signal(lambda course, now: course.load_at(now) * down / up, fitted.scale.unit)
-    lost = signal(lambda course, now: float(course.field(now) - course.at(now).rotor))
-    stalled = signal(lambda course, now: float(course.at(now).stalled))
+    position = signal(lambda trajectory, now: trajectory.load_at(now) * down / up, fitted.scale.unit)
+    lost = signal(lambda trajectory, now: float(trajectory.field(now) - trajectory.at(now).rotor))
+    stalled = signal(lambda trajectory, now: float(trajectory.at(now).stalled))
     return dict(zip(MECHANICS, (position, lost, stalled), strict=True))
 
 

@@ -44,14 +44,14 @@ class Sensor(Contact):
     FIXED: ClassVar[tuple[str, ...]] = ("_at", "_belt", "_of_marks", "_seen")
     __slots__ = (*FIXED,)
 
-    def __init__(self, circuit: Circuit, belt: Carrying, spec: SensorSpec, chance: Chance, lane: str) -> None:
+    def __init__(self, circuit: Circuit, belt: Carrying, spec: SensorSpec, chance: Chance, channel: str) -> None:
         super().__init__(
             circuit,
             normally_closed=spec.contact == "NC",
             bounce_ns=spec.bounce,
             bounces=spec.bounces,
             chance=chance,
-            lane=lane,
+            channel=channel,
         )
         self._belt = belt
         self._at = belt.places(spec.at)

@@ -116,12 +116,12 @@ def _stick(active: ActiveFault, brake: Brake, begins: bool, now: Nanos) -> str:
 def _make(spec: BrakeSpec, site: Site) -> Brake:
     mechanism = find_axis(spec.axis, site).mechanism
     motor = mechanism.build.motor
-    if motor is None or not mechanism.build.is_free:
+    if motor is None or not mechanism.build.coasts_unpowered:
         raise Misuse(f"axis {spec.axis!r} stands without current: a brake needs an [axis.motor] with when_off = 'free'")
     braked = [name for name, other in site.parts.built(BRAKE).items() if other.acts_on(mechanism)]
     if braked:
         raise Misuse(f"axis {spec.axis!r} has the brake {braked[0]!r} already")
-    motor.check_free(spec.torque)
+    motor.check_coasting(spec.torque)
     return Brake(site.board(spec.name), spec, mechanism)
 
 

@@ -33,7 +33,7 @@ def _build(spec: ButtonSpec, site: Site) -> tuple[Button, Scheduler]:
         bounce_ns=spec.bounce,
         bounces=spec.bounces,
         chance=site.bounce_of(circuit),
-        lane=spec.name,
+        channel=spec.name,
     )
     button.rest_at(spec.contact == "NC")
     scheduler.add_part(button, (circuit.target.controller,), spec.name, circuit.target.controller)
@@ -42,7 +42,7 @@ def _build(spec: ButtonSpec, site: Site) -> tuple[Button, Scheduler]:
 
 def _signals(built: tuple[Button, Scheduler]) -> Mapping[str, SignalOf]:
     button, scheduler = built
-    return {"pressed": SignalOf((scheduler.source(button.lane),), lambda now: float(button.pressed))}
+    return {"pressed": SignalOf((scheduler.source(button.channel),), lambda now: float(button.pressed))}
 
 
 BUTTON: Element[ButtonSpec, tuple[Button, Scheduler]] = Element(

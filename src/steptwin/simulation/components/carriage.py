@@ -15,14 +15,14 @@ from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.components.site import Site
-from steptwin.simulation.components.switch import SwitchSpec, lane_of, put_switch, zone_of
+from steptwin.simulation.components.switch import SwitchSpec, channel_of, put_switch, zone_of
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.faults.table import number as parameter
 from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.mechanics.channels import SPRING_SHARE, MovedChannel
 from steptwin.simulation.mechanics.drawing import rail
-from steptwin.simulation.mechanics.lanes import SPRING_SHARE, MovedLane
-from steptwin.simulation.mechanics.loadmotion import load_stretches
+from steptwin.simulation.mechanics.loadmotion import load_intervals
 from steptwin.simulation.toml.table import key, table, tables_in
 from steptwin.simulation.toml.values import NameOf, name_value, number
 from steptwin.state import Plain, Stateful
@@ -54,14 +54,14 @@ class Carriage(Stateful):
         self._version: object = axis.mechanism.version()
 
     def _respond(self, now: Nanos, x: float, v: float) -> Response:
-        return Response(self._spring, load_stretches(self.axis.mechanism.course(now), now), x, v)
+        return Response(self._spring, load_intervals(self.axis.mechanism.trajectory(now), now), x, v)
 
     def _renew(self, now: Nanos) -> None:
         """Go on from the present place after a change of the motion of the axis, or of the belt."""
         before = self._response
         x, v = before.at(now)
-        drives = tuple(load_stretches(self.axis.mechanism.course(now), now))
-        v += 2.0 * self._spring.rate * (drives[0].p - before.stretch(now).drive.at(now)[0])
+        drives = tuple(load_intervals(self.axis.mechanism.trajectory(now), now))
+        v += 2.0 * self._spring.rate * (drives[0].p - before.interval(now).drive.at(now)[0])
         self._response = Response(self._spring, drives, x, v)
         self._version = self.axis.mechanism.version()
 
@@ -76,7 +76,7 @@ class Carriage(Stateful):
     def update(self, now: Nanos) -> None:
         if self.axis.mechanism.version() != self._version:
             self._renew(now)
-            self.axis.scheduler.mark(self.spec.name)
+            self.axis.scheduler.notify(self.spec.name)
 
     def deadline(self) -> Nanos | None:
         """None: its motion is computed in advance."""
@@ -103,10 +103,12 @@ class Carriage(Stateful):
         return self._response.reaches(position - 0.5 * direction, after, direction)
 
     @property
-    def moved(self) -> tuple[str, MovedLane]:
+    def moved(self) -> tuple[str, MovedChannel]:
         spec, scale = self.spec, self.axis.scale
         per_pulse = self.axis.mechanism.build.sign / float(scale.pulses_per_unit)
-        return self.axis.spec.name, MovedLane(spec.name, "position", scale.unit, per_pulse, spring=(spec.frequency, spec.damping))
+        return self.axis.spec.name, MovedChannel(
+            spec.name, "position", scale.unit, per_pulse, spring=(spec.frequency, spec.damping)
+        )
 
     # ------------------------------------------------------------------ signals
 
@@ -115,18 +117,18 @@ class Carriage(Stateful):
 
     def deflection(self, now: Nanos) -> float:
         """By how much it is ahead of its drive."""
-        return self._units(self._response.at(now)[0] - self._response.stretch(now).drive.at(now)[0])
+        return self._units(self._response.at(now)[0] - self._response.interval(now).drive.at(now)[0])
 
     def settled(self, now: Nanos) -> float:
         """1 while its drive stands and it does not swing."""
-        drive = self._response.stretch(now).drive
+        drive = self._response.interval(now).drive
         return float(not (self._response.oscillates(now) or drive.v or drive.a or drive.j))
 
     def _units(self, pulses: float) -> float:
         return pulses / float(self.axis.scale.pulses_per_unit)
 
-    def turns(self, now: Nanos) -> Iterator[Nanos]:
-        return self._response.turns(now)
+    def turning_points(self, now: Nanos) -> Iterator[Nanos]:
+        return self._response.turning_points(now)
 
     def ends(self, now: Nanos) -> Iterator[Nanos]:
         return (end for end in self._response.ends() if end > now)
@@ -157,15 +159,15 @@ def _build(spec: CarriageSpec, site: Site) -> Carriage:
     mechanism = carriage.axis.mechanism
     carriage.axis.scheduler.add_part(carriage, (mechanism.controller, spec.axis), spec.name)
     for n, switch in enumerate(spec.switches, start=1):
-        site.text.unless_wrong(switch.path, partial(_put_switch, carriage, switch, lane_of(spec.name, n), site))
+        site.text.unless_wrong(switch.path, partial(_put_switch, carriage, switch, channel_of(spec.name, n), site))
     return carriage
 
 
-def _put_switch(carriage: Carriage, spec: SwitchSpec, lane: str, site: Site) -> None:
+def _put_switch(carriage: Carriage, spec: SwitchSpec, channel: str, site: Site) -> None:
     scale = carriage.axis.scale
     usual = scale.turn if carriage.axis.spec.kind == "rotary" else None
     period = usual if spec.period is None else scale.pulses(spec.period)
-    put_switch(carriage.axis.scheduler, carriage, carriage.spec.name, zone_of(spec, scale.nearest, period), spec, lane, site)
+    put_switch(carriage.axis.scheduler, carriage, carriage.spec.name, zone_of(spec, scale.nearest, period), spec, channel, site)
 
 
 def _signals(carriage: Carriage) -> Mapping[str, SignalOf]:
@@ -175,7 +177,7 @@ def _signals(carriage: Carriage) -> Mapping[str, SignalOf]:
 
     source, unit = (carriage.axis.scheduler.source(carriage.spec.name),), carriage.axis.scale.unit
     return {
-        "position": SignalOf(source, carriage.position, carriage.turns, carriage.version, unit),
+        "position": SignalOf(source, carriage.position, carriage.turning_points, carriage.version, unit),
         "deflection": SignalOf(source, carriage.deflection, unit=unit, check=refuse),
         "settled": SignalOf(source, carriage.settled, carriage.ends, carriage.version),
     }

@@ -15,7 +15,7 @@ from typing import ClassVar
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.simulation.components.axis import find_axis, turns_of_axis
+from steptwin.simulation.components.axis import find_axis, turning_points_of_axis
 from steptwin.simulation.components.beltsensor import Sensor, SensorSpec
 from steptwin.simulation.components.conveyortable import FEED, RUN, ConveyorSpec, stop_terminal
 from steptwin.simulation.components.elementspec import Reference
@@ -64,7 +64,7 @@ class Conveyor(BoardPart):
         "_moved_by",
         "_seen",
         "_stops",
-        "_turns",
+        "_turning_points",
         "drive",
         "following",
         "per_mm",
@@ -93,10 +93,10 @@ class Conveyor(BoardPart):
         per_mm: Fraction,
         own: ConstantDrive | None,
         moved_by: tuple[str, ...] = (),
-        turns: Callable[[Nanos], Iterator[Nanos]] = lambda now: iter(()),
+        turning_points: Callable[[Nanos], Iterator[Nanos]] = lambda now: iter(()),
     ) -> None:
         """``own``: the drive, where it is the conveyor's own; ``moved_by``: otherwise the controller that moves it, between
-        ``turns`` one way."""
+        ``turning_points`` one way."""
         super().__init__(board)
         self.spec = spec
         self.drive = drive
@@ -105,7 +105,7 @@ class Conveyor(BoardPart):
         self._stops = tuple((stop_terminal(n), self.places(stop.at)) for n, stop in enumerate(spec.stops, start=1))
         self._own = own
         self._moved_by = moved_by
-        self._turns = turns
+        self._turning_points = turning_points
         self._then = drive.place(board.scheduler.now)
         """The place of the belt when it was looked at last: since then it has moved one way while anything stands."""
         self.following: Conveyor | None = None
@@ -164,14 +164,14 @@ class Conveyor(BoardPart):
             self._hold(now)
             self._deliver(now)
             self._seen = self._state()
-            self.board.scheduler.mark(self.board.name)
+            self.board.scheduler.notify(self.board.name)
             self._due = self._next(now)
 
     def _feed(self, now: Nanos) -> None:
         """Put a workpiece at the beginning, where there is room for it."""
         if self.feeder_stands or self.load.covering(0, self.drive.place(now)) is not None:
             self.missed += 1
-            self.board.scheduler.mark(self.board.name)
+            self.board.scheduler.notify(self.board.name)
             return
         self.fed += 1
         spec = self.spec
@@ -183,7 +183,7 @@ class Conveyor(BoardPart):
         self._then = self.drive.place(now)
         self.load.put(piece._replace(origin=self.drive.place(now) - self.places(front), held=None))
         self.report(IS_ON(piece=piece.name, belt=self.spec.name), piece.name, "on")
-        self.board.scheduler.mark(self.board.name)
+        self.board.scheduler.notify(self.board.name)
 
     def take_over(self, piece: Workpiece, other: Conveyor, front: float, now: Nanos) -> None:
         """Put a workpiece that was on another belt on this one."""
@@ -198,7 +198,7 @@ class Conveyor(BoardPart):
     def take(self, piece: Workpiece) -> None:
         """Take a workpiece off the belt."""
         self.load.take(piece)
-        self.board.scheduler.mark(self.board.name)
+        self.board.scheduler.notify(self.board.name)
 
     def front(self, number: int, now: Nanos) -> float:
         """How far the front of a workpiece is from the beginning, mm. 0 is the workpiece that was put there first; NaN if
@@ -283,7 +283,9 @@ class Conveyor(BoardPart):
         above = min((piece.origin + self._way(piece, belt, now) for piece in moving), default=None)
         due = next_change(self.drive, None if below is None else below - 1, above, now)
         if len(moving) < len(self.load.pieces):
-            due = min(filter(None, (due, next(self._turns(now), None), self.drive.reaches(belt - 1, now, -1))), default=None)
+            due = min(
+                filter(None, (due, next(self._turning_points(now), None), self.drive.reaches(belt - 1, now, -1))), default=None
+            )
         following = self.following
         if following is None or not self.load.pieces or not self._is_blocked(now):
             return due
@@ -339,8 +341,8 @@ def _make(spec: ConveyorSpec, site: Site) -> Conveyor:
     else:
         axis = find_axis(spec.axis, site)
         per_mm = axis.scale.pulses_per_unit / exact_fraction(spec.mm_per_unit)
-        turns = partial(turns_of_axis, axis)
-        conveyor = Conveyor(board, spec, axis.mechanism, per_mm, None, (axis.mechanism.controller,), turns)
+        turning_points = partial(turning_points_of_axis, axis)
+        conveyor = Conveyor(board, spec, axis.mechanism, per_mm, None, (axis.mechanism.controller,), turning_points)
     if conveyor.places(spec.length) < 1:
         raise Misuse(
             f"length = {spec.length:g} mm: the belt is shorter than one step of its drive, {float(1 / conveyor.per_mm):g} mm"
@@ -366,19 +368,19 @@ def _refers_of_sensors(spec: ConveyorSpec) -> Iterator[Reference]:
         yield Reference(spec.name, sensor.target[0], (*sensor.path, "to"))
 
 
-def _lane(spec: ConveyorSpec, number: int) -> str:
+def _channel(spec: ConveyorSpec, number: int) -> str:
     return f"{spec.name}.sensor{number}"
 
 
 def _put_sensors(spec: ConveyorSpec, conveyor: Conveyor, site: Site) -> None:
     for n, sensor in enumerate(spec.sensors, start=1):
-        site.text.unless_wrong(sensor.path, partial(_put_sensor, conveyor, sensor, _lane(spec, n), site))
+        site.text.unless_wrong(sensor.path, partial(_put_sensor, conveyor, sensor, _channel(spec, n), site))
 
 
-def _put_sensor(conveyor: Conveyor, spec: SensorSpec, lane: str, site: Site) -> None:
+def _put_sensor(conveyor: Conveyor, spec: SensorSpec, channel: str, site: Site) -> None:
     scheduler = conveyor.board.scheduler
     circuit = site.circuit(scheduler, spec.target, (*spec.path, "to"), spec.join)
-    sensor = Sensor(circuit, conveyor, spec, site.bounce_of(circuit), lane)
+    sensor = Sensor(circuit, conveyor, spec, site.bounce_of(circuit), channel)
     scheduler.add_part(sensor, (conveyor.board.name,), drives=circuit.target.controller)
 
 

@@ -8,9 +8,9 @@ from math import ceil, floor, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
 from steptwin.controller import SECOND, Nanos
-from steptwin.motion.elastic import DriveStretch
+from steptwin.motion.elastic import DriveInterval
 from steptwin.points import FARTHEST_NS
-from steptwin.simulation.mechanics.loadmotion import load_stretches
+from steptwin.simulation.mechanics.loadmotion import load_intervals
 
 if TYPE_CHECKING:
     from steptwin.simulation.components.axis import BuiltAxis
@@ -48,7 +48,7 @@ class Coordinate:
 
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
         """As `MovingPart.reaches`."""
-        for begin, end in pairwise((after, *self.turns(after), after + FARTHEST_NS)):
+        for begin, end in pairwise((after, *self.turning_points(after), after + FARTHEST_NS)):
             if begin < end and self._is_short(position, direction, begin) and not self._is_short(position, direction, end):
                 low, high = begin, end
                 while high - low > 1:
@@ -63,14 +63,14 @@ class Coordinate:
     def _is_short(self, position: int, direction: int, now: Nanos) -> bool:
         return (self.place(now) - position) * direction < 0
 
-    def turns(self, now: Nanos) -> Iterator[Nanos]:
+    def turning_points(self, now: Nanos) -> Iterator[Nanos]:
         """Moments after ``now`` between which it moves one way. Along arcs the acceleration is taken as constant for 1 ms."""
         moves = [
-            (share / float(axis.scale.pulses_per_unit), [*load_stretches(axis.mechanism.course(now), now)])
+            (share / float(axis.scale.pulses_per_unit), [*load_intervals(axis.mechanism.trajectory(now), now)])
             for axis, share, its in zip(self._axes, self._shares, self._pulled, strict=True)
             if its.held is None and share
         ]
-        begins = sorted({now, *(max(stretch.begin, now) for _, stretches in moves for stretch in stretches)})
+        begins = sorted({now, *(max(interval.begin, now) for _, intervals in moves for interval in intervals)})
         at = [0] * len(moves)
         for n, begin in enumerate(begins):
             end = begins[n + 1] if n + 1 < len(begins) else now + FARTHEST_NS
@@ -79,10 +79,10 @@ class Coordinate:
                     yield begin - 1  # a rotor that is caught is at once somewhere else
                 yield begin
             v = a = j = 0.0
-            for m, (factor, stretches) in enumerate(moves):
-                while at[m] + 1 < len(stretches) and stretches[at[m] + 1].begin <= begin:
+            for m, (factor, intervals) in enumerate(moves):
+                while at[m] + 1 < len(intervals) and intervals[at[m] + 1].begin <= begin:
                     at[m] += 1
-                its_v, its_a, its_j = _motion(stretches[at[m]], begin)
+                its_v, its_a, its_j = _motion(intervals[at[m]], begin)
                 v, a, j = v + factor * its_v, a + factor * its_a, j + factor * its_j
             for root in rests(v, a, j):
                 turn = begin + ceil(root * SECOND) if root * SECOND < end - begin else end
@@ -94,13 +94,13 @@ def pulled_to(axis: BuiltAxis, its: Pulled, now: Nanos) -> float:
     """Where an axis holds what it moves, in its units."""
     if its.held is not None:
         return its.held
-    return axis.mechanism.course(now).position(now) / float(axis.scale.pulses_per_unit) - its.behind
+    return axis.mechanism.trajectory(now).position(now) / float(axis.scale.pulses_per_unit) - its.behind
 
 
-def _motion(stretch: DriveStretch, now: Nanos) -> tuple[float, float, float]:
+def _motion(interval: DriveInterval, now: Nanos) -> tuple[float, float, float]:
     """Velocity, acceleration and jerk."""
-    s = (now - stretch.begin) / SECOND
-    return stretch.at(now)[1], stretch.a + s * stretch.j, stretch.j
+    s = (now - interval.begin) / SECOND
+    return interval.at(now)[1], interval.a + s * interval.j, interval.j
 
 
 def rests(v: float, a: float, j: float) -> list[float]:

@@ -13,7 +13,7 @@ from steptwin.messages import Message
 from steptwin.simulation.components.elementspec import Reference
 from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
 from steptwin.simulation.components.site import Site
-from steptwin.simulation.components.switch import SwitchSpec, lane_of, put_switch, zone_of
+from steptwin.simulation.components.switch import SwitchSpec, channel_of, put_switch, zone_of
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.kinds.kind import Terminals
@@ -94,7 +94,7 @@ class Cylinder(BoardPart):
         force = self._force()
         if force != self.travel.direction:
             self.travel.send(force, now)
-            self.board.scheduler.mark(self.board.name)
+            self.board.scheduler.notify(self.board.name)
         place = self.travel.place(now)
         self.board.put(EXTENDED, float(place == self.travel.full))
         self.board.put(RETRACTED, float(place == 0))
@@ -122,7 +122,7 @@ class Cylinder(BoardPart):
         return self._spool
 
     def deadline(self) -> Nanos | None:
-        moments = (*self.travel.turns(self.board.scheduler.now), *(() if self._due is None else (self._due,)))
+        moments = (*self.travel.turning_points(self.board.scheduler.now), *(() if self._due is None else (self._due,)))
         return min(moments, default=None)
 
     @property
@@ -174,18 +174,18 @@ def _refers_of_switches(spec: CylinderSpec) -> Iterator[Reference]:
 
 def _put_switches(spec: CylinderSpec, cylinder: Cylinder, site: Site) -> None:
     for n, switch in enumerate(spec.switches, start=1):
-        site.text.unless_wrong(switch.path, partial(_put_switch, cylinder, switch, lane_of(spec.name, n), site))
+        site.text.unless_wrong(switch.path, partial(_put_switch, cylinder, switch, channel_of(spec.name, n), site))
 
 
-def _put_switch(cylinder: Cylinder, spec: SwitchSpec, lane: str, site: Site) -> None:
+def _put_switch(cylinder: Cylinder, spec: SwitchSpec, channel: str, site: Site) -> None:
     zone = zone_of(spec, cylinder.places, None if spec.period is None else cylinder.places(spec.period))
-    put_switch(cylinder.board.scheduler, cylinder.travel, cylinder.board.name, zone, spec, lane, site)
+    put_switch(cylinder.board.scheduler, cylinder.travel, cylinder.board.name, zone, spec, channel, site)
 
 
 def _signals(cylinder: Cylinder) -> Mapping[str, SignalOf]:
     source, travel = cylinder.board.source, cylinder.travel
     bounds = (0.0, cylinder.stroke)
-    return {"position": SignalOf((source,), cylinder.position, travel.turns, travel.version, unit="mm", bounds=bounds)}
+    return {"position": SignalOf((source,), cylinder.position, travel.turning_points, travel.version, unit="mm", bounds=bounds)}
 
 
 CYLINDER = with_terminals(

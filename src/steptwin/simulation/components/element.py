@@ -16,8 +16,8 @@ from steptwin.simulation.components.site import Site
 from steptwin.simulation.faults.table import FaultKind, Layer
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.mechanics.channels import MovedChannel
 from steptwin.simulation.mechanics.drawing import Drawing
-from steptwin.simulation.mechanics.lanes import MovedLane
 from steptwin.simulation.toml.table import InnerTable, TableRows, TableSpec
 from steptwin.tables import IncompleteTable
 
@@ -40,8 +40,8 @@ class Element(ElementTable[S, B]):
     """How it is drawn, where there is more to see than levels and numbers."""
     function: Callable[[B], str] | None = None
     """The word that says what it does among those of its kind, such as ``and``."""
-    moved: Callable[[B], Iterable[tuple[str, MovedLane]]] | None = None
-    """The lanes of its motion, each of which follows from that of an axis, by name."""
+    moved: Callable[[B], Iterable[tuple[str, MovedChannel]]] | None = None
+    """The channels of its motion, each of which follows from that of an axis, by name."""
     faults: tuple[FaultKind, ...] = ()
     """Its faults (`Layer.ELEMENT`), which act on the built object."""
     is_named: bool = field(init=False)

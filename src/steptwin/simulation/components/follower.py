@@ -11,19 +11,19 @@ from typing import ClassVar
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.simulation.components.axis import AXIS, turns_of_axis
+from steptwin.simulation.components.axis import AXIS, turning_points_of_axis
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.components.shaft import SHAFT, TURN, GearedShaft
 from steptwin.simulation.components.site import Site
-from steptwin.simulation.components.switch import SwitchSpec, lane_of, put_switch, zone_of
+from steptwin.simulation.components.switch import SwitchSpec, channel_of, put_switch, zone_of
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.faults.table import number
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.cam import Cam
+from steptwin.simulation.mechanics.channels import LIFT_SHARE, STUCK, MovedChannel
 from steptwin.simulation.mechanics.drawing import ROD, Drawing
-from steptwin.simulation.mechanics.lanes import LIFT_SHARE, STUCK, MovedLane
 from steptwin.simulation.mechanics.scale import exact_fraction
 from steptwin.simulation.toml.names import Unknown
 from steptwin.simulation.toml.reader import TomlText
@@ -100,9 +100,9 @@ class Follower(Stateful):
             return None
         level = Fraction(2 * position - direction, 2 * PLACES) / self._share
         here, found = self.shaft.place(after), []
-        for way in (1, -1):
-            place = self._cam.next(level, here, direction, way)
-            if place is not None and (due := self.shaft.reaches(place, after, way)) is not None:
+        for heading in (1, -1):
+            place = self._cam.next(level, here, direction, heading)
+            if place is not None and (due := self.shaft.reaches(place, after, heading)) is not None:
                 found.append(due)
         return min(found, default=None)
 
@@ -111,11 +111,11 @@ class Follower(Stateful):
     def position(self, now: Nanos) -> float:
         return float(self.lift(now))
 
-    def turns(self, now: Nanos) -> Iterator[Nanos]:
+    def turning_points(self, now: Nanos) -> Iterator[Nanos]:
         """Moments after ``now`` between which it moves one way."""
         if self._held is not None:
             return
-        for leg in (*turns_of_axis(self.shaft.axis, now), None):
+        for leg in (*turning_points_of_axis(self.shaft.axis, now), None):
             yield from self._corners(now, leg)
             if leg is not None:
                 yield leg
@@ -124,10 +124,10 @@ class Follower(Stateful):
     def _corners(self, begin: Nanos, end: Nanos | None) -> Iterator[Nanos]:
         """When its axis, which goes one way from ``begin`` to ``end``, passes points of the cam, in one revolution."""
         here = self.shaft.place(begin)
-        for way in (1, -1):
+        for heading in (1, -1):
             now = begin
-            for place in self._cam.corners(here, way):
-                due = self.shaft.reaches(place, now, way)
+            for place in self._cam.corners(here, heading):
+                due = self.shaft.reaches(place, now, heading)
                 if due is None or (end is not None and due >= end):
                     break
                 if due > now + 1:
@@ -148,10 +148,10 @@ class Follower(Stateful):
         axis.scheduler.report(axis.mechanism.controller, "edge", f"{self.spec.name}.{what}", level)
 
     @property
-    def moved(self) -> tuple[str, MovedLane]:
-        axis, lane = self.shaft.moved
+    def moved(self) -> tuple[str, MovedChannel]:
+        axis, channel = self.shaft.moved
         points = tuple(sorted(self.spec.points))
-        return axis, lane._replace(name=self.spec.name, signal="position", unit=self.spec.unit, points=points)
+        return axis, channel._replace(name=self.spec.name, signal="position", unit=self.spec.unit, points=points)
 
     @property
     def drawing(self) -> Drawing:
@@ -202,7 +202,7 @@ def _build(spec: FollowerSpec, site: Site) -> Follower:
     scheduler = shaft.axis.scheduler
     scheduler.add_part(follower, (shaft.axis.mechanism.controller, shaft.axis.spec.name, spec.shaft, spec.name), spec.name)
     for n, switch in enumerate(spec.switches, start=1):
-        site.text.unless_wrong(switch.path, partial(_put_switch, follower, switch, lane_of(spec.name, n), site))
+        site.text.unless_wrong(switch.path, partial(_put_switch, follower, switch, channel_of(spec.name, n), site))
     return follower
 
 
@@ -214,7 +214,7 @@ def _cam(spec: FollowerSpec, shaft: GearedShaft) -> Cam:
     return Cam(((place - floor(place / turn) * turn, lift) for place, lift in found), turn)
 
 
-def _put_switch(follower: Follower, spec: SwitchSpec, lane: str, site: Site) -> None:
+def _put_switch(follower: Follower, spec: SwitchSpec, channel: str, site: Site) -> None:
     if spec.period is not None:
         raise Misuse(f"period = {spec.period:g}: a follower moves between two ends, its switches have one zone")
 
@@ -224,13 +224,13 @@ def _put_switch(follower: Follower, spec: SwitchSpec, lane: str, site: Site) -> 
     zone = site.memo.once(spec.path, lambda: zone_of(spec, places))
     mechanism = follower.shaft.axis.mechanism
     scheduler = follower.shaft.axis.scheduler
-    put_switch(scheduler, follower, (mechanism.controller, follower.spec.shaft, follower.spec.name), zone, spec, lane, site)
+    put_switch(scheduler, follower, (mechanism.controller, follower.spec.shaft, follower.spec.name), zone, spec, channel, site)
 
 
 def _signals(follower: Follower) -> Mapping[str, SignalOf]:
     source, spec = (follower.shaft.axis.scheduler.source(follower.spec.name),), follower.spec
     bounds = 0.0, spec.highest
-    return {"position": SignalOf(source, follower.position, follower.turns, follower.version, spec.unit, bounds)}
+    return {"position": SignalOf(source, follower.position, follower.turning_points, follower.version, spec.unit, bounds)}
 
 
 FOLLOWER: Element[FollowerSpec, Follower] = Element(

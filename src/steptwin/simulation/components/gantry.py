@@ -21,8 +21,8 @@ from steptwin.simulation.faults.table import number
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.condition import SignalCondition
 from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.mechanics.channels import MovedChannel
 from steptwin.simulation.mechanics.drawing import Drawing, rail
-from steptwin.simulation.mechanics.lanes import MovedLane
 from steptwin.simulation.mechanics.scale import Loading, burden_of
 from steptwin.simulation.scheduler.scheduler import Board
 from steptwin.simulation.toml.reader import TomlText
@@ -118,19 +118,19 @@ class Gantry(Touch):
 
     def deadline(self) -> Nanos | None:
         now = self.board.scheduler.now
-        dues = (super().deadline(), *(end.mechanism.next_stall(now) for end in self.ends))
-        return min((due for due in dues if due is not None), default=None)
+        deadlines = (super().deadline(), *(end.mechanism.next_stall(now) for end in self.ends))
+        return min((due for due in deadlines if due is not None), default=None)
 
     @property
     def drawing(self) -> Drawing:
         return rail(self.ends[0].spec.travel)
 
     @property
-    def moved(self) -> tuple[str, MovedLane]:
+    def moved(self) -> tuple[str, MovedChannel]:
         half, other_half = (end.mechanism.build.sign / (2.0 * float(end.scale.pulses_per_unit)) for end in self.ends)
         other = self.ends[1].mechanism
         place = other.controller, str(other.number)
-        return self.ends[0].spec.name, MovedLane(
+        return self.ends[0].spec.name, MovedChannel(
             self.board.name, "position", self.unit, half, other=place, other_per_pulse=other_half
         )
 
@@ -144,7 +144,7 @@ def _moving(ends: tuple[BuiltAxis, BuiltAxis]) -> Iterator[tuple[str, SignalOf]]
     sources, unit = tuple(end.source for end in ends), ends[0].scale.unit
     for name, shares in SHARES.items():
         its = Coordinate(ends, shares, (Pulled(), Pulled()))
-        yield name, SignalOf(sources, its.value, its.turns, its.version, unit)
+        yield name, SignalOf(sources, its.value, its.turning_points, its.version, unit)
 
 
 GUIDES_ARE_STIFF = Message("simulation.guides-are-stiff", "the guides of {name} have {factor:g} times their friction")

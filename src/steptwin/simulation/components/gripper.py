@@ -86,7 +86,7 @@ class Gripper(Carrier):
         direction = 0 if self.is_held else 1 if closes else -1
         if direction != self.travel.direction:
             self.travel.send(direction, now)
-            self.board.scheduler.mark(self.board.name)
+            self.board.scheduler.notify(self.board.name)
         place = self.travel.place(now)
         self.board.put(OPENED, float(place == 0))
         self.board.put(CLOSED, float(place == self.travel.full))
@@ -95,7 +95,7 @@ class Gripper(Carrier):
     def deadline(self) -> Nanos | None:
         now = self.board.scheduler.now
         touches = self.travel.reaches(self._at, now, 1)
-        moments = (*self.travel.turns(now), *(() if touches is None else (touches,)))
+        moments = (*self.travel.turning_points(now), *(() if touches is None else (touches,)))
         return min(moments, default=None)
 
     @property
@@ -120,7 +120,7 @@ def _signals(gripper: Gripper) -> Mapping[str, SignalOf]:
     source, travel = gripper.board.source, gripper.travel
     bounds = (0.0, gripper.stroke)
     return {
-        "position": SignalOf((source,), gripper.position, travel.turns, travel.version, unit="mm", bounds=bounds),
+        "position": SignalOf((source,), gripper.position, travel.turning_points, travel.version, unit="mm", bounds=bounds),
         **carrier_signals(gripper),
     }
 

@@ -141,8 +141,8 @@ class FurtherLoad(BoardPart):
         self._due = None if self._condition is None else self._condition.change(now)
 
     def deadline(self) -> Nanos | None:
-        dues = (self._due, None if self._curve is None else self._curve.due)
-        return min((due for due in dues if due is not None), default=None)
+        deadlines = (self._due, None if self._curve is None else self._curve.due)
+        return min((due for due in deadlines if due is not None), default=None)
 
     def set_state(self, plain: Plain) -> None:
         super().set_state(plain)
@@ -164,9 +164,9 @@ def _make(spec: LoadSpec, site: Site) -> FurtherLoad:
     if build.motor is None:
         raise Misuse(f"axis {spec.axis!r} has no [axis.motor]: without, it moves any load")
     whole = burden_of(spec.loading, axis.scale, "load")
-    if build.is_free:
+    if build.coasts_unpowered:
         most = max((share for _, share in spec.points or ()), default=1.0)
-        build.motor.check_free(most * (abs(whole.load) + whole.friction))
+        build.motor.check_coasting(most * (abs(whole.load) + whole.friction))
     curve = None
     if spec.of is not None and spec.points is not None:
         curve = Stepped(signal_of("of", board, site, spec.of), spec.points, spec.resolution)

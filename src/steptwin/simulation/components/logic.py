@@ -167,7 +167,7 @@ def with_terminals(
     connect: Callable[[S, P, Site], None] | None = None,
     drawing: Callable[[P], Drawing] | None = None,
 ) -> Element[S, P]:
-    """An element with a name and terminals. Each terminal is a signal, each output a lane.
+    """An element with a name and terminals. Each terminal is a signal, each output a channel.
 
     ``signals`` and ``refers`` are those besides. ``fit`` adds the parts of tables in its table. ``connect`` and ``drawing`` are
     as in `Element`.

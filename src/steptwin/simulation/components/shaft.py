@@ -11,18 +11,18 @@ from typing import Any, ClassVar
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, turns_of_axis
+from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, turning_points_of_axis
 from steptwin.simulation.components.contact import ContactSpec
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.components.site import Site
-from steptwin.simulation.components.switch import lane_of, put_switch
+from steptwin.simulation.components.switch import channel_of, put_switch
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.logic.contacts import Zone
 from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.mechanics.channels import SLIPS, MovedChannel
 from steptwin.simulation.mechanics.drawing import DIAL, Drawing, SensorZone
-from steptwin.simulation.mechanics.lanes import SLIPS, MovedLane
 from steptwin.simulation.mechanics.scale import exact_fraction
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table, tables_in
@@ -111,12 +111,12 @@ class GearedShaft(Stateful):
         elif self._held is not None:
             self._behind = mechanism.place(now) - self._held
             self._held = None
-        scheduler.mark(self.spec.name)
+        scheduler.notify(self.spec.name)
 
     @property
-    def moved(self) -> tuple[str, MovedLane]:
+    def moved(self) -> tuple[str, MovedChannel]:
         sign, name = self.axis.mechanism.build.sign, self.spec.name
-        return self.axis.spec.name, MovedLane(
+        return self.axis.spec.name, MovedChannel(
             name, "angle", "degree", float(sign * TURN / self.pulses_per_turn), self.spec.offset, name
         )
 
@@ -161,17 +161,17 @@ def _build(spec: ShaftSpec, site: Site) -> GearedShaft:
     mechanism = shaft.axis.mechanism
     shaft.axis.scheduler.add_part(shaft, (mechanism.controller, spec.axis, spec.name), spec.name)
     for n, cam in enumerate(spec.cams, start=1):
-        site.text.unless_wrong(cam.path, partial(_put_cam, shaft, cam, lane_of(spec.name, n), site))
+        site.text.unless_wrong(cam.path, partial(_put_cam, shaft, cam, channel_of(spec.name, n), site))
     return shaft
 
 
-def _put_cam(shaft: GearedShaft, cam: CamSpec, lane: str, site: Site) -> None:
+def _put_cam(shaft: GearedShaft, cam: CamSpec, channel: str, site: Site) -> None:
     moved_by = shaft.axis.mechanism.controller, shaft.spec.name
-    put_switch(shaft.axis.scheduler, shaft, moved_by, shaft.zone(cam), cam, lane, site)
+    put_switch(shaft.axis.scheduler, shaft, moved_by, shaft.zone(cam), cam, channel, site)
 
 
 def _signals(shaft: GearedShaft) -> Mapping[str, SignalOf]:
-    turning = partial(turns_of_axis, shaft.axis)
+    turning = partial(turning_points_of_axis, shaft.axis)
     source = (shaft.axis.scheduler.source(shaft.spec.name),)
     return {"angle": SignalOf(source, shaft.angle, turning, shaft.version, "degree")}
 

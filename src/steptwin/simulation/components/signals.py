@@ -44,8 +44,8 @@ class Idle:
         self._busy: int | None = None
         """Index of the controller or line that was busy last."""
 
-    def bring(self, now: Nanos) -> tuple[Source, ...]:
-        """As `SignalOf.bring`: a busy controller or line, or all if none is busy."""
+    def sync(self, now: Nanos) -> tuple[Source, ...]:
+        """As `SignalOf.sync`: a busy controller or line, or all if none is busy."""
         for n in (*(() if self._busy is None else (self._busy,)), *range(len(self._things))):
             source, is_at_rest = self._things[n]
             source.scheduler.advance(now)
@@ -59,10 +59,10 @@ class Idle:
         """Conditions can always use it."""
 
     def value(self, now: Nanos) -> float:
-        """1 if idle, otherwise 0; after `bring`."""
+        """1 if idle, otherwise 0; after `sync`."""
         return float(self._busy is None)
 
-    def turns(self, now: Nanos) -> Iterator[Nanos]:
+    def turning_points(self, now: Nanos) -> Iterator[Nanos]:
         yield from ()
 
     def version(self) -> object:
@@ -118,7 +118,7 @@ def _of_controller(kind: AnyKind, controller: MotionController, source: Source, 
     if point is None:
         raise _unknown([point.path for point in kind.datasheet(controller).points], rest, name, AND_PINS())
     return SignalOf(
-        (source,), point.read, point.turns, point.version, point.point.unit, is_kept=point.is_kept, freeze=point.freeze
+        (source,), point.read, point.turning_points, point.version, point.point.unit, is_kept=point.is_kept, freeze=point.freeze
     )
 
 

@@ -100,8 +100,8 @@ class Ramp(NamedTuple):
     def at(self, now: Nanos) -> float:
         if now >= self.end:
             return self.target
-        way = self.rate * (now - self.begin)
-        return self.volts + way if self.target > self.volts else self.volts - way
+        change = self.rate * (now - self.begin)
+        return self.volts + change if self.target > self.volts else self.volts - change
 
     def crosses(self, level: float, after: Nanos) -> Nanos | None:
         """First moment after one at which it is on the other side of a level: at or above it, or below."""
@@ -142,7 +142,7 @@ class Supply(BoardPart):
     def volts(self, now: Nanos) -> float:
         return self._ramp.at(now)
 
-    def turns(self, now: Nanos) -> Iterator[Nanos]:
+    def turning_points(self, now: Nanos) -> Iterator[Nanos]:
         if self._ramp.end > now:
             yield self._ramp.end
 
@@ -194,8 +194,8 @@ class Supply(BoardPart):
 
     def deadline(self) -> Nanos | None:
         now = self.board.scheduler.now
-        dues = (self._switch_due, self._ramp.crosses(self._spec.threshold, now), next(self.turns(now), None))
-        return min((due for due in dues if due is not None), default=None)
+        deadlines = (self._switch_due, self._ramp.crosses(self._spec.threshold, now), next(self.turning_points(now), None))
+        return min((due for due in deadlines if due is not None), default=None)
 
 
 FULL_VOLTAGE = Message("simulation.full-voltage", "{name} has all of its voltage again")
@@ -233,7 +233,7 @@ def _make(spec: SupplySpec, site: Site) -> Supply:
 
 
 def _signals(supply: Supply) -> Mapping[str, SignalOf]:
-    of = SignalOf((supply.board.source,), supply.volts, supply.turns, supply.version, "V", (0.0, supply.full))
+    of = SignalOf((supply.board.source,), supply.volts, supply.turning_points, supply.version, "V", (0.0, supply.full))
     return {"volts": of}
 
 

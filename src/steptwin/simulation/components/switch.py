@@ -47,7 +47,7 @@ class SwitchSpec(ContactSpec):
             text.wrong(self.path, "D007", "a switch needs one of below, above and position")
 
 
-def lane_of(axis: str, number: int) -> str:
+def channel_of(axis: str, number: int) -> str:
     """Under which a switch of an axis is recorded; they count from 1."""
     return f"{axis}.switch{number}"
 
@@ -58,7 +58,7 @@ def put_switch(
     moved_by: str | tuple[str, ...],
     zone: Zone,
     spec: ContactSpec,
-    lane: str,
+    channel: str,
     site: Site,
 ) -> None:
     """Put a switch where a carriage, which the controllers or elements ``moved_by`` move, runs over it."""
@@ -72,7 +72,7 @@ def put_switch(
         bounce_ns=spec.bounce,
         bounces=spec.bounces,
         chance=site.bounce_of(circuit),
-        lane=lane,
+        channel=channel,
     )
     scheduler.add_part(part, (moved_by,) if isinstance(moved_by, str) else moved_by, drives=circuit.target.controller)
 

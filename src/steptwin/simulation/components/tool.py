@@ -19,8 +19,8 @@ from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.faults.table import Parameter, ParameterForm
 from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.mechanics.channels import SLIPS, MovedChannel
 from steptwin.simulation.mechanics.drawing import PLANE, Drawing, rail
-from steptwin.simulation.mechanics.lanes import SLIPS, MovedLane
 from steptwin.simulation.mechanics.scale import exact_fraction
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table, tables_in
@@ -106,7 +106,7 @@ class Tool(Stateful):
             self._pulled[n] = Pulled(None, pulled_to(axis, Pulled(), now) - its.held)
         scheduler = axis.scheduler
         scheduler.report(self.axes[0].mechanism.controller, "edge", f"{self.spec.name}.{belt}.{SLIPS}", float(slips))
-        scheduler.mark(self.spec.name)
+        scheduler.notify(self.spec.name)
         return self._pulled[n].behind
 
     def copy_state(self) -> Plain:
@@ -130,7 +130,7 @@ class Tool(Stateful):
         return Drawing(PLANE, x.length, COORDINATES, sensors=x.sensors, low=x.low, across=y.length, across_low=y.low)
 
     @property
-    def moved(self) -> Iterator[tuple[str, MovedLane]]:
+    def moved(self) -> Iterator[tuple[str, MovedChannel]]:
         other = self.axes[1].mechanism
         for name, shares in zip(COORDINATES, (self.spec.x, self.spec.y), strict=True):
             factors = [
@@ -139,7 +139,7 @@ class Tool(Stateful):
             ]
             yield (
                 self.axes[0].spec.name,
-                MovedLane(
+                MovedChannel(
                     self.spec.name,
                     name,
                     self.unit,
@@ -171,8 +171,8 @@ def _build(spec: ToolSpec, site: Site) -> Tool:
     tool = Tool(spec, (one, other))
     one.scheduler.add_part(tool, (*_controllers(tool), spec.axis, spec.other, spec.name), spec.name)
     for name, n, switch in spec.switches:
-        lane = f"{spec.name}.{name}_switch{n}"
-        site.text.unless_wrong(switch.path, partial(_put_switch, tool, name, switch, lane, site))
+        channel = f"{spec.name}.{name}_switch{n}"
+        site.text.unless_wrong(switch.path, partial(_put_switch, tool, name, switch, channel, site))
     return tool
 
 
@@ -180,17 +180,19 @@ def _controllers(tool: Tool) -> tuple[str, ...]:
     return tuple(dict.fromkeys(axis.mechanism.controller for axis in tool.axes))
 
 
-def _put_switch(tool: Tool, name: str, spec: SwitchSpec, lane: str, site: Site) -> None:
+def _put_switch(tool: Tool, name: str, spec: SwitchSpec, channel: str, site: Site) -> None:
     def places(units: float) -> int:
         return round(exact_fraction(units) * PLACES)
 
     zone = zone_of(spec, places, None if spec.period is None else places(spec.period))
-    put_switch(tool.axes[0].scheduler, tool.coordinates[name], (*_controllers(tool), tool.spec.name), zone, spec, lane, site)
+    put_switch(tool.axes[0].scheduler, tool.coordinates[name], (*_controllers(tool), tool.spec.name), zone, spec, channel, site)
 
 
 def _signals(tool: Tool) -> Mapping[str, SignalOf]:
     source = (tool.axes[0].scheduler.source(tool.spec.name),)
-    return {name: SignalOf(source, its.value, its.turns, its.version, tool.unit) for name, its in tool.coordinates.items()}
+    return {
+        name: SignalOf(source, its.value, its.turning_points, its.version, tool.unit) for name, its in tool.coordinates.items()
+    }
 
 
 TOOL_BELT_SLIPS = Message("simulation.tool-belt-slips", "the belt of {belt} of {name} slips")

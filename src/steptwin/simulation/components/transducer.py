@@ -90,7 +90,7 @@ def _build(spec: TransducerSpec, site: Site) -> Transducer:
     site.input(spec.target, (*spec.path, "to"), ANALOG_INPUT)
     found = find_signal(site.parts, spec.of)
     found.watch(spec.of)
-    if all(source.scheduler is not scheduler for source in found.bring(scheduler.now)):
+    if all(source.scheduler is not scheduler for source in found.sync(scheduler.now)):
         raise Misuse(f"of = {spec.of!r} is no quantity of what {spec.target[0]!r} is connected to")
     transducer = Transducer(scheduler, spec, found)
     scheduler.add_part(transducer, name=spec.name)

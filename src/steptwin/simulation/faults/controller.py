@@ -176,14 +176,14 @@ class FaultyController(Stateful):
         return own
 
     def deadline(self) -> Nanos | None:
-        dues = (self.inner.deadline(), self._own())
-        return min((due for due in dues if due is not None), default=None)
+        deadlines = (self.inner.deadline(), self._own())
+        return min((due for due in deadlines if due is not None), default=None)
 
     def _own(self) -> Nanos | None:
-        dues = [a.due for a in self._mine() if a.due is not None]
-        dues += [at for at, *_ in self._bounces] + [at for at, *_ in self._released]
-        dues += [at for at in (self._off_until, self._cut) if at is not None]
-        return min(dues, default=None)
+        deadlines = [a.due for a in self._mine() if a.due is not None]
+        deadlines += [at for at, *_ in self._bounces] + [at for at, *_ in self._released]
+        deadlines += [at for at in (self._off_until, self._cut) if at is not None]
+        return min(deadlines, default=None)
 
     def _run(self, now: Nanos) -> None:
         if self._cut is not None:

@@ -43,13 +43,13 @@ class FaultyElement(Stateful):
 
     def begin(self, active: ActiveFault) -> None:
         """A fault has been set."""
-        self._scheduler.mark()
+        self._scheduler.notify()
 
     def end(self, active: ActiveFault, now: Nanos) -> None:
         """A fault has been removed."""
         if active.name in self._lasting:
             self._turn(active, now, begins=False)
-        self._scheduler.mark()
+        self._scheduler.notify()
 
     def held(self) -> Iterator[tuple[str, HeldLevel]]:
         """The terminals that faults hold, in small letters."""
@@ -70,7 +70,7 @@ class FaultyElement(Stateful):
         if begins:
             active.struck += 1
         text = active.fault.kind.effect.act(active, self._part, begins, now)
-        self._scheduler.mark()  # the part may have been updated already at this moment
+        self._scheduler.notify()  # the part may have been updated already at this moment
         self._faults.report(active, self.name, now, text)
 
     def deadline(self) -> Nanos | None:

@@ -16,19 +16,19 @@ class ControllerView:
         self._world = world
         self.name = name
 
-    def _touch(self) -> None:
-        self._world.touch(self.name)
+    def _sync(self) -> None:
+        self._world.sync(self.name)
 
     @property
     def state(self) -> ControllerState:
         """Status, program, axes, pins and details."""
-        self._touch()
+        self._sync()
         return self._world.kind(self.name).state(self._world.controllers[self.name], self._world.now)
 
     @property
     def pins(self) -> Mapping[str, float]:
         """The level of every pin: 0, 1, volts."""
-        self._touch()
+        self._sync()
         return self._world.kind(self.name).state.pins(self._world.controllers[self.name], self._world.now)
 
     def set_pin(self, pin: str, value: float) -> None:

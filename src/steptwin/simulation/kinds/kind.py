@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from steptwin.simulation.kinds.lines import Line, LineWords, LineWrite
     from steptwin.simulation.kinds.programs import Programs
     from steptwin.simulation.kinds.programtexts import Destination, Downloading, ProgramText, TextLanguage
-    from steptwin.simulation.mechanics.lanes import AxisLane
+    from steptwin.simulation.mechanics.channels import AxisChannel
     from steptwin.simulation.scheduler.trace import RecordSink
     from steptwin.simulation.script.deadmanjog import DeadManJog
     from steptwin.simulation.script.steps import Step
@@ -136,7 +136,7 @@ class RunningWorld(Protocol):
         """The kind of a controller."""
         ...
 
-    def touch(self, name: str, /) -> Scheduler:
+    def sync(self, name: str, /) -> Scheduler:
         """The scheduler of a controller or line, advanced to the present."""
         ...
 
@@ -334,7 +334,7 @@ class ControllerKind(OptionalMethods, ABC, Generic[S, M, V]):
         """How its axis of a number (from 1) counts. Raises `Misuse`."""
 
     @abstractmethod
-    def lanes(self, controller: M, /) -> Mapping[str, AxisLane]:
+    def channels(self, controller: M, /) -> Mapping[str, AxisChannel]:
         """How its axes are shown in a trace, by the subject of their plans."""
 
     @abstractmethod

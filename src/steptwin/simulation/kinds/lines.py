@@ -202,7 +202,7 @@ class Line(Stateful, ABC):
             faulty: FaultyPort = FaultySendingPort(
                 port, place, self._faults, self.fault_kinds[kind], line_name=self.name, is_read=place != SCRIPTS
             )
-            port.on_output = partial(self._scheduler.mark, self.name)
+            port.on_output = partial(self._scheduler.notify, self.name)
             is_busy = True
         else:
             faulty = FaultyPort(
@@ -259,9 +259,9 @@ class Line(Stateful, ABC):
         answer = found.port.exchange(data, now)
         if place in self._busy or found.port.deadline() is not None:
             self._busy[place] = found
-            self._scheduler.mark(self.name)
-        if self._scheduler.is_attentive or self._scheduler.hears_requests:
-            self._scheduler.mark()
+            self._scheduler.notify(self.name)
+        if self._scheduler.is_step_exact or self._scheduler.hears_requests:
+            self._scheduler.notify()
         if self._followers:
             self._count_unframed(place, found, now)
         return answer
@@ -284,7 +284,7 @@ class Line(Stateful, ABC):
         answer = self.exchange(place, found, data, now)
         if answer:
             self._came(place, found, [(now, answer)])
-        self._scheduler.mark(self.name)
+        self._scheduler.notify(self.name)
 
     def _came(self, place: str, found: LineEndPoint, pieces: list[tuple[Nanos, bytes]]) -> None:
         found.received.extend(pieces)
@@ -306,8 +306,8 @@ class Line(Stateful, ABC):
     def deadline(self) -> Nanos | None:
         if not self._busy:
             return None
-        dues = [due for place in self._busy.values() if (due := place.port.deadline()) is not None]
-        return min(dues, default=None)
+        deadlines = [due for place in self._busy.values() if (due := place.port.deadline()) is not None]
+        return min(deadlines, default=None)
 
     def stop_recording(self) -> None:
         """Record no frames from now on."""

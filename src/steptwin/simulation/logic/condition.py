@@ -33,17 +33,17 @@ class Signal(Protocol):
     def continuous(self) -> bool: ...
     @property
     def unit(self) -> str: ...
-    def bring(self, now: Nanos) -> tuple[Any, ...]:
-        """Prepare the value at ``now``. Returns what it depends on: until one of these changes, it follows its course."""
+    def sync(self, now: Nanos) -> tuple[Any, ...]:
+        """Prepare the value at ``now``. Returns what it depends on: until one of these changes, it follows its trajectory."""
         ...
 
     def value(self, now: Nanos) -> float: ...
-    def turns(self, now: Nanos) -> Iterator[Nanos]:
+    def turning_points(self, now: Nanos) -> Iterator[Nanos]:
         """Moments after ``now``, in order, between which (and after the last of which) the value is monotonic."""
         ...
 
     def version(self) -> object:
-        """A value that changes whenever the future course may have changed; None if that is unknown."""
+        """A value that changes whenever the future trajectory may have changed; None if that is unknown."""
         ...
 
 
@@ -72,7 +72,7 @@ WRONG_CONDITION = Message("simulation.wrong-condition", "condition {text!r}: {pr
 class SignalCondition:
     """A condition with its signals."""
 
-    __slots__ = ("_brought", "_comparisons", "_crossings", "_signals", "_test", "text")
+    __slots__ = ("_comparisons", "_crossings", "_signals", "_synced", "_test", "text")
 
     def __init__(self, text: str, signals: Signals, node: Truth | None = None) -> None:
         """``node``: what the text says, if it is known and its numbers are in the units of its signals.
@@ -83,7 +83,7 @@ class SignalCondition:
         is_new = node is None
         node = parse_condition(text) if node is None else node
         self._signals = {name: signals(name) for name in node.names()}
-        self._brought = tuple(self._signals.values())
+        self._synced = tuple(self._signals.values())
         try:
             if is_new:
                 node = _in_units(text, tuple((name, signal.unit) for name, signal in self._signals.items()))
@@ -96,20 +96,20 @@ class SignalCondition:
         """The crossings computed last."""
         self.forget()
 
-    def bring(self, now: Nanos) -> tuple[Any, ...]:
-        """As `Signal.bring`, for all its signals. Must be called before `holds` and `due`."""
-        if len(self._brought) == 1:
-            return self._brought[0].bring(now)
+    def sync(self, now: Nanos) -> tuple[Any, ...]:
+        """As `Signal.sync`, for all its signals. Must be called before `holds` and `due`."""
+        if len(self._synced) == 1:
+            return self._synced[0].sync(now)
         found: dict[Any, None] = {}
-        for signal in self._brought:
-            found.update(dict.fromkeys(signal.bring(now)))
+        for signal in self._synced:
+            found.update(dict.fromkeys(signal.sync(now)))
         return tuple(found)
 
     def holds(self, now: Nanos) -> bool:
         return self._test(now)
 
     def told(self, now: Nanos) -> str:
-        """Its text and what its signals are, after `bring`: ``lift.count == 3; lift.count is 0``. At most `MOST_TOLD` of them."""
+        """Its text and what its signals are, after `sync`: ``lift.count == 3; lift.count is 0``. At most `MOST_TOLD` of them."""
         texts = [f"{name} is {one.value(now):.9g} {one.unit}".rstrip() for name, one in self._signals.items()]
         more = len(texts) - MOST_TOLD
         told = ", ".join(texts) if more <= 0 else f"{', '.join(texts[:MOST_TOLD])} and {more} more"
@@ -121,15 +121,15 @@ class SignalCondition:
 
     def change(self, now: Nanos) -> Nanos | None:
         """The next moment at which one of its comparisons may change without an event; None if never."""
-        dues = [due for n in range(len(self._comparisons)) if (due := self._crossing(n, now)) is not None]
-        return min(dues, default=None)
+        deadlines = [due for n in range(len(self._comparisons)) if (due := self._crossing(n, now)) is not None]
+        return min(deadlines, default=None)
 
     def forget(self) -> None:
         """Compute crossings again: after a restored snapshot, whose signals may have versions that they had in another past."""
         self._crossings = [None] * len(self._comparisons)
 
     def _crossing(self, n: int, now: Nanos) -> Nanos | None:
-        """The moment at which a comparison changes; cached while the courses of its signals are unchanged."""
+        """The moment at which a comparison changes; cached while the trajectories of its signals are unchanged."""
         comparison, known = self._comparisons[n], self._crossings[n]
         version, level = comparison.version(), comparison.level(now)
         if known is not None and version is not None and known[:2] == (version, level) and now < known.until:
@@ -181,7 +181,7 @@ def crossing(signal: Signal, level: float | Fraction, now: Nanos) -> Nanos | Non
     """First whole nanosecond after ``now`` at which the signal is on another side of ``level`` (below, at, above)."""
     border = Border.of(level)
     begin = now
-    for turn in signal.turns(now):
+    for turn in signal.turning_points(now):
         found = _first_other(signal, border, begin, turn)
         if found is not None:
             return found

@@ -53,8 +53,8 @@ class CountedPosition:
 
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
         plan = self._drive.plan
-        for begin, way in profile_of(plan).legs(after):
-            if way == direction and (plan.count(begin) - position) * direction < 0:
+        for begin, leg in profile_of(plan).legs(after):
+            if leg == direction and (plan.count(begin) - position) * direction < 0:
                 return plan.pulse_time(position, max(begin, after))
         return None
 
@@ -90,9 +90,9 @@ class Zone:
         """The last turn whose zone, with hysteresis, begins at or below ``place``."""
         return ceil((place - (self.low or 0) + self.hysteresis + Fraction(1, 2)) / period) - 1
 
-    def _ends(self, way: Fraction | int) -> tuple[int, int]:
-        """The zone, moved by ``way``."""
-        shift = floor(way + Fraction(1, 2))
+    def _ends(self, shift_p: Fraction | int) -> tuple[int, int]:
+        """The zone, moved by ``shift_p``."""
+        shift = floor(shift_p + Fraction(1, 2))
         return (self.low or 0) + shift, (self.high or 0) + shift
 
     def _near(self, place: int) -> tuple[int | None, int | None]:
@@ -148,33 +148,33 @@ class Circuit:
         levels = [contact.level for contact in self.contacts]
         self._scheduler.drive(self.target, float(all(levels) if self.in_series else any(levels)))
 
-    def mark(self) -> None:
+    def notify(self) -> None:
         """One of the contacts bounces from now on."""
-        self._scheduler.mark(self.target.controller)
+        self._scheduler.notify(self.target.controller)
 
-    def report(self, lane: str, level: float) -> None:
+    def report(self, channel: str, level: float) -> None:
         """The level of one contact, apart from the others of the input."""
-        self._scheduler.report(self.controller, "edge", lane, level)
+        self._scheduler.report(self.controller, "edge", channel, level)
 
 
 class Contact(Stateful):
     """A contact that may bounce. ``closed`` is what it comes to rest at.
 
     A change bounces ``bounces`` times, at moments drawn from ``chance``, and rests within ``bounce_ns``. Its level is recorded
-    as ``lane``.
+    as ``channel``.
     """
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_circuit", "lane", "normally_closed")
+    FIXED: ClassVar[tuple[str, ...]] = ("_circuit", "channel", "normally_closed")
     __slots__ = (*FIXED, "_bouncing", "_chance", "_due", "bounce_ns", "bounces", "closed", "level")
 
     def __init__(
-        self, circuit: Circuit, *, normally_closed: bool, bounce_ns: Nanos, bounces: int, chance: Chance, lane: str = ""
+        self, circuit: Circuit, *, normally_closed: bool, bounce_ns: Nanos, bounces: int, chance: Chance, channel: str = ""
     ) -> None:
         self._circuit = circuit
         self._chance = chance
         self._bouncing: deque[Nanos] = deque()
         self._due: Nanos | None = None
-        self.lane = lane
+        self.channel = channel
         self.normally_closed = normally_closed
         self.bounce_ns = bounce_ns
         self.bounces = bounces
@@ -217,8 +217,8 @@ class Contact(Stateful):
         self._circuit.close()
 
     def _report(self) -> None:
-        if self.lane:
-            self._circuit.report(self.lane, float(self.level))
+        if self.channel:
+            self._circuit.report(self.channel, float(self.level))
 
 
 class Button(Contact):
@@ -229,7 +229,7 @@ class Button(Contact):
     def press(self, pressed: bool, now: Nanos) -> None:
         """Press or release it."""
         self.change(pressed is not self.normally_closed, now)
-        self._circuit.mark()
+        self._circuit.notify()
 
     @property
     def pressed(self) -> bool:
@@ -255,10 +255,12 @@ class Switch(Contact):
         bounce_ns: Nanos = 0,
         bounces: int = 0,
         chance: Chance | None = None,
-        lane: str = "",
+        channel: str = "",
     ) -> None:
         chance = chance or Chance(0, str(circuit.target))
-        super().__init__(circuit, normally_closed=normally_closed, bounce_ns=bounce_ns, bounces=bounces, chance=chance, lane=lane)
+        super().__init__(
+            circuit, normally_closed=normally_closed, bounce_ns=bounce_ns, bounces=bounces, chance=chance, channel=channel
+        )
         self._carriage = carriage
         self._version: object = None
         """Version of the carriage when its next change was computed; None before, `_RESTORED` after a restored snapshot."""

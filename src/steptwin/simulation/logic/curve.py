@@ -95,8 +95,8 @@ class Stepped(Stateful):
     def _next(self, value: float, now: Nanos) -> Nanos | None:
         if not self._signal.continuous:
             return None
-        dues = (crossing(self._signal, end, now) for end in self._curve.ends(value))
-        return min((due for due in dues if due is not None), default=None)
+        deadlines = (crossing(self._signal, end, now) for end in self._curve.ends(value))
+        return min((due for due in deadlines if due is not None), default=None)
 
     def set_state(self, plain: Plain) -> None:
         super().set_state(plain)

@@ -229,7 +229,7 @@ class MovingSignal(Protocol):
     """A signal that moves, as `steptwin.simulation.logic.condition.Signal`."""
 
     def value(self, now: Nanos) -> float: ...
-    def turns(self, now: Nanos) -> Iterator[Nanos]: ...
+    def turning_points(self, now: Nanos) -> Iterator[Nanos]: ...
 
 
 def next_change(
@@ -238,12 +238,12 @@ def next_change(
     """First whole nanosecond after ``now`` at which a quantity is on another side of 0 (below, at, above, no number); None if
     never.
 
-    Between their turns signals are monotonic, so that the ranges of an interval follow from its ends; it is halved until
+    Between their turning points signals are monotonic, so that the ranges of an interval follow from its ends; it is halved until
     its range is on one side, or it is a nanosecond long. Where signals stay equal, as of two cylinders on one valve, that
     has no end: after `MOST_LOOKS` intervals, changes of less than a growing time may be overlooked.
     """
     search = _Search(quantity, {name: signal.value for name, signal in moving.items()}, at_rest)
-    return search.first(now, merge(*(signal.turns(now) for signal in moving.values())))
+    return search.first(now, merge(*(signal.turning_points(now) for signal in moving.values())))
 
 
 def change_between(quantity: Quantity, reads: Mapping[str, Callable[[Nanos], float]], begin: Nanos, end: Nanos) -> Nanos | None:
@@ -265,12 +265,12 @@ class _Search:
         self._at_rest = at_rest
         self._looks = 0
 
-    def first(self, now: Nanos, turns: Iterable[Nanos]) -> Nanos | None:
-        """``turns`` are in order."""
+    def first(self, now: Nanos, turning_points: Iterable[Nanos]) -> Nanos | None:
+        """``turning_points`` are in order."""
         values = self._values(now)
         side = self._side(values)
         begin = now
-        for end in chain(turns, (now + FARTHEST_NS,)):
+        for end in chain(turning_points, (now + FARTHEST_NS,)):
             if end > begin:
                 there = self._values(end)
                 found = self._within(begin, values, end, there, side)
@@ -280,7 +280,7 @@ class _Search:
         return None
 
     def between(self, begin: Nanos, end: Nanos) -> Nanos | None:
-        """In a time without turns."""
+        """In a time without turning points."""
         values = self._values(begin)
         return self._within(begin, values, end, self._values(end), self._side(values))
 

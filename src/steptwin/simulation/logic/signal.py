@@ -29,7 +29,8 @@ class SignalOf:
     is_kept: bool = False
     """Whether a request may change it without an event of its scheduler."""
     freeze: Callable[[Nanos], Callable[[Nanos], float]] | None = None
-    """Gives the course at a moment as a function that stays as it is, also when the signal goes another way; None: it cannot."""
+    """Gives the trajectory at a moment as a function that stays as it is, also when the signal goes another way; None: it
+    cannot."""
     check: Callable[[], None] = lambda: None
     """Raises `Misuse` if conditions cannot use it, because it changes between events at unknown moments."""
 
@@ -41,15 +42,15 @@ class SignalOf:
     def continuous(self) -> bool:
         return self.turning is not None
 
-    def bring(self, now: Nanos) -> tuple[Source, ...]:
+    def sync(self, now: Nanos) -> tuple[Source, ...]:
         """Advance what the value depends on to ``now`` and return it. Until one of these changes, the value is constant or
-        follows its course."""
+        follows its trajectory."""
         for source in self.sources:
             source.scheduler.advance(now)
         return self.sources
 
     def value(self, now: Nanos) -> float:
-        """The value, after `bring`. Raises `Misuse` for a write-only signal."""
+        """The value, after `sync`. Raises `Misuse` for a write-only signal."""
         if self.read is None:
             raise Misuse(IT_CAN_ONLY_BE_WRITTEN())
         return self.read(now)
@@ -61,9 +62,9 @@ class SignalOf:
         self.check()
         if self.is_kept:
             for source in self.sources:
-                source.scheduler.is_attentive = True
+                source.scheduler.is_step_exact = True
 
-    def turns(self, now: Nanos) -> Iterator[Nanos]:
+    def turning_points(self, now: Nanos) -> Iterator[Nanos]:
         return iter(() if self.turning is None else self.turning(now))
 
     def version(self) -> object:

@@ -48,8 +48,8 @@ class ConstantDrive(Stateful):
         """As `MovingPart.reaches`."""
         if not self.runs or direction < 0 or position <= self.place(after):
             return None
-        way = (position - self._base) * self._divisor
-        return self._begin - (-way // self._speed)
+        distance = (position - self._base) * self._divisor
+        return self._begin - (-distance // self._speed)
 
 
 class Workpiece(NamedTuple):

@@ -55,14 +55,15 @@ class Cam:
         x0, x1, y0, y1 = self._x[i - 1], self._x[i], self._y[i - 1], self._y[i]
         return _Ratio(y0 * (x1 - x0) + (y1 - y0) * (x - x0), (x1 - x0) * self._lifts)
 
-    def span(self, place: float, way: int) -> tuple[float, float, float, float]:
-        """The least and greatest place of a stretch, and ``rise`` and ``shift``: in it the lift is ``rise`` · place + ``shift``.
+    def span(self, place: float, heading: int) -> tuple[float, float, float, float]:
+        """The least and greatest place of an interval, and ``rise`` and ``shift``: in it the lift is ``rise`` · place +
+        ``shift``.
 
-        ``place``, which need not be whole, is in it; at a corner, the stretch in ``way`` from there.
+        ``place``, which need not be whole, is in it; at a corner, the interval in ``heading`` from there.
         """
         turns = floor(place / self.turn)
         x = (place - turns * float(self.turn)) * self._places
-        i = bisect_right(self._x, x) if way > 0 else bisect_left(self._x, x)
+        i = bisect_right(self._x, x) if heading > 0 else bisect_left(self._x, x)
         i = min(max(i, 1), len(self._x) - 1)
         x0, x1, y0, y1 = self._x[i - 1], self._x[i], self._y[i - 1], self._y[i]
         low, high = (float(x / self._places + turns * self.turn) for x in (x0, x1))
@@ -79,36 +80,36 @@ class Cam:
                 at = _Ratio(x0 * rise + abs(over0) * (x1 - x0), rise)  # used only where one of them is on the other side
                 yield _Ratio(x0, 1) if over0 * direction >= 0 else at, _Ratio(x1, 1) if over1 * direction >= 0 else at
 
-    def next(self, level: Fraction, place: int, direction: int, way: int) -> int | None:
-        """The next whole place in ``way`` from ``place`` at which the lift is at the level, or beyond it in ``direction``."""
-        found = (self._first(low, high, place, way) for low, high in self._spans(level, direction))
-        return min((one for one in found if one is not None), key=lambda one: one * way, default=None)
+    def next(self, level: Fraction, place: int, direction: int, heading: int) -> int | None:
+        """The next whole place in ``heading`` from ``place`` at which the lift is at the level, or beyond it in ``direction``."""
+        found = (self._first(low, high, place, heading) for low, high in self._spans(level, direction))
+        return min((one for one in found if one is not None), key=lambda one: one * heading, default=None)
 
-    def _first(self, low: _Ratio, high: _Ratio, place: int, way: int) -> int | None:
-        if way < 0:
+    def _first(self, low: _Ratio, high: _Ratio, place: int, heading: int) -> int | None:
+        if heading < 0:
             low, high = _Ratio(-high.above, high.below), _Ratio(-low.above, low.below)
-        after = place * way + 1
+        after = place * heading + 1
         turn = -((high.above - after * self._places * high.below) // (self._turn * high.below))
         for one in range(turn, turn + self._turns):
             shift = one * self._turn
             at = max(after, -((-low.above - shift * low.below) // (low.below * self._places)))
             if at * self._places * high.below <= high.above + shift * high.below:
-                return at * way
+                return at * heading
         return None
 
-    def corners(self, place: int, way: int) -> Iterator[int]:
-        """Whole places in ``way`` from ``place`` between which, as far as a revolution's end, the lift goes one way."""
+    def corners(self, place: int, heading: int) -> Iterator[int]:
+        """Whole places in ``heading`` from ``place`` between which, as far as a revolution's end, the lift goes one way."""
         now = place
         for _ in range(self._turns * len(self._x)):
-            now = min((self._beyond(x, now, way) for x in self._x[1:-1]), key=lambda one: one * way)
+            now = min((self._beyond(x, now, heading) for x in self._x[1:-1]), key=lambda one: one * heading)
             yield now
 
-    def _beyond(self, x: int, place: int, way: int) -> int:
+    def _beyond(self, x: int, place: int, heading: int) -> int:
         """The first whole place after ``place`` that is beyond a point of the profile, or at it."""
-        turn = (place * self._places - x) * way // self._turn
-        while (found := -((-x * way - turn * self._turn) // self._places)) <= place * way:
+        turn = (place * self._places - x) * heading // self._turn
+        while (found := -((-x * heading - turn * self._turn) // self._places)) <= place * heading:
             turn += 1
-        return found * way
+        return found * heading
 
 
 def _whole(values: Iterable[Fraction], below: int) -> Sequence[int]:

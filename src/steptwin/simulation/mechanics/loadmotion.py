@@ -9,8 +9,8 @@ from typing import Any
 from steptwin.controller import SECOND, Nanos
 from steptwin.motion import Profile, Segment
 from steptwin.motion.divisions import profile_of
-from steptwin.motion.elastic import DriveStretch
-from steptwin.simulation.mechanics.course import Course
+from steptwin.motion.elastic import DriveInterval
+from steptwin.simulation.mechanics.trajectory import Trajectory
 
 LOOK_NS: Nanos = 1_000_000
 """Motions along arcs are no polynomials: their acceleration is taken as constant for so long."""
@@ -18,21 +18,21 @@ MOST_LOOKS = 100_000
 """Limit of the parts of an arc."""
 
 
-def load_stretches(course: Course, now: Nanos) -> Iterator[DriveStretch]:
+def load_intervals(trajectory: Trajectory, now: Nanos) -> Iterator[DriveInterval]:
     """The motion of the load of an axis from a moment on."""
-    profile = profile_of(course.plan) if course.free is None else course.free
-    sign, zero = course.build.sign, course.build.zero
-    begun = [piece for piece in course.pieces if piece.begin <= now]
-    pieces = [*begun[-1:], *course.pieces[len(begun) :]]
+    profile = profile_of(trajectory.plan) if trajectory.coasting is None else trajectory.coasting
+    sign, zero = trajectory.build.sign, trajectory.build.zero
+    begun = [piece for piece in trajectory.pieces if piece.begin <= now]
+    pieces = [*begun[-1:], *trajectory.pieces[len(begun) :]]
     for n, piece in enumerate(pieces):
         begin = max(piece.begin, now)
         end = pieces[n + 1].begin if n + 1 < len(pieces) else None
         if not piece.load_follows:
-            yield DriveStretch(begin, float(piece.load), 0.0, 0.0, 0.0)
+            yield DriveInterval(begin, float(piece.load), 0.0, 0.0, 0.0)
             continue
         offset = piece.load + zero
         for at, p, v, a, j in polynomials(profile, begin, end):
-            yield DriveStretch(at, offset + sign * p, sign * v, sign * a, sign * j)
+            yield DriveInterval(at, offset + sign * p, sign * v, sign * a, sign * j)
 
 
 def polynomials(profile: Profile, begin: Nanos, end: Nanos | None) -> Iterator[tuple[Nanos, float, float, float, float]]:

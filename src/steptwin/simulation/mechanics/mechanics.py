@@ -1,7 +1,7 @@
 """The mechanics of an axis: rotor and load with hard stops, backlash and motor, and the encoders on them.
 
 A `Mechanism` follows the plans of one drive. An ideal one, whose load always is at the commanded position, costs no computing
-time; otherwise each plan gives a `Course` in closed form. Positions in pulses of the mechanics.
+time; otherwise each plan gives a `Trajectory` in closed form. Positions in pulses of the mechanics.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from steptwin.messages import Message
 from steptwin.motion import Profile
 from steptwin.motion.divisions import profile_of
 from steptwin.motioncontroller import Drive
-from steptwin.simulation.mechanics.course import Build, Course, LoadPiece, MechanicalState
-from steptwin.simulation.mechanics.loose import Looseness
 from steptwin.simulation.mechanics.motor import NO_BURDEN, Burden
+from steptwin.simulation.mechanics.rotorhold import RotorHold
+from steptwin.simulation.mechanics.trajectory import Build, LoadPiece, MechanicalState, Trajectory
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.state import Plain, Stateful
 
@@ -30,14 +30,14 @@ FOLLOW_NS: Nanos = 10 * MILLISECOND
 
 
 class Shaft(NamedTuple):
-    """The motion of an encoder shaft: a course, in the frame of the drive's counted position. Immutable."""
+    """The motion of an encoder shaft: a trajectory, in the frame of the drive's counted position. Immutable."""
 
-    course: Course
+    trajectory: Trajectory
     on_load: bool
 
     def count(self, now: Nanos) -> int:
-        state = self.course.at(now)
-        build = self.course.build
+        state = self.trajectory.at(now)
+        build = self.trajectory.build
         return ((state.load if self.on_load else state.rotor) - build.zero) * build.sign
 
 
@@ -98,12 +98,12 @@ class Mechanism(Stateful):
         "_changed",
         "_changes",
         "_coupled",
-        "_course",
+        "_trajectory",
         "_due",
         "_falls",
-        "_loose",
+        "_hold",
         "_reported",
-        "_reported_course",
+        "_reported_trajectory",
         "_rest_due",
         "_simple",
         "_stall_due",
@@ -120,7 +120,7 @@ class Mechanism(Stateful):
         self.build = build
         self._encoders: list[EncoderBuild] = []
         self._coupled = False
-        """Whether the encoders were coupled to a course instead of the drive."""
+        """Whether the encoders were coupled to a trajectory instead of the drive."""
         self._due: Nanos | None = None
         """The next notification of controllers that follow an encoder."""
         self._stalled = False
@@ -140,16 +140,16 @@ class Mechanism(Stateful):
         """All of them together."""
         self._changed: tuple[int, Burden] | None = None
         """Where the rotor was when they changed, and what it carried until then."""
-        self._loose = None if build.motor is None or not build.is_loose else Looseness(build, build.motor, scheduler.now)
+        self._hold = None if build.motor is None or not build.may_coast else RotorHold(build, build.motor, scheduler.now)
         """None for a rotor that always goes with its field, or stands."""
         self._falls = False
         self._rest_due: Nanos | None = None
-        """When a free rotor that moves comes to rest."""
+        """When a coasting rotor that moves comes to rest."""
         self._changes = 0
         self._reported: tuple[LoadPiece, ...] | None = (LoadPiece(scheduler.now, True, 0),)
         """The position of the load as reported last; None while it moves freely."""
-        self._reported_course: Course | None = None
-        """The course that was reported."""
+        self._reported_trajectory: Trajectory | None = None
+        """The trajectory that was reported."""
         self._simple = build.ideal
         """Whether the load always was, and always will be, at the commanded position."""
         drive = scheduler.drive_of(controller, number)
@@ -161,8 +161,8 @@ class Mechanism(Stateful):
                 f"{controller} axis {number} stands at {here} imp, outside its hard stops {build.low} to {build.high} imp"
             )
         self._revision = drive.revision
-        self._course = Course(build, drive.plan, scheduler.now, MechanicalState(here, here))
-        if self._loose is not None and not scheduler.is_blank:
+        self._trajectory = Trajectory(build, drive.plan, scheduler.now, MechanicalState(here, here))
+        if self._hold is not None and not scheduler.is_blank:
             self._renew(drive, scheduler.now)
 
     @property
@@ -171,39 +171,39 @@ class Mechanism(Stateful):
 
     # ------------------------------------------------------------------ position
 
-    def course(self, now: Nanos) -> Course:
-        """The course at ``now``, which is the scheduler's moment or later. What is looked at in advance changes nothing: a course
-        is renewed at the scheduler's moment."""
+    def trajectory(self, now: Nanos) -> Trajectory:
+        """The trajectory at ``now``, which is the scheduler's moment or later. What is looked at in advance changes nothing: a
+        trajectory is renewed at the scheduler's moment."""
         drive = self._drive
-        if drive.revision != self._revision or (self._loose is not None and self._loose.is_switched(drive, self._scheduler.now)):
+        if drive.revision != self._revision or (self._hold is not None and self._hold.is_switched(drive, self._scheduler.now)):
             self._renew(drive, self._scheduler.now)
-        return self._course
+        return self._trajectory
 
     def at(self, now: Nanos) -> MechanicalState:
-        return self.course(now).at(now)
+        return self.trajectory(now).at(now)
 
     def lost(self, now: Nanos) -> int:
         """The number of pulses by which the rotor is below the field; negative: above it."""
-        course = self.course(now)
-        return course.field(now) - course.at(now).rotor
+        trajectory = self.trajectory(now)
+        return trajectory.field(now) - trajectory.at(now).rotor
 
     def version(self) -> object:
         return self._scheduler.controllers[self.controller].axes[self.number - 1].revision, self._changes
 
     def place(self, now: Nanos) -> int:
-        return self.course(now).load_at(now)
+        return self.trajectory(now).load_at(now)
 
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
-        return self.course(after).reaches(position, after, direction)
+        return self.trajectory(after).reaches(position, after, direction)
 
     # ------------------------------------------------------------------ time
 
     def update(self, now: Nanos) -> None:
         if not self._simple:
             drive = self._drive
-            if drive.revision != self._revision or (self._loose is not None and self._loose.is_switched(drive, now)):
+            if drive.revision != self._revision or (self._hold is not None and self._hold.is_switched(drive, now)):
                 self._renew(drive, now)
-                self._scheduler.mark(self.controller)  # switches on it look ahead
+                self._scheduler.notify(self.controller)  # switches on it look ahead
             elif self._due is not None and self._due <= now:
                 self._turn_encoders(now)
             if self._stall_due is not None and self._stall_due <= now:
@@ -216,25 +216,28 @@ class Mechanism(Stateful):
 
     def _report_load(self, now: Nanos) -> None:
         """Report the position of the load, unless it follows from earlier reports or from the plan of the drive."""
-        course = self._course
-        if course is self._reported_course:
+        trajectory = self._trajectory
+        if trajectory is self._reported_trajectory:
             return
-        self._reported_course = course
-        free = course.free
-        if free is not None and free.segments:
+        self._reported_trajectory = trajectory
+        coasting = trajectory.coasting
+        if coasting is not None and coasting.segments:
             self._reported = None
-            state = course.at(now)
-            moved = Profile(free.start, free.base + (state.load - state.rotor) * self.build.sign, free.segments, free.final_p)
+            state = trajectory.at(now)
+            moved = Profile(
+                coasting.start, coasting.base + (state.load - state.rotor) * self.build.sign, coasting.segments, coasting.final_p
+            )
             self._scheduler.report(self.controller, "free", str(self.number), moved)
             return
-        pieces = _from(course.load_pieces(), now)
+        pieces = _from(trajectory.load_pieces(), now)
         if self._reported is None or pieces != _from(self._reported, now):
             self._reported = pieces
             self._scheduler.report(self.controller, "load", str(self.number), pieces)
 
     def deadline(self) -> Nanos | None:
-        """Courses are computed in advance: what is due is to be reported, or concerns followers and the current of the axis."""
-        first = None if self._loose is None else self._loose.due
+        """Trajectories are computed in advance: what is due is to be reported, or concerns followers and the current of the
+        axis."""
+        first = None if self._hold is None else self._hold.due
         for due in (self._due, self._stall_due, self._stop_due, self._rest_due):
             if due is not None and (first is None or due < first):
                 first = due
@@ -242,10 +245,10 @@ class Mechanism(Stateful):
 
     def _watch_motor(self, now: Nanos) -> None:
         """Report that the motor has stalled or has synchronised again."""
-        stalled = self._course.at(now).stalled
+        stalled = self._trajectory.at(now).stalled
         if stalled is not self._stalled:
             self._stalled = stalled
-            text = self._course.stall_of(self._name, now) if stalled else IS_CAUGHT(axis=self._name, pulses=self.lost(now))
+            text = self._trajectory.stall_of(self._name, now) if stalled else IS_CAUGHT(axis=self._name, pulses=self.lost(now))
             facts = (
                 ("axis", self.number),
                 ("element", self._name),
@@ -253,11 +256,11 @@ class Mechanism(Stateful):
                 ("lost", 0 if stalled else self.lost(now)),
             )
             self._scheduler.report(self.controller, "event", "stall", text, *facts)
-        self._stall_due = self._course.next_stall(now)
+        self._stall_due = self._trajectory.next_stall(now)
 
     def _watch_stops(self, now: Nanos) -> None:
         """Report that the motor begins to push against a hard stop, and that it no longer does."""
-        stop = self._course.stop(now)
+        stop = self._trajectory.stop(now)
         if stop != self._stop:
             pushes, side = stop != 0, "upper" if (stop or self._stop) > 0 else "lower"
             lost = self.lost(now)
@@ -268,11 +271,12 @@ class Mechanism(Stateful):
             facts = ("axis", self.number), ("element", self._name), ("stop", side), ("pushes", pushes), ("lost", lost)
             self._scheduler.report(self.controller, "event", "hard-stop", text, *facts)
             self._stop = stop
-        self._stop_due = self._course.next_stop(now)
+        self._stop_due = self._trajectory.next_stop(now)
 
     def _renew(self, drive: Drive, now: Nanos, state: MechanicalState | None = None, *, rests: bool = False) -> None:
-        """Compute a new course after a change of the drive's plan or of the mechanics. ``rests``: a free rotor stands now."""
-        before, plan = self._course, drive.plan
+        """Compute a new trajectory after a change of the drive's plan or of the mechanics. ``rests``: a coasting rotor stands
+        now."""
+        before, plan = self._trajectory, drive.plan
         if state is None:
             if self._simple:
                 here = self.build.sign * plan.count(now) + self.build.zero
@@ -282,17 +286,19 @@ class Mechanism(Stateful):
                 # After power-off a controller counts from 0 again.
                 counted_anew = self.build.sign * (plan.count(now) - before.plan.count(now))
                 state = state._replace(behind=state.behind + counted_anew)
-        led = profile_of(before.plan) if before.free is None else before.free
+        led = profile_of(before.plan) if before.coasting is None else before.coasting
         jump = profile_of(plan).velocity(now) - led.velocity(now)
         is_new = drive.revision != self._revision
         self._revision = drive.revision
-        free = None
-        if self._loose is not None:
-            free, state = self._loose.motion(
+        coasting = None
+        if self._hold is not None:
+            coasting, state = self._hold.motion(
                 drive, before, state, now, is_new=is_new, burden=self._carried, stands=self._blocked or rests
             )
         vibration = before.vibration(now)
-        self._course = Course(self._loaded(), plan, now, state, blocked=self._blocked, jump=jump, free=free, vibration=vibration)
+        self._trajectory = Trajectory(
+            self._loaded(), plan, now, state, blocked=self._blocked, jump=jump, coasting=coasting, vibration=vibration
+        )
         self._changes += 1
         if self._encoders:
             self._turn_encoders(now)
@@ -300,8 +306,8 @@ class Mechanism(Stateful):
             self._watch_motor(now)
         if self.build.low is not None or self.build.high is not None:
             self._watch_stops(now)
-        if self._loose is not None:
-            self._watch_fall(now, free)
+        if self._hold is not None:
+            self._watch_fall(now, coasting)
 
     # ------------------------------------------------------------------ load
 
@@ -318,16 +324,16 @@ class Mechanism(Stateful):
         own = Burden(motor.inertia, motor.friction, motor.load).plus(more)
         return replace(self.build, motor=replace(motor, inertia=own.inertia, friction=own.friction, load=own.load))
 
-    def _watch_fall(self, now: Nanos, free: Profile | None) -> None:
+    def _watch_fall(self, now: Nanos, coasting: Profile | None) -> None:
         """Report that a rotor that its field does not hold begins to move, and that it rests again."""
-        falls = free is not None and free.moving(now)
-        if falls is not self._falls and self._loose is not None:
+        falls = coasting is not None and coasting.moving(now)
+        if falls is not self._falls and self._hold is not None:
             self._falls = falls
             lost = self.lost(now)
-            text = self._loose.why(axis=self._name) if falls else STANDS(axis=self._name, pulses=lost)
+            text = self._hold.why(axis=self._name) if falls else STANDS(axis=self._name, pulses=lost)
             facts = ("axis", self.number), ("element", self._name), ("falls", falls), ("lost", lost)
             self._scheduler.report(self.controller, "event", "fall", text, *facts)
-        self._rest_due = free.end if free is not None and falls else None
+        self._rest_due = coasting.end if coasting is not None and falls else None
 
     def brake(self, torque: float, now: Nanos) -> None:
         """Let a brake act on the rotor with ``torque`` N·m."""
@@ -336,28 +342,28 @@ class Mechanism(Stateful):
         state = self.at(now)
         self._brake = torque
         self._renew(self._drive, now, state)
-        self._scheduler.mark(self.controller)
+        self._scheduler.notify(self.controller)
 
     def burden(self, by: str, more: Burden, now: Nanos) -> None:
         """Let the element ``by`` load the rotor with ``more``, in place of what it did before."""
         if more == self._burdens.get(by, NO_BURDEN):
             return
-        course, before = self.course(now), self._carried
+        trajectory, before = self.trajectory(now), self._carried
         self._burdens[by] = more
         self._burden = NO_BURDEN
         for one in self._burdens.values():
             self._burden = self._burden.plus(one)
-        state = course.at(now)
-        rests = self._loose is not None and self._settles(self._loose, course, before, now)
+        state = trajectory.at(now)
+        rests = self._hold is not None and self._settles(self._hold, trajectory, before, now)
         self._renew(self._drive, now, state, rests=rests)
-        self._scheduler.mark(self.controller)
+        self._scheduler.notify(self.controller)
 
-    def _settles(self, loose: Looseness, course: Course, before: Burden, now: Nanos) -> bool:
-        """Whether a free rotor stands whose load changes from ``before`` where it changed the other way the last time."""
-        rotor = course.at(now).rotor
+    def _settles(self, hold: RotorHold, trajectory: Trajectory, before: Burden, now: Nanos) -> bool:
+        """Whether a coasting rotor stands whose load changes from ``before`` where it changed the other way the last time."""
+        rotor = trajectory.at(now).rotor
         last, self._changed = self._changed, (rotor, before)
         is_again = last is not None and last[1] == self._carried and 4 * abs(last[0] - rotor) <= self.build.period_p
-        return is_again and loose.settles(course, before, self._carried, now)
+        return is_again and hold.settles(trajectory, before, self._carried, now)
 
     def pulls(self, now: Nanos) -> bool:
         """Whether the motor follows its field, or would: it has current, has not stalled, and nothing blocks it."""
@@ -365,7 +371,7 @@ class Mechanism(Stateful):
 
     def next_stall(self, now: Nanos) -> Nanos | None:
         """First moment after ``now`` at which the motor stalls or synchronises again."""
-        return self.course(now).next_stall(now)
+        return self.trajectory(now).next_stall(now)
 
     # ------------------------------------------------------------------ encoders
 
@@ -381,18 +387,18 @@ class Mechanism(Stateful):
     @property
     def may_turn(self) -> set[str]:
         """Controllers whose encoders it may turn without an event of theirs."""
-        return {encoder.controller for encoder in self._encoders if self.build.is_loose or encoder.controller != self.controller}
+        return {encoder.controller for encoder in self._encoders if self.build.may_coast or encoder.controller != self.controller}
 
     def _turn_encoders(self, now: Nanos) -> None:
-        course = self._course
+        trajectory = self._trajectory
         self._due = None
         for encoder in self._encoders:
             own = self._is_own(encoder)
-            exact = own and course.is_exact and not (encoder.on_load and self.build.play)
+            exact = own and trajectory.is_exact and not (encoder.on_load and self.build.play)
             if not exact or self._coupled:
                 self._coupled = True
-                encoder.device.follow_shaft(encoder.axis, Shaft(course, encoder.on_load), now)
-            if not own and course.moves(now):
+                encoder.device.follow_shaft(encoder.axis, Shaft(trajectory, encoder.on_load), now)
+            if not own and trajectory.moves(now):
                 self._due = now + FOLLOW_NS
 
     def _is_own(self, encoder: EncoderBuild) -> bool:
@@ -416,7 +422,7 @@ class Mechanism(Stateful):
         self._blockers = (*others, by) if blocked else ()
         stalled = state.stalled or (not blocked and self.build.motor is not None)
         self._renew(self._drive, now, state._replace(stalled=stalled))
-        self._scheduler.mark(self.controller)
+        self._scheduler.notify(self.controller)
 
     def lose(self, pulses: int, now: Nanos) -> None:
         """Move the rotor ``pulses`` behind the field (negative: ahead), within the hard stops."""
@@ -427,17 +433,17 @@ class Mechanism(Stateful):
         if build.high is not None:
             rotor = min(rotor, build.high)
         self._simple = False
-        behind = self.course(now).field(now) - rotor
+        behind = self.trajectory(now).field(now) - rotor
         self._renew(self._drive, now, MechanicalState(rotor, min(max(load, rotor), rotor + build.play), stalled, behind))
-        self._scheduler.mark(self.controller)
+        self._scheduler.notify(self.controller)
 
     def slip(self, counts: int, now: Nanos) -> None:
         """Let the encoders slip by ``counts`` on their shaft."""
         for encoder in self._encoders:
             encoder.device.turn_encoder(encoder.axis, counts, now)
-        self._scheduler.mark(self.controller)
+        self._scheduler.notify(self.controller)
 
-    # Revisions of a drive are not restored, so the state only holds whether the course belongs to the drive's present plan.
+    # Revisions of a drive are not restored, so the state only holds whether the trajectory belongs to the drive's present plan.
 
     def copy_state(self) -> Plain:
         return super().copy_state(), self._revision == self._drive.revision
@@ -470,4 +476,4 @@ class RotorMark:
         return self._mechanism.at(now).rotor
 
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
-        return self._mechanism.course(after).reaches(position, after, direction, rotor=True)
+        return self._mechanism.trajectory(after).reaches(position, after, direction, rotor=True)

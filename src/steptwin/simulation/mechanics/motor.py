@@ -7,7 +7,7 @@ Torques in N·m, speeds in pulses/s. While the torque that a motion needs,
 does not exceed the curve at its speed, the rotor follows the field. Where it exceeds the curve, the rotor stops at once, and
 pulses are lost until the field is slow enough and the torque is sufficient; then the rotor synchronises. Velocity within a
 segment is a polynomial, so both moments are computed in closed form. What it does in a band of resonance is in
-`steptwin.simulation.mechanics.resonance`, what it does when its field stops at once in `steptwin.simulation.mechanics.wells`.
+`steptwin.simulation.mechanics.resonance`, what it does when its field stops at once in `steptwin.simulation.mechanics.potential`.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ class StepperMotor:
         if any(torque < 0.0 for _, torque in self.curve) or self.inertia < 0.0 or self.friction < 0.0:
             raise Misuse("torques of a curve, inertia and friction must not be negative")
 
-    def check_free(self, brake: float = 0.0) -> None:
+    def check_coasting(self, brake: float = 0.0) -> None:
         """Raises `Misuse` if the torques are too high for the inertia while no current holds the rotor. ``brake`` in N·m."""
         torque = abs(self.load) + self.friction + brake
         if torque > FASTEST * self.inertia:
@@ -194,8 +194,8 @@ class StepperMotor:
         need = (self.needs(sign * 2.0 * s.c2, sign * d), self.inertia * sign * 6.0 * s.c3)
         constant, slope = self._line(abs(s.velocity(0.5 * (t0 + t1))))
         spares = [
-            (constant + slope * speed[0] - way * need[0], slope * speed[1] - way * need[1], slope * speed[2])
-            for way in (1.0, -1.0)
+            (constant + slope * speed[0] - side * need[0], slope * speed[1] - side * need[1], slope * speed[2])
+            for side in (1.0, -1.0)
         ]
         return spares, _SLACK * (abs(constant) + abs(need[0]))
 

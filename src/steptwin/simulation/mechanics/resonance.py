@@ -39,7 +39,7 @@ class MotionPart(NamedTuple):
     use: float
 
 
-class Spell(NamedTuple):
+class ResonanceInterval(NamedTuple):
     """From ``begin_s`` on the vibration, ``amplitude`` full steps then, grows with ``rate`` 1/s (negative: fades)."""
 
     begin_s: float
@@ -62,16 +62,18 @@ def limit(use: float) -> float:
     return sqrt(max(2.0 * barrier / stiffness, 0.0)) / QUARTER
 
 
-def spells(of: Resonance, parts: Iterable[MotionPart], amplitude: float) -> Iterator[tuple[Spell, float | None]]:
+def resonance_intervals(
+    of: Resonance, parts: Iterable[MotionPart], amplitude: float
+) -> Iterator[tuple[ResonanceInterval, float | None]]:
     """The vibration through parts of a motion, with the moment at which the rotor loses the field, which ends them."""
     for part in parts:
         grows = of.low < part.speed < of.high
-        spell = Spell(part.begin_s, amplitude, of.growth if grows else -of.fading)
+        interval = ResonanceInterval(part.begin_s, amplitude, of.growth if grows else -of.fading)
         if grows:
             times = limit(part.use) / amplitude
             lost = part.begin_s + (logarithm(times) / of.growth if times > 1.0 else 0.0)
             if lost < part.end_s:
-                yield spell, lost
+                yield interval, lost
                 return
-        yield spell, None
-        amplitude = spell.at(part.end_s, of.least) if part.end_s < inf else of.least
+        yield interval, None
+        amplitude = interval.at(part.end_s, of.least) if part.end_s < inf else of.least

@@ -56,12 +56,12 @@ class Travel(Stateful):
 
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
         """As `MovingPart.reaches`."""
-        way = (position - self._place) * direction
+        distance = (position - self._place) * direction
         if direction != self._direction or (position - self.place(after)) * direction <= 0 or not 0 <= position <= self.full:
             return None
-        return self._begin - (-way // self.speed(direction))
+        return self._begin - (-distance // self.speed(direction))
 
-    def turns(self, now: Nanos) -> Iterator[Nanos]:
+    def turning_points(self, now: Nanos) -> Iterator[Nanos]:
         """The moments, ns, at which it has left the end where it stands and at which it arrives at the other end."""
         if self._direction == 0:
             return

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from steptwin.simulation.scheduler.order import successors, update_order
+from steptwin.simulation.scheduler.runqueue import Deadlines, RunQueue
 from steptwin.simulation.scheduler.scheduledpart import ScheduledPart
-from steptwin.simulation.scheduler.turns import Dues, Turns
 from steptwin.simulation.scheduler.wires import Wire
 
 
 class ScheduledParts:
-    """Parts with numbers in the order in which they are updated: what each watches, computes and drives, and when it has a turn.
+    """Parts with numbers in the order in which they are updated: what each watches, computes and drives, and when it runs.
 
     All that is kept by number is here, and `arranged` makes it anew, so that nothing of one numbering gets into another.
     """
 
-    __slots__ = ("_drives", "_watched", "all", "by_name", "computes", "dues", "looked_at", "parts", "turns")
+    __slots__ = ("_drives", "_watched", "all", "by_name", "computes", "deadlines", "parts", "queue", "visited")
 
     def __init__(self) -> None:
         self.parts: list[ScheduledPart] = []
@@ -30,10 +30,10 @@ class ScheduledParts:
         """The line or element whose signals each part computes."""
         self._drives: dict[int, str] = {}
         """The controller or element whose input a part drives."""
-        self.turns = Turns()
+        self.queue = RunQueue()
         """Those that are updated when the signals settle."""
-        self.dues = Dues()
-        self.looked_at: set[int] = set()
+        self.deadlines = Deadlines()
+        self.visited: set[int] = set()
         """Those whose deadlines may have changed since the signals last settled."""
 
     def add(self, part: ScheduledPart, watches: Iterable[str] | None, computes: str | None, drives: str | None) -> int:
@@ -58,7 +58,7 @@ class ScheduledParts:
         return () if found == sorted(found) else found
 
     def arranged(self, order: Sequence[int]) -> ScheduledParts:
-        """The same parts, added in another order; none has a turn yet. ``order``: their present numbers."""
+        """The same parts, added in another order; none waits to run yet. ``order``: their present numbers."""
         found = ScheduledParts()
         for old in order:
             found.add(self.parts[old], self._watched[old], self.computes[old], self._drives.get(old))

@@ -16,10 +16,10 @@ from steptwin.messages import NONE, Message
 from steptwin.motioncontroller import Drive, MotionController
 from steptwin.simulation.scheduler.followers import SchedulerFollower, SchedulerFollowers
 from steptwin.simulation.scheduler.recordedplans import RecordedPlans
+from steptwin.simulation.scheduler.runqueue import Deadlines, RunQueue
 from steptwin.simulation.scheduler.scheduledpart import ScheduledPart, SchedulerState
 from steptwin.simulation.scheduler.scheduledparts import ScheduledParts
 from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
-from steptwin.simulation.scheduler.turns import Dues, Turns
 from steptwin.simulation.scheduler.wires import PinName, Wire, Wires
 from steptwin.state import Stateful
 
@@ -110,11 +110,11 @@ SIGNALS_DO_NOT_SETTLE = Message(
 class Scheduler:
     """Runs controllers together. Ties in time are broken by the order in which controllers and parts were added.
 
-    An event costs what it changes: only controllers and parts that are due, or that something they watch has changed (`mark`),
+    An event costs what it changes: only controllers and parts that are due, or that something they watch has changed (`notify`),
     are looked at.
 
     Before a controller is changed directly (by a request or a pin), the scheduler must be advanced to that moment, so that
-    delayed levels arrive in order; the effects propagate with the next `advance`, `deadline` or `settle`.
+    delayed levels arrive in order; the effects propagate with the next `advance`, `deadline` or `propagate`.
 
     ``record`` gets the first level of each driven input, every edge of an output and of an input, and every new plan of an axis.
     """
@@ -131,9 +131,9 @@ class Scheduler:
         self._parts = ScheduledParts()
         self.observers: list[Callable[[str, PinEdge], None]] = []
         """Called with controller name and edge, in order, for every output edge."""
-        self.stale = False
+        self.is_dirty = False
         """Whether something changed since the signals last settled."""
-        self.is_attentive = False
+        self.is_step_exact = False
         """Whether a condition depends on values that a request or a statement may change without an event; then each of them
         counts as one."""
         self.hears_requests = False
@@ -161,10 +161,10 @@ class Scheduler:
         """The numbers of the controllers, by name."""
         self._sources: dict[str, Source] = {}
         """The controllers, and the lines and elements with a part that computes their signals."""
-        self._controller_turns = Turns()
+        self._controller_queue = RunQueue()
         """Those whose edges have to be taken when the signals settle."""
-        self._controller_dues = Dues()
-        self._controllers_looked_at: set[int] = set()
+        self._controller_deadlines = Deadlines()
+        self._controllers_visited: set[int] = set()
         """Those whose deadlines may have changed since the signals last settled."""
         self._due: Nanos | None = None
         self._alone: tuple[str, RecordedPlans] | None = None
@@ -188,25 +188,25 @@ class Scheduler:
         self._names.append(name)
         self._sources[name] = Source(self, name)
         self._plans.append(RecordedPlans(name, controller))
-        controller.changed = partial(self.mark, name)
+        controller.changed = partial(self.notify, name)
         self._join()
         if len(self._names) == 1 and not self.parts and not self.wires:
             self._alone = name, self._plans[0]
-        self.mark(name)
+        self.notify(name)
 
     def _join(self) -> None:
         """Something joins the controllers: from now on it is scheduled what has to be looked at."""
         if self._alone is not None:
             self._alone = None
-            self.mark()
+            self.notify()
 
     def replace(self, name: str, controller: MotionController) -> None:
         """Replace the controller ``name`` by a wrapper with the same pins and axes."""
         if name not in self.controllers:
             raise Misuse(UNKNOWN_CONTROLLER(name=name, names=list(self.controllers) or NONE()))
         self.controllers[name] = controller
-        controller.changed = partial(self.mark, name)
-        self.mark(name)
+        controller.changed = partial(self.notify, name)
+        self.notify(name)
 
     def add_board(self, board: Board) -> None:
         """Add the terminals of an element, whose part has their state."""
@@ -227,8 +227,8 @@ class Scheduler:
         if name is not None:
             self._sources[name] = Source(self, name)
         if not self.is_blank:
-            self._parts.turns.add(number)
-        self.stale = True
+            self._parts.queue.add(number)
+        self.is_dirty = True
         if self.on_change is not None:
             self.on_change(self)
 
@@ -239,7 +239,7 @@ class Scheduler:
     def arrange(self, order: Sequence[int]) -> None:
         """Update its parts in another order from now on, before the first moment. ``order``: their present numbers."""
         self._parts = self._parts.arranged(order)
-        self.mark()
+        self.notify()
 
     def source(self, name: str) -> Source:
         """The controller, line or element ``name`` as what a value depends on."""
@@ -256,7 +256,7 @@ class Scheduler:
         if not self.is_blank:
             self.drive(wire.target, wire.transmitted(self._level(wire.source)))
         self.wires.add(wire)
-        self.mark(wire.target.controller)
+        self.notify(wire.target.controller)
 
     def wire_to(self, target: PinName) -> Wire | None:
         """The wire that drives an input, if one does."""
@@ -305,22 +305,22 @@ class Scheduler:
         changed, self._changed = self._changed, set()
         return changed
 
-    def mark(self, name: str | None = None) -> None:
+    def notify(self, name: str | None = None) -> None:
         """Register a change of a controller, a line or an element, or of anything: the signals have to settle."""
         if self._alone is not None or self.is_blank:
-            pass  # it is looked at whenever the scheduler settles, all of it after `restore`
+            pass  # it is looked at whenever the scheduler propagates, all of it after `restore`
         elif name is None:
             for number in range(len(self._names)):
-                self._controller_turns.add(number)
+                self._controller_queue.add(number)
             for number in range(len(self.parts)):
-                self._parts.turns.add(number)
+                self._parts.queue.add(number)
         else:
             of_controller = self._numbers.get(name)
             if of_controller is not None:
-                self._controller_turns.add(of_controller)
+                self._controller_queue.add(of_controller)
             for number in self._parts.by_name.get(name, ()):
-                self._parts.turns.add(number)
-        self.stale = True
+                self._parts.queue.add(number)
+        self.is_dirty = True
         if self.on_change is not None:
             self.on_change(self)
 
@@ -342,7 +342,7 @@ class Scheduler:
         board = self.boards.get(target.controller)
         if board is not None:
             board.set_pin(target.pin, level, self.now)
-            self.mark(target.controller)
+            self.notify(target.controller)
             return
         controller, (_, pin) = self.controllers[target.controller], target
         if self._record is None:
@@ -368,7 +368,7 @@ class Scheduler:
         """An output of an element has another level now, or its first one."""
         self.report(self.owner(element), "edge", f"{element}.{output.lower()}", level)
         self.wires.transmit(PinName(element, output), level, self.now)
-        self.mark(element)
+        self.notify(element)
 
     def report(self, controller: str, kind: str, subject: str, value: object, *facts: Fact) -> None:
         """Record an event of a controller at the present moment."""
@@ -380,8 +380,8 @@ class Scheduler:
     def advance(self, now: Nanos) -> None:
         if now < self.now:
             raise TimeReversal(self.now, now)
-        if self.stale:
-            self.settle()
+        if self.is_dirty:
+            self.propagate()
         due = self._due
         if due is not None and due <= now:
             self._run(now)
@@ -401,30 +401,30 @@ class Scheduler:
                 self.followers.leave(self._due)
             self.now = self._due
             self._advance_controllers(now)
-            for number in self._parts.dues.take(self.now):
-                self._parts.turns.add(number)
+            for number in self._parts.deadlines.take(self.now):
+                self._parts.queue.add(number)
             if self.wires.delayed:
                 self.wires.arrive(self.now)
-            self.settle()
+            self.propagate()
 
     def _advance_controllers(self, now: Nanos) -> None:
         """Advance the controllers that are due; a single one to where it changes something, or where anything else is due."""
-        due = self._controller_dues.take(self.now)
-        until = self._nothing_else_until(now) if len(due) == 1 and not self.is_attentive else self.now
+        due = self._controller_deadlines.take(self.now)
+        until = self._nothing_else_until(now) if len(due) == 1 and not self.is_step_exact else self.now
         for number in due:
             name = self._names[number]
-            self.stale = False
+            self.is_dirty = False
             if until > self.now:
                 self.now = self.controllers[name].advance_to_change(until)
             else:
                 self.controllers[name].advance(self.now)
-            if not self.stale:  # the controller has not called its hook
-                self.mark(name)
+            if not self.is_dirty:  # the controller has not called its hook
+                self.notify(name)
 
     def _nothing_else_until(self, now: Nanos) -> Nanos:
         """The last moment, at most ``now``, before anything is due besides a controller that is due now."""
-        until, dues = now, (self._controller_dues.first(), self._parts.dues.first())
-        for due in (*dues, self.wires.next_arrival()) if self.wires.delayed else dues:
+        until, deadlines = now, (self._controller_deadlines.first(), self._parts.deadlines.first())
+        for due in (*deadlines, self.wires.next_arrival()) if self.wires.delayed else deadlines:
             if due is not None and due <= until:
                 until = due - 1
         return until
@@ -435,40 +435,40 @@ class Scheduler:
         while due is not None and due <= now:
             if self.followers is not None:
                 self.followers.leave(due)
-            if self.is_attentive:
+            if self.is_step_exact:
                 controller.advance(due)
                 self.now = due
             else:
                 self.now = controller.advance_to_change(now)
-            self._settle_alone(name, plans)
+            self._propagate_alone(name, plans)
             if self.followers is not None:
                 self.followers.news |= self.followers.by_name.get(name, {})
                 self.followers.tell(self.now)
             due = self._due
-            if self.is_attentive and self.on_change is not None:
+            if self.is_step_exact and self.on_change is not None:
                 self.on_change(self)
 
-    def _settle_alone(self, name: str, plans: RecordedPlans) -> None:
-        """As `settle`, for a single controller without parts and wires."""
+    def _propagate_alone(self, name: str, plans: RecordedPlans) -> None:
+        """As `propagate`, for a single controller without parts and wires."""
         controller = self.controllers[name]
         for edge in controller.take_edges():
             self._edge(name, edge)
         if self._record is not None:
             plans.report(self._record, self.now)
         self._due = controller.deadline()
-        self.stale = False
+        self.is_dirty = False
 
     def deadline(self) -> Nanos | None:
         """The time of the next event; None if there is none."""
-        if self.stale:
-            self.settle()
+        if self.is_dirty:
+            self.propagate()
         return self._due
 
-    def settle(self) -> None:
+    def propagate(self) -> None:
         """Propagate edges along wires and update parts until nothing changes; then find the next deadline."""
         if self._alone is not None:
             self._changed.add(self._alone[0])
-            self._settle_alone(*self._alone)
+            self._propagate_alone(*self._alone)
             if self.followers is not None:
                 self.followers.news |= self.followers.by_name.get(self._alone[0], {})
         else:
@@ -480,26 +480,26 @@ class Scheduler:
 
     def _settle_connected(self) -> None:
         for _ in range(MAX_ROUNDS_PER_INSTANT):
-            self.stale = False
+            self.is_dirty = False
             for number in self._parts.all:
-                self._parts.turns.add(number)
+                self._parts.queue.add(number)
             self._update_parts()
             self._take_edges()
-            if not self.stale:
+            if not self.is_dirty:
                 break
         else:
             raise Runaway(SIGNALS_DO_NOT_SETTLE(most=MAX_ROUNDS_PER_INSTANT, now=self.now))
         self._find_deadlines()
 
     def _update_parts(self) -> None:
-        parts, turns, looked_at = self._parts.parts, self._parts.turns, self._parts.looked_at
-        while (number := turns.take()) is not None:
-            looked_at.add(number)
+        parts, queue, visited = self._parts.parts, self._parts.queue, self._parts.visited
+        while (number := queue.take()) is not None:
+            visited.add(number)
             parts[number].update(self.now)
 
     def _take_edges(self) -> None:
-        while (number := self._controller_turns.take()) is not None:
-            self._controllers_looked_at.add(number)
+        while (number := self._controller_queue.take()) is not None:
+            self._controllers_visited.add(number)
             name = self._names[number]
             for edge in self.controllers[name].take_edges():
                 self._edge(name, edge)
@@ -507,25 +507,25 @@ class Scheduler:
     def _find_deadlines(self) -> None:
         """Record new plans of the controllers that were looked at, and find when anything is due next."""
         followers = self.followers
-        for number in sorted(self._controllers_looked_at):
+        for number in sorted(self._controllers_visited):
             if self._record is not None:
                 self._plans[number].report(self._record, self.now)
             name = self._names[number]
             self._changed.add(name)
             if followers is not None and name in followers.by_name:
                 followers.news |= followers.by_name[name]
-            self._controller_dues.put(number, self.controllers[name].deadline())
+            self._controller_deadlines.put(number, self.controllers[name].deadline())
         parts = self._parts
-        for number in parts.looked_at:
+        for number in parts.visited:
             of = parts.computes[number]
             if of is not None:
                 self._changed.add(of)
                 if followers is not None and of in followers.by_name:
                     followers.news |= followers.by_name[of]
-            parts.dues.put(number, parts.parts[number].deadline())
-        self._controllers_looked_at.clear()
-        parts.looked_at.clear()
-        due, of_parts = self._controller_dues.first(), parts.dues.first()
+            parts.deadlines.put(number, parts.parts[number].deadline())
+        self._controllers_visited.clear()
+        parts.visited.clear()
+        due, of_parts = self._controller_deadlines.first(), parts.deadlines.first()
         if due is None or (of_parts is not None and of_parts < due):
             due = of_parts
         arrival = self.wires.next_arrival() if self.wires.delayed else None
@@ -545,8 +545,8 @@ class Scheduler:
 
     def snapshot(self) -> SchedulerState:
         """State of everything at the scheduler's moment."""
-        if self.stale:
-            self.settle()
+        if self.is_dirty:
+            self.propagate()
         return SchedulerState(
             self.now,
             tuple(controller.snapshot() for controller in self.controllers.values()),
@@ -567,5 +567,5 @@ class Scheduler:
         self.wires.delayed = list(state.delayed)
         for plans in self._plans:
             plans.mark_reported()
-        self.mark()
-        self.settle()
+        self.notify()
+        self.propagate()

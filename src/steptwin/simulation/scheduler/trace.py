@@ -340,6 +340,6 @@ def _segment(s: Segment) -> bytes:
 
 
 def _arc(s: ArcSegment) -> bytes:
-    course = s.course
-    shape = _ARC.pack(s.end_s, course.centre_p, course.radius_p, course.angle_q, course.turn_q, s.end_p, s.half, s.direction)
-    return b"a" + shape + _segment(s.way)
+    curve = s.curve
+    shape = _ARC.pack(s.end_s, curve.centre_p, curve.radius_p, curve.angle_q, curve.turn_q, s.end_p, s.half, s.direction)
+    return b"a" + shape + _segment(s.travel)

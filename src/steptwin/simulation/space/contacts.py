@@ -1,7 +1,7 @@
 """When two bodies begin or cease to overlap while everything moves as planned, to the nanosecond.
 
-A stretch of time is left out where nothing can change in it: bodies that are apart along one direction at both of its ends are
-apart in all of it, but for what the motion bends away from a straight line, which the plans bound. Other stretches are halved,
+An interval of time is left out where nothing can change in it: bodies that are apart along one direction at both of its ends are
+apart in all of it, but for what the motion bends away from a straight line, which the plans bound. Other intervals are halved,
 down to a nanosecond. Bodies that slide along each other do not bend towards each other, however near they are, and cost one look.
 """
 
@@ -77,9 +77,9 @@ class Pair:
         for begin, end, pieces in together([motion.pieces(now) for motion in self.moving.values()]):
             first, last = max(begin, now + 1), (begin + FARTHEST_NS if end is None else end) - 1
             if first <= last:
-                stretch = _Stretch(self, pieces, first, last)
-                found = stretch.first_apart(left) if overlap else stretch.first_overlap(left)
-                left -= stretch.looks
+                interval = _Stretch(self, pieces, first, last)
+                found = interval.first_apart(left) if overlap else interval.first_overlap(left)
+                left -= interval.looks
                 if found.at is not None:
                     return found
                 if left <= 0 and end is not None:

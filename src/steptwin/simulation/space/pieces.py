@@ -15,11 +15,11 @@ from typing import Any, NamedTuple, TypeAlias
 from steptwin.controller import SECOND, Nanos
 from steptwin.motion import Profile, Segment
 from steptwin.motion.divisions import profile_of
-from steptwin.motion.elastic import Response, ResponseStretch
+from steptwin.motion.elastic import Response, ResponseInterval
 from steptwin.motion.paths import ArcSegment
 from steptwin.motion.trig import QUARTER
 from steptwin.simulation.mechanics.cam import Cam
-from steptwin.simulation.mechanics.course import Course
+from steptwin.simulation.mechanics.trajectory import Trajectory
 from steptwin.simulation.mechanics.travel import Travel
 
 FARTHEST_NS: Nanos = 1 << 55
@@ -118,17 +118,17 @@ class ArcPiece(Piece):
 
     def _turning(self, begin: Nanos, end: Nanos) -> tuple[float, float]:
         """Bounds of the angular speed and its rate, rad."""
-        way, per_way = self.segment.way, abs(self.segment.course.turn_q) * QUARTER
+        way, per_way = self.segment.travel, abs(self.segment.curve.turn_q) * QUARTER
         times = [(t - self.start) / SECOND for t in (begin, end)]
         rate = max(abs(2.0 * way.c2 + 6.0 * way.c3 * (t - way.anchor_s)) for t in times)
         return per_way * max(abs(way.velocity(t)) for t in times), per_way * rate
 
     def speed(self, begin: Nanos, end: Nanos) -> float:
-        return self.segment.course.radius_p * self._turning(begin, end)[0]
+        return self.segment.curve.radius_p * self._turning(begin, end)[0]
 
     def bend(self, begin: Nanos, end: Nanos) -> Range:
         turning, rate = self._turning(begin, end)
-        most = self.segment.course.radius_p * (turning * turning + rate)
+        most = self.segment.curve.radius_p * (turning * turning + rate)
         return -most, most
 
 
@@ -136,16 +136,16 @@ class ArcPiece(Piece):
 class SwingingPiece(Piece):
     """A mass on a spring."""
 
-    stretch: ResponseStretch
+    interval: ResponseInterval
 
     def at(self, now: Nanos) -> float:
-        return self.stretch.at(now)[0]
+        return self.interval.at(now)[0]
 
     def speed(self, begin: Nanos, end: Nanos) -> float:
-        return abs(self.stretch.at(begin)[1]) + self.stretch.bounds(begin, end)[0] * (end - begin) / SECOND
+        return abs(self.interval.at(begin)[1]) + self.interval.bounds(begin, end)[0] * (end - begin) / SECOND
 
     def bend(self, begin: Nanos, end: Nanos) -> Range:
-        most = self.stretch.bounds(begin, end)[0]
+        most = self.interval.bounds(begin, end)[0]
         return -most, most
 
 
@@ -210,12 +210,12 @@ def standing(position: float) -> Motion:
 # ---------------------------------------------------------------------- what moves in a controller
 
 
-def pieces_of_course(course: Course, now: Nanos) -> Iterator[Piece]:
+def pieces_of_course(trajectory: Trajectory, now: Nanos) -> Iterator[Piece]:
     """The load of an axis between its whole pulses, in pulses."""
-    profile = profile_of(course.plan) if course.free is None else course.free
-    sign, zero = course.build.sign, course.build.zero
-    begun = [piece for piece in course.pieces if piece.begin <= now]
-    pieces = [*begun[-1:], *course.pieces[len(begun) :]]
+    profile = profile_of(trajectory.plan) if trajectory.coasting is None else trajectory.coasting
+    sign, zero = trajectory.build.sign, trajectory.build.zero
+    begun = [piece for piece in trajectory.pieces if piece.begin <= now]
+    pieces = [*begun[-1:], *trajectory.pieces[len(begun) :]]
     for n, piece in enumerate(pieces):
         begin, end = max(piece.begin, now), pieces[n + 1].begin if n + 1 < len(pieces) else None
         if end is not None and end <= begin:
@@ -259,12 +259,12 @@ def pieces_of_travel(travel: Travel, now: Nanos) -> Iterator[Piece]:
 
 def pieces_of_response(response: Response, now: Nanos) -> Iterator[Piece]:
     """A mass that a drive moves through a spring, in pulses of the drive."""
-    stretches = response.stretches
-    for n, stretch in enumerate(stretches):
-        begin = stretch.drive.begin if n else min(stretch.drive.begin, now)
-        end = stretches[n + 1].drive.begin if n + 1 < len(stretches) else None
+    intervals = response.intervals
+    for n, interval in enumerate(intervals):
+        begin = interval.drive.begin if n else min(interval.drive.begin, now)
+        end = intervals[n + 1].drive.begin if n + 1 < len(intervals) else None
         if end is None or end > max(begin, now):
-            yield SwingingPiece(max(begin, now), end, stretch)
+            yield SwingingPiece(max(begin, now), end, interval)
 
 
 def pieces_of_cam(cam: Cam, shaft: Iterable[Piece]) -> Iterator[Piece]:

@@ -49,20 +49,20 @@ def _record(model: Model, controller: str, what: str, value: object) -> None:
 
 @contextmanager
 def _now(model: Model, name: str) -> Generator[Scheduler]:
-    """The scheduler of a controller or line, advanced to the present; it settles after the action."""
-    scheduler = model.touch(name)
+    """The scheduler of a controller or line, advanced to the present; it propagates signals after the action."""
+    scheduler = model.sync(name)
     yield scheduler
-    scheduler.mark(name)
-    scheduler.settle()
+    scheduler.notify(name)
+    scheduler.propagate()
 
 
 def _set(model: Model, scripts: Scripts, step: do.Set) -> None:
     for name, pin, value in step.levels:
         known = model.input_pin(name, pin, value)
-        scheduler = model.touch(name)  # as `_now`, but with hundreds of levels at a moment
+        scheduler = model.sync(name)  # as `_now`, but with hundreds of levels at a moment
         scheduler.set_input(PinName(name, known), value)
-        scheduler.mark(name)
-        scheduler.settle()
+        scheduler.notify(name)
+        scheduler.propagate()
 
 
 def _press(model: Model, scripts: Scripts, step: do.Press) -> None:
@@ -103,7 +103,7 @@ def _move_button(model: Model, scripts: Scripts, name: str, *, pressed: bool) ->
 def _write(model: Model, scripts: Scripts, step: do.Write) -> None:
     parts, now = model.parts, model.now
     for name, values in model.by_controller(step):
-        scheduler = model.touch(name)  # as `_now` does: every write of every script comes here
+        scheduler = model.sync(name)  # as `_now` does: every write of every script comes here
         controller, on = parts.controllers[name], parts.line_of.get(name)
         for pdu in model.requests(name, values):
             if on is not None:
@@ -112,8 +112,8 @@ def _write(model: Model, scripts: Scripts, step: do.Write) -> None:
             else:
                 _record(model, name, "request", pdu)
                 model.registers(name).execute(controller, pdu, now)
-        scheduler.mark(name if on is None else on[0].name)
-        scheduler.settle()
+        scheduler.notify(name if on is None else on[0].name)
+        scheduler.propagate()
 
 
 def _halt(model: Model, scripts: Scripts, given: Halt) -> None:
@@ -180,7 +180,7 @@ def _set_variable(model: Model, scripts: Scripts, given: SetVariable) -> None:
 
 def _leave(model: Model, scripts: Scripts, given: Leave) -> None:
     line = model.line_called(given.line)
-    model.touch(given.line)
+    model.sync(given.line)
     line.leave(given.place)
 
 
@@ -216,7 +216,7 @@ def _set_fault(model: Model, scripts: Scripts, step: do.SetFault) -> None:
 def _clear_fault(model: Model, scripts: Scripts, step: do.ClearFault) -> None:
     faults = model.parts.faults
     if step.name in (active.name for active in faults.active):  # otherwise it was cleared already or is not set yet
-        model.settle_all()
+        model.sync_all()
         faults.remove(step.name, model.now)
 
 
@@ -226,7 +226,7 @@ def _expect(model: Model, scripts: Scripts, step: do.Expect) -> None:
 
 def _note(model: Model, scripts: Scripts, step: do.Note) -> None:
     if model.trace.watchers:
-        model.settle_all()  # earlier events are shown first
+        model.sync_all()  # earlier events are shown first
 
     model.trace.add(TraceRecord(model.now, "world", "event", "note", step.text))
 

@@ -14,8 +14,8 @@ from typing import Generic, TypeAlias, TypeVar
 
 from steptwin.controller import Nanos
 from steptwin.simulation.scheduler.observing import WorldObserver
+from steptwin.simulation.scheduler.runqueue import Deadlines
 from steptwin.simulation.scheduler.scheduler import Scheduler, Source
-from steptwin.simulation.scheduler.turns import Dues
 from steptwin.simulation.world.running import Script
 
 Waiter: TypeAlias = "Script | WorldObserver"
@@ -109,7 +109,7 @@ class Watchers:
     """Which scripts depend on which controllers, lines and elements, when their schedulers are due, and what has changed since
     the last `take`."""
 
-    __slots__ = ("_again", "_changed", "_dues", "_numbers", "_schedulers", "_scripts", "_watch")
+    __slots__ = ("_again", "_changed", "_deadlines", "_numbers", "_schedulers", "_scripts", "_watch")
 
     def __init__(self) -> None:
         self._watch: Callable[[Scheduler], None] | None = None
@@ -121,7 +121,7 @@ class Watchers:
         self._schedulers: list[Scheduler] = []
         """All that were watched ever, by number."""
         self._numbers: dict[Scheduler, int] = {}
-        self._dues = Dues()
+        self._deadlines = Deadlines()
         """Deadlines of schedulers on which a script depends."""
 
     def set(self, script: Waiter, sources: tuple[Source, ...]) -> None:
@@ -146,7 +146,7 @@ class Watchers:
         del named[name]
         if not named:
             del self._scripts[scheduler]
-            self._dues.put(self._numbers[scheduler], None)
+            self._deadlines.put(self._numbers[scheduler], None)
             scheduler.on_change = self._watch
 
     def _begin(self, scheduler: Scheduler) -> None:
@@ -154,16 +154,16 @@ class Watchers:
             self._numbers[scheduler] = len(self._schedulers)
             self._schedulers.append(scheduler)
         self._scripts[scheduler] = {}
-        self._dues.put(self._numbers[scheduler], scheduler.deadline())
+        self._deadlines.put(self._numbers[scheduler], scheduler.deadline())
         scheduler.on_change = self.change
 
     def due(self) -> Nanos | None:
         """When a scheduler on which a script depends is due, as far as `take` has nothing to give."""
-        return self._dues.first()
+        return self._deadlines.first()
 
     def advance(self, now: Nanos) -> None:
         """Advance the schedulers that are due by ``now``."""
-        for number in self._dues.take(now):
+        for number in self._deadlines.take(now):
             self._schedulers[number].advance(now)
 
     def change(self, scheduler: Scheduler) -> None:
@@ -196,7 +196,7 @@ class Watchers:
             scheduler, _ = self._changed.popitem()
             named = self._scripts.get(scheduler)
             if named is not None:
-                self._dues.put(self._numbers[scheduler], scheduler.deadline())  # signals settle
+                self._deadlines.put(self._numbers[scheduler], scheduler.deadline())  # signals settle
                 for name in scheduler.take_changed():
                     found.update(named.get(name, ()))
         return [found[n] for n in sorted(found)]

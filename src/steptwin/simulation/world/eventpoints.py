@@ -25,7 +25,7 @@ def points_of(world: Simulation, owner: str) -> Iterator[tuple[str, LivePoint | 
 
 
 def stays_between_events(point: LivePoint) -> bool:
-    return point.read is not None and point.turns is None
+    return point.read is not None and point.turning_points is None
 
 
 class EventPoints:

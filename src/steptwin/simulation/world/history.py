@@ -42,24 +42,24 @@ def replay(world: Simulation, inputs: Iterable[RecordedInput], end: Nanos, slice
     for time, what, settled in inputs:
         if time > end:
             break
-        for _ in _bring(world, time, slice_ns):
+        for _ in _run_to(world, time, slice_ns):
             yield False
         if settled:
             world.advance(time)
         world.apply_input(what)
         yield True
-    for _ in _bring(world, end, slice_ns):
+    for _ in _run_to(world, end, slice_ns):
         yield False
     world.advance(world.now)
-    world.settle_all()
+    world.sync_all()
 
 
-def _bring(world: Simulation, moment: Nanos, slice_ns: Nanos | None) -> Iterator[None]:
+def _run_to(world: Simulation, moment: Nanos, slice_ns: Nanos | None) -> Iterator[None]:
     while world.now < moment:
         world.go_on()
         world.advance(moment if slice_ns is None else min(moment, world.now + slice_ns))
         if slice_ns is not None:
-            world.settle_all()
+            world.sync_all()
         yield
 
 

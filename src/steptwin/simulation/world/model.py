@@ -70,7 +70,7 @@ class Model:
         """Expectations that did not hold."""
         self.overdue = Reports()
         """Conditions that scripts of the description waited for until their time-out."""
-        self.settled_first: Sequence[Scheduler] = ()
+        self.synced_first: Sequence[Scheduler] = ()
         """Schedulers that are advanced before the others where the order is free, so that what observes them can read the
         others."""
         self._encoded: dict[object, tuple[bytes, ...]] = {}
@@ -99,7 +99,7 @@ class Model:
     def schedulers(self) -> list[Scheduler]:
         return self.parts.schedulers
 
-    def touch(self, name: str) -> Scheduler:
+    def sync(self, name: str) -> Scheduler:
         """The scheduler of a controller or line, advanced to the present. Raises `Misuse` with the existing names."""
         scheduler = self.parts.scheduler_of.get(name)
         if scheduler is None:
@@ -140,7 +140,7 @@ class Model:
     def read(self, name: str) -> float:
         """The present value of a signal. Raises `Misuse` for a write-only one."""
         found = self.signal(name)
-        found.bring(self.now)
+        found.sync(self.now)
         return float(found.value(self.now))
 
     @cached_property
@@ -149,9 +149,9 @@ class Model:
         found = {one.name: one.kind.programs(one, self.controllers[one.name], self.given) for one in self.spec.controllers}
         return {name: programs for name, programs in found.items() if programs is not None}
 
-    def settle_all(self) -> None:
+    def sync_all(self) -> None:
         """Advance every scheduler to the present."""
-        for scheduler in (*self.settled_first, *self.schedulers):
+        for scheduler in (*self.synced_first, *self.schedulers):
             scheduler.advance(self.now)
 
     # ------------------------------------------------------------------ by name
@@ -240,7 +240,7 @@ class Model:
 
     def put_fault(self, fault: Fault) -> None:
         """Set a fault now. Raises `Misuse` for one that cannot occur in this world."""
-        self.settle_all()
+        self.sync_all()
         self.rigging.put(fault, self.now)
 
     # ------------------------------------------------------------------ reports
@@ -252,13 +252,13 @@ class Model:
 
     def holds(self, condition: SignalCondition) -> bool:
         """Whether a condition is true now."""
-        condition.bring(self.now)
+        condition.sync(self.now)
         return condition.holds(self.now)
 
     def told(self, text: str) -> str:
         """A condition with what its signals are now: ``lift.count == 3; lift.count is 0``."""
         condition = self.condition(text)
-        condition.bring(self.now)
+        condition.sync(self.now)
         return condition.told(self.now)
 
     def report_refused(self, text: str) -> None:

@@ -22,7 +22,7 @@ def ordered(model: Model, command: ControllerCommand | Seek) -> Step | Halt:
     """
     name = command.controller
     kind, controller = model.kind(name), model.controller(name)
-    model.touch(name)
+    model.sync(name)
     controller.advance(model.now)
     on = model.parts.line_of.get(name)
     return kind.step_of(controller, None if on is None else on[0].name, command)

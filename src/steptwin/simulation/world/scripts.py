@@ -178,16 +178,16 @@ class Scripts:
         waiting, model = script.waiting, self._model
         if waiting is None:
             return
-        dues = [waiting.until]
+        deadlines = [waiting.until]
         if waiting.condition is None:
-            sources = tuple(model.touch(asked.line).source(asked.line) for asked in waiting.asked)
-            dues.append(model.now if self._are_answered(waiting) else None)
+            sources = tuple(model.sync(asked.line).source(asked.line) for asked in waiting.asked)
+            deadlines.append(model.now if self._are_answered(waiting) else None)
         else:
             condition = model.condition(waiting.condition)
-            sources = condition.bring(model.now)
-            dues.append(condition.due(model.now))
+            sources = condition.sync(model.now)
+            deadlines.append(condition.due(model.now))
         self._watchers.set(script, sources)
-        self._agenda_of(script).watch(script, min((due for due in dues if due is not None), default=None))
+        self._agenda_of(script).watch(script, min((due for due in deadlines if due is not None), default=None))
 
     def _are_answered(self, waiting: ScriptWait) -> bool:
         return all(self._master(asked.line).finished >= asked.last for asked in waiting.asked)
@@ -238,7 +238,7 @@ class Scripts:
             return
         if waiting.condition is not None:
             condition = self._model.condition(waiting.condition)
-            condition.bring(now)
+            condition.sync(now)
             value: Any = condition.holds(now)
             has_come = value
         else:

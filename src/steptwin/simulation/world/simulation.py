@@ -196,7 +196,7 @@ class Simulation(Model):
         self.advance(end)
         if watch is not None:
             self._scripts.end(watch)
-        self.settle_all()
+        self.sync_all()
         return self.stopped
 
     def go_on(self) -> None:
@@ -207,7 +207,7 @@ class Simulation(Model):
 
     def snapshot(self, *, with_inputs: bool = True) -> SimulationSnapshot:
         """Everything at the present moment, ``with_inputs`` also what came from outside before, where it is kept."""
-        self.settle_all()
+        self.sync_all()
         return SimulationSnapshot(
             self._description(),
             self.now,

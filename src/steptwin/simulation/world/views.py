@@ -50,7 +50,7 @@ class MechanicsView:
 
     @property
     def _now(self) -> int:
-        self._simulation.touch(self._fitted.spec.drive[0])
+        self._simulation.sync(self._fitted.spec.drive[0])
         return self._simulation.now
 
     @property
@@ -92,6 +92,6 @@ class LineView:
 
     def received(self, place: str = "python") -> bytes:
         """Remove and return the bytes received for ``place``."""
-        self._simulation.touch(self.name)
+        self._simulation.sync(self.name)
         line = self._simulation.lines[self.name]
         return b"".join(data for _, data in line.connect(place).take(self._simulation.now))

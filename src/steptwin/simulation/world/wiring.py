@@ -35,7 +35,7 @@ def connections(parts: WorldParts) -> Iterator[Connection]:
         elif circuit is not None:
             join = None if len(circuit.contacts) < 2 else "series" if circuit.in_series else "parallel"
             for contact in circuit.contacts:
-                yield Connection(contact.lane, target, contact.normally_closed, join=join)
+                yield Connection(contact.channel, target, contact.normally_closed, join=join)
         else:
             kind, number = str(path[0]), path[1]
             spec = parts.described[kind][int(number)]

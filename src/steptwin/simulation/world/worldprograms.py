@@ -29,7 +29,7 @@ def program_texts(model: Model, controller: str) -> Sequence[ProgramText]:
     """Program texts of a controller, at the present moment of the world; empty without any. Raises `Misuse` for another name."""
     if controller not in model.controllers:
         raise Misuse(NO_SUCH_CONTROLLER(controller=controller, names=list(model.controllers)))
-    model.touch(controller)
+    model.sync(controller)
     spec = next(one for one in model.spec.controllers if one.name == controller)
     return spec.kind.texts(spec, model.controllers[controller], model.given)
 

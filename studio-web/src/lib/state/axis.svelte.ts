@@ -1,11 +1,11 @@
 import type { SubjectEvent } from "../protocol/types";
 import type { AxisModel } from "./model";
-import { Course, type Motion, type Plan } from "./plan";
+import { Trajectory, type Motion, type Plan } from "./plan";
 
-/** A stretch of the past or present of an axis: its plan, and where the zero of its coordinate was. */
-export interface Stretch {
+/** An interval of the past or present of an axis: its plan, and where the zero of its coordinate was. */
+export interface Interval {
   from_ns: bigint;
-  course: Course;
+  trajectory: Trajectory;
   /** Pulses by which the position shown is above that of the plan. */
   origin: number;
 }
@@ -17,7 +17,7 @@ export interface Sample {
   velocity: number;
 }
 
-/** Stretches and samples kept of each axis. */
+/** Intervals and samples kept of each axis. */
 const KEPT = 5000;
 
 type OfKind<K extends SubjectEvent["kind"]> = Extract<SubjectEvent, { kind: K }>;
@@ -32,10 +32,10 @@ function cut<T>(list: T[], isLate: (element: T) => boolean): void {
 export class AxisState {
   /** Counts changes; a curve that has drawn this one is up to date. */
   revision = $state(0);
-  readonly stretches: Stretch[] = [];
+  readonly intervals: Interval[] = [];
   readonly samples: Sample[] = [];
   /** What held at a moment that is looked at: the page may not have been open then. */
-  private past: Stretch | null = null;
+  private past: Interval | null = null;
 
   constructor(readonly model: AxisModel) {}
 
@@ -50,26 +50,26 @@ export class AxisState {
   takeEarlier(events: readonly (OfKind<"plan"> | OfKind<"coordinate">)[]): void {
     const earlier = new AxisState(this.model);
     for (const event of events) earlier.take(event);
-    const first = this.stretches[0]?.from_ns;
-    const found = earlier.stretches.filter(({ from_ns }) => first === undefined || from_ns < first);
-    this.stretches.unshift(...found.slice(Math.max(0, found.length + this.stretches.length - KEPT)));
+    const first = this.intervals[0]?.from_ns;
+    const found = earlier.intervals.filter(({ from_ns }) => first === undefined || from_ns < first);
+    this.intervals.unshift(...found.slice(Math.max(0, found.length + this.intervals.length - KEPT)));
     this.revision++;
   }
 
   /** Time has gone back to `time_ns`: what was later has not happened. */
   forgetAfter(time_ns: bigint): void {
-    cut(this.stretches, ({ from_ns }) => from_ns > time_ns);
+    cut(this.intervals, ({ from_ns }) => from_ns > time_ns);
     cut(this.samples, (sample) => sample.time_ns > time_ns);
     this.revision++;
   }
 
   /** In units of the axis. */
   at(now_ns: bigint): Motion {
-    const stretch = this.stretchAt(now_ns);
-    if (stretch !== null) {
+    const interval = this.intervalAt(now_ns);
+    if (interval !== null) {
       const scale = this.model.pulses_per_unit ?? 1;
-      const { position, velocity } = stretch.course.at(now_ns);
-      return { position: (position + stretch.origin) / scale, velocity: velocity / scale };
+      const { position, velocity } = interval.trajectory.at(now_ns);
+      return { position: (position + interval.origin) / scale, velocity: velocity / scale };
     }
     const { position, velocity } = this.samples.at(-1) ?? { position: NaN, velocity: NaN };
     return { position, velocity };
@@ -77,20 +77,20 @@ export class AxisState {
 
   /** As the controller shows it, in whole pulses, in units of the axis. */
   shown(now_ns: bigint): number {
-    const stretch = this.stretchAt(now_ns);
-    if (stretch === null) return this.at(now_ns).position;
-    return (stretch.course.counted(now_ns) + stretch.origin) / (this.model.pulses_per_unit ?? 1);
+    const interval = this.intervalAt(now_ns);
+    if (interval === null) return this.at(now_ns).position;
+    return (interval.trajectory.counted(now_ns) + interval.origin) / (this.model.pulses_per_unit ?? 1);
   }
 
   /** Pulses of the plan, from power-on. NaN where there are samples only. */
   pulses(now_ns: bigint): number {
-    return this.stretchAt(now_ns)?.course.at(now_ns).position ?? NaN;
+    return this.intervalAt(now_ns)?.trajectory.at(now_ns).position ?? NaN;
   }
 
   /** Null where that is not known: it may move. */
   isMoving(now_ns: bigint): boolean | null {
-    const stretch = this.stretchAt(now_ns);
-    if (stretch !== null) return stretch.course.isMoving(now_ns);
+    const interval = this.intervalAt(now_ns);
+    if (interval !== null) return interval.trajectory.isMoving(now_ns);
     const { velocity } = this.at(now_ns);
     return Number.isNaN(velocity) ? null : velocity !== 0;
   }
@@ -100,48 +100,48 @@ export class AxisState {
     this.past =
       event === null
         ? null
-        : { from_ns: BigInt(event.time_ns), course: new Course(event.plan), origin: event.origin ?? 0 };
+        : { from_ns: BigInt(event.time_ns), trajectory: new Trajectory(event.plan), origin: event.origin ?? 0 };
     this.revision++;
   }
 
   /** Moments at which motions begin and end, in no order. */
   *moments(): Iterable<bigint> {
-    for (const { course } of this.stretches) {
-      if (course.end_ns === course.start_ns) continue;
-      yield course.start_ns;
-      if (course.end_ns !== null) yield course.end_ns;
+    for (const { trajectory } of this.intervals) {
+      if (trajectory.end_ns === trajectory.start_ns) continue;
+      yield trajectory.start_ns;
+      if (trajectory.end_ns !== null) yield trajectory.end_ns;
     }
   }
 
   /** What held at a moment; null where there are samples only, or nothing yet. */
-  stretchAt(now_ns: bigint): Stretch | null {
+  intervalAt(now_ns: bigint): Interval | null {
     if (this.past?.from_ns === now_ns) return this.past;
-    return this.stretches[this.indexAt(now_ns)] ?? null;
+    return this.intervals[this.indexAt(now_ns)] ?? null;
   }
 
-  /** Of the stretch that held at a moment; the first one before there was any. */
+  /** Of the interval that held at a moment; the first one before there was any. */
   indexAt(time_ns: bigint): number {
-    let [low, high] = [0, this.stretches.length];
+    let [low, high] = [0, this.intervals.length];
     while (low < high) {
       const middle = (low + high) >> 1;
-      if ((this.stretches[middle] as Stretch).from_ns <= time_ns) low = middle + 1;
+      if ((this.intervals[middle] as Interval).from_ns <= time_ns) low = middle + 1;
       else high = middle;
     }
     return Math.max(0, low - 1);
   }
 
   private plan(time_ns: bigint, plan: Plan, origin: number | null): void {
-    this.add({ from_ns: time_ns, course: new Course(plan), origin: origin ?? this.stretches.at(-1)?.origin ?? 0 });
+    this.add({ from_ns: time_ns, trajectory: new Trajectory(plan), origin: origin ?? this.intervals.at(-1)?.origin ?? 0 });
   }
 
   private coordinate(time_ns: bigint, origin: number): void {
-    const last = this.stretches.at(-1);
+    const last = this.intervals.at(-1);
     if (last !== undefined) this.add({ ...last, from_ns: time_ns, origin });
   }
 
-  private add(stretch: Stretch): void {
-    this.stretches.push(stretch);
-    if (this.stretches.length > KEPT) this.stretches.splice(0, KEPT / 10);
+  private add(interval: Interval): void {
+    this.intervals.push(interval);
+    if (this.intervals.length > KEPT) this.intervals.splice(0, KEPT / 10);
   }
 
   private sample(time_ns: bigint, position: number, velocity: number): void {

@@ -16,9 +16,9 @@ test("levels hold until the next edge", () => {
   expect(edges.at("b", 100n)).toBeNaN();
 });
 
-test("stretches are cut where the window ends", () => {
+test("intervals are cut where the window ends", () => {
   const found: unknown[] = [];
-  three().stretches("a", 250n, 450n, (from, to, level) => found.push([from, to, level]));
+  three().intervals("a", 250n, 450n, (from, to, level) => found.push([from, to, level]));
   expect(found).toEqual([
     [250n, 400n, 1],
     [400n, 450n, 0],

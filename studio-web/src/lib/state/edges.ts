@@ -59,8 +59,8 @@ export class Edges {
     return kept === undefined ? NaN : (kept.levels[this.before(kept, time_ns)] ?? NaN);
   }
 
-  /** Calls with each stretch of a level that has a part between two moments. */
-  stretches(
+  /** Calls with each interval of a level that has a part between two moments. */
+  intervals(
     pin: string,
     from_ns: bigint,
     to_ns: bigint,

@@ -33,7 +33,7 @@ export class Load {
 
   /** With the drive, as at present: NaN until the drive has stood once, and before its first plan that is known. */
   planned(axis: AxisState, at_ns: bigint): number {
-    const first = axis.stretches[0]?.from_ns;
+    const first = axis.intervals[0]?.from_ns;
     if (first === undefined || at_ns < first) return NaN;
     return (axis.pulses(at_ns) + this.offset) / this.pulses_per_unit;
   }

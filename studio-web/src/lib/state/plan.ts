@@ -51,7 +51,7 @@ function onArc({ way, course: [centre, radius, angle, turn] }: Arc, t: number): 
 }
 
 /** A plan made ready to be asked very often. */
-export class Course {
+export class Trajectory {
   readonly start_ns: bigint;
   /** Ends of its segments, in seconds after the start. */
   readonly corners_s: readonly number[];

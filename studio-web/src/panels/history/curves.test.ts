@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { csvOf, linesOf, movedFirst, rangeOf, stretchesOf, valueAt, type Series } from "./curves";
+import { csvOf, linesOf, movedFirst, rangeOf, intervalsOf, valueAt, type Series } from "./curves";
 
 const series = (values: Series["values"], at_s: number[], is_motion = false): Series => ({
   point: "table.M1.position",
@@ -30,8 +30,8 @@ test("the range has room, also around one value", () => {
   expect(rangeOf([series(["a"], [0])])).toBeNull();
 });
 
-test("a text holds from its moment on; the same text twice is one stretch", () => {
-  expect(stretchesOf(series(["on", "on", null, "off"], [0, 1, 2, 3]), 5)).toEqual([
+test("a text holds from its moment on; the same text twice is one interval", () => {
+  expect(intervalsOf(series(["on", "on", null, "off"], [0, 1, 2, 3]), 5)).toEqual([
     { from: 0, to: 2, text: "on" },
     { from: 3, to: 5, text: "off" },
   ]);

@@ -4,7 +4,7 @@ export type Series = Requests["history_values"]["answer"]["series"][number];
 export type Span = readonly [number, number];
 
 /** Of a text: from when to when it holds. */
-export interface Stretch {
+export interface Interval {
   from: number;
   to: number;
   text: string;
@@ -27,7 +27,7 @@ export function rangeOf(all: readonly Series[]): Span | null {
 
 /**
  * The points of polylines in a box. Values of a motion are joined; others hold until the next one, the last one until `end_s`, the
- * end of the run or stretch. A line ends where a value is not known.
+ * end of the run or interval. A line ends where a value is not known.
  */
 export function linesOf(
   series: Series,
@@ -57,8 +57,8 @@ export function linesOf(
 }
 
 /** When each text holds, in order; what is not known is left out. */
-export function stretchesOf(series: Series, end_s: number): Stretch[] {
-  const found: Stretch[] = [];
+export function intervalsOf(series: Series, end_s: number): Interval[] {
+  const found: Interval[] = [];
   series.at_s.forEach((from, index) => {
     const value = series.values[index];
     if (value === null || value === undefined) return;

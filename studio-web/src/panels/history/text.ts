@@ -16,7 +16,7 @@ export const t = texts(
     to: "To",
     whole: "Whole run",
     refresh: "Read again",
-    zoomHelp: "Drag over a curve to see that stretch.",
+    zoomHelp: "Drag over a curve to see that interval.",
     addPoint: "Add a point",
     searchHelp: "position, status, IN3 …",
     add: "Add {point}",

@@ -1,4 +1,4 @@
-import type { AxisState, Stretch } from "../../lib/state/axis.svelte";
+import type { AxisState, Interval } from "../../lib/state/axis.svelte";
 
 /** What a curve does in each column of a picture: its first and last value there and its extremes. NaN without any. */
 export class Columns {
@@ -59,7 +59,7 @@ export function fill(
   now_ns: bigint,
 ): void {
   columns.clear();
-  if (axis.stretches.length) fillFromPlans(columns, axis, quantity, from_ns, span_ns, now_ns);
+  if (axis.intervals.length) fillFromPlans(columns, axis, quantity, from_ns, span_ns, now_ns);
   else if (quantity === "position") fillFromSamples(columns, axis, from_ns, span_ns);
 }
 
@@ -74,20 +74,20 @@ function fillFromPlans(
   const scale = axis.model.pulses_per_unit ?? 1;
   const perColumn = Number(span_ns) / columns.width;
   const until = Math.min(Number(span_ns), Number(now_ns - from_ns));
-  for (let index = axis.indexAt(from_ns); index < axis.stretches.length; index++) {
-    const { from_ns: begin_ns, course, origin } = axis.stretches[index] as Stretch;
-    const next = axis.stretches[index + 1];
+  for (let index = axis.indexAt(from_ns); index < axis.intervals.length; index++) {
+    const { from_ns: begin_ns, trajectory, origin } = axis.intervals[index] as Interval;
+    const next = axis.intervals[index + 1];
     const begin = Math.max(0, Number(begin_ns - from_ns));
     const end = Math.min(until, next === undefined ? Infinity : Number(next.from_ns - from_ns));
     if (begin > until) return;
     if (end < begin) continue;
-    const start = Number(course.start_ns - from_ns);
+    const start = Number(trajectory.start_ns - from_ns);
     const value = (at: number): number => {
-      const motion = course.atSeconds((at - start) / 1e9);
+      const motion = trajectory.atSeconds((at - start) / 1e9);
       return (quantity === "position" ? motion.position + origin : motion.velocity) / scale;
     };
     const put = (at: number): void => columns.add(Math.min(columns.width - 1, Math.floor(at / perColumn)), value(at));
-    const corners = course.corners_s.map((corner) => start + corner * 1e9).filter((at) => at > begin && at < end);
+    const corners = trajectory.corners_s.map((corner) => start + corner * 1e9).filter((at) => at > begin && at < end);
     let corner = 0;
     put(begin);
     for (let column = Math.floor(begin / perColumn) + 1; column * perColumn < end; column++) {

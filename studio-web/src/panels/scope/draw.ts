@@ -4,9 +4,9 @@ import { inWords } from "../../text";
 import { shortNumber, shownNumber } from "../../lib/state/numbers";
 import type { Severity } from "../../lib/state/severity";
 import { Columns, fill, fillFrom } from "./columns";
-import { drawFrames, drawStatements } from "./lanes";
+import { drawFrames, drawStatements } from "./channels";
 import { trace } from "./polyline";
-import { isCurve, isLane, isPassed, tracksOf, type Signal } from "./signals";
+import { isCurve, isChannel, isPassed, tracksOf, type Signal } from "./signals";
 import { valueAt, type Sources } from "./values";
 import { bounds, digitsOf, ticks, type View } from "./view";
 
@@ -15,7 +15,7 @@ const LEFT = 62;
 const RIGHT = 10;
 const BOTTOM = 20;
 const MARKS = 12;
-const LANE = 20;
+const CHANNEL = 20;
 const GAP = 14;
 const LEAST_TRACK = 60;
 /** Of a character of the numbers, with their font of one width. */
@@ -88,18 +88,18 @@ export class Picture {
     const bottom = height - BOTTOM;
     this.time(scene.view, bottom, colours);
     this.marks(scene, colours);
-    const lanes = scene.signals.filter(isLane);
+    const channels = scene.signals.filter(isChannel);
     const tracks = tracksOf(scene.signals);
-    const room = bottom - MARKS - lanes.length * LANE;
+    const room = bottom - MARKS - channels.length * CHANNEL;
     const each = tracks.length ? Math.max(LEAST_TRACK, room / tracks.length) : 0;
     let top = MARKS;
     for (const { unit, signals } of tracks) {
       this.track(scene, unit, signals, top, each - GAP, colours);
       top += each;
     }
-    for (const signal of lanes) {
-      this.lane(scene, signal, top, colours);
-      top += LANE;
+    for (const signal of channels) {
+      this.channel(scene, signal, top, colours);
+      top += CHANNEL;
     }
     this.cursor(scene, scene.moment, "◀", bottom, colours.warn, []);
     this.cursor(scene, scene.cursors.a, "A", bottom, colours.accent, []);
@@ -234,7 +234,7 @@ export class Picture {
     found.clear();
     if (isPassed(signal)) return found;
     const until = from_ns + span_ns < scene.now_ns ? from_ns + span_ns : scene.now_ns;
-    this.sources.edges.stretches(signal.pin, from_ns, until, (begin, end, level) => {
+    this.sources.edges.intervals(signal.pin, from_ns, until, (begin, end, level) => {
       if (Number.isNaN(level)) return;
       const [first, last] = [begin, end].map((at) => (Number(at - from_ns) / Number(span_ns)) * width) as [
         number,
@@ -245,14 +245,14 @@ export class Picture {
     return found;
   }
 
-  private lane(scene: Scene, signal: Signal, top: number, colours: Colours): void {
+  private channel(scene: Scene, signal: Signal, top: number, colours: Colours): void {
     const { ctx } = this;
     const colour = colours.traces[styleOf(scene.signals.indexOf(signal)).trace] as string;
-    const [low, high] = [top + LANE - 5, top + 4];
+    const [low, high] = [top + CHANNEL - 5, top + 4];
     ctx.textAlign = "right";
     ctx.fillStyle = colours.ink;
     const name = isPassed(signal) ? signal.source : signal.label;
-    ctx.fillText(name.length > 8 ? `…${name.slice(-7)}` : name, LEFT - 5, top + LANE / 2);
+    ctx.fillText(name.length > 8 ? `…${name.slice(-7)}` : name, LEFT - 5, top + CHANNEL / 2);
     ctx.strokeStyle = colour;
     ctx.lineWidth = 1.5;
     const { from_ns, span_ns } = scene.view;
@@ -260,15 +260,15 @@ export class Picture {
     if (isPassed(signal)) {
       const { passed } = this.sources;
       const x = (time_ns: bigint) => this.x(scene, time_ns);
-      const lane = { left: LEFT, right: LEFT + this.inner, high, low, from_ns, to_ns: until, x };
-      if (signal.kind === "frames") drawFrames(ctx, lane, passed, signal.source, colour, colours.danger);
-      else drawStatements(ctx, lane, passed, signal.source, colour, colours.ink);
+      const channel = { left: LEFT, right: LEFT + this.inner, high, low, from_ns, to_ns: until, x };
+      if (signal.kind === "frames") drawFrames(ctx, channel, passed, signal.source, colour, colours.danger);
+      else drawStatements(ctx, channel, passed, signal.source, colour, colours.ink);
       return;
     }
     if (signal.kind !== "level") return;
     let before: number | null = null;
     ctx.beginPath();
-    this.sources.edges.stretches(signal.pin, from_ns, until, (begin, end, level) => {
+    this.sources.edges.intervals(signal.pin, from_ns, until, (begin, end, level) => {
       const [x0, x1] = [this.x(scene, begin), this.x(scene, end)];
       if (Number.isNaN(level)) {
         before = null;

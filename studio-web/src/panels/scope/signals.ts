@@ -15,7 +15,7 @@ export interface CurveSignal extends Common {
   axis: AxisModel;
 }
 
-/** A pin: a lane of levels, or a curve in volts. */
+/** A pin: a channel of levels, or a curve in volts. */
 export interface PinSignal extends Common {
   kind: "level" | "voltage";
   pin: string;
@@ -29,7 +29,7 @@ export interface CurrentSignal extends Common {
   phase: 1 | 2;
 }
 
-/** A lane of what passes: the frames of a line, the lines of a program that a controller executes. */
+/** A channel of what passes: the frames of a line, the lines of a program that a controller executes. */
 export interface PassedSignal extends Common {
   kind: "frames" | "statements";
   source: string;
@@ -44,7 +44,7 @@ export const isPassed = (signal: Signal): signal is PassedSignal =>
   signal.kind === "frames" || signal.kind === "statements";
 
 /** Of a height of its own; all others share axes of values. */
-export const isLane = (signal: Signal): boolean => signal.kind === "level" || isPassed(signal);
+export const isChannel = (signal: Signal): boolean => signal.kind === "level" || isPassed(signal);
 
 /** The pin of a chip that tells the waveform of its phase currents. */
 const WAVEFORM = "N";
@@ -120,7 +120,7 @@ export function usual(signals: readonly Signal[]): string[] {
 export function tracksOf(signals: readonly Signal[]): { unit: string; signals: Signal[] }[] {
   const tracks = new Map<string, Signal[]>();
   for (const signal of signals) {
-    if (isLane(signal)) continue;
+    if (isChannel(signal)) continue;
     const kept = tracks.get(signal.unit);
     if (kept === undefined) tracks.set(signal.unit, [signal]);
     else kept.push(signal);

@@ -12,7 +12,7 @@ export interface Trigger {
 /** A crossing is placed to this. [ns] */
 const PRECISION_NS = 1000n;
 
-/** Steps in which a stretch of time is looked through: of 1 ms, and no more than 2000. */
+/** Steps in which an interval of time is looked through: of 1 ms, and no more than 2000. */
 export const stepOf = (gone_ns: bigint): bigint => (gone_ns > 2_000_000_000n ? gone_ns / 2000n : 1_000_000n);
 
 /**

@@ -18,7 +18,7 @@ export function valueAt(sources: Sources, signal: Signal, time_ns: bigint): numb
   if (signal.kind === "current") return currentAt(sources, signal, time_ns);
   if (!isCurve(signal)) return sources.edges.at(signal.pin, time_ns);
   const axis = sources.axis(signal.axis);
-  const first = axis.stretches[0];
+  const first = axis.intervals[0];
   if (first === undefined) return signal.kind === "position" ? sampleAt(axis.samples, time_ns) : NaN;
   return time_ns < first.from_ns ? NaN : axis.at(time_ns)[signal.kind];
 }
@@ -26,9 +26,9 @@ export function valueAt(sources: Sources, signal: Signal, time_ns: bigint): numb
 /** Of the microstep that the motor is on. */
 function currentAt(sources: Sources, { axis: model, pin, phase }: CurrentSignal, time_ns: bigint): number {
   const axis = sources.axis(model);
-  const stretch = axis.stretchAt(time_ns);
-  if (stretch === null || time_ns < stretch.from_ns) return NaN;
-  return phaseCurrent(sources.edges.at(pin, time_ns), phase, stretch.course.counted(time_ns));
+  const interval = axis.intervalAt(time_ns);
+  if (interval === null || time_ns < interval.from_ns) return NaN;
+  return phaseCurrent(sources.edges.at(pin, time_ns), phase, interval.trajectory.counted(time_ns));
 }
 
 function sampleAt(samples: readonly { time_ns: bigint; position: number }[], time_ns: bigint): number {

@@ -1,4 +1,4 @@
-// Drawing of lanes. A pen knows the stretch of time in view; every lane costs about as much as there are pixels.
+// Drawing of channels. A pen knows the interval of time in view; every channel costs about as much as there are pixels.
 
 class Pen {
   constructor(context, view, width, color) {
@@ -9,23 +9,23 @@ class Pen {
   t(x) { return this.from + x * this.perPixel; }
 }
 
-function draw(pen, lane, y) {
+function draw(pen, channel, y) {
   const c = pen.context;
   c.save();
   c.beginPath();
-  c.rect(pen.x(0), y, pen.x(SPAN) - pen.x(0), lane.height);
+  c.rect(pen.x(0), y, pen.x(SPAN) - pen.x(0), channel.height);
   c.clip();
-  c.strokeStyle = c.fillStyle = pen.color(lane.color ?? "--dim");
+  c.strokeStyle = c.fillStyle = pen.color(channel.color ?? "--dim");
   c.lineWidth = 1.4;
   c.lineJoin = "round";
-  const top = y + 5, bottom = y + lane.height - 5;
-  if (lane.kind === "position" || lane.kind === "velocity") drawCurve(pen, lane, top, bottom);
-  else if (lane.kind === "step") drawPulses(pen, lane, top, bottom);
-  else if (lane.kind === "level") drawLevels(pen, lane, top, bottom);
-  else if (lane.kind === "analog") drawAnalog(pen, lane, top, bottom);
-  else if (lane.kind === "statement") drawStatements(pen, lane, top, bottom);
-  else if (lane.kind === "frames") drawFrames(pen, lane, top, bottom);
-  else if (lane.kind === "marks") drawMarks(pen, lane, top, bottom);
+  const top = y + 5, bottom = y + channel.height - 5;
+  if (channel.kind === "position" || channel.kind === "velocity") drawCurve(pen, channel, top, bottom);
+  else if (channel.kind === "step") drawPulses(pen, channel, top, bottom);
+  else if (channel.kind === "level") drawLevels(pen, channel, top, bottom);
+  else if (channel.kind === "analog") drawAnalog(pen, channel, top, bottom);
+  else if (channel.kind === "statement") drawStatements(pen, channel, top, bottom);
+  else if (channel.kind === "frames") drawFrames(pen, channel, top, bottom);
+  else if (channel.kind === "marks") drawMarks(pen, channel, top, bottom);
   c.restore();
 }
 
@@ -62,13 +62,13 @@ class Line {
   }
 }
 
-// The curves of a lane on one scale, whose ends are left in `bounds`.
-function drawCurve(pen, lane, top, bottom) {
-  const velocity = lane.kind === "velocity", c = pen.context;
-  let [least, most] = pen.scaled ? rangeOf(lane.curves, velocity, pen.from, pen.to) : lane.range;
+// The curves of a channel on one scale, whose ends are left in `bounds`.
+function drawCurve(pen, channel, top, bottom) {
+  const velocity = channel.kind === "velocity", c = pen.context;
+  let [least, most] = pen.scaled ? rangeOf(channel.curves, velocity, pen.from, pen.to) : channel.range;
   if (velocity) [least, most] = [Math.min(least, 0), Math.max(most, 0)];
   if (!(most > least)) [least, most] = [least - 1, least + 1];
-  lane.bounds = [least, most];
+  channel.bounds = [least, most];
   const y = (value) => bottom - (value - least) / (most - least) * (bottom - top);
   if (least <= 0 && most >= 0) {
     c.save();
@@ -81,7 +81,7 @@ function drawCurve(pen, lane, top, bottom) {
     c.stroke();
     c.restore();
   }
-  for (const { motion, color, dashed } of lane.curves) {
+  for (const { motion, color, dashed } of channel.curves) {
     c.strokeStyle = pen.color(color);
     c.setLineDash(dashed ? [5, 3] : []);
     const line = new Line(c);
@@ -98,19 +98,19 @@ function drawCurve(pen, lane, top, bottom) {
   c.setLineDash([]);
 }
 
-// The ends of the scale of a lane, beside the plot, where they hide no curve.
-function drawBounds(c, lane, y, color) {
-  const [least, most] = lane.bounds, unit = 10 ** (Math.floor(Math.log10(most - least)) - 4);
+// The ends of the scale of a channel, beside the plot, where they hide no curve.
+function drawBounds(c, channel, y, color) {
+  const [least, most] = channel.bounds, unit = 10 ** (Math.floor(Math.log10(most - least)) - 4);
   c.font = '9.5px system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif';
   c.fillStyle = color("--dim");
-  for (const [value, at] of [[most, y + 11], [least, y + lane.height - 5]]) {
+  for (const [value, at] of [[most, y + 11], [least, y + channel.height - 5]]) {
     c.fillText(number(Math.round(value / unit) * unit, 6), 5, at);
   }
 }
 
 // Pulses forward go up, backward down; closer together than three pixels they are a band.
-function drawPulses(pen, lane, top, bottom) {
-  const { motion } = lane, c = pen.context, middle = (top + bottom) / 2;
+function drawPulses(pen, channel, top, bottom) {
+  const { motion } = channel, c = pen.context, middle = (top + bottom) / 2;
   c.globalAlpha = 0.6;
   c.fillRect(0, middle, pen.width, 1);
   c.globalAlpha = 1;
@@ -143,9 +143,9 @@ function drawPulses(pen, lane, top, bottom) {
   }
 }
 
-function drawLevels(pen, lane, top, bottom) {
-  const { changes, size } = lane.pin, c = pen.context;
-  let i = lastAt(changes, 2, pen.from), level = lane.pin.level(pen.from), x = 0;
+function drawLevels(pen, channel, top, bottom) {
+  const { changes, size } = channel.pin, c = pen.context;
+  let i = lastAt(changes, 2, pen.from), level = channel.pin.level(pen.from), x = 0;
   const fill = (until, high) => {
     if (high) {
       c.globalAlpha = 0.22;
@@ -167,12 +167,12 @@ function drawLevels(pen, lane, top, bottom) {
   fill(pen.width, level);
 }
 
-function drawAnalog(pen, lane, top, bottom) {
-  const { changes, size } = lane.pin;
-  let [least, most] = pen.scaled ? lane.pin.range(pen.from, pen.to) : lane.range;
+function drawAnalog(pen, channel, top, bottom) {
+  const { changes, size } = channel.pin;
+  let [least, most] = pen.scaled ? channel.pin.range(pen.from, pen.to) : channel.range;
   if (!(most > least)) most = least + 1;
   const y = (value) => bottom - (value - least) / (most - least) * (bottom - top);
-  let level = lane.pin.level(pen.from);
+  let level = channel.pin.level(pen.from);
   const line = new Line(pen.context);
   if (level !== null) line.to(0, y(level));
   for (let i = lastAt(changes, 2, pen.from) + 1; i < size && changes[2 * i] <= pen.to; i++) {
@@ -183,12 +183,12 @@ function drawAnalog(pen, lane, top, bottom) {
   }
   if (level !== null) line.to(pen.width, y(level));
   line.stroke();
-  lane.bounds = [least, most];
+  channel.bounds = [least, most];
 }
 
 // Marks in view: calls back with index, x, and the x of the next one.
-function eachMark(pen, lane, from, visit) {
-  const { times } = lane;
+function eachMark(pen, channel, from, visit) {
+  const { times } = channel;
   for (let i = Math.max(lastAt(times, 1, from), 0); i < times.length && times[i] <= pen.to; ) {
     const x = pen.x(times[i]);
     const last = Math.max(lastAt(times, 1, pen.t(x + 1)), i);
@@ -209,42 +209,42 @@ function label(c, text, x, y, room, font) {
 const SMALL = '11px system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif';
 const MONO = '10.5px ui-monospace, "DejaVu Sans Mono", monospace';
 
-function drawMarks(pen, lane, top, bottom) {
+function drawMarks(pen, channel, top, bottom) {
   const c = pen.context;
-  eachMark(pen, lane, pen.from - 400 * pen.perPixel, (i, x, next) => {
+  eachMark(pen, channel, pen.from - 400 * pen.perPixel, (i, x, next) => {
     c.fillRect(x - 0.7, top, 1.4, bottom - top);
-    const [, , , subject, text] = DATA.marks[lane.marks[i]];
+    const [, , , subject, text] = DATA.marks[channel.marks[i]];
     label(c, text || subject, x, bottom - 3, next - x, SMALL);
   });
 }
 
-function drawStatements(pen, lane, top, bottom) {
+function drawStatements(pen, channel, top, bottom) {
   const c = pen.context;
-  eachMark(pen, lane, pen.from, (i, x, next) => {
+  eachMark(pen, channel, pen.from, (i, x, next) => {
     const end = Math.min(next, pen.width + 2), begin = Math.max(x, -2);
     c.globalAlpha = 0.16;
     c.fillRect(begin, top, end - begin, bottom - top);
     c.globalAlpha = 1;
     c.fillRect(x - 0.5, top, 1, bottom - top);
-    label(c, DATA.marks[lane.marks[i]][4].replace("line ", ""), begin, bottom - 3, Math.min(end - begin, 400), SMALL);
+    label(c, DATA.marks[channel.marks[i]][4].replace("line ", ""), begin, bottom - 3, Math.min(end - begin, 400), SMALL);
   });
 }
 
 // What goes into the controller above, what comes out below.
-function drawFrames(pen, lane, top, bottom) {
+function drawFrames(pen, channel, top, bottom) {
   const c = pen.context, middle = (top + bottom) / 2;
   for (const [end, color, high] of [["in", "--in", top], ["out", "--out", middle + 1]]) {
-    lane[end] ??= split(lane, end);
+    channel[end] ??= split(channel, end);
     c.fillStyle = pen.color(color);
-    eachMark(pen, lane[end], pen.from - 400 * pen.perPixel, (i, x, next) => {
+    eachMark(pen, channel[end], pen.from - 400 * pen.perPixel, (i, x, next) => {
       c.fillRect(x - 0.7, high, 1.4, middle - top - 1);
-      label(c, DATA.marks[lane[end].marks[i]][4], x, high + middle - top - 4, next - x, MONO);
+      label(c, DATA.marks[channel[end].marks[i]][4], x, high + middle - top - 4, next - x, MONO);
     });
   }
 }
 
-function split(lane, end) {
-  const chosen = lane.marks.filter((index) => (DATA.marks[index][3].split("/")[1] ?? "in") === end);
+function split(channel, end) {
+  const chosen = channel.marks.filter((index) => (DATA.marks[index][3].split("/")[1] ?? "in") === end);
   return { marks: chosen, times: chosen.map((index) => DATA.marks[index][0]) };
 }
 

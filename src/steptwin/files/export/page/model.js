@@ -116,7 +116,7 @@ class Motion {
     }
     return null;
   }
-  // Least and most of position or velocity in a stretch.
+  // Least and most of position or velocity in an interval.
   range(velocity, from, to) {
     let least = Infinity, most = -Infinity;
     for (let i = this.at(from); i < this.size && this.begin(i) <= to; i++) {
@@ -149,7 +149,7 @@ class Pin {
   }
 }
 
-// ---------------------------------------------------------------------- lanes
+// ---------------------------------------------------------------------- channels
 
 // What a controller does, for the row of one that is folded.
 function summaryOf(controller) {
@@ -168,13 +168,13 @@ function rangeOf(curves, velocity, from, to) {
   return [Math.min(...ranges.map(([least]) => least)), Math.max(...ranges.map(([, most]) => most))];
 }
 
-// All lanes of a controller, in the order in which they are shown. Times of marks are in a flat list of their own for searching.
-function lanesOf(controller) {
-  const lanes = [];
+// All channels of a controller, in the order in which they are shown. Times of marks are in a flat list of their own for searching.
+function channelsOf(controller) {
+  const channels = [];
   const still = [];
   for (const axis of DATA.axes.filter((axis) => axis.controller === controller)) {
     const motion = new Motion(axis), load = axis.true && new Motion(axis.true), curve = { motion, color: COLORS.position };
-    const common = { controller, motion, unit: axis.unit, first: lanes.length === 0 };
+    const common = { controller, motion, unit: axis.unit, first: channels.length === 0 };
     const moves = motion.moves(), count = axis.counted ? new Motion(axis.counted) : motion;
     if (!moves && !load?.changes() && !axis.counted) {
       const stands = motion.position(0, 0) === 0 ? "" : ` at ${positionText(motion, 0)} ${axis.unit}`;
@@ -182,38 +182,38 @@ function lanesOf(controller) {
       continue;
     }
     const position = { ...common, kind: "position", name: `${axis.name} position`, curves: [curve] };
-    lanes.push(position);
+    channels.push(position);
     if (load) {
       const its = { motion: load, color: COLORS.true };
-      // In one lane where both have the same unit; the true one is dashed, so that both are seen where they agree.
+      // In one channel where both have the same unit; the true one is dashed, so that both are seen where they agree.
       if (axis.true.unit === axis.unit) {
         position.name += `, ${axis.true.name}`;
         position.curves.push({ ...its, dashed: true });
       } else {
-        lanes.push({ controller, motion: load, unit: axis.true.unit, kind: "position", isTrue: true, name: `${axis.true.name} position`, curves: [its] });
+        channels.push({ controller, motion: load, unit: axis.true.unit, kind: "position", isTrue: true, name: `${axis.true.name} position`, curves: [its] });
       }
     }
     if (axis.counted) {
       const its = { motion: count, color: COLORS.position };
-      lanes.push({ controller, motion: count, unit: axis.unit, kind: "position", name: `${axis.name} since power-on`, curves: [its] });
+      channels.push({ controller, motion: count, unit: axis.unit, kind: "position", name: `${axis.name} since power-on`, curves: [its] });
     }
     if (!moves) continue;
-    lanes.push({ ...common, kind: "velocity", name: `${axis.name} velocity`, curves: [{ motion, color: COLORS.velocity }], first: false });
-    lanes.push({ ...common, motion: count, kind: "step", name: `${axis.name} pulses`, first: false });
+    channels.push({ ...common, kind: "velocity", name: `${axis.name} velocity`, curves: [{ motion, color: COLORS.velocity }], first: false });
+    channels.push({ ...common, motion: count, kind: "step", name: `${axis.name} pulses`, first: false });
   }
   for (const moved of DATA.moved.filter((one) => one.controller === controller)) {
     const motion = new Motion(moved), curves = [{ motion, color: COLORS.true }];
-    if (motion.changes()) lanes.push({ controller, motion, unit: moved.unit, kind: "position", isTrue: true, name: moved.name, curves });
+    if (motion.changes()) channels.push({ controller, motion, unit: moved.unit, kind: "position", isTrue: true, name: moved.name, curves });
     else still.push(`${moved.name} ${positionText(motion, 0)} ${moved.unit}`);
   }
-  for (const lane of lanes) if (lane.curves) lane.range = rangeOf(lane.curves, lane.kind === "velocity", 0, SPAN);
+  for (const channel of channels) if (channel.curves) channel.range = rangeOf(channel.curves, channel.kind === "velocity", 0, SPAN);
   if (still.length) {
-    lanes.push({ controller, kind: "still", name: `no motion: ${still.join(", ")}`, first: lanes.length === 0 });
+    channels.push({ controller, kind: "still", name: `no motion: ${still.join(", ")}`, first: channels.length === 0 });
   }
   const pins = DATA.pins.filter((pin) => pin.controller === controller);
   pins.forEach((pin, i) => {
     const data = new Pin(pin);
-    lanes.push({ controller, kind: pin.analog ? "analog" : "level", name: pin.name, pin: data, first: i === 0, range: data.range(0, SPAN) });
+    channels.push({ controller, kind: pin.analog ? "analog" : "level", name: pin.name, pin: data, first: i === 0, range: data.range(0, SPAN) });
   });
   const groups = new Map();
   DATA.marks.forEach((mark, index) => {
@@ -222,37 +222,37 @@ function lanesOf(controller) {
     const name = kind === "frame" ? subject.split("/")[0] : kind === "statement" ? subject : MARK_NAMES[kind] ?? kind;
     const key = `${kind} ${name}`;
     if (!groups.has(key)) {
-      const lane = kind === "frame" ? "frames" : kind === "statement" ? "statement" : "marks";
-      groups.set(key, { controller, kind: lane, name, mark: kind, times: [], marks: [], first: groups.size === 0 });
+      const channel = kind === "frame" ? "frames" : kind === "statement" ? "statement" : "marks";
+      groups.set(key, { controller, kind: channel, name, mark: kind, times: [], marks: [], first: groups.size === 0 });
     }
     groups.get(key).times.push(mark[0]);
     groups.get(key).marks.push(index);
   });
-  lanes.push(...groups.values());
-  for (const lane of lanes) {
-    lane.height = HEIGHTS[lane.kind];
-    lane.color = lane.isTrue ? COLORS.true : COLORS[lane.kind] ?? MARK_COLORS[lane.mark];
+  channels.push(...groups.values());
+  for (const channel of channels) {
+    channel.height = HEIGHTS[channel.kind];
+    channel.color = channel.isTrue ? COLORS.true : COLORS[channel.kind] ?? MARK_COLORS[channel.mark];
   }
-  return lanes;
+  return channels;
 }
 
-function nextChange(lane, t) {
-  if (lane.kind === "step") return lane.motion.nextPulse(t);
-  const [flat, size] = flatOf(lane);
+function nextChange(channel, t) {
+  if (channel.kind === "step") return channel.motion.nextPulse(t);
+  const [flat, size] = flatOf(channel);
   const i = lastAt(flat, size, t) + 1;
   return i * size < flat.length ? flat[i * size] : null;
 }
 
-function previousChange(lane, t) {
-  if (lane.kind === "step") return lane.motion.previousPulse(t);
-  const [flat, size] = flatOf(lane);
+function previousChange(channel, t) {
+  if (channel.kind === "step") return channel.motion.previousPulse(t);
+  const [flat, size] = flatOf(channel);
   const i = lastAt(flat, size, t - 0.5);
   return i >= 0 ? flat[i * size] : null;
 }
 
-function flatOf(lane) {
-  if (lane.kind === "still") return [[], 1];
-  return lane.motion ? [lane.motion.pieces, PIECE] : lane.pin ? [lane.pin.changes, 2] : [lane.times, 1];
+function flatOf(channel) {
+  if (channel.kind === "still") return [[], 1];
+  return channel.motion ? [channel.motion.pieces, PIECE] : channel.pin ? [channel.pin.changes, 2] : [channel.times, 1];
 }
 
 // ---------------------------------------------------------------------- texts
@@ -267,20 +267,20 @@ function positionText(motion, t) {
   return motion.position(motion.at(t), t).toFixed(motion.digits).replace("-", "−");
 }
 
-function valueText(lane, t) {
-  switch (lane.kind) {
-    case "position": return `${lane.curves.map(({ motion }) => positionText(motion, t)).join(" / ")} ${lane.unit}`;
+function valueText(channel, t) {
+  switch (channel.kind) {
+    case "position": return `${channel.curves.map(({ motion }) => positionText(motion, t)).join(" / ")} ${channel.unit}`;
     case "still": return "";
-    case "velocity": return `${number(lane.motion.velocity(lane.motion.at(t), t), 5)} ${lane.unit}/s`;
-    case "step": return number(lane.motion.count(t), 15);
-    case "level": return lane.pin.level(t) ? "1" : "0";
-    case "analog": return number(lane.pin.level(t), 5) + (lane.name.startsWith("AIN") ? " V" : "");
+    case "velocity": return `${number(channel.motion.velocity(channel.motion.at(t), t), 5)} ${channel.unit}/s`;
+    case "step": return number(channel.motion.count(t), 15);
+    case "level": return channel.pin.level(t) ? "1" : "0";
+    case "analog": return number(channel.pin.level(t), 5) + (channel.name.startsWith("AIN") ? " V" : "");
     case "group": return "";
   }
-  const i = lastAt(lane.times, 1, t);
+  const i = lastAt(channel.times, 1, t);
   if (i < 0) return "";
-  const text = DATA.marks[lane.marks[i]][4];
-  return lane.kind === "statement" ? text : `${i + 1} of ${lane.times.length}`;
+  const text = DATA.marks[channel.marks[i]][4];
+  return channel.kind === "statement" ? text : `${i + 1} of ${channel.times.length}`;
 }
 
 // A moment as seconds with nine digits in groups: 9.070 000 012 s

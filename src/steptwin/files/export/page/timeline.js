@@ -1,51 +1,51 @@
 // View, cursor and mark; keys and mouse.
 
 const $ = (id) => document.getElementById(id);
-const plot = $("plot"), scale = $("scale-ends"), ruler = $("ruler"), overview = $("overview"), lanesElement = $("lanes");
+const plot = $("plot"), scale = $("scale-ends"), ruler = $("ruler"), overview = $("overview"), channelsElement = $("channels");
 const view = { from: 0, to: SPAN, scaled: false };
-let cursor = 0, mark = null, hover = null, chosen = 0, dirty = false, overviewImage = null, lanesKey = "", layout = 0;
+let cursor = 0, mark = null, hover = null, chosen = 0, dirty = false, overviewImage = null, channelsKey = "", layout = 0;
 const LEAST_VIEW = 200;
 
-const controllers = DATA.controllers.map((name) => ({ name, lanes: null, summary: null, open: DATA.controllers.length <= 8 }));
+const controllers = DATA.controllers.map((name) => ({ name, channels: null, summary: null, open: DATA.controllers.length <= 8 }));
 controllers[0] && (controllers[0].open = true);
-let lanes = [], wanted = [];
+let channels = [], wanted = [];
 
-// Lanes with all the wanted words; without any, those of the controllers that are not folded.
-function lanesShown(controller) {
-  if (!wanted.length) return controller.open ? controller.lanes ??= lanesOf(controller.name) : [];
-  return (controller.lanes ??= lanesOf(controller.name)).filter((lane) => {
-    const text = `${controller.name} ${lane.name}`.toLowerCase();
+// Channels with all the wanted words; without any, those of the controllers that are not folded.
+function channelsShown(controller) {
+  if (!wanted.length) return controller.open ? controller.channels ??= channelsOf(controller.name) : [];
+  return (controller.channels ??= channelsOf(controller.name)).filter((channel) => {
+    const text = `${controller.name} ${channel.name}`.toLowerCase();
     return wanted.every((word) => text.includes(word));
   });
 }
 
 function layOut() {
   layout += 1;
-  lanes = [];
+  channels = [];
   for (const controller of controllers) {
-    if (controllers.length > 1 && !wanted.length) lanes.push({ kind: "group", name: controller.name, group: controller, height: HEIGHTS.group });
-    lanes.push(...lanesShown(controller));
+    if (controllers.length > 1 && !wanted.length) channels.push({ kind: "group", name: controller.name, group: controller, height: HEIGHTS.group });
+    channels.push(...channelsShown(controller));
   }
   let y = 0;
-  lanesElement.replaceChildren(...lanes.map((lane, i) => {
-    lane.y = y;
-    y += lane.height;
+  channelsElement.replaceChildren(...channels.map((channel, i) => {
+    channel.y = y;
+    y += channel.height;
     const element = document.createElement("div");
-    element.className = `lane ${lane.kind}${lane.first ? " first" : ""}`;
-    element.style.height = `${lane.height}px`;
-    element.style.setProperty("--color", `var(${lane.color ?? "--dim"})`);
+    element.className = `channel ${channel.kind}${channel.first ? " first" : ""}`;
+    element.style.height = `${channel.height}px`;
+    element.style.setProperty("--color", `var(${channel.color ?? "--dim"})`);
     element.setAttribute("role", "option");
-    if (lane.group) element.setAttribute("aria-expanded", lane.group.open);
+    if (channel.group) element.setAttribute("aria-expanded", channel.group.open);
     const name = document.createElement("span"), value = document.createElement("span");
     name.className = "name";
-    name.textContent = name.title = wanted.length && controllers.length > 1 ? `${lane.controller}.${lane.name}` : lane.name;
+    name.textContent = name.title = wanted.length && controllers.length > 1 ? `${channel.controller}.${channel.name}` : channel.name;
     value.className = "value";
     element.append(name, value);
-    element.addEventListener("click", () => { choose(i); if (lane.group) fold(lane.group); });
-    Object.assign(lane, { element, value });
+    element.addEventListener("click", () => { choose(i); if (channel.group) fold(channel.group); });
+    Object.assign(channel, { element, value });
     return element;
   }));
-  chosen = Math.min(chosen, lanes.length - 1);
+  chosen = Math.min(chosen, channels.length - 1);
   choose(chosen);
 }
 
@@ -53,7 +53,7 @@ function fold(controller, all = false) {
   const open = !controller.open;
   for (const one of all ? controllers : [controller]) one.open = open;
   layOut();
-  choose(lanes.findIndex((lane) => lane.group === controller));
+  choose(channels.findIndex((channel) => channel.group === controller));
 }
 
 function want(text) {
@@ -63,10 +63,10 @@ function want(text) {
 }
 
 function choose(i) {
-  lanes[chosen]?.element.removeAttribute("aria-selected");
-  chosen = Math.max(0, Math.min(i, lanes.length - 1));
-  lanes[chosen]?.element.setAttribute("aria-selected", "true");
-  lanes[chosen]?.element.scrollIntoView({ block: "nearest" });
+  channels[chosen]?.element.removeAttribute("aria-selected");
+  chosen = Math.max(0, Math.min(i, channels.length - 1));
+  channels[chosen]?.element.setAttribute("aria-selected", "true");
+  channels[chosen]?.element.scrollIntoView({ block: "nearest" });
   redraw();
 }
 
@@ -107,7 +107,7 @@ function zoomToMark() {
 const styles = getComputedStyle(document.documentElement);
 let palette = new Map();
 const color = (name) => palette.get(name) ?? (palette.set(name, styles.getPropertyValue(name).trim()), palette.get(name));
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { palette = new Map(); overviewImage = null; lanesKey = ""; redraw(); });
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { palette = new Map(); overviewImage = null; channelsKey = ""; redraw(); });
 
 function redraw() {
   if (dirty) return;
@@ -128,20 +128,20 @@ function prepare(canvas) {
   return [context, width, height];
 }
 
-// Lanes are drawn anew when something about them has changed; for cursors alone their picture is good enough.
-const lanesImage = document.createElement("canvas");
+// Channels are drawn anew when something about them has changed; for cursors alone their picture is good enough.
+const channelsImage = document.createElement("canvas");
 
 function paint() {
-  const [c, width, height] = prepare(plot), scroll = lanesElement.scrollTop;
+  const [c, width, height] = prepare(plot), scroll = channelsElement.scrollTop;
   const key = [view.from, view.to, view.scaled, scroll, chosen, layout, plot.width, plot.height].join();
   const pen = new Pen(c, view, width, color);
-  if (key !== lanesKey) {
+  if (key !== channelsKey) {
     paintLanes(pen, scroll, width, height);
-    lanesImage.width = plot.width;
-    lanesImage.height = plot.height;
-    lanesImage.getContext("2d").drawImage(plot, 0, 0);
-    lanesKey = key;
-  } else c.drawImage(lanesImage, 0, 0, width, height);
+    channelsImage.width = plot.width;
+    channelsImage.height = plot.height;
+    channelsImage.getContext("2d").drawImage(plot, 0, 0);
+    channelsKey = key;
+  } else c.drawImage(channelsImage, 0, 0, width, height);
   for (const [t, name] of [[mark, "--mark"], [cursor, "--cursor"]]) {
     if (t === null || t < view.from || t > view.to) continue;
     c.fillStyle = color(name);
@@ -161,9 +161,9 @@ function paint() {
 
 function paintScale(scroll) {
   const [c, , height] = prepare(scale);
-  for (const lane of lanes) {
-    const y = lane.y - scroll;
-    if (lane.bounds && y + lane.height > 0 && y < height) drawBounds(c, lane, y, color);
+  for (const channel of channels) {
+    const y = channel.y - scroll;
+    if (channel.bounds && y + channel.height > 0 && y < height) drawBounds(c, channel, y, color);
   }
 }
 
@@ -174,24 +174,24 @@ function paintLanes(pen, scroll, width, height) {
   c.fillStyle = color("--panel");
   c.fillRect(0, 0, Math.max(pen.x(0), 0), height);
   c.fillRect(pen.x(SPAN), 0, Math.max(width - pen.x(SPAN), 0), height);
-  lanes.forEach((lane, i) => {
-    const y = lane.y - scroll;
-    if (y + lane.height < 0 || y > height) return;
-    if (lane.kind === "group") {
+  channels.forEach((channel, i) => {
+    const y = channel.y - scroll;
+    if (y + channel.height < 0 || y > height) return;
+    if (channel.kind === "group") {
       c.fillStyle = color("--panel");
-      c.fillRect(0, y, width, lane.height);
-      if (!lane.group.open) drawSummary(pen, lane.group.summary ??= summaryOf(lane.name), y + 5, y + lane.height - 3);
+      c.fillRect(0, y, width, channel.height);
+      if (!channel.group.open) drawSummary(pen, channel.group.summary ??= summaryOf(channel.name), y + 5, y + channel.height - 3);
     } else {
       if (i === chosen) {
         c.globalAlpha = 0.5;
         c.fillStyle = color("--chosen");
-        c.fillRect(0, y, width, lane.height);
+        c.fillRect(0, y, width, channel.height);
         c.globalAlpha = 1;
       }
-      draw(pen, lane, y);
+      draw(pen, channel, y);
     }
-    c.fillStyle = color(lanes[i + 1]?.first ? "--rule-strong" : "--rule");
-    c.fillRect(0, y + lane.height - 1, width, 1);
+    c.fillStyle = color(channels[i + 1]?.first ? "--rule-strong" : "--rule");
+    c.fillRect(0, y + channel.height - 1, width, 1);
   });
 }
 
@@ -238,8 +238,8 @@ function paintOverview() {
 }
 
 function tell() {
-  const t = hover ?? cursor, top = lanesElement.scrollTop, bottom = top + lanesElement.clientHeight;
-  for (const lane of lanes) if (lane.y < bottom && lane.y + lane.height > top) lane.value.textContent = valueText(lane, t);
+  const t = hover ?? cursor, top = channelsElement.scrollTop, bottom = top + channelsElement.clientHeight;
+  for (const channel of channels) if (channel.y < bottom && channel.y + channel.height > top) channel.value.textContent = valueText(channel, t);
   const parts = [["Cursor", moment(t)]];
   if (mark !== null) {
     const between = t - mark;
@@ -262,7 +262,7 @@ const KEYS = {
   ArrowRight: (e) => moveCursor(cursor + stride(e)),
   ArrowUp: () => choose(chosen - 1),
   ArrowDown: () => choose(chosen + 1),
-  Enter: (e) => lanes[chosen]?.group && fold(lanes[chosen].group, e.shiftKey),
+  Enter: (e) => channels[chosen]?.group && fold(channels[chosen].group, e.shiftKey),
   "+": () => zoom(1 / 1.6, cursor),
   "=": () => zoom(1 / 1.6, cursor),
   "-": () => zoom(1.6, cursor),
@@ -290,8 +290,8 @@ function stride(e) {
 }
 
 function jump(how) {
-  const lane = lanes[chosen];
-  const t = lane && !lane.group ? how(lane, cursor) : null;
+  const channel = channels[chosen];
+  const t = channel && !channel.group ? how(channel, cursor) : null;
   if (t !== null) moveCursor(t);
 }
 
@@ -312,9 +312,9 @@ addEventListener("keydown", (e) => {
 // ---------------------------------------------------------------------- mouse
 
 const timeAt = (e) => view.from + (e.clientX - plot.getBoundingClientRect().left) / plot.clientWidth * (view.to - view.from);
-const laneAt = (e) => {
-  const y = e.clientY - plot.getBoundingClientRect().top + lanesElement.scrollTop;
-  return lanes.findIndex((lane) => y >= lane.y && y < lane.y + lane.height);
+const channelAt = (e) => {
+  const y = e.clientY - plot.getBoundingClientRect().top + channelsElement.scrollTop;
+  return channels.findIndex((channel) => y >= channel.y && y < channel.y + channel.height);
 };
 
 plot.addEventListener("wheel", (e) => {
@@ -328,26 +328,26 @@ let drag = null;
 plot.addEventListener("pointerdown", (e) => {
   if (e.button !== 0) return;
   plot.setPointerCapture(e.pointerId);
-  drag = { x: e.clientX, from: view.from, to: view.to, at: timeAt(e), stretch: e.shiftKey, moved: false };
+  drag = { x: e.clientX, from: view.from, to: view.to, at: timeAt(e), interval: e.shiftKey, moved: false };
 });
 plot.addEventListener("pointermove", (e) => {
   if (drag) {
     if (Math.abs(e.clientX - drag.x) > 3) drag.moved = true;
     if (!drag.moved) return;
-    if (drag.stretch) [mark, cursor] = [Math.max(0, Math.round(drag.at)), Math.max(0, Math.min(Math.round(timeAt(e)), SPAN))];
+    if (drag.interval) [mark, cursor] = [Math.max(0, Math.round(drag.at)), Math.max(0, Math.min(Math.round(timeAt(e)), SPAN))];
     else {
       plot.classList.add("dragging");
       const by = (drag.x - e.clientX) / plot.clientWidth * (drag.to - drag.from);
       show(drag.from + by, drag.to + by);
     }
   }
-  hover = drag?.stretch ? null : Math.max(0, Math.min(timeAt(e), SPAN));
+  hover = drag?.interval ? null : Math.max(0, Math.min(timeAt(e), SPAN));
   tip(e);
   redraw();
 });
 plot.addEventListener("pointerup", (e) => {
   if (!drag) return;
-  if (drag.stretch && drag.moved) zoomToMark();
+  if (drag.interval && drag.moved) zoomToMark();
   else if (!drag.moved) click(e);
   plot.classList.remove("dragging");
   drag = null;
@@ -356,27 +356,27 @@ plot.addEventListener("pointerleave", () => { hover = null; $("tip").hidden = tr
 plot.addEventListener("dblclick", (e) => zoom(1 / 4, timeAt(e)));
 
 function click(e) {
-  const i = laneAt(e), t = timeAt(e);
+  const i = channelAt(e), t = timeAt(e);
   if (i >= 0) choose(i);
-  moveCursor(nearChange(lanes[i], t, 6) ?? t, false);
+  moveCursor(nearChange(channels[i], t, 6) ?? t, false);
 }
 
-// The nearest change of a lane within so many pixels.
-function nearChange(lane, t, pixels) {
-  if (!lane || lane.group || lane.kind === "still") return null;
+// The nearest change of a channel within so many pixels.
+function nearChange(channel, t, pixels) {
+  if (!channel || channel.group || channel.kind === "still") return null;
   const reach = pixels * (view.to - view.from) / plot.clientWidth;
-  const near = [previousChange(lane, t + 1), nextChange(lane, t)].filter((x) => x !== null && Math.abs(x - t) <= reach);
+  const near = [previousChange(channel, t + 1), nextChange(channel, t)].filter((x) => x !== null && Math.abs(x - t) <= reach);
   return near.length ? near.reduce((a, b) => (Math.abs(a - t) <= Math.abs(b - t) ? a : b)) : null;
 }
 
 function tip(e) {
-  const lane = lanes[laneAt(e)], element = $("tip");
-  const at = lane?.marks && !drag ? nearChange(lane, timeAt(e), 7) : null;
+  const channel = channels[channelAt(e)], element = $("tip");
+  const at = channel?.marks && !drag ? nearChange(channel, timeAt(e), 7) : null;
   element.hidden = at === null;
   if (at === null) return;
   const texts = [];
-  for (let i = lastAt(lane.times, 1, at); i >= 0 && lane.times[i] === at && texts.length < 6; i--) {
-    const [, , , subject, text] = DATA.marks[lane.marks[i]];
+  for (let i = lastAt(channel.times, 1, at); i >= 0 && channel.times[i] === at && texts.length < 6; i--) {
+    const [, , , subject, text] = DATA.marks[channel.marks[i]];
     texts.unshift(text ? `${subject}: ${text}` : subject);
   }
   element.textContent = `${moment(at)}\n${texts.join("\n")}`;
@@ -394,7 +394,7 @@ overview.addEventListener("pointerdown", (e) => { sweeping = true; overview.setP
 overview.addEventListener("pointermove", (e) => sweeping && sweep(e));
 overview.addEventListener("pointerup", () => { sweeping = false; });
 
-lanesElement.addEventListener("scroll", redraw);
+channelsElement.addEventListener("scroll", redraw);
 $("zoom-in").addEventListener("click", () => zoom(1 / 1.6, cursorOrMiddle()));
 $("zoom-out").addEventListener("click", () => zoom(1.6, cursorOrMiddle()));
 $("fit").addEventListener("click", fit);
@@ -499,15 +499,15 @@ function saveInAddress() {
   clearTimeout(saving);
   saving = setTimeout(() => {
     const at = ((cursor + DATA.begin) / 1e9).toFixed(9), span = ((view.to - view.from) / 1e9).toPrecision(6);
-    const lanes = wanted.length ? `&lanes=${encodeURIComponent(wanted.join(" "))}` : "";
-    try { history.replaceState(null, "", `#at=${at}&span=${span}${lanes}`); } catch { /* some viewers do not let pages do this */ }
+    const channels = wanted.length ? `&channels=${encodeURIComponent(wanted.join(" "))}` : "";
+    try { history.replaceState(null, "", `#at=${at}&span=${span}${channels}`); } catch { /* some viewers do not let pages do this */ }
   }, 300);
 }
 
 function readAddress() {
   const given = new URLSearchParams(location.hash.slice(1));
   const at = Number(given.get("at")) * 1e9 - DATA.begin, size = Number(given.get("span")) * 1e9;
-  $("wanted").value = given.get("lanes") ?? "";
+  $("wanted").value = given.get("channels") ?? "";
   want($("wanted").value);
   fit();
   if (!given.has("at") || !Number.isFinite(at)) return;

@@ -42,7 +42,7 @@ from steptwin.simulation.kinds.m1486.programs import ChipPrograms
 from steptwin.simulation.kinds.m1486.table import M1486Spec
 from steptwin.simulation.kinds.m1486.view import M1486View
 from steptwin.simulation.kinds.programtexts import Destination, Downloading, ProgramText
-from steptwin.simulation.mechanics.lanes import AxisLane, PhaseOutputs, StepOutputs
+from steptwin.simulation.mechanics.channels import AxisChannel, PhaseOutputs, StepOutputs
 from steptwin.simulation.mechanics.scale import DriveScale, GivenScale
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.control import ControlProgram, Halt, Jog, Move, Seek, StopAxes
@@ -124,13 +124,13 @@ class M1486Kind(ControllerKind[M1486Spec, M1486Chip, M1486View]):
         per_rev, full_steps = motor(given.pulses_per_rev, given.full_steps)
         return DriveScale(pulses_per_rev=per_rev, full_steps=full_steps, text="counts minimum microsteps")
 
-    def lanes(self, chip: M1486Chip) -> Mapping[str, AxisLane]:
+    def channels(self, chip: M1486Chip) -> Mapping[str, AxisChannel]:
         """In full steps."""
         outputs: StepOutputs | PhaseOutputs = PhaseOutputs(characteristic_pin=WAVEFORM)
         if chip.interface is STEP_DIRECTION:
             # The chip has DIRECTION itself.
             outputs = StepOutputs(dir=None, active_low=True, width_ns=STEP_PULSE_NS)
-        return {AXIS: AxisLane("axis", "step", float(FULL_STEP), outputs)}
+        return {AXIS: AxisChannel("axis", "step", float(FULL_STEP), outputs)}
 
     def body(self, chip: M1486Chip, service: LineUnit, shafts: Mapping[int, AxisLoad]) -> M1486Body:
         return M1486Body(chip, shafts.values())

@@ -17,16 +17,16 @@ class M1486View(ControllerView):
     @property
     def position(self) -> int:
         """Where the pulses given so far have led, since power-on."""
-        self._touch()
+        self._sync()
         return self.chip.drive.true_u(self._world.now)
 
     @property
     def counter(self) -> int:
         """The position counter, 24 bits."""
-        self._touch()
+        self._sync()
         return self.chip.drive.counter_u(self._world.now)
 
     @property
     def moving(self) -> bool:
-        self._touch()
+        self._sync()
         return self.chip.drive.is_busy

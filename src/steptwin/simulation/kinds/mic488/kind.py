@@ -54,7 +54,7 @@ from steptwin.simulation.kinds.mic488.table import Mic488Spec
 from steptwin.simulation.kinds.mic488.view import Mic488View
 from steptwin.simulation.kinds.mic488.writes import encode_write
 from steptwin.simulation.kinds.programtexts import Destination, Downloading, ProgramText
-from steptwin.simulation.mechanics.lanes import AxisLane, plain_view
+from steptwin.simulation.mechanics.channels import AxisChannel, plain_view
 from steptwin.simulation.mechanics.scale import FULL_STEPS, DriveScale, GivenScale, exact_fraction
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.script import steps as do
@@ -189,7 +189,7 @@ class Mic488Kind(ControllerKind[Mic488Spec, Mic488Device, Mic488View]):
             text=f"has axis {axis} in {its.config.unit_name}",
         )
 
-    def lanes(self, device: Mic488Device) -> Mapping[str, AxisLane]:
+    def channels(self, device: Mic488Device) -> Mapping[str, AxisChannel]:
         """In configured units."""
         return {
             str(axis.number): plain_view(str(axis.number))._replace(unit=axis.config.unit_name, pulses_per_unit=axis.gear)

@@ -26,12 +26,12 @@ class Mic488View(ControllerView):
     @property
     def status(self) -> int:
         """M_STATUS."""
-        self._touch()
+        self._sync()
         return int(self.device.status())
 
     @property
     def program(self) -> ProgramState:
-        self._touch()
+        self._sync()
         return self.device.program.state
 
     def write(self, register: str, value: float) -> None:
@@ -56,7 +56,7 @@ class Mic488AxisView:
 
     @property
     def _now(self) -> int:
-        self._controller._touch()
+        self._controller._sync()
         return self._controller._world.now
 
     @property
@@ -79,12 +79,12 @@ class Mic488AxisView:
 
     @property
     def status(self) -> AxisStatus:
-        self._controller._touch()
+        self._controller._sync()
         return self._axis.status
 
     @property
     def enabled(self) -> bool:
-        self._controller._touch()
+        self._controller._sync()
         return self._axis.enabled
 
     @property

@@ -1,4 +1,4 @@
-"""The courses of what is in no trace, such as registers: found by running parts of the past again, and remembered."""
+"""Values over time of what is in no trace, such as registers: found by running parts of the past again, and remembered."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ from steptwin.why.states import Interval
 MOST_REMEMBERED = 200_000
 """Values after which all are forgotten before the next question."""
 
-CourseTurns: TypeAlias = list[tuple[Nanos, float]]
+TimeSeries: TypeAlias = list[tuple[Nanos, float]]
 """The values from the beginning of an interval on, each with its moment."""
-CourseWatch: TypeAlias = Callable[[Simulation, str, CourseTurns], do.Steps]
-"""A script that notes the turns of what has a name."""
+SeriesWatch: TypeAlias = Callable[[Simulation, str, TimeSeries], do.Steps]
+"""A script that notes the series of what has a name."""
 
 
-class _Course(NamedTuple):
+class _KnownSeries(NamedTuple):
     end: Nanos
-    turns: CourseTurns
+    series: TimeSeries
 
 
 NOTHING_IS_KNOWN = Message("why.nothing-is-known", "{name}: nothing is known of it at {end:g} s")
 
 
-class Courses:
+class ReplayedSignals:
     """``make`` gives the world at its beginning, ``inputs`` are what came from outside since, more and more."""
 
     def __init__(self, make: Callable[[], Simulation], inputs: Sequence[RecordedInput]) -> None:
         self._make = make
         self._inputs = inputs
         self._second: Simulation | None = None
-        self._known: dict[tuple[str, Nanos], _Course] = {}
+        self._known: dict[tuple[str, Nanos], _KnownSeries] = {}
         self._remembered = 0
 
     def begin(self) -> None:
@@ -51,8 +51,8 @@ class Courses:
             self._known.clear()
             self._remembered = 0
 
-    def bring(self, wanted: Collection[str], watch: CourseWatch, intervals: Sequence[Interval], at: Nanos) -> Iterator[None]:
-        """Have the courses in the first of ``intervals``, at least until a moment in it, in parts.
+    def prepare(self, wanted: Collection[str], watch: SeriesWatch, intervals: Sequence[Interval], at: Nanos) -> Iterator[None]:
+        """Have the values in the first of ``intervals``, at least until a moment in it, in parts.
 
         The others are those before it, the last one first; as far as nothing is known of them, they are run again with it, so
         that one state is restored for all. Raises `Misuse` for what cannot be watched.
@@ -63,21 +63,23 @@ class Courses:
         state, end = lacking[-1].state, lacking[0].end
         world = self._second = self._second or self._make()
         world.restore(state.snapshot)
-        found: dict[str, CourseTurns] = {name: [] for name in wanted}
-        for name, turns in found.items():
-            world.start("why", partial(watch, world, name, turns), is_external=True)
+        found: dict[str, TimeSeries] = {name: [] for name in wanted}
+        for name, series in found.items():
+            world.start("why", partial(watch, world, name, series), is_external=True)
         for _ in in_parts(world, self._inputs[state.inputs :], end):
             yield
-        for name, turns in found.items():
-            if not turns:
+        for name, series in found.items():
+            if not series:
                 raise Misuse(NOTHING_IS_KNOWN(name=name, end=end / SECOND))
             for interval in lacking:
-                self._known[name, interval.state.snapshot.now] = _Course(interval.end, list(_within(turns, interval)))
-            self._remembered += len(turns) + len(lacking)
+                self._known[name, interval.state.snapshot.now] = _KnownSeries(interval.end, list(_within(series, interval)))
+            self._remembered += len(series) + len(lacking)
 
     def remember(self, name: str, interval: Interval, value: float) -> None:
         """Note that a signal has one value in a whole interval."""
-        self._known.setdefault((name, interval.state.snapshot.now), _Course(interval.end, [(interval.state.snapshot.now, value)]))
+        self._known.setdefault(
+            (name, interval.state.snapshot.now), _KnownSeries(interval.end, [(interval.state.snapshot.now, value)])
+        )
 
     def _has(self, wanted: Collection[str], interval: Interval, at: Nanos) -> bool:
         begin, needed = interval.state.snapshot.now, min(at, interval.end)
@@ -85,46 +87,46 @@ class Courses:
 
     def level(self, name: str, interval: Interval, at: Nanos) -> float:
         """The value at a moment in an interval; at its beginning, if the moment is before."""
-        turns = self._turns(name, interval)
-        return turns[max(0, bisect_right(turns, at, key=_moment) - 1)][1]
+        series = self._series(name, interval)
+        return series[max(0, bisect_right(series, at, key=_moment) - 1)][1]
 
     def changes(self, name: str, interval: Interval, until: Nanos) -> Iterator[Nanos]:
         """The moments of the changes in an interval by a moment, the last one first."""
-        turns = self._turns(name, interval)
-        return (turns[index][0] for index in range(bisect_right(turns, min(until, interval.end), key=_moment) - 1, 0, -1))
+        series = self._series(name, interval)
+        return (series[index][0] for index in range(bisect_right(series, min(until, interval.end), key=_moment) - 1, 0, -1))
 
-    def _turns(self, name: str, interval: Interval) -> CourseTurns:
-        return self._known[name, interval.state.snapshot.now].turns
+    def _series(self, name: str, interval: Interval) -> TimeSeries:
+        return self._known[name, interval.state.snapshot.now].series
 
 
-def _within(turns: CourseTurns, interval: Interval) -> Iterator[tuple[Nanos, float]]:
-    """The turns in an interval, the first one at its beginning: what came from outside at this moment came after the state."""
+def _within(series: TimeSeries, interval: Interval) -> Iterator[tuple[Nanos, float]]:
+    """The values in an interval, the first one at its beginning: what came from outside at this moment came after the state."""
     begin = interval.state.snapshot.now
-    first = max(1, bisect_left(turns, begin, key=_moment))
-    yield begin, turns[first - 1][1]
-    yield from turns[first : bisect_right(turns, interval.end, key=_moment)]
+    first = max(1, bisect_left(series, begin, key=_moment))
+    yield begin, series[first - 1][1]
+    yield from series[first : bisect_right(series, interval.end, key=_moment)]
 
 
-def _moment(turn: tuple[Nanos, float]) -> Nanos:
-    return turn[0]
+def _moment(one: tuple[Nanos, float]) -> Nanos:
+    return one[0]
 
 
-def watch_truth(world: Simulation, text: str, turns: CourseTurns) -> do.Steps:
+def watch_truth(world: Simulation, text: str, series: TimeSeries) -> do.Steps:
     """Notes when a condition becomes true and false."""
     negated = f"not ({text})"
     is_true = world.holds(world.condition(text))
-    turns.append((world.now, float(is_true)))
+    series.append((world.now, float(is_true)))
     while True:
         yield do.Until(negated if is_true else text)
         is_true = not is_true
-        turns.append((world.now, float(is_true)))
+        series.append((world.now, float(is_true)))
 
 
-def watch_value(world: Simulation, name: str, turns: CourseTurns) -> do.Steps:
+def watch_value(world: Simulation, name: str, series: TimeSeries) -> do.Steps:
     """Notes when a signal takes another value."""
     value = world.read(name)
-    turns.append((world.now, value))
+    series.append((world.now, value))
     while True:
         yield do.Until(f"{name} != {value!r}")
         value = world.read(name)
-        turns.append((world.now, value))
+        series.append((world.now, value))

@@ -14,14 +14,14 @@ from math import ceil, inf, sqrt
 from steptwin.controller import SECOND, Nanos
 from steptwin.motion import Profile, Segment
 from steptwin.motion.profile import cruise, ramp
-from steptwin.simulation.mechanics.wells import Wells
+from steptwin.simulation.mechanics.potential import PeriodicPotential
 
 _NEAR_P = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class FreeMotion:
-    """Torques on a free rotor, in pulses of its drive. Torques in N·m, ``inertia`` in N·m per pulse/s², above 0.
+class CoastingRotor:
+    """Torques on a coasting rotor, in pulses of its drive. Torques in N·m, ``inertia`` in N·m per pulse/s², above 0.
 
     ``load`` is positive if it pulls towards lower positions, ``friction`` acts against motion, and as much of it as is needed at
     rest. Stops are inelastic.
@@ -32,7 +32,7 @@ class FreeMotion:
     friction: float
     low: int | None
     high: int | None
-    detent: Wells | None = None
+    detent: PeriodicPotential | None = None
     """At whole multiples of its period."""
 
     @property
@@ -51,7 +51,7 @@ class FreeMotion:
             end = float(round(end))
         return Profile(now, base, segments, end)
 
-    def overrun(self, field: Wells, now: Nanos, base: int, velocity: float) -> Profile | None:
+    def overrun(self, field: PeriodicPotential, now: Nanos, base: int, velocity: float) -> Profile | None:
         """The motion on from ``base`` with ``velocity`` at ``now``, where the field stops; None where it holds the rotor."""
         direction = 1 if velocity > 0.0 else -1
         resisting = self.friction + direction * self.load
@@ -61,9 +61,9 @@ class FreeMotion:
         mean = sqrt(max(velocity * velocity - 2.0 * field.deep(resisting) / self.inertia, 0.0))
         if wells is None:
             return self.profile(now, base, 0.0, direction * mean)
-        way = round(wells * field.period)
-        enough = mean * mean * self.inertia / (2.0 * way) * (1.0 - 1e-9)  # so that it comes to the place
-        stop = int(self._stopped(0, base + direction * way, direction))
+        distance = round(wells * field.period)
+        enough = mean * mean * self.inertia / (2.0 * distance) * (1.0 - 1e-9)  # so that it comes to the place
+        stop = int(self._stopped(0, base + direction * distance, direction))
         low, high = (base, stop) if direction > 0 else (stop, base)
         driven = replace(self, load=0.0, friction=min(resisting, enough), low=low, high=high)
         return driven.profile(now, base, 0.0, direction * mean)
@@ -104,27 +104,27 @@ class FreeMotion:
             begin_s, position = found.end_s, self._stopped(base, found.position(found.end_s), direction)
             velocity = 0.0
 
-    def _caught(self, detent: Wells, base: int, s: Segment, begin_s: float, p: float, v: float) -> list[Segment]:
-        """The way to the full step that catches it, instead of the segment ``s`` from ``p`` with velocity ``v``; empty where
+    def _caught(self, detent: PeriodicPotential, base: int, s: Segment, begin_s: float, p: float, v: float) -> list[Segment]:
+        """The motion to the full step that catches it, instead of the segment ``s`` from ``p`` with velocity ``v``; empty where
         none does."""
         direction, rate = s.direction, self._rate(s.direction)
         slow = detent.catches_below(self.inertia, self.friction + direction * self.load)
         if slow == 0.0:
             return []
-        way: list[Segment] = []
+        begun: list[Segment] = []
         if abs(v) > slow:
             if rate * direction >= 0.0 or abs(s.velocity(s.end_s)) > slow:
                 return []
-            way.append(ramp(begin_s, p, v, direction * slow, abs(rate)))
-        at = way[0].position(way[0].end_s) if way else p
+            begun.append(ramp(begin_s, p, v, direction * slow, abs(rate)))
+        at = begun[0].position(begun[0].end_s) if begun else p
         well = self._well(detent, base, at, p, direction)
-        if way and (well - at) * direction <= 0.0:
+        if begun and (well - at) * direction <= 0.0:
             left = sqrt(max(v * v - 2.0 * abs(rate) * abs(well - p), 0.0))
             return [ramp(begin_s, p, v, direction * left, abs(rate))]
-        speed, now = (slow, way[0].end_s) if way else (abs(v), begin_s)
-        return [*way, ramp(now, at, direction * speed, 0.0, speed * speed / (2.0 * abs(well - at)))]
+        speed, now = (slow, begun[0].end_s) if begun else (abs(v), begin_s)
+        return [*begun, ramp(now, at, direction * speed, 0.0, speed * speed / (2.0 * abs(well - at)))]
 
-    def _well(self, detent: Wells, base: int, at: float, begin: float, direction: int) -> float:
+    def _well(self, detent: PeriodicPotential, base: int, at: float, begin: float, direction: int) -> float:
         """The whole place of the full step nearest to ``at``, not before ``begin``; the stop, where that comes first."""
         well = detent.nearest(base + at) - base
         if (well - begin) * direction <= 0.0:
@@ -135,8 +135,8 @@ class FreeMotion:
         """From velocity ``v`` in one direction to rest, to ``stop``, or for ever."""
         rate = self._rate(direction)
         if rate * direction < 0.0:
-            way = v * v / (2.0 * abs(rate))
-            if stop is None or (stop - p) * direction >= way:
+            distance = v * v / (2.0 * abs(rate))
+            if stop is None or (stop - p) * direction >= distance:
                 return ramp(begin_s, p, v, 0.0, abs(rate))
             left = direction * sqrt(v * v - 2.0 * abs(rate) * (stop - p) * direction)
             found = ramp(begin_s, p, v, left, abs(rate))
@@ -150,7 +150,7 @@ class FreeMotion:
 
 
 def slow_from(profile: Profile, now: Nanos, speed: float) -> Nanos | None:
-    """First moment from ``now`` on at which a free motion is not faster than ``speed`` pulses/s; None if it never is."""
+    """First moment from ``now`` on at which a coasting motion is not faster than ``speed`` pulses/s; None if it never is."""
     if abs(profile.velocity(now)) <= speed:
         return now
     part = bisect_right(profile.ends, now - profile.start)

@@ -9,9 +9,9 @@ A rotor that was held synchronises at the nearest position with the electrical a
 reverses: the loss is a whole number of electrical periods (four full steps). If that position is up to two full steps before a
 stop, the rotor springs back to it; if it is beyond the stop, the rotor leaves the stop when the field has returned that far.
 
-Between two reversals of the field, rotor and load are constant or have a constant distance to the field: a course is a list of
-such pieces. While no current drives the rotor of a `Build.is_free` axis, its motion (`steptwin.simulation.mechanics.free`) is in
-the place of the field, and the load keeps its distance to the rotor.
+Between two reversals of the field, rotor and load are constant or have a constant distance to the field: a trajectory is a list
+of such pieces. While no current drives the rotor of a `Build.coasts_unpowered` axis, its motion
+(`steptwin.simulation.mechanics.coasting`) is in the place of the field, and the load keeps its distance to the rotor.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message, MessageText
 from steptwin.motion import Profile, Segment
 from steptwin.motion.divisions import Plan, profile_of
-from steptwin.points import turns_of
+from steptwin.points import turning_points_of
 from steptwin.simulation.mechanics.motor import StepperMotor
-from steptwin.simulation.mechanics.resonance import Spell, spells
+from steptwin.simulation.mechanics.resonance import ResonanceInterval, resonance_intervals
 
 UNFOLLOWED = Message("simulation.no-longer-follows", "it no longer follows its field")
 
@@ -48,13 +48,13 @@ class Build:
     period_p: int = 1
     """Electrical period of the motor (four full steps): pulses are lost in multiples of it."""
     motor: StepperMotor | None = None
-    is_free: bool = False
+    coasts_unpowered: bool = False
     """Whether the load moves the rotor while no current does."""
 
     @property
-    def is_loose(self) -> bool:
+    def may_coast(self) -> bool:
         """Whether the rotor may move otherwise than its field."""
-        return self.is_free or (self.motor is not None and self.motor.overruns)
+        return self.coasts_unpowered or (self.motor is not None and self.motor.overruns)
 
     @property
     def ideal(self) -> bool:
@@ -73,8 +73,8 @@ class MechanicalState(NamedTuple):
     """Distance of the rotor's equilibrium position behind the field. The rotor is there unless something holds it."""
 
 
-class CoursePiece(NamedTuple):
-    """From ``begin`` on the rotor is the field (or the free motion) and ``rotor``, or at ``rotor``; likewise the load."""
+class TrajectoryPiece(NamedTuple):
+    """From ``begin`` on the rotor is the field (or the coasting motion) and ``rotor``, or at ``rotor``; likewise the load."""
 
     begin: Nanos
     direction: int
@@ -103,13 +103,25 @@ STALLS_BY_RESONANCE = Message("simulation.stalls-by-resonance", "{axis} stalls b
 STALLS = Message("simulation.stalls", "{axis} stalls: {why}")
 
 
-class Course:
-    """The way of an axis from ``begin`` on while ``plan`` is in force; immutable.
+class Trajectory:
+    """The motion of an axis from ``begin`` on while ``plan`` is in force; immutable.
 
-    ``blocked``: nothing moves the rotor. ``free``: its motion without current, in pulses of the drive.
+    ``blocked``: nothing moves the rotor. ``coasting``: its motion without current, in pulses of the drive.
     """
 
-    __slots__ = ("_amplitude", "_laid", "_now", "_shaken", "_spells", "_state", "begin", "blocked", "build", "free", "plan")
+    __slots__ = (
+        "_amplitude",
+        "_laid",
+        "_now",
+        "_resonance_intervals",
+        "_shaken",
+        "_state",
+        "begin",
+        "blocked",
+        "build",
+        "coasting",
+        "plan",
+    )
 
     def __init__(
         self,
@@ -120,7 +132,7 @@ class Course:
         *,
         blocked: bool = False,
         jump: float = 0.0,
-        free: Profile | None = None,
+        coasting: Profile | None = None,
         vibration: float = 0.0,
     ) -> None:
         """``jump``: by how much (pulses/s) the speed of the field changes at once at ``begin``. ``vibration`` in full steps."""
@@ -128,10 +140,10 @@ class Course:
         self.plan = plan
         self.begin = begin
         self.blocked = blocked
-        self.free = free
-        self._laid: list[CoursePiece] = []
+        self.coasting = coasting
+        self._laid: list[TrajectoryPiece] = []
         motor = build.motor
-        self._spells: list[Spell] = []
+        self._resonance_intervals: list[ResonanceInterval] = []
         self._amplitude = vibration if motor is None or motor.resonance is None else max(vibration, motor.resonance.least)
         self._shaken: list[Nanos] = []
         if motor is not None and not motor.follows(jump) and profile_of(plan).moving(begin):
@@ -141,7 +153,7 @@ class Course:
     # ------------------------------------------------------------------ questions
 
     @property
-    def pieces(self) -> list[CoursePiece]:
+    def pieces(self) -> list[TrajectoryPiece]:
         """Computed on first use."""
         if not self._laid:
             self._lay(self.begin)
@@ -149,9 +161,9 @@ class Course:
 
     @property
     def is_exact(self) -> bool:
-        """Whether not a pulse is lost, before or on this course."""
+        """Whether not a pulse is lost, before or on this trajectory."""
         begin = self._state
-        if self.blocked or self.free is not None or begin.rotor != self.field(self.begin):
+        if self.blocked or self.coasting is not None or begin.rotor != self.field(self.begin):
             return False
         build, profile = self.build, profile_of(self.plan)
         if build.ideal or not profile.segments:
@@ -165,15 +177,15 @@ class Course:
 
     def moves(self, now: Nanos) -> bool:
         """Whether what the rotor follows moves."""
-        return (profile_of(self.plan) if self.free is None else self.free).moving(now)
+        return (profile_of(self.plan) if self.coasting is None else self.coasting).moving(now)
 
     def leads(self, now: Nanos) -> bool:
         """Whether the rotor goes with that."""
         return self._piece(now).rotor_follows
 
     def _lead(self, now: Nanos) -> int:
-        """Position that the rotor follows: that of the field, or of the free motion."""
-        return self.field(now) if self.free is None else self.build.sign * self.free.count(now) + self.build.zero
+        """Position that the rotor follows: that of the field, or of the coasting motion."""
+        return self.field(now) if self.coasting is None else self.build.sign * self.coasting.count(now) + self.build.zero
 
     def at(self, now: Nanos) -> MechanicalState:
         """Where everything is at ``now``, not before ``begin``."""
@@ -188,7 +200,7 @@ class Course:
         piece = self._piece(now)
         if not piece.load_follows:
             return piece.load
-        plan = self.plan if self.free is None else self.free
+        plan = self.plan if self.coasting is None else self.coasting
         return piece.load + self.build.sign * plan.count(now) + self.build.zero
 
     def position(self, now: Nanos) -> float:
@@ -196,7 +208,7 @@ class Course:
         piece = self._piece(now)
         if not piece.load_follows:
             return float(piece.load)
-        lead = profile_of(self.plan) if self.free is None else self.free
+        lead = profile_of(self.plan) if self.coasting is None else self.coasting
         return piece.load + (self.build.zero + self.build.sign * lead.position(now))
 
     def reaches(self, position: int, after: Nanos, direction: int, *, rotor: bool = False) -> Nanos | None:
@@ -216,11 +228,11 @@ class Course:
                     return time
         return None
 
-    def turns(self, now: Nanos) -> list[Nanos]:
+    def turning_points(self, now: Nanos) -> list[Nanos]:
         """Moments after ``now``, in order, between which field, rotor and load each go one way."""
         found = {piece.begin for piece in self.pieces if piece.begin > now}  # a segment of the field begins one at least
-        if self.free is not None:
-            found.update(turns_of(lambda: profile_of(self.plan))(now))
+        if self.coasting is not None:
+            found.update(turning_points_of(lambda: profile_of(self.plan))(now))
         return sorted(found)
 
     def next_stall(self, after: Nanos) -> Nanos | None:
@@ -229,7 +241,7 @@ class Course:
         return next((piece.begin for piece in self.pieces if piece.begin > after and piece.stalled is not stalled), None)
 
     def stop(self, now: Nanos) -> int:
-        """The hard stop against which the field draws the rotor, as in `CoursePiece`."""
+        """The hard stop against which the field draws the rotor, as in `TrajectoryPiece`."""
         return self._piece(now).stop
 
     def next_stop(self, after: Nanos) -> Nanos | None:
@@ -240,11 +252,11 @@ class Course:
     def vibration(self, now: Nanos) -> float:
         """The amplitude of the rotor about the field, full steps; 0 where no resonance is described."""
         motor = self.build.motor
-        if motor is None or motor.resonance is None or not self.pieces or not self._spells:
+        if motor is None or motor.resonance is None or not self.pieces or not self._resonance_intervals:
             return self._amplitude
         now_s = (now - profile_of(self.plan).start) / SECOND
-        before = max(bisect_right(self._spells, now_s, key=attrgetter("begin_s")) - 1, 0)
-        return self._spells[before].at(max(now_s, self._spells[before].begin_s), motor.resonance.least)
+        before = max(bisect_right(self._resonance_intervals, now_s, key=attrgetter("begin_s")) - 1, 0)
+        return self._resonance_intervals[before].at(max(now_s, self._resonance_intervals[before].begin_s), motor.resonance.least)
 
     def stall_of(self, axis: str, now: Nanos) -> MessageText:
         """The message that the rotor of ``axis`` loses the field in this moment, with its reason."""
@@ -274,19 +286,21 @@ class Course:
                 found.append(now)
         return tuple(found)
 
-    def _piece(self, now: Nanos) -> CoursePiece:
+    def _piece(self, now: Nanos) -> TrajectoryPiece:
         pieces = self._laid or self.pieces
         after = bisect_left(pieces, (now + 1,))
         return pieces[after - 1 if after else 0]
 
     def _time(self, lead: int, after: Nanos) -> Nanos | None:
-        return (self.plan if self.free is None else self.free).pulse_time((lead - self.build.zero) * self.build.sign, after)
+        return (self.plan if self.coasting is None else self.coasting).pulse_time(
+            (lead - self.build.zero) * self.build.sign, after
+        )
 
     # ------------------------------------------------------------------ laying out the pieces
 
     def _lay(self, begin: Nanos) -> None:
-        if self.free is not None:
-            self._lay_free(self.free)
+        if self.coasting is not None:
+            self._lay_coasting(self.coasting)
             return
         profile = profile_of(self.plan)
         if self._keeps_distance(profile):
@@ -302,7 +316,9 @@ class Course:
             rest = max(profile.end, begin)
             motor = self.build.motor
             if motor is not None and motor.resonance is not None:
-                self._spells.append(Spell((rest - profile.start) / SECOND, self._amplitude, -motor.resonance.fading))
+                self._resonance_intervals.append(
+                    ResonanceInterval((rest - profile.start) / SECOND, self._amplitude, -motor.resonance.fading)
+                )
             if not self.blocked and (not self._now.stalled or motor is None or motor.holds()):
                 self._catch(rest)
             self._stand(rest, 1)
@@ -325,21 +341,21 @@ class Course:
         """Lay the pieces where nothing can come between field, rotor and load: most axes, most of the time."""
         behind = self._state.behind
         for begin, direction in profile.legs(self.begin):
-            self._laid.append(CoursePiece(begin, direction * self.build.sign, True, -behind, True, -behind, False, behind))
+            self._laid.append(TrajectoryPiece(begin, direction * self.build.sign, True, -behind, True, -behind, False, behind))
         if profile.end is not None:
             rest = max(profile.end, self.begin)
             here = self.field(rest) - behind
-            self._laid.append(CoursePiece(rest, 1, False, here, False, here, False, behind))
+            self._laid.append(TrajectoryPiece(rest, 1, False, here, False, here, False, behind))
 
-    def _lay_free(self, free: Profile) -> None:
-        """The rotor goes with the free motion, the load keeps its distance to it."""
+    def _lay_coasting(self, coasting: Profile) -> None:
+        """The rotor goes with the coasting motion, the load keeps its distance to it."""
         rotor, load, stalled, behind = self._state
         away = load - rotor
-        for moment, direction in free.legs(self.begin):
-            self._laid.append(CoursePiece(moment, direction * self.build.sign, True, 0, True, away, stalled, behind))
-        if free.end is not None:
-            rest = self._lead(free.end)
-            self._laid.append(CoursePiece(max(free.end, self.begin), 1, False, rest, False, rest + away, stalled, behind))
+        for moment, direction in coasting.legs(self.begin):
+            self._laid.append(TrajectoryPiece(moment, direction * self.build.sign, True, 0, True, away, stalled, behind))
+        if coasting.end is not None:
+            rest = self._lead(coasting.end)
+            self._laid.append(TrajectoryPiece(max(coasting.end, self.begin), 1, False, rest, False, rest + away, stalled, behind))
 
     def _segment(self, s: Segment, begin: Nanos, end: Nanos | None) -> None:
         """Lay the pieces while the field goes one way."""
@@ -386,18 +402,18 @@ class Course:
         if resonance is None:
             return weak
         least = resonance.least
-        for spell, lost in spells(resonance, motor.parts(s, now_s, end_s, self.build.sign), self._amplitude):
-            if weak is not None and spell.begin_s >= weak:
+        for interval, lost in resonance_intervals(resonance, motor.parts(s, now_s, end_s, self.build.sign), self._amplitude):
+            if weak is not None and interval.begin_s >= weak:
                 break
-            self._spells.append(spell)
+            self._resonance_intervals.append(interval)
             if lost is not None and (weak is None or lost < weak):
                 self._shaken.append(max(self.begin, profile_of(self.plan).start + ceil(lost * SECOND)))
                 weak = lost
         if weak is not None:
-            self._spells.append(Spell(weak, least, -resonance.fading))
+            self._resonance_intervals.append(ResonanceInterval(weak, least, -resonance.fading))
             self._amplitude = least
-        elif self._spells:
-            self._amplitude = self._spells[-1].at(end_s, least) if end_s < inf else least
+        elif self._resonance_intervals:
+            self._amplitude = self._resonance_intervals[-1].at(end_s, least) if end_s < inf else least
         return weak
 
     def _follow(self, begin: Nanos, end: Nanos | None, direction: int) -> None:
@@ -427,11 +443,11 @@ class Course:
             met = None
         if held != begin:
             if met != begin:
-                self._laid.append(CoursePiece(begin, direction, True, offset, False, load, False, behind))
+                self._laid.append(TrajectoryPiece(begin, direction, True, offset, False, load, False, behind))
             if met is not None:
-                self._laid.append(CoursePiece(met, direction, True, offset, True, offset + slack, False, behind))
+                self._laid.append(TrajectoryPiece(met, direction, True, offset, True, offset + slack, False, behind))
         if held is not None and stop is not None:
-            self._laid.append(CoursePiece(held, direction, False, stop, False, stop + slack, False, behind, direction))
+            self._laid.append(TrajectoryPiece(held, direction, False, stop, False, stop + slack, False, behind, direction))
         if end is not None:
             rotor = offset + self.field(end)
             if stop is not None and (rotor - stop) * direction > 0:
@@ -449,7 +465,7 @@ class Course:
 
     def _stand(self, now: Nanos, direction: int, *, stop: int = 0) -> None:
         rotor, load, stalled, behind = self._now
-        self._laid.append(CoursePiece(now, direction, False, rotor, False, load, stalled, behind, stop))
+        self._laid.append(TrajectoryPiece(now, direction, False, rotor, False, load, stalled, behind, stop))
 
     def _catch(self, now: Nanos) -> None:
         """The rotor goes to the nearest place that has the electrical angle of the field, or towards it as far as a stop."""

@@ -1,10 +1,10 @@
-"""Small worlds of M1486 chips on one line."""
+"""Generated worlds of M1486 chips on one line."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from steptwin.simulation.describe.small import LINE, InputChange, TomlTable, Whole, small_world
+from steptwin.simulation.describe.generated import LINE, InputChange, TomlTable, Whole, generated_world
 
 HOST = "host"
 """The script that sends lines to chips."""
@@ -40,7 +40,7 @@ def m1486_world(
     tables = [TomlTable("m1486", {"name": chip_name(one), "line": LINE, "address": one, **values}) for one in addresses]
     tables += [TomlTable("wire", {"from": source, "to": target}) for source, target in wires]
     tables += _host([chip_name(one) for one in addresses], typed)
-    return small_world(whole, "m1486", tables, changes, _EXAMPLE.format(controller=chip_name(addresses[0])))
+    return generated_world(whole, "m1486", tables, changes, _EXAMPLE.format(controller=chip_name(addresses[0])))
 
 
 def chip_name(address: int) -> str:

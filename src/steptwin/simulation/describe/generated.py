@@ -1,6 +1,6 @@
-"""Descriptions of small worlds: controllers on one line, as a text that a person can go on with.
+"""Descriptions of generated worlds: controllers on one line, as a text that a person can go on with.
 
-What the controllers of a kind are given is made beside the kind: `steptwin.simulation.describe.small_mic488`.
+What the controllers of a kind are given is made beside the kind: `steptwin.simulation.describe.generated_mic488`.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class TomlTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Whole:
-    """Parts of a small world besides its controllers. ``line`` are values of ``[[line]]``."""
+    """Parts of a generated world besides its controllers. ``line`` are values of ``[[line]]``."""
 
     name: str
     line: Mapping[str, object] = field(default_factory=dict)
@@ -58,7 +58,7 @@ class InputChange(NamedTuple):
     note: str
 
 
-def small_world(
+def generated_world(
     whole: Whole, line_kind: str, tables: Iterable[TomlTable], changes: Iterable[InputChange] = (), example: str = ""
 ) -> str:
     """The description: the world, a line of a kind, what is on it and around it (``tables``), and at the end an example of what

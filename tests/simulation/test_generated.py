@@ -1,6 +1,6 @@
-"""What ``serve`` and ``run`` describe, as a person gets it to go on with: golden/small.txt, without what is said of keys.
+"""What ``serve`` and ``run`` describe, as a person gets it to go on with: golden/generated.txt, without what is said of keys.
 
-Regenerate with ``python tests/simulation/test_small.py`` and read the diff.
+Regenerate with ``python tests/simulation/test_generated.py`` and read the diff.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ import pytest
 
 from steptwin.controller import MILLISECOND, SECOND
 from steptwin.files.world import World
-from steptwin.simulation.describe.small import InputChange, Whole
-from steptwin.simulation.describe.small_m1486 import m1486_world
-from steptwin.simulation.describe.small_mic488 import AxisSwitches, mic488_world
+from steptwin.simulation.describe.generated import InputChange, Whole
+from steptwin.simulation.describe.generated_m1486 import m1486_world
+from steptwin.simulation.describe.generated_mic488 import AxisSwitches, mic488_world
 from steptwin.simulation.faults import read
 
-GOLDEN = Path(__file__).parent / "golden" / "small.txt"
+GOLDEN = Path(__file__).parent / "golden" / "generated.txt"
 HERE = {"tcp": "127.0.0.1:0"}
 
 WORLDS = {

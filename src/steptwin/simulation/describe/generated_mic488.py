@@ -1,11 +1,11 @@
-"""Small worlds of MIC488 controllers on one line."""
+"""Generated worlds of MIC488 controllers on one line."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from steptwin.simulation.describe.small import LINE, InputChange, TomlTable, Whole, small_world
+from steptwin.simulation.describe.generated import LINE, InputChange, TomlTable, Whole, generated_world
 
 AXES = "xyzu"
 """Names of the spindles of `demo`."""
@@ -63,7 +63,7 @@ def mic488_world(
             tables += _spindles(name, "" if len(names) == 1 else f"-{unit}")
     axes = [table for one in switches for table in _switches(names[0], one)]
     example = "" if demo or axes else _EXAMPLE.format(controller=names[0])
-    return small_world(whole, "modbus", [*tables, *axes], changes, example)
+    return generated_world(whole, "modbus", [*tables, *axes], changes, example)
 
 
 def _demo_axes() -> Iterator[TomlTable]:

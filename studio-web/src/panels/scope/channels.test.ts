@@ -1,9 +1,9 @@
 import { expect, test } from "vitest";
 import type { Pen } from "../../lib/drawing/pen";
 import { Passed } from "../../lib/state/passed";
-import { drawFrames, drawStatements, frameCode } from "./lanes";
+import { drawFrames, drawStatements, frameCode } from "./channels";
 
-const lane = {
+const channel = {
   left: 0,
   right: 100,
   high: 0,
@@ -26,7 +26,7 @@ test("frames go up to the controllers and down from them, one of a kind in a col
   passed.take("bus", 60n, frameCode(true, false));
   passed.take("bus", 70n, frameCode(true, true));
   const { pen, drawn } = fake();
-  drawFrames(pen, lane, passed, "bus", "blue", "red");
+  drawFrames(pen, channel, passed, "bus", "blue", "red");
   expect(drawn).toEqual([
     ["to", 10.5, 0],
     ["to", 50.5, 0],
@@ -41,7 +41,7 @@ test("statements have the number of their line where there is room", () => {
   passed.take("table", 40n, 13);
   passed.take("table", 45n, 14);
   const { pen, drawn } = fake();
-  drawStatements(pen, lane, passed, "table", "blue", "black");
+  drawStatements(pen, channel, passed, "table", "blue", "black");
   expect(drawn).toEqual([
     ["to", 5.5, 10],
     ["text", "12", 8.5, 5],

@@ -13,9 +13,9 @@ from motor_rig import INERTIA, LINEAR, at_speed, motor
 from steptwin.controller import SECOND
 from steptwin.motion import MotionState, Profile, Segment, plan_position, plan_velocity
 from steptwin.motion.paths import Circular
-from steptwin.simulation.mechanics.course import Build, Course, MechanicalState
 from steptwin.simulation.mechanics.motor import StepperMotor, _first_below_0
 from steptwin.simulation.mechanics.resonance import MotionPart, Resonance
+from steptwin.simulation.mechanics.trajectory import Build, MechanicalState, Trajectory
 
 # ---------------------------------------------------------------------- along an arc
 
@@ -36,8 +36,8 @@ def test_along_an_arc_it_is_looked_every_millisecond(
     radius: int, speed: float, inertia: float, friction: float, load: float, start: float, sign: int, part: float
 ) -> None:
     """x = R cos φ with φ = w / R: velocity and acceleration by the derivatives of that, at whole milliseconds of a segment."""
-    way = plan_position(MotionState(0, 0, 0.0, 0.0), round(2 * pi * radius), 40_000.0, 40_000.0, speed)
-    profile = Circular(-radius, radius, 0.0, 4.0 / round(2 * pi * radius)).profile(way, 0, 0)
+    travel = plan_position(MotionState(0, 0, 0.0, 0.0), round(2 * pi * radius), 40_000.0, 40_000.0, speed)
+    profile = Circular(-radius, radius, 0.0, 4.0 / round(2 * pi * radius)).profile(travel, 0, 0)
     drive = StepperMotor(LINEAR, inertia, friction, load, start)
     scale = 2 * pi / round(2 * pi * radius)
     begin = 0.0
@@ -47,7 +47,7 @@ def test_along_an_arc_it_is_looked_every_millisecond(
         is_close = False
         for n in range(int((s.end_s - first) / 0.001) + 1):
             t = first + n * 0.001
-            w, dw, ddw = s.way.position(t), s.way.velocity(t), 2 * s.way.c2
+            w, dw, ddw = s.travel.position(t), s.travel.velocity(t), 2 * s.travel.c2
             velocity = -radius * sin(scale * w) * scale * dw
             acceleration = -radius * scale * (cos(scale * w) * scale * dw * dw + sin(scale * w) * ddw)
             need = abs(inertia * sign * acceleration + friction * sign * s.direction + load)
@@ -66,13 +66,13 @@ def test_along_an_arc_it_is_looked_every_millisecond(
 
 def test_a_motor_on_an_arc_loses_the_field_where_the_curve_is_too_tight() -> None:
     """R = 8000 at 20 000 pulses/s: 50 000 pulses/s² where the axis turns; 1 N·m is there at any speed."""
-    way = plan_position(MotionState(0, 0, 0.0, 0.0), 50_265, 20_000.0, 20_000.0, 20_000.0)
-    profile = Circular(-8000, 8000, 0.0, 4.0 / 50_265).profile(way, 0, 0)
+    travel = plan_position(MotionState(0, 0, 0.0, 0.0), 50_265, 20_000.0, 20_000.0, 20_000.0)
+    profile = Circular(-8000, 8000, 0.0, 4.0 / 50_265).profile(travel, 0, 0)
     for need, follows in ((0.99, True), (1.01, False)):
         build = Build(period_p=64, motor=StepperMotor(((0.0, 1.0), (32_000.0, 1.0)), need / 50_000.0, 0.0, 0.0, 20_000.0))
-        course = Course(build, profile, 0, MechanicalState(0, 0))
-        assert (course.next_stall(0) is None) is follows, need
-        assert (course.at(1000 * SECOND) == MechanicalState(0, 0)) is follows or course.at(1000 * SECOND).behind % 64 == 0
+        trajectory = Trajectory(build, profile, 0, MechanicalState(0, 0))
+        assert (trajectory.next_stall(0) is None) is follows, need
+        assert (trajectory.at(1000 * SECOND) == MechanicalState(0, 0)) is follows or trajectory.at(1000 * SECOND).behind % 64 == 0
 
 
 # ---------------------------------------------------------------------- motions without end
@@ -112,11 +112,11 @@ def test_a_rotor_that_would_be_caught_and_lost_at_once_stays_lost() -> None:
     build = Build(period_p=64, motor=motor(((0.0, 0.5), (32_000.0, 0.5)), inertia=1e-9, friction=0.6))
     plan = plan_velocity(MotionState(0, 0, 0.0, 0.0), 5000.0, 1000.0, 1000.0)
     turned = plan_velocity(MotionState.of(plan, SECOND), -5000.0, 1000.0, 1000.0)
-    course = Course(build, turned, SECOND, MechanicalState(0, 0, stalled=True))
+    trajectory = Trajectory(build, turned, SECOND, MechanicalState(0, 0, stalled=True))
     for moment in (SECOND, 2 * SECOND, 3 * SECOND, 9 * SECOND):
-        assert course.at(moment).stalled, moment
-        assert course.at(moment).rotor == 0
-    assert [piece.begin for piece in course.pieces] == sorted({piece.begin for piece in course.pieces})
+        assert trajectory.at(moment).stalled, moment
+        assert trajectory.at(moment).rotor == 0
+    assert [piece.begin for piece in trajectory.pieces] == sorted({piece.begin for piece in trajectory.pieces})
 
 
 @pytest.mark.parametrize(
@@ -193,8 +193,8 @@ def test_no_more_than_all_of_the_torque_is_used(friction: float, use: float) -> 
 
 
 def test_along_an_arc_there_is_a_part_for_each_millisecond() -> None:
-    way = plan_position(MotionState(0, 0, 0.0, 0.0), 50_265, 20_000.0, 20_000.0, 20_000.0)
-    arc = Circular(-8000, 8000, 0.0, 4.0 / 50_265).profile(way, 0, 0).segments[0]
+    travel = plan_position(MotionState(0, 0, 0.0, 0.0), 50_265, 20_000.0, 20_000.0, 20_000.0)
+    arc = Circular(-8000, 8000, 0.0, 4.0 / 50_265).profile(travel, 0, 0).segments[0]
     drive = replace(motor(friction=0.1), resonance=BAND)
     begin, end = 0.1, 0.1045
     parts = list(drive.parts(arc, begin, end, 1))

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from steptwin.motion.trig import PI, QUARTER, arcsine
 
 
-class Wells(NamedTuple):
+class PeriodicPotential(NamedTuple):
     """``torque`` in N·m, ``period`` in pulses."""
 
     torque: float

@@ -10,10 +10,10 @@ from steptwin.messages import Message
 from steptwin.motion import Profile, at_rest
 from steptwin.motion.divisions import profile_of
 from steptwin.motioncontroller import Drive
-from steptwin.simulation.mechanics.course import Build, Course, MechanicalState
-from steptwin.simulation.mechanics.free import FreeMotion, slow_from
+from steptwin.simulation.mechanics.coasting import CoastingRotor, slow_from
 from steptwin.simulation.mechanics.motor import Burden, StepperMotor
-from steptwin.simulation.mechanics.wells import Wells
+from steptwin.simulation.mechanics.potential import PeriodicPotential
+from steptwin.simulation.mechanics.trajectory import Build, MechanicalState, Trajectory
 from steptwin.state import Stateful
 
 RUNS_ON = Message("simulation.runs-on", "{axis} runs on after a stop without ramp")
@@ -21,11 +21,11 @@ MOVES_WITH_LITTLE_CURRENT = Message("simulation.moves-with-little-current", "{ax
 MOVES_WITHOUT_CURRENT = Message("simulation.moves-without-current", "{axis} moves without current")
 
 
-class Looseness(Stateful):
+class RotorHold(Stateful):
     """Whether a rotor is held by its field, from moment to moment."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("_build", "_motor")
-    __slots__ = (*FIXED, "_on_since", "_overruns", "due", "has_current", "is_free")
+    __slots__ = (*FIXED, "_on_since", "_overruns", "due", "has_current", "is_coasting")
 
     def __init__(self, build: Build, motor: StepperMotor, now: Nanos) -> None:
         self._build = build
@@ -35,7 +35,7 @@ class Looseness(Stateful):
         self._overruns = False
         """Whether the rotor runs on after a stop of its field."""
         self.has_current = True
-        self.is_free = False
+        self.is_coasting = False
         """Whether the field does not hold it: there is no current or too little, or the rotor is too fast."""
         self.due: Nanos | None = None
         """When that may change without an input: the rotor is slow enough, current is reduced, or the field stops at once."""
@@ -46,7 +46,7 @@ class Looseness(Stateful):
 
     @property
     def why(self) -> Message:
-        """Message for events about what a free rotor does."""
+        """Message for events about what a coasting rotor does."""
         if self._overruns:
             return RUNS_ON
         return MOVES_WITH_LITTLE_CURRENT if self.has_current else MOVES_WITHOUT_CURRENT
@@ -54,7 +54,7 @@ class Looseness(Stateful):
     def motion(
         self,
         drive: Drive,
-        before: Course,
+        before: Trajectory,
         state: MechanicalState,
         now: Nanos,
         *,
@@ -64,11 +64,11 @@ class Looseness(Stateful):
     ) -> tuple[Profile | None, MechanicalState]:
         """The motion of a rotor that its field does not hold from now on, None where it does; and its place as that begins.
 
-        ``before``: its course until now. ``is_new``: the drive has another plan. ``burden``: what it moves besides
+        ``before``: its trajectory until now. ``is_new``: the drive has another plan. ``burden``: what it moves besides
         its motor's own. ``stands``: something holds it from now on.
         """
         plan, motor = profile_of(drive.plan), self._motor
-        led = profile_of(before.plan) if before.free is None else before.free
+        led = profile_of(before.plan) if before.coasting is None else before.coasting
         moves = before.leads(now) and not stands
         speed = led.velocity(now) if moves else 0.0
         if drive.is_energised and not self.has_current:
@@ -78,18 +78,18 @@ class Looseness(Stateful):
         self._overruns = runs_on
         if runs_on:
             self.due = due
-            return before.free, state
-        motion = self._free_motion(state, burden)
+            return before.coasting, state
+        motion = self._coasting_rotor(state, burden)
         is_weak = self._is_weak(plan, motion, now)
-        if not is_weak and (not self.is_free or self._motor.follows(speed)):
-            self.is_free = False
+        if not is_weak and (not self.is_coasting or self._motor.follows(speed)):
+            self.is_coasting = False
             found = None
             if motor.overruns and before.leads(now - 1) and not stands and not state.stalled:
                 found = self._overrun(plan, led, motion, state, now)
             if found is None:
                 self._watch(plan, motion, now)
             return found, state
-        self.is_free = True
+        self.is_coasting = True
         if motion.detent is not None and speed == 0.0 and motion.detent.torque > motion.friction + abs(motion.load):
             state = self._at_full_step(state, motion.detent)
         base = (state.rotor - self._build.zero) * self._build.sign
@@ -100,40 +100,40 @@ class Looseness(Stateful):
             self.due = slow_from(found, now, motor.catch_p)
         return found, state
 
-    def settles(self, course: Course, before: Burden, after: Burden, now: Nanos) -> bool:
-        """Whether a free rotor, whose load changes from ``before`` to ``after``, swings by less than a full step about this
+    def settles(self, trajectory: Trajectory, before: Burden, after: Burden, now: Nanos) -> bool:
+        """Whether a coasting rotor, whose load changes from ``before`` to ``after``, swings by less than a full step about this
         place, to which both drive it. Places being whole pulses, it would never come to rest."""
-        speed = 0.0 if course.free is None else course.free.velocity(now)
+        speed = 0.0 if trajectory.coasting is None else trajectory.coasting.velocity(now)
         if speed == 0.0:
             return False
         direction = 1 if speed > 0.0 else -1
-        one, other = (self._free_motion(course.at(now), burden) for burden in (before, after))
+        one, other = (self._coasting_rotor(trajectory.at(now), burden) for burden in (before, after))
         drives_to, drives_back = -direction * one.load - one.friction, direction * other.load - other.friction
         braking = direction * other.load + other.friction
         swing = 0.5 * other.inertia * speed * speed
         return drives_to > 0.0 and drives_back > 0.0 and swing < braking * self._build.period_p / 4
 
-    def _free_motion(self, state: MechanicalState, burden: Burden) -> FreeMotion:
+    def _coasting_rotor(self, state: MechanicalState, burden: Burden) -> CoastingRotor:
         build, motor = self._build, self._motor
         away = state.load - state.rotor
         ends = sorted((stop - away - build.zero) * build.sign for stop in (build.low, build.high) if stop is not None)
-        return FreeMotion(
+        return CoastingRotor(
             inertia=motor.inertia + burden.inertia,
             load=(motor.load + burden.load) * build.sign,
             friction=motor.friction + burden.friction,
             low=ends[0] if ends else None,
             high=ends[-1] if ends else None,
-            detent=Wells(motor.detent, build.period_p / 4) if motor.detent and not self.has_current else None,
+            detent=PeriodicPotential(motor.detent, build.period_p / 4) if motor.detent and not self.has_current else None,
         )
 
-    def _is_weak(self, plan: Profile, motion: FreeMotion, now: Nanos) -> bool:
+    def _is_weak(self, plan: Profile, motion: CoastingRotor, now: Nanos) -> bool:
         """Whether there is no current, or too little for the load."""
         weak_from = self._weak_from(plan, motion)
-        return self._build.is_free and (not self.has_current or (weak_from is not None and weak_from <= now))
+        return self._build.coasts_unpowered and (not self.has_current or (weak_from is not None and weak_from <= now))
 
-    def _weak_from(self, plan: Profile, motion: FreeMotion) -> Nanos | None:
+    def _weak_from(self, plan: Profile, motion: CoastingRotor) -> Nanos | None:
         """From when on a field at rest has too little torque for the load: at once, or when the current is reduced."""
-        if not self._build.is_free or plan.end is None:
+        if not self._build.coasts_unpowered or plan.end is None:
             return None
         motor, needed = self._motor, abs(motion.load) - motion.friction
         rests = max(plan.end, self._on_since)
@@ -141,26 +141,26 @@ class Looseness(Stateful):
             return rests
         return rests + motor.hold_ns if needed > motor.hold * motor.holding else None
 
-    def _watch(self, plan: Profile, motion: FreeMotion, now: Nanos) -> None:
+    def _watch(self, plan: Profile, motion: CoastingRotor, now: Nanos) -> None:
         """Find when something happens to a rotor that is held."""
-        dues = [self._weak_from(plan, motion)]
+        deadlines = [self._weak_from(plan, motion)]
         if self._motor.overruns and plan.end is not None and _speed_into(plan, plan.end):
-            dues.append(plan.end)
-        self.due = min((due for due in dues if due is not None and due > now), default=None)
+            deadlines.append(plan.end)
+        self.due = min((due for due in deadlines if due is not None and due > now), default=None)
 
-    def _overrun(self, plan: Profile, led: Profile, motion: FreeMotion, state: MechanicalState, now: Nanos) -> Profile | None:
+    def _overrun(self, plan: Profile, led: Profile, motion: CoastingRotor, state: MechanicalState, now: Nanos) -> Profile | None:
         """The motion on after a stop of the field at ``now``; None where there is none, or the field holds the rotor."""
         speed = _speed_into(led, now)
         if plan.moving(now) or speed == 0.0:
             return None
         base = (state.rotor - self._build.zero) * self._build.sign
-        found = motion.overrun(Wells(self._motor.holding, float(self._build.period_p)), now, base, speed)
+        found = motion.overrun(PeriodicPotential(self._motor.holding, float(self._build.period_p)), now, base, speed)
         if found is not None:
-            self.is_free = self._overruns = True
+            self.is_coasting = self._overruns = True
             self.due = found.end
         return found
 
-    def _at_full_step(self, state: MechanicalState, detent: Wells) -> MechanicalState:
+    def _at_full_step(self, state: MechanicalState, detent: PeriodicPotential) -> MechanicalState:
         """At the nearest full step, as far as the stops permit it."""
         build = self._build
         counted = (state.rotor - build.zero) * build.sign

@@ -13,15 +13,15 @@ from hypothesis import strategies as st
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.motion import Profile
-from steptwin.simulation.mechanics.free import FreeMotion, slow_from
-from steptwin.simulation.mechanics.wells import Wells
+from steptwin.simulation.mechanics.coasting import CoastingRotor, slow_from
+from steptwin.simulation.mechanics.potential import PeriodicPotential
 
 NOW, BASE = 3 * SECOND, 500
-BODY = FreeMotion(inertia=0.001, load=0.4, friction=0.1, low=None, high=None)
+BODY = CoastingRotor(inertia=0.001, load=0.4, friction=0.1, low=None, high=None)
 """It accelerates by 300 pulses/s² downwards, and brakes upwards with 500."""
 
 
-def integrated(body: FreeMotion, position: float, velocity: float, seconds: float) -> tuple[float, float]:
+def integrated(body: CoastingRotor, position: float, velocity: float, seconds: float) -> tuple[float, float]:
     """Position from `BASE` and velocity after a time, without detents."""
     step = 1e-5
     for _ in range(round(seconds / step)):
@@ -55,7 +55,7 @@ def integrated(body: FreeMotion, position: float, velocity: float, seconds: floa
         (replace(BODY, load=0.05, high=510), 300.0),
     ],
 )
-def test_against_the_equation_of_motion(body: FreeMotion, velocity: float) -> None:
+def test_against_the_equation_of_motion(body: CoastingRotor, velocity: float) -> None:
     found = body.profile(NOW, BASE, 0.0, velocity)
     for seconds in (0.05, 0.3, 0.7, 1.0, 1.6):
         position, speed = integrated(body, 0.0, velocity, seconds)
@@ -93,7 +93,7 @@ def test_at_its_stop_it_stands(load: float, stop: str) -> None:
 
 def test_a_detent_holds_and_catches() -> None:
     """Wells every 16 pulses with 0.3 N·m: they hold 0.3 and the friction, and catch what has less than their energy."""
-    body = replace(BODY, detent=Wells(0.3, 16.0))
+    body = replace(BODY, detent=PeriodicPotential(0.3, 16.0))
     assert body.holding == pytest.approx(0.4)
     assert body.profile(NOW, 496, 0.0, 0.0).segments == ()
     assert replace(body, load=0.41).profile(NOW, 496, 0.0, 0.0).segments != ()
@@ -106,11 +106,11 @@ def test_a_detent_holds_and_catches() -> None:
 
 
 def test_a_detent_that_is_too_weak_catches_nothing() -> None:
-    body = replace(BODY, detent=Wells(0.3, 16.0), load=0.41)
+    body = replace(BODY, detent=PeriodicPotential(0.3, 16.0), load=0.41)
     assert body.profile(NOW, 500, 0.0, -100.0).end is None
 
 
-FIELD = Wells(1.0, 64.0)
+FIELD = PeriodicPotential(1.0, 64.0)
 
 
 @pytest.mark.parametrize("direction", [1, -1])
@@ -253,7 +253,7 @@ def test_how_long_it_runs_on(direction: int, share: float, periods: int) -> None
 
 def test_it_also_runs_on_slowly() -> None:
     """In a field that hardly holds it."""
-    weak = Wells(1e-7, 64.0)
+    weak = PeriodicPotential(1e-7, 64.0)
     body = replace(BODY, load=0.0, friction=1e-8)
     found = body.overrun(weak, NOW, BASE, 0.5)
     assert found is not None
@@ -265,8 +265,8 @@ def test_it_also_runs_on_slowly() -> None:
 @pytest.mark.parametrize(("speed", "load"), [(60.0, 0.0), (200.0, 0.0), (300.0, 0.05), (300.0, -0.05)])
 def test_a_detent_catches_it_once_it_is_slow(speed: float, load: float, direction: int) -> None:
     """Before, only load and friction act; from then on it goes evenly slower to the nearest full step."""
-    body = replace(BODY, detent=Wells(0.3, 16.0), load=load * direction)
-    slow = Wells(0.3, 16.0).catches_below(body.inertia, 0.1 + load)
+    body = replace(BODY, detent=PeriodicPotential(0.3, 16.0), load=load * direction)
+    slow = PeriodicPotential(0.3, 16.0).catches_below(body.inertia, 0.1 + load)
     rate = (0.1 + load) / body.inertia
     found = body.profile(NOW, BASE, 0.25, direction * speed)
     assert found.end is not None
@@ -288,11 +288,11 @@ def test_a_detent_catches_it_once_it_is_slow(speed: float, load: float, directio
 
 
 def test_a_detent_does_not_catch_what_nothing_brakes_or_what_comes_to_a_stop_first() -> None:
-    still = replace(BODY, detent=Wells(0.3, 16.0), load=0.0, friction=0.0)
-    slow = Wells(0.3, 16.0).catches_below(still.inertia, 0.0)
+    still = replace(BODY, detent=PeriodicPotential(0.3, 16.0), load=0.0, friction=0.0)
+    slow = PeriodicPotential(0.3, 16.0).catches_below(still.inertia, 0.0)
     assert still.profile(NOW, BASE, 0.0, slow * 1.01).end is None
     assert still.profile(NOW, BASE, 0.0, slow * 0.99).end is not None
-    held = replace(BODY, detent=Wells(0.3, 16.0), load=0.0, high=BASE + 100).profile(NOW, BASE, 0.0, 300.0)
+    held = replace(BODY, detent=PeriodicPotential(0.3, 16.0), load=0.0, high=BASE + 100).profile(NOW, BASE, 0.0, 300.0)
     assert held.end is not None
     assert held.count(held.end) == BASE + 100
     assert (held.end - NOW) / SECOND == pytest.approx((300.0 - sqrt(300.0**2 - 2.0 * 100.0 * 100.0)) / 100.0)

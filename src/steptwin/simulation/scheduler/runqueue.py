@@ -1,4 +1,4 @@
-"""Work lists of a scheduler by number: what has to be looked at, and what is due when, without a scan of everything."""
+"""Run queue and deadlines of a scheduler, by number: what has to run, and what is due when, without a scan of everything."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ _FEW = 64
 """Number of outdated entries that a queue tolerates before it removes them."""
 
 
-class Turns:
-    """Numbers that wait for their turn, each once, in passes of ascending order.
+class RunQueue:
+    """Numbers that wait to be run, each once, in passes of ascending order.
 
-    A number that is added behind the present turn waits for the next pass.
+    A number that is added behind the present one waits for the next pass.
     """
 
     __slots__ = ("_last", "_next", "_present")
@@ -23,7 +23,7 @@ class Turns:
         """A bit for each number: faster than a queue, because there are few or most of them wait."""
         self._next = 0
         self._last = -1
-        """The number whose turn it is."""
+        """The present number."""
 
     def add(self, number: int) -> None:
         if number > self._last:
@@ -44,8 +44,8 @@ class Turns:
         return None
 
 
-class Dues:
-    """The next due moment of each number."""
+class Deadlines:
+    """The next deadline of each number."""
 
     __slots__ = ("_due", "_entries", "_room")
 
@@ -76,11 +76,11 @@ class Dues:
 
     def take(self, now: Nanos) -> list[int]:
         """Remove and return the numbers that are due by ``now``, in ascending order."""
-        entries, dues = self._entries, self._due
+        entries, deadlines = self._entries, self._due
         found: list[int] = []
         while entries and entries[0][0] <= now:
             moment, number = heappop(entries)
-            if dues.get(number) == moment:
-                del dues[number]
+            if deadlines.get(number) == moment:
+                del deadlines[number]
                 found.append(number)
         return found if len(found) < 2 else sorted(found)

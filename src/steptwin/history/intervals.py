@@ -1,4 +1,4 @@
-"""Stretches of a history as users name them, and the comparison of two."""
+"""Intervals of a history as users name them, and the comparison of two."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from steptwin.errors import Misuse
 from steptwin.history.reading import HistoryDatabase, KeptRun, Moment, PointSeries
 
 GRID = 1000
-"""Moments at which two stretches are compared where nothing else was asked for."""
+"""Moments at which two intervals are compared where nothing else was asked for."""
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
+class Interval:
     """Part of a history, between two dates; or of one ``run`` of it, between two times since its begin, s."""
 
     begin: Moment
@@ -31,7 +31,7 @@ class Stretch:
         return None if self.run is None else self.run.number
 
 
-def read_stretch(past: HistoryDatabase, run: int | None, begin: str | None, end: str | None) -> Stretch:
+def read_interval(past: HistoryDatabase, run: int | None, begin: str | None, end: str | None) -> Interval:
     """``begin`` and ``end``: times since the begin of the run (``10 s``), or dates with time (ISO 8601; local without an offset).
 
     Times without a run are of the last one. Raises `Misuse`.
@@ -44,7 +44,7 @@ def read_stretch(past: HistoryDatabase, run: int | None, begin: str | None, end:
     if dates != sorted(dates) or times != sorted(times):
         raise Misuse(f"--to {end}: this is before --from {begin}")
     found = past.run(-1 if run is None else run) if times or run is not None else None
-    return Stretch(*moments, found)
+    return Interval(*moments, found)
 
 
 def _moment(text: str | None) -> Moment:
@@ -62,7 +62,7 @@ def _moment(text: str | None) -> Moment:
 
 
 class Difference(NamedTuple):
-    """How far two stretches of a point are apart at most, and how long after their begin. ``values``: one of each there."""
+    """How far two intervals of a point are apart at most, and how long after their begin. ``values``: one of each there."""
 
     point: str
     unit: str
@@ -72,14 +72,14 @@ class Difference(NamedTuple):
 
 
 def compare(
-    past: HistoryDatabase, points: Sequence[str], one: Stretch, other: Stretch, every_s: float | None = None
+    past: HistoryDatabase, points: Sequence[str], one: Interval, other: Interval, every_s: float | None = None
 ) -> list[Difference]:
-    """The points that differ between two stretches of runs, most first. Texts differ by infinity. Raises `Misuse`."""
-    lengths = [_length_s(stretch) for stretch in (one, other)]
+    """The points that differ between two intervals of runs, most first. Texts differ by infinity. Raises `Misuse`."""
+    lengths = [_length_s(interval) for interval in (one, other)]
     step = every_s or max(min(lengths) / GRID, 1e-6)
     found: list[Difference] = []
     for point in points:
-        pair = [_on_grid(past, point, stretch, step) for stretch in (one, other)]
+        pair = [_on_grid(past, point, interval, step) for interval in (one, other)]
         shared = min(len(series) for series in pair)
         if not shared:
             continue
@@ -95,12 +95,12 @@ def compare(
     return sorted(found, key=lambda difference: -difference.most)
 
 
-def _on_grid(past: HistoryDatabase, point: str, stretch: Stretch, step: float) -> PointSeries:
-    return past.series(point, stretch.begin, stretch.end, every_s=step, run=stretch.number)
+def _on_grid(past: HistoryDatabase, point: str, interval: Interval, step: float) -> PointSeries:
+    return past.series(point, interval.begin, interval.end, every_s=step, run=interval.number)
 
 
-def _length_s(stretch: Stretch) -> float:
-    if stretch.run is None or isinstance(stretch.begin, datetime) or isinstance(stretch.end, datetime):
-        raise Misuse("stretches of runs can be compared: --run and --with, from and to a time since their begin")
-    whole = (stretch.run.ended_ns - stretch.run.began_ns) / SECOND
-    return min(whole, whole if stretch.end is None else stretch.end) - (stretch.begin or 0.0)
+def _length_s(interval: Interval) -> float:
+    if interval.run is None or isinstance(interval.begin, datetime) or isinstance(interval.end, datetime):
+        raise Misuse("intervals of runs can be compared: --run and --with, from and to a time since their begin")
+    whole = (interval.run.ended_ns - interval.run.began_ns) / SECOND
+    return min(whole, whole if interval.end is None else interval.end) - (interval.begin or 0.0)

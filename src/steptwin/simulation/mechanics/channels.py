@@ -37,8 +37,8 @@ SLIPS, STUCK, LIFT_SHARE, SPRING_SHARE = "slips", "stuck", "lift_share", "freque
 cam, of the frequency of a slack belt."""
 
 
-class MovedLane(NamedTuple):
-    """Lane of what an axis moves besides its load, as a function of the pulses P of the load (`Mechanics`).
+class MovedChannel(NamedTuple):
+    """Channel of what an axis moves besides its load, as a function of the pulses P of the load (`Mechanics`).
 
     A shaft is at ``offset`` + ``per_pulse`` · P. A follower is lifted by that angle, as ``points`` say. A carriage swings about
     it, with ``spring``. A gantry and a tool are moved by the load of ``other``, too.
@@ -85,7 +85,7 @@ class Mechanics(NamedTuple):
     zero_p: int = 0
     is_ideal: bool = True
     """Whether the load is at the commanded position, unless a ``load`` of the trace states otherwise."""
-    moved: tuple[MovedLane, ...] = ()
+    moved: tuple[MovedChannel, ...] = ()
     """Elements that it moves."""
 
     @property
@@ -93,7 +93,7 @@ class Mechanics(NamedTuple):
         return f"{self.name}_true_position_{self.unit}"
 
 
-class AxisLane(NamedTuple):
+class AxisChannel(NamedTuple):
     """``pulses_per_unit``: units of its profiles in one ``unit``."""
 
     name: str
@@ -117,10 +117,10 @@ class AxisLane(NamedTuple):
         return f"{self.name}_velocity_{self.unit}_s"
 
 
-AxisViews: TypeAlias = Mapping[tuple[str, str], AxisLane]
+AxisViews: TypeAlias = Mapping[tuple[str, str], AxisChannel]
 """By controller and subject of its ``plan`` records (``"1"``…)."""
 
 
-def plain_view(axis: str) -> AxisLane:
+def plain_view(axis: str) -> AxisChannel:
     """The view of an axis of which nothing is known."""
-    return AxisLane(f"M{axis}", outputs=StepOutputs(f"M{axis}_STEP", f"M{axis}_DIR"))
+    return AxisChannel(f"M{axis}", outputs=StepOutputs(f"M{axis}_STEP", f"M{axis}_DIR"))
