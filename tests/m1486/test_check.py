@@ -1,5 +1,6 @@
-"""The checker. What it says of wrong programs stands in ``golden/*.golden``; ``python tests/m1486/test_check.py`` writes
-the findings there anew, and the difference is for review.
+"""The checker. Its findings in wrong programs stand in golden/*.golden (`golden_findings`).
+
+Regenerate with ``make golden ARGS=tests/m1486/test_check.py`` and read the diff.
 """
 
 from __future__ import annotations
@@ -8,10 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
+from golden_findings import shown
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from steptwin.diagnostics import SourceText, render
+from steptwin.diagnostics import SourceText
 from steptwin.m1486 import findings
 from steptwin.m1486.check import check
 from steptwin.m1486.lines import DUAL_DAC, STEP_DIRECTION, TWO_DACS, interface
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
     from m1486_programs import Programs
 
 GOLDEN = Path(__file__).parent / "golden"
-HEADER = "# Regenerate: python tests/m1486/test_check.py"
+HEADER = "# make golden ARGS=tests/m1486/test_check.py"
 PROGRAM, FINDINGS = "--- program ---\n", "--- findings ---\n"
 A, B, E1 = variant("A"), variant("B"), variant("E1")
 
@@ -37,7 +39,7 @@ def read(file: Path) -> tuple[str, str, str]:
 def findings_of(options: str, program: str) -> str:
     name, _, driver = options.removeprefix("# ").partition(" ")
     checked = check(program, variant(name), interface(driver))
-    return render(SourceText("program", program), checked.diagnostics) + "\n"
+    return shown(SourceText("program", program), checked.diagnostics) + "\n"
 
 
 @pytest.mark.parametrize("file", sorted(GOLDEN.glob("*.golden")), ids=lambda file: file.stem)
@@ -47,8 +49,8 @@ def test_golden(file: Path) -> None:
 
 
 def test_golden_files_show_every_finding() -> None:
-    shown = "".join(read(file)[2] for file in GOLDEN.glob("*.golden"))
-    assert [f.code for f in findings.TABLE if f": {f.severity.value} {f.code}: " not in shown] == []
+    everything = "".join(read(file)[2] for file in GOLDEN.glob("*.golden"))
+    assert [f.code for f in findings.TABLE if f" {f.severity.value} {f.code} «" not in everything] == []
 
 
 def codes(text: str, v: Variant = A, driver: str = "sd") -> list[str]:

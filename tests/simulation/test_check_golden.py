@@ -1,7 +1,7 @@
 """What is told of wrong descriptions, with places, hints and repairs: golden/wrong.txt.
 
-Regenerate with ``python tests/simulation/test_check_golden.py`` and read the diff. A case is ``=== title``, the description,
-``---``, the findings. ``@ name`` begins a file that the description names.
+Regenerate with ``make golden ARGS=tests/simulation/test_check_golden.py`` and read the diff. A case is ``=== title``, the
+description, ``---``, the findings (`golden_findings`). ``@ name`` begins a file that the description names.
 """
 
 from __future__ import annotations
@@ -10,8 +10,9 @@ import re
 from pathlib import Path
 
 import pytest
+from golden_findings import shown
 
-from steptwin.diagnostics import SourceText, render
+from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.simulation.world.check import diagnose
 
@@ -30,13 +31,9 @@ def found(text: str) -> str:
         return files[name].encode()
 
     diagnosis = diagnose("w.toml", description, read)
-    lines: list[str] = []
-    for finding in diagnosis.findings:
-        lines.append(render(SourceText("w.toml", description), [finding]))
-        if finding.fix is not None:
-            lines.append(f"  fix: {description[finding.fix.span.start : finding.fix.span.end]!r} → {finding.fix.text!r}")
-    lines += [render(source, of) for source, of in diagnosis.files if of]
-    return "\n".join(lines)
+    parts = [shown(SourceText("w.toml", description), diagnosis.findings)]
+    parts += [f"{source.name}:\n{shown(source, of)}" for source, of in diagnosis.files if of]
+    return "\n".join(parts)
 
 
 def cases() -> list[tuple[str, str, str]]:

@@ -1,7 +1,7 @@
 """Messages are behaviour users rely on: every one of them stands in golden/, and a change of one deserves a review.
 
 `programs.txt` has the mistakes, `other_languages.txt` what people bring along from other languages. Regenerate both with
-``python tests/wbc/test_check_golden.py`` and read the diff.
+``make golden ARGS=tests/wbc/test_check_golden.py`` and read the diff (notation: `golden_findings`).
 """
 
 from __future__ import annotations
@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from golden_findings import shown
 
-from steptwin.diagnostics import Diagnostic, SourceText, render
+from steptwin.diagnostics import Diagnostic, SourceText
 from steptwin.wbc.check import check
 from steptwin.wbc.dialect import dialect_for
 from steptwin.wbc.findings import FINDINGS
@@ -40,7 +41,7 @@ class Case:
         return "".join(line for line in self.text.splitlines(keepends=True) if not line.startswith("@ "))
 
     def found(self) -> str:
-        return render(SourceText(self.name, self.program), self.check(self.program)) or NO_FINDING
+        return shown(SourceText(self.name, self.program), self.check(self.program)) or NO_FINDING
 
     def check(self, text: str) -> list[Diagnostic]:
         rows = self.settings("row")
@@ -99,9 +100,9 @@ def test_a_fix_mends_what_it_is_for(case: Case) -> None:
 
 
 def test_every_message_about_a_program_has_a_case() -> None:
-    shown = "".join(case.expected for case in CASES)
+    everything = "".join(case.expected for case in CASES)
     about_programs = {code for code in FINDINGS if not code.startswith(("W15", "W16", "W25", "W26"))}
-    assert {code for code in about_programs if f" {code}: " not in shown} == {"W123", "W136"}  # long programs: test_check.py
+    assert {code for code in about_programs if f" {code} «" not in everything} == {"W123", "W136"}  # long programs: test_check.py
 
 
 def test_there_are_wrong_programs_enough() -> None:
