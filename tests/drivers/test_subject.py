@@ -69,6 +69,7 @@ def test_the_description_of_a_device(table: DeviceSubject, rig: Rig) -> None:
     found = table.description
     (controller,) = found.controllers
     assert (controller.name, controller.unit, controller.datasheet) == (twin.name, twin.unit, twin.datasheet)
+    assert (controller.is_real, twin.is_real) == (True, False)
     assert read_description(json.loads(json.dumps(found.plain()))) == found
     assert found.lines[0].baud is None
 

@@ -1,7 +1,7 @@
 """What a chip does with what a host types, event by event: golden/traces.txt.
 
 The rules behind it have their own tests; here whole sessions are compared, so that no moment and no pulse changes unnoticed.
-Regenerate with ``PYTHONPATH=tests/support python tests/m1486/test_traces.py`` and read the diff.
+Regenerate with ``make golden ARGS=tests/m1486/test_traces.py`` and read the diff.
 
 A case is ``=== name`` and a script, whose lines are followed by what comes of them. A script begins with the type (``@ B``) and
 options of the chip (``@ statement_ns 0``); a line behind ``>`` is typed with its CR, but for those with a backquote:
@@ -9,7 +9,7 @@ options of the chip (``@ statement_ns 0``); a line behind ``>`` is typed with it
     `wait 0.5`     seconds        `pin LIMIT 0`        `raw 6B 41`   characters, in hexadecimal
 
 Behind ``⇒`` is what the chip sends; below is what has happened when: positions in minimum microsteps from power-on, with the
-counter behind a slash, and the internal variable. Cases by chance were drawn once.
+counter behind a slash, and the internal variable.
 """
 
 from __future__ import annotations

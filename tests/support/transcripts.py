@@ -204,11 +204,11 @@ def regenerate(make: Callable[[str], Bench], *goldens: Path) -> None:
         golden.write_text(head + "\n".join(written), encoding="utf-8")
 
 
-def names_of(drivers: ModuleType, wire: VirtualWire, log: object) -> dict[str, Any]:
+def names_of(drivers: ModuleType, wire: VirtualWire) -> dict[str, Any]:
     """What the scripts of both kinds of devices may use; ``drivers``: the package of a kind."""
     of_drivers = {name: getattr(drivers, name) for name in drivers.__all__}
     of_subjects = {"command": commands, "steps": script, "filter_of": filter_of, "finish": finish}
-    return {**of_drivers, **of_subjects, "wire": wire, "suspend": suspending(wire), "log": log}
+    return {**of_drivers, **of_subjects, "wire": wire, "suspend": suspending(wire)}
 
 
 def suspending(wire: VirtualWire) -> Callable[[int, float, str], None]:

@@ -80,6 +80,23 @@ def test_it_has_tests_of_its_own(name: str) -> None:
     assert (Path(__file__).parent / TESTS.get(name, f"test_{name}.py")).is_file()
 
 
+OWN_FAULTS = [(name, kind.name) for name, element in ELEMENTS.items() for kind in element.faults if not kind.effect.holds]
+
+
+@pytest.mark.parametrize(("name", "kind"), OWN_FAULTS)
+def test_a_fault_says_that_it_begins_and_that_it_is_over(name: str, kind: str) -> None:
+    """Of which element, for a world has several. Terminals that are held at a level: test_rigging.py."""
+    with lamp.registered():
+        world = everything()
+        (spec, *_) = ELEMENTS[name].named(world.spec.elements[name])
+        world.fault(f"{kind} element={spec.name} name=this-one")
+        world.clear_fault("this-one")
+        begins, ends = (str(record.value) for record in world.trace if (record.kind, record.subject) == ("fault", "this-one"))
+    assert spec.name in begins
+    assert spec.name in ends
+    assert begins != ends
+
+
 Recorded: TypeAlias = "tuple[Simulation, AxisViews, set[str], set[str]]"
 
 
