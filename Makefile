@@ -40,7 +40,7 @@ PEER_PACKAGES := chromium curl mbpoll libmodbus-dev gcc libc6-dev pkg-config mak
   prometheus ser2net tshark
 
 .DEFAULT_GOAL := help
-.PHONY: help run test golden soak extras page vsix lint format types imports bench mutants docs peers lock clean
+.PHONY: help run test golden soak extras page vsix lint format types imports bench docs peers lock clean
 
 help:  ## Show the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -87,9 +87,6 @@ imports: $(DEV_STAMP)  ## Check that imports go down only and that pure packages
 
 bench: $(DEV_STAMP)  ## Measure requests per second and latencies against other servers
 	$(BIN)/python -m bench $(ARGS)
-
-mutants: $(DEV_STAMP)  ## Try whether the tests notice small mistakes in the core (ARGS="-n 300 --seed 1 wire motion")
-	$(BIN)/python -m mutants $(ARGS)
 
 docs: $(DEV_STAMP)  ## Build the documentation into build/docs
 	$(BIN)/sphinx-build -W --keep-going --quiet -b html -d build/doctrees docs build/docs

@@ -29,7 +29,7 @@ from typing import Any, NoReturn, TypeVar
 import pytest
 from facts import checked_facts
 from guard import guarded
-from hypothesis import Phase, settings
+from hypothesis import settings
 from soak import time_limit
 from virtual_loop import VirtualLoop, run_virtually
 from warm import COMMAND
@@ -48,8 +48,6 @@ pytest_plugins = ["pytester"]
 settings.register_profile("steptwin", deadline=None)
 # A change is judged by the same examples every time; `make test` on a developer's machine draws new ones.
 settings.register_profile("same", deadline=None, derandomize=True)
-# For mutation tests any counterexample will do.
-settings.register_profile("unshrunk", deadline=None, derandomize=True, phases=[Phase.explicit, Phase.generate])
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "steptwin"))
 
 # Commands that tests start inherit ignored signals: SIGINT from a shell without job control (`make test &`), SIGHUP from nohup.
