@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from typing import Any
 
 import pytest
@@ -10,11 +11,14 @@ from line_rig import MemoryEndpoint
 
 from steptwin.controller import MILLISECOND, SECOND
 from steptwin.drivers.m1486.driver import AsyncM1486
+from steptwin.drivers.m1486.jog import AsyncM1486Jog
 from steptwin.drivers.m1486.lines import TALK, AsyncM1486Line, ThreadM1486Line
-from steptwin.drivers.m1486.sync import M1486, M1486Line
+from steptwin.drivers.m1486.sync import M1486, M1486Jog, M1486Line
+from steptwin.drivers.mic488.axis import AsyncMic488Axis
 from steptwin.drivers.mic488.driver import AsyncMic488
+from steptwin.drivers.mic488.jog import AsyncMic488Jog
 from steptwin.drivers.mic488.lines import AsyncModbusLine, ThreadModbusLine
-from steptwin.drivers.mic488.sync import Mic488, ModbusLine
+from steptwin.drivers.mic488.sync import Mic488, Mic488Axis, Mic488Jog, ModbusLine
 from steptwin.errors import Misuse
 from steptwin.mic488.config import ControllerConfig
 
@@ -70,6 +74,28 @@ def test_a_controller_for_threads_takes_all_that_one_for_asyncio_takes(monkeypat
     assert (shared.place, [mic.axis(number).number for number in (1, 2, 3, 4)]) == (RTU, [1, 2, 3, 4])
     with pytest.raises(Misuse, match="axis 5"):
         mic.axis(5)
+
+
+@pytest.mark.parametrize(
+    ("threads", "tasks"),
+    [
+        (Mic488, AsyncMic488),
+        (Mic488Axis, AsyncMic488Axis),
+        (Mic488Jog, AsyncMic488Jog),
+        (M1486, AsyncM1486),
+        (M1486Jog, AsyncM1486Jog),
+    ],
+)
+def test_methods_for_threads_have_the_parameters_and_defaults_of_those_for_asyncio(threads: type[Any], tasks: type[Any]) -> None:
+    methods = {name: method for name, method in inspect.getmembers(tasks, inspect.isfunction) if not name.startswith("_")}
+    both = {name: method for name, method in inspect.getmembers(threads, inspect.isfunction) if name in methods}
+    assert both
+    for name, method in both.items():
+        mine, others = (
+            [(one.name, one.kind, one.default) for one in inspect.signature(of).parameters.values()]
+            for of in (method, methods[name])
+        )
+        assert mine == others, name
 
 
 @pytest.mark.parametrize("kind", [ThreadM1486Line, AsyncM1486Line])

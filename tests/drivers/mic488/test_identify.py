@@ -86,6 +86,22 @@ def test_somebody_else_is_named() -> None:
         opened(wire)
 
 
+@pytest.mark.parametrize("address", [10_000, 10_013])
+def test_one_value_that_a_mic488_cannot_have_is_enough(address: int) -> None:
+    """DATA_TYPE and M4_STATUS, the first and the last of the registers that are read."""
+    wire = Wire()
+
+    def answer(request: bytes) -> bytes:
+        first, count = struct.unpack(">HH", request[1:5])
+        if first != 10_000:
+            return bytes((request[0] | 0x80, 2))
+        return bytes((3, 2 * count)) + b"".join((99 * (first + n == address)).to_bytes(2, "big") for n in range(count))
+
+    answering(wire, answer)
+    with pytest.raises(NoMic488):
+        opened(wire)
+
+
 def test_nobody_is_not_waited_for_long() -> None:
     wire = Wire()
     wire.severed = True

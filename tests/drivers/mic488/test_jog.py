@@ -431,6 +431,17 @@ def test_a_stop_before_a_jog_has_begun() -> None:
     assert mic.get("M1_VMAX") == {"M1_VMAX": 25.0}
 
 
+def test_a_pause_of_the_program_does_not_end_a_jog_that_has_begun() -> None:
+    """What a pause holds up is the program; before the first move it may be the program that is meant."""
+    wire, mic = ready()
+    with mic.axis(1).jog(5.0) as jog:
+        mic.program.pause()
+        wire.sleep(0.1)
+        assert jog.hold()
+    assert jog.end is not None
+    assert jog.end.reason is Reason.RELEASED
+
+
 def test_a_stop_while_a_jog_is_released() -> None:
     _, mic = ready()
     jog = mic.axis(1).jog(5.0)
