@@ -26,7 +26,7 @@ TOOLS = {
     "cli/completion.py": "firmwares and types for completion",
     "cli/decompile.py": "compiled images of WBC programs",
     "cli/device.py": "REAL numbers as text",
-    "cli/diff.py": "recordings of sessions with a MIC488",
+    "cli/diff.py": "transcripts of a MIC488",
     "cli/record.py": "positions of a MIC488 into its position table",
     "cli/registers.py": "register map of the MIC488",
     "languages/chips.py": "options of chips on a line",

@@ -43,7 +43,7 @@ DONE = (
     *(f"{room}/**/*.py" for room in ("access", "calc", "debug", "devices", "m1486", "mic488", "studio", "subject", "why")),
     *(
         f"live/{name}.py"
-        for name in ("clock", "control", "debugging", "directory", "keptsettings", "lookback", "pace", "why", "world")
+        for name in ("clock", "control", "debugging", "directory", "keptsettings", "pace", "timetravel", "why", "world")
     ),
     *(f"drivers/{name}.py" for name in ("address", "exchange", "place", "subject", "tcp", "*/failures", "*/jog", "*/subject")),
     *(f"drivers/{name}.py" for name in ("m1486/chip", "mic488/axis")),

@@ -180,12 +180,12 @@ def test_memory_lasts_and_has_one_owner(start: Start, tmp_path: Path) -> None:
 def test_a_world_is_up_and_its_session_replays(start: Start, tmp_path: Path) -> None:
     world = tmp_path / "machine.toml"
     world.write_text('[[line]]\nname = "bus"\ntcp = "127.0.0.1:0"\n[[mic488]]\nname = "table"\nline = "bus"\n', "utf-8")
-    session = tmp_path / "session.json"
-    twin = start("up", str(world), "--session", str(session))
+    recording = tmp_path / "session.json"
+    twin = start("up", str(world), "--session", str(recording))
     with ModbusTcpClient("127.0.0.1", port=twin.port("tcp"), timeout=10, retries=0) as client:
         assert not client.write_coil(2000, True, device_id=1).isError()
     digest = twin.end().rpartition("digest ")[2].strip()
-    assert digest in run("replay", session)
+    assert digest in run("replay", recording)
 
 
 def test_worlds_and_programs_run_and_their_traces_are_exported(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ MOST_BYTES = 256 << 10
 MOST_DESCRIPTION_BYTES = 1 << 20
 """Limit for descriptions of worlds."""
 MOST_RECORDED_BYTES = 48 << 20
-"""Limit for sessions and recordings, which programs write."""
+"""Limit for recordings and transcripts, which programs write."""
 MOST_RECORDED_VALUES = 1_500_000
 """Limit for the lists, objects and their items in such a file: an empty list takes 3 bytes on disk and 64 in memory."""
 
@@ -51,7 +51,7 @@ NO_TEXT = Message("inputfiles.no-text", "cannot read {path}: it is no UTF-8 text
 
 
 def read_recorded(path: Path) -> str:
-    """The text of a session or recording (JSON in UTF-8), which may be parsed: its size and its number of values are bounded.
+    """The text of a recording or transcript (JSON in UTF-8), which may be parsed: its size and its number of values are bounded.
     Raises `Misuse`."""
     data = read_bytes(path, MOST_RECORDED_BYTES)
     values = sum(map(data.count, (b",", b"[", b"{")))

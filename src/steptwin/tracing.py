@@ -13,7 +13,7 @@ Attribute: TypeAlias = str | int | float | bool
 
 
 class TraceSpan(Protocol):
-    def note(self, name: str, value: Attribute) -> None:
+    def set_attribute(self, name: str, value: Attribute) -> None:
         """Note what is known after its begin."""
         ...
 
@@ -21,7 +21,7 @@ class TraceSpan(Protocol):
 class NoSpan:
     """Span of what is not traced."""
 
-    def note(self, name: str, value: Attribute) -> None:
+    def set_attribute(self, name: str, value: Attribute) -> None:
         """Nobody asks."""
 
 

@@ -15,7 +15,7 @@ from steptwin.campaign.faultmatrix import FaultMatrix, fault_matrix
 from steptwin.campaign.reading import load_campaign
 from steptwin.campaign.report.matrixpage import write_matrix
 from steptwin.errors import Misuse
-from steptwin.files import session as sessions
+from steptwin.files import recording as recordings
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 SECOND = 1_000_000_000
@@ -112,9 +112,9 @@ def test_each_cell_replays(press: tuple[FaultMatrix, Path]) -> None:
     cells = [cell for row in matrix.rows for cell in row.cells]
     assert len({cell.session for cell in cells}) == len(cells) == len(matrix.rows) * 7
     for cell in cells[:: len(cells) // 10]:
-        session = sessions.load(folder / cell.session)
-        assert session.replay().trace.digest() == session.digest
-        assert [str(given.what.fault) for given in session.inputs if hasattr(given.what, "fault")] == [cell.fault]
+        recording = recordings.load(folder / cell.session)
+        assert recording.replay().trace.digest() == recording.digest
+        assert [str(given.what.fault) for given in recording.inputs if hasattr(given.what, "fault")] == [cell.fault]
 
 
 def test_table_page_and_json(press: tuple[FaultMatrix, Path]) -> None:

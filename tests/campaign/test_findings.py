@@ -16,7 +16,7 @@ from steptwin.campaign.reproduce import check_case, identifier
 from steptwin.campaign.runner import CaseRunner
 from steptwin.campaign.shrink import digits_of, failures_of
 from steptwin.campaign.variation import Between, Choice, Normal
-from steptwin.files import session as sessions
+from steptwin.files import recording as recordings
 
 WORLD = """
 [[mic488]]
@@ -103,9 +103,9 @@ def test_the_session_is_the_run_of_the_case(found: list[FoundFailure], campaign:
     for one in found:
         assert one.files is not None
         assert one.files.session is not None
-        session = sessions.load(one.files.session)
-        assert session.digest == one.result.digest
-        assert session.replay().trace.digest() == session.digest
+        recording = recordings.load(one.files.session)
+        assert recording.digest == one.result.digest
+        assert recording.replay().trace.digest() == recording.digest
         assert one.files.timeline is not None
         assert "table" in one.files.timeline.read_text(encoding="utf-8")
         assert one.plain(campaign.parent)["files"]["session"].startswith("out")

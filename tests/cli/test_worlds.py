@@ -37,10 +37,10 @@ def test_run_writes_a_trace_and_a_session_that_replays(tmp_path: Path) -> None:
 
 def test_a_replay_that_differs_says_so(tmp_path: Path) -> None:
     invoke("run", str(FEEDER), "--for", "3s", "--trace", str(tmp_path))
-    session = tmp_path / "session.json"
-    data = json.loads(session.read_text())
-    session.write_text(json.dumps(data | {"digest": "0" * 32}))
-    assert "the run differs from the recorded one" in invoke("replay", str(session), code=1)
+    recording = tmp_path / "session.json"
+    data = json.loads(recording.read_text())
+    recording.write_text(json.dumps(data | {"digest": "0" * 32}))
+    assert "the run differs from the recorded one" in invoke("replay", str(recording), code=1)
 
 
 def test_what_a_statement_does_stands_before_what_came_of_it(tmp_path: Path) -> None:
@@ -78,14 +78,14 @@ def test_a_condition_that_never_comes_true_is_waited_for_an_hour_and_told(tmp_pa
 
 
 def test_run_writes_a_session_on_its_own(tmp_path: Path) -> None:
-    session = tmp_path / "new" / "s.json"
+    recording = tmp_path / "new" / "s.json"
     told = invoke(
-        "run", str(FEEDER), "--for", "2s", "--session", str(session), "--fault", "lost-steps machine=table pulses=64 at_s=1"
+        "run", str(FEEDER), "--for", "2s", "--session", str(recording), "--fault", "lost-steps machine=table pulses=64 at_s=1"
     )
-    assert f"wrote {session}\n" in told
-    assert "2 s of bar feeder, 1 inputs: the same" in invoke("replay", str(session))
+    assert f"wrote {recording}\n" in told
+    assert "2 s of bar feeder, 1 inputs: the same" in invoke("replay", str(recording))
     with pytest.raises(Misuse, match="--session is not for WBC programs"):
-        invoke("run", "x.prg", "--session", str(session))
+        invoke("run", "x.prg", "--session", str(recording))
 
 
 def test_ctrl_c_ends_a_run_and_keeps_what_it_did(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -94,12 +94,12 @@ def test_ctrl_c_ends_a_run_and_keeps_what_it_did(tmp_path: Path, monkeypatch: py
         yield lambda now: signal.raise_signal(signal.SIGINT) if now == SECOND else None
 
     monkeypatch.setattr("steptwin.languages.run_world.bar", bar)
-    session = tmp_path / "s.json"
-    told = invoke("run", str(FEEDER), "--for", "20s", "--session", str(session), code=130)
+    recording = tmp_path / "s.json"
+    told = invoke("run", str(FEEDER), "--for", "20s", "--session", str(recording), code=130)
     assert "1 s of bar feeder in" in told
     assert "ended by: Ctrl-C" in told
     monkeypatch.undo()
-    assert "1 s of bar feeder, 0 inputs: the same" in invoke("replay", str(session))
+    assert "1 s of bar feeder, 0 inputs: the same" in invoke("replay", str(recording))
 
 
 def test_a_session_goes_on_another_way(tmp_path: Path) -> None:
@@ -120,10 +120,10 @@ def test_a_session_goes_on_another_way(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["s.json", "--seed", "3"], r"--seed: s\.json is a session, which continues with its own"),
-        (["s.json", "--from", "3s"], r"the session ends at 2 s, before 3 s"),
+        (["s.json", "--seed", "3"], r"--seed: s\.json is a recording, which continues with its own"),
+        (["s.json", "--from", "3s"], r"the recording ends at 2 s, before 3 s"),
         (["s.json", "--input", "table.IN8=1@1s"], r"--input table\.IN8: at 1 s: this world is at 2 s already"),
-        ([str(FEEDER), "--from", "1s"], r"--from: .*feeder\.toml is not a session; a description begins at 0 s"),
+        ([str(FEEDER), "--from", "1s"], r"--from: .*feeder\.toml is not a recording; a description begins at 0 s"),
         ([str(FEEDER), "--seed", "-1"], r"seed -1: permitted are whole numbers from 0 to"),
         (["x.prg", "--seed", "0"], r"--seed is not for WBC programs"),
         (["x.m1486", "--from", "0s"], r"--from is not for M1486 programs"),
@@ -139,20 +139,20 @@ def test_what_a_session_cannot_go_on_with(
 
 
 def test_a_session_that_goes_on_otherwise_says_so(tmp_path: Path) -> None:
-    session = tmp_path / "s.json"
-    invoke("run", str(FEEDER), "--for", "2s", "--session", str(session))
-    session.write_text(json.dumps(json.loads(session.read_text()) | {"digest": "0" * 32}))
-    assert "the replay differs from the run recorded" in invoke("run", str(session), "--for", "1s")
+    recording = tmp_path / "s.json"
+    invoke("run", str(FEEDER), "--for", "2s", "--session", str(recording))
+    recording.write_text(json.dumps(json.loads(recording.read_text()) | {"digest": "0" * 32}))
+    assert "the replay differs from the run recorded" in invoke("run", str(recording), "--for", "1s")
 
 
 def test_another_seed_is_another_chance_and_stays_with_the_session(tmp_path: Path) -> None:
-    session = tmp_path / "s.json"
+    recording = tmp_path / "s.json"
     said = [
-        invoke("run", str(FEEDER), "--for", "9s", "--seed", seed, "--session", str(session)).splitlines()[-1]
+        invoke("run", str(FEEDER), "--for", "9s", "--seed", seed, "--session", str(recording)).splitlines()[-1]
         for seed in ("7", "8", "8")
     ]
     assert said[0] != said[1] == said[2]
-    assert "the same" in invoke("replay", str(session))
+    assert "the same" in invoke("replay", str(recording))
 
 
 def test_an_expectation_that_fails_again_and_again_is_two_lines(tmp_path: Path) -> None:
@@ -224,7 +224,7 @@ def test_a_place_where_nothing_can_be_written_is_refused_before_anything_runs(tm
     with pytest.raises(Misuse, match=r"cannot write .*: is a directory"):
         invoke("up", str(program), "--session", str(tmp_path / "s.json"))
     for command in (("up", str(program), "--session"), ("run", str(program), "--session"), ("save",)):
-        with pytest.raises(Misuse, match=r"now\.toml: the name of a session must end with \.json$"):
+        with pytest.raises(Misuse, match=r"now\.toml: the name of a recording must end with \.json$"):
             invoke(*command, str(tmp_path / "now.toml"))
 
 

@@ -26,7 +26,7 @@ from steptwin.cli import app, main
 from steptwin.cli.writtenfiles import keep_apart
 from steptwin.errors import SteptwinError
 from steptwin.files.memory import StateDirectory
-from steptwin.files.session import save, session_of
+from steptwin.files.recording import recording_of, save
 from steptwin.files.world import World
 from steptwin.live.studio.drawing import WorldArrangement
 from steptwin.simulation.describe.arrangement import DrawnPlace
@@ -65,8 +65,8 @@ def _arrange(folder: Path) -> object:
     return there
 
 
-def _save_session(folder: Path) -> None:
-    save(session_of(World.load(folder / "w.toml")), folder / "s.json")
+def _save_recording(folder: Path) -> None:
+    save(recording_of(World.load(folder / "w.toml")), folder / "s.json")
 
 
 def _save_memory(folder: Path) -> None:
@@ -91,7 +91,7 @@ WAYS = [
     *(Way(f"h.{form}", f"history h.db table.M1.position -o h.{form}") for form in ("csv", "parquet")),
     Way("saved.toml", "serve mic488 --save-world saved.toml"),
     Way("arranged.toml", _arrange, HALL.encode()),
-    Way("s.json", _save_session),
+    Way("s.json", _save_recording),
     Way("unit1.image", _save_memory),
 ]
 

@@ -6,7 +6,7 @@ from steptwin.controller import MILLISECOND, SECOND
 from steptwin.coverage.counts import Coverage, Summary, TextCoverage
 from steptwin.coverage.watch import WorldCoverage
 from steptwin.diagnostics import SourceText
-from steptwin.files.session import session_of
+from steptwin.files.recording import recording_of
 from steptwin.files.world import World
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.inputs import Download
@@ -206,7 +206,7 @@ def test_a_world_that_goes_back_counts_what_it_executes_besides_what_it_had_exec
 def test_what_is_replayed_to_continue_a_session_does_not_count() -> None:
     there = wbc_world("n = 1\nDELAY 0.5\nOUT1 = ON\nEND\n")
     there.run_to(SECOND // 10)
-    text = only(covered(session_of(there).replay()))
+    text = only(covered(recording_of(there).replay()))
     assert by_line(text) == {1: 0, 2: 0, 3: 1, 4: 1}
 
 

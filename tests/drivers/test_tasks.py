@@ -354,7 +354,7 @@ def test_an_exchange_is_traced_with_its_failed_attempts() -> None:
     spans: list[tuple[object, ...]] = []
 
     class Noted:
-        def note(self, name: str, value: object) -> None:
+        def set_attribute(self, name: str, value: object) -> None:
             spans.append((name, value))
 
     @contextlib.contextmanager

@@ -17,8 +17,8 @@ from steptwin import __version__
 from steptwin.dap.launch import ARGUMENTS
 from steptwin.diagnostics import Severity
 from steptwin.lsp.answers import TokenKind
+from steptwin.lsp.editorsession import EditorSession
 from steptwin.lsp.languages import LANGUAGES
-from steptwin.lsp.session import EditorSession
 from steptwin.m1486.variants import VARIANTS
 
 ROOT = Path(__file__).parents[2]

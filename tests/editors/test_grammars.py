@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from steptwin.lsp.answers import TokenKind
-from steptwin.lsp.session import EditorSession
+from steptwin.lsp.editorsession import EditorSession
 from steptwin.lsp.textmate import GRAMMARS, grammar_text
 from steptwin.m1486.commands import TABLE
 from steptwin.m1486.variants import variant

@@ -10,7 +10,7 @@ from world_rig import moved, small
 
 from steptwin.controller import SECOND
 from steptwin.errors import Misuse
-from steptwin.files.session import session_of
+from steptwin.files.recording import recording_of
 from steptwin.files.world import World
 from steptwin.simulation.script import steps as do
 from steptwin.wbc.check import check
@@ -69,7 +69,7 @@ def test_the_last_hand_on_a_button_says_when_it_is_released() -> None:
         levels.append(int(world.mic488["b"].pins["IN4"]))
         world.run(for_=0.2)
     assert levels == [1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 1, 1, 0, 0, 1, 1, 1, 1, 1, 1]
-    assert session_of(world).replay().trace.digest() == world.trace.digest()
+    assert recording_of(world).replay().trace.digest() == world.trace.digest()
 
 
 def test_at_and_when_call_functions() -> None:

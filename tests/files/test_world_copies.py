@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from steptwin.errors import Misuse
-from steptwin.files.session import load, save, session_of
+from steptwin.files.recording import load, recording_of, save
 from steptwin.files.world import World
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.toml import tomlplaces
@@ -46,7 +46,7 @@ def test_a_copy_goes_on_as_the_world_does(twice: Any) -> None:
         one.run(for_=6)
     assert other.trace.digest() == world.trace.digest()
     assert list(other.trace) == list(world.trace)
-    assert session_of(other) == session_of(world)
+    assert recording_of(other) == recording_of(world)
 
 
 def test_a_snapshot_can_be_pickled() -> None:
@@ -86,7 +86,7 @@ def test_worlds_and_snapshots_go_between_processes(name: str) -> None:
     first, again, came, ended = in_another_process(world, there)
     world.run(for_=3)
     assert first == again == came.trace.digest() == world.trace.digest()
-    assert session_of(came) == session_of(world)
+    assert recording_of(came) == recording_of(world)
     for one in (came, world):
         one.run(for_=1)
     assert came.trace.digest() == world.trace.digest()
@@ -121,10 +121,10 @@ def test_faults_from_python_are_in_the_session(tmp_path: Path) -> None:
         world.clear_fault(busy)
     with pytest.raises(Misuse, match="axis = 9"):
         world.fault("stall machine=table axis=9")
-    session = session_of(world)
-    save(session, tmp_path / "s.json")
-    assert load(tmp_path / "s.json").replay().trace.digest() == session.digest
-    assert len(session.inputs) == 3
+    recording = recording_of(world)
+    save(recording, tmp_path / "s.json")
+    assert load(tmp_path / "s.json").replay().trace.digest() == recording.digest
+    assert len(recording.inputs) == 3
 
 
 def test_values_of_a_description_can_be_replaced(tmp_path: Path) -> None:
@@ -134,10 +134,10 @@ def test_values_of_a_description_can_be_replaced(tmp_path: Path) -> None:
     assert world.mic488["table"].device.config.axes[0].acc == 500.0
     assert world.axes["x"].spec.pitch == 10.0
     world.run(for_=1)
-    save(session_of(world), tmp_path / "s.json")
-    session = load(tmp_path / "s.json")
-    assert session.overrides == overrides
-    assert session.replay().trace.digest() == session.digest
+    save(recording_of(world), tmp_path / "s.json")
+    recording = load(tmp_path / "s.json")
+    assert recording.overrides == overrides
+    assert recording.replay().trace.digest() == recording.digest
     assert pickle.loads(pickle.dumps(world)).spec.overrides == overrides
     with pytest.raises(Misuse, match="another world"):
         World.load(EXAMPLES / "feeder.toml").restore(world.snapshot())

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from steptwin.files import session as sessions
+from steptwin.files import recording as recordings
 from steptwin.files.memory import StateDirectory, StateInUse
 from steptwin.files.world import World
 from steptwin.simulation.script.steps import Send, Write
@@ -92,12 +92,12 @@ def test_a_session_replays_from_the_memory_it_began_with(tmp_path: Path) -> None
         _save(world, 4711)
     with _begin(tmp_path, CONTROLLER, '[world]\nstate = "memory"') as world:
         world.run(for_="1 s")
-        session = sessions.session_of(world)
+        recording = recordings.recording_of(world)
         _save(world, 1)
-    sessions.save(session, tmp_path / "run.json")
-    replayed = sessions.load(tmp_path / "run.json").replay()
+    recordings.save(recording, tmp_path / "run.json")
+    replayed = recordings.load(tmp_path / "run.json").replay()
     assert _stored(replayed) == 4711
-    assert replayed.trace.digest() == session.digest
+    assert replayed.trace.digest() == recording.digest
     with StateDirectory(tmp_path / "memory") as state:  # a replay keeps nothing
         assert state.load("table") != (4711).to_bytes(2, "big") + bytes(1998)
 
@@ -138,11 +138,11 @@ def test_a_save_that_failed_fails_in_the_replay_too(kind: str, tmp_path: Path, m
             world.run(for_="3 s")
         world.apply_input(save)
         world.run(for_="3 s")
-        session = sessions.session_of(world)
-        sessions.save(session, tmp_path / "s.json")
+        recording = recordings.recording_of(world)
+        recordings.save(recording, tmp_path / "s.json")
         (failed,) = [record for record in world.trace.events(controller) if record.subject == code]
         assert "no space left on device" in str(failed.value)
         assert [(one.time, one.controller) for one in world.failed_saves] == [(failed.time, controller)]
-    again = sessions.load(tmp_path / "s.json").replay()
-    assert again.trace.digest() == session.digest
-    assert sessions.session_of(again) == session
+    again = recordings.load(tmp_path / "s.json").replay()
+    assert again.trace.digest() == recording.digest
+    assert recordings.recording_of(again) == recording

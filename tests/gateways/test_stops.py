@@ -51,8 +51,8 @@ from steptwin.mic488.values import RegisterItem, encoded
 from steptwin.simulation.script import steps
 from steptwin.studio.hub import Hub
 from steptwin.studio.rest import Rest
-from steptwin.studio.session import ViewerSession
 from steptwin.studio.surroundings import PresentMoment, Surroundings
+from steptwin.studio.viewersession import ViewerSession
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Command, plain_command
 from steptwin.subject.contract import Result

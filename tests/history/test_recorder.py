@@ -161,7 +161,7 @@ def test_writes_are_not_observed_without_a_history() -> None:
 def test_commands_are_kept_with_who_gave_them() -> None:
     made = RecordedWorld(CELL)
     audit = Audit(lambda: "2026-03-01T12:00:00.000+00:00")
-    audit.watchers.append(made.recorder.note)
+    audit.watchers.append(made.recorder.log)
     client = GatewayClient("anna", Role.OPERATOR, "OPC UA, 127.0.0.1:5000")
     audit.add(client, made.world.now, "move", {"controller": "table", "axis": 1, "to": 5.0}, "done")
     made.look()

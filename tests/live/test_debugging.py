@@ -10,7 +10,7 @@ import pytest
 
 from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse, Refusal
-from steptwin.files.session import session_of
+from steptwin.files.recording import recording_of
 from steptwin.files.world import World
 from steptwin.live import debugging as module
 from steptwin.live.clock import Clock
@@ -18,7 +18,7 @@ from steptwin.live.pace import Pace
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.live.world_control import WorldControl
-from steptwin.simulation.world import history
+from steptwin.simulation.world import snapshotlog
 from steptwin.subject.commands import read_command
 from steptwin.subject.events import Event
 from steptwin.subject.following import filter_of
@@ -99,8 +99,8 @@ def scene(run: Run, play: Callable[[Rig], Awaitable[None]]) -> None:
         assert rig.live.run_control is None
         rig.pace.close()
         rig.realtime.close()
-        session = session_of(rig.world)
-        assert session.replay().trace.digest() == session.digest
+        recording = recording_of(rig.world)
+        assert recording.replay().trace.digest() == recording.digest
 
     run(played())
 
@@ -390,7 +390,7 @@ def test_more_inputs_than_are_kept_while_time_stands(run: Run, monkeypatch: pyte
         await rig.stop()
         rig.do("resume")
         await rig.stop()
-        monkeypatch.setattr(history, "MOST_INPUTS", 50)
+        monkeypatch.setattr(snapshotlog, "MOST_INPUTS", 50)
         for number in range(200):
             rig.do("set", levels={"table.IN5": number % 2})
         rig.do("resume")
@@ -406,7 +406,7 @@ def test_a_world_without_programs_does_not_keep_its_past(run: Run) -> None:
         for _ in range(3):
             with pytest.raises(Misuse, match="no controller has a program"):
                 rig.do("debug")
-        assert rig.live.history is None
+        assert rig.live.snapshots is None
         assert not rig.world.input_watchers
         rig.pace.close()
         rig.realtime.close()

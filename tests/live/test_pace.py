@@ -16,7 +16,7 @@ from world_rig import TWO_LINES
 
 from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.errors import Misuse, Refusal
-from steptwin.files.session import load, session_of
+from steptwin.files.recording import load, recording_of
 from steptwin.files.world import World
 from steptwin.files.worldoptions import WorldRunOptions
 from steptwin.live import pace as pacing
@@ -91,9 +91,9 @@ def feeder() -> World:
 
 
 def the_same_again(world: World) -> bool:
-    session = session_of(world)
-    again = session.replay()
-    return again.trace.digest() == session.digest and list(again.trace) == list(world.trace)
+    recording = recording_of(world)
+    again = recording.replay()
+    return again.trace.digest() == recording.digest and list(again.trace) == list(world.trace)
 
 
 @settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -232,7 +232,7 @@ def test_a_long_step_is_taken_in_parts(run: Run, monkeypatch: pytest.MonkeyPatch
         assert answer["time_ns"] == 20 * SECOND
         whole = feeder()
         whole.run(for_=20)
-        assert session_of(rig.close()).digest == session_of(whole).digest
+        assert recording_of(rig.close()).digest == recording_of(whole).digest
 
     run(scene())
 
@@ -306,8 +306,8 @@ def test_what_a_hand_does_to_a_standing_world_leads_to_something_at_that_moment(
         assert rig.do("pins")["a.IN2"] == 1.0
         answer = rig.do("save", file=str(tmp_path / "s.json"))
         assert (answer["time_ns"], answer["inputs"]) == (SECOND, 1)
-        session = load(tmp_path / "s.json")
-        assert session.replay().trace.digest() == answer["digest"] == session.digest
+        recording = load(tmp_path / "s.json")
+        assert recording.replay().trace.digest() == answer["digest"] == recording.digest
         rig.do("set", levels={"a.IN3": 1})
         rig.do("step", for_ns=5 * SECOND)
         assert rig.do("pause")["time_ns"] == 6 * SECOND
@@ -345,7 +345,7 @@ def test_without_a_clock_a_world_can_be_paused_and_slowed_down_too(run: Run) -> 
         ("step", {"until": "nothing > 3"}, "nothing is called 'nothing'"),
         ("save", {}, "save: file is missing, expected a text: Absolute path"),
         ("save", {"file": "s.json"}, "file = 's.json': must be the absolute path"),
-        ("save", {"file": "/tmp/no session"}, "for a session, name the file NAME.json"),
+        ("save", {"file": "/tmp/no session"}, "for a recording, name the file NAME.json"),
         ("save", {"file": "/nowhere/at/all/s.json"}, "cannot write /nowhere/at/all/s.json: there is no folder /nowhere/at/all"),
     ],
 )
@@ -380,9 +380,9 @@ def test_a_session_goes_on_live_without_those_who_were_there(run: Run, tmp_path:
     options = UpOptions(world=tmp_path / "s.json", run=WorldRunOptions(session=end), live=fast)
     assert up(options)
     assert "5.000 s, 2 inputs, ended by: enough" in capfd.readouterr().out
-    session = load(tmp_path / "end.json")
-    assert [type(given.what).__name__ for given in session.inputs] == ["Bytes", "Leave"]
-    assert session.replay().trace.digest() == session.digest
+    recording = load(tmp_path / "end.json")
+    assert [type(given.what).__name__ for given in recording.inputs] == ["Bytes", "Leave"]
+    assert recording.replay().trace.digest() == recording.digest
     assert up(UpOptions(world=tmp_path / "s.json", run=WorldRunOptions(from_="1s", session=end), live=fast))
     assert load(tmp_path / "end.json").inputs == ()
 
@@ -397,9 +397,9 @@ def test_what_a_script_stopped_goes_on_from_its_session(tmp_path: Path, capfd: p
     told = capfd.readouterr().out
     assert "note: on" in told
     assert "2.000 s, 0 inputs, ended by: there" in told
-    session = load(second)
-    assert session.seed == 5
-    assert session.replay().trace.digest() == session.digest
+    recording = load(second)
+    assert recording.seed == 5
+    assert recording.replay().trace.digest() == recording.digest
 
 
 ONE_ON_EACH = f"""{TWO_LINES}

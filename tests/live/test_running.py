@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.errors import LineFailure, Misuse
 from steptwin.files.export.tracefile import TraceFile
-from steptwin.files.session import load, session_of
+from steptwin.files.recording import load, recording_of
 from steptwin.files.world import World
 from steptwin.files.worldoptions import WorldRunOptions
 from steptwin.live.clock import Clock
@@ -87,9 +87,9 @@ def test_live_and_virtual_give_the_same_trace(looks: list[tuple[int, str]], spee
         return world
 
     world = asyncio.run(run())
-    session = session_of(world)
-    again = session.replay()
-    assert again.trace.digest() == session.digest
+    recording = recording_of(world)
+    again = recording.replay()
+    assert again.trace.digest() == recording.digest
     assert list(again.trace) == list(world.trace)
 
 
@@ -131,7 +131,7 @@ def test_in_a_studio_a_script_that_stops_is_reported_and_time_goes_on() -> None:
     live = LiveWorld(World.from_toml(STOPPING))
     told = live.subject.follow(filter_of(["status"]), 9)
     live.advance(5 * SECOND)
-    assert session_of(live.world).replay().trace.digest() == live.world.trace.digest()
+    assert recording_of(live.world).replay().trace.digest() == live.world.trace.digest()
     assert (live.now, live.world.stopped) == (5 * SECOND, None)
     assert [(event.time, event.text) for event in told.take().events] == [(SECOND, "a script would end the run here: enough")]
 
@@ -172,9 +172,9 @@ def test_a_world_can_begin_with_faults(tmp_path: Path, capfd: pytest.CaptureFixt
     options = replace(options, run=replace(options.run, fault=("lost-steps machine=a axis=1 pulses=64 at_s=0.5",)))
     assert up(options)
     assert "lost-steps: M1 loses 64 pulses" in capfd.readouterr().out
-    session = load(tmp_path / "s.json")
-    assert len(session.inputs) == 1
-    assert session.replay().trace.digest() == session.digest
+    recording = load(tmp_path / "s.json")
+    assert len(recording.inputs) == 1
+    assert recording.replay().trace.digest() == recording.digest
     with pytest.raises(Misuse, match="axis = 9"):
         up(replace(options, run=WorldRunOptions(fault=("stall machine=a axis=9",))))
 

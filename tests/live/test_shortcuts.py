@@ -13,7 +13,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from steptwin.controller import MILLISECOND
-from steptwin.files.session import session_of
+from steptwin.files.recording import recording_of
 from steptwin.files.world import World
 from steptwin.live.batches import batches
 from steptwin.live.clock import Clock
@@ -136,7 +136,7 @@ def join(name: str, world: World, found: Seen) -> Callable[[], None]:
 
 
 def played(given_batches: list[Batch], *, shortcuts: bool, records: bool) -> Seen:
-    """What the clients and observers see. ``records``: with trace and session, which is replayed."""
+    """What the clients and observers see. ``records``: with trace and recording, which is replayed."""
     found = Seen((), [], [], [], [], [], "")
 
     async def run() -> Seen:
@@ -178,7 +178,7 @@ def played(given_batches: list[Batch], *, shortcuts: bool, records: bool) -> See
         realtime.close()
         world.sync_all()
         if records:
-            assert session_of(world).replay().trace.digest() == world.trace.digest()
+            assert recording_of(world).replay().trace.digest() == world.trace.digest()
         state = repr([world.kind(name).state(controller, world.now) for name, controller in world.controllers.items()])
         return found._replace(answers=tuple(client.heard for client in clients), state=state)
 

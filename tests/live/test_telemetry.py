@@ -56,8 +56,8 @@ def tree(exporter: InMemorySpanExporter) -> dict[str, str | None]:
 
 def test_nothing_is_traced_without_a_tracer() -> None:
     assert not is_traced()
-    with span("gateway move", {"command": "move"}) as noted:
-        assert isinstance(noted, NoSpan)
+    with span("gateway move", {"command": "move"}) as traced_span:
+        assert isinstance(traced_span, NoSpan)
 
 
 def test_a_command_of_a_client_has_its_parts_and_polling_is_left_out() -> None:

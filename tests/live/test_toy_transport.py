@@ -1,4 +1,4 @@
-"""A transport that only the tests know opens lines of every kind: descriptions, `up`, sessions and faults know its places."""
+"""A transport that only the tests know opens lines of every kind: descriptions, `up`, recordings and faults know its places."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from toy import kind as toy_kind
 from toy import transport
 
 from steptwin.errors import Misuse
-from steptwin.files.session import load
+from steptwin.files.recording import load
 from steptwin.files.world import World
 from steptwin.files.worldoptions import WorldRunOptions
 from steptwin.live.options import UpOptions
@@ -78,7 +78,7 @@ def asked(path: Path, request: bytes, count: int, times: int = 1) -> bytes:
 
 def test_up_serves_lines_of_every_kind_over_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
-    place, session = tmp_path / "world.toml", tmp_path / "session.json"
+    place, recording = tmp_path / "world.toml", tmp_path / "session.json"
     place.write_text(TEXT.format(folder=tmp_path), "utf-8")
     read = with_crc(bytes.fromhex("01 01 17 70 00 01"))
 
@@ -88,14 +88,14 @@ def test_up_serves_lines_of_every_kind_over_it(tmp_path: Path, monkeypatch: pyte
 
     with ThreadPoolExecutor() as pool:
         answers = pool.submit(clients)
-        assert up(UpOptions(world=place, run=WorldRunOptions(session=session)))
+        assert up(UpOptions(world=place, run=WorldRunOptions(session=recording)))
     toy, damaged, done = answers.result()
     right = with_crc(bytes.fromhex("01 01 01 00"))
     assert (toy, done) == (b"P\0", OUTPUT_ON)
     assert damaged[:4] == right[:4]
     assert damaged != right, "the fault of the link has struck the second answer"
     assert list(tmp_path.glob("bus")) + list(tmp_path.glob("toys")) == []
-    again = load(session)
+    again = load(recording)
     places = {given.what.place for given in again.inputs if isinstance(given.what, Bytes)}
     assert places == {"unix-1", "unix-2"}
     assert again.replay().trace.digest() == again.digest

@@ -14,9 +14,9 @@ from steptwin.eventloop import result_of
 from steptwin.files.world import World
 from steptwin.later import start
 from steptwin.live import why as module
-from steptwin.live.lookback import Lookback
+from steptwin.live.timetravel import WorldTimeTravel
 from steptwin.subject.commands import read_command
-from steptwin.why import kept
+from steptwin.why import pastquestions
 
 Run = Callable[..., Any]
 
@@ -52,8 +52,8 @@ class Asked(Rig):
     def __init__(self, world: World | None = None) -> None:
         super().__init__(world or World.from_toml(LAMP, {"lamp.prg": PROGRAM}))
 
-    def keep_past(self) -> Lookback:
-        return Lookback(self.live, self.realtime, self.pace)
+    def begin_time_travel(self) -> WorldTimeTravel:
+        return WorldTimeTravel(self.live, self.realtime, self.pace)
 
     async def why(self, question: str | None = None, **fields: object) -> Any:
         asked = {"question": question, **fields}
@@ -67,7 +67,7 @@ def links(answer: Any) -> list[str]:
 def test_the_answer_is_that_of_the_session(run: Run) -> None:
     async def scene() -> None:
         rig = Asked()
-        rig.keep_past()
+        rig.begin_time_travel()
         await asyncio.sleep(1)
         rig.do("press", button="go")
         await asyncio.sleep(2)
@@ -82,11 +82,15 @@ def test_the_answer_is_that_of_the_session(run: Run) -> None:
 
 def test_a_chain_is_followed_to_older_states(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     made: list[int] = []
-    monkeypatch.setattr(kept, "_Known", lambda history, at, most, real=kept._Known: made.append(at) or real(history, at, most))
+    monkeypatch.setattr(
+        pastquestions,
+        "_Known",
+        lambda snapshots, at, most, real=pastquestions._Known: made.append(at) or real(snapshots, at, most),
+    )
 
     async def scene() -> None:
         rig = Asked()
-        rig.keep_past()
+        rig.begin_time_travel()
         await asyncio.sleep(1)
         rig.do("press", button="go")
         await asyncio.sleep(300)
@@ -113,7 +117,7 @@ def test_what_was_before_the_past_that_is_kept_is_not_known(run: Run) -> None:
         await asyncio.sleep(1)
         with pytest.raises(Refusal, match=r"no past is kept here: start the twin with 'steptwin up --past' or in the studio"):
             await rig.why("OUT1")
-        rig.keep_past()
+        rig.begin_time_travel()
         await asyncio.sleep(3)
         assert (await rig.why("OUT1"))["text"].splitlines() == [
             "cell.OUT1 is 1, since before 2.000000 s (at 5 s)",
@@ -140,7 +144,7 @@ def test_a_moving_axis_began_to_move_before(run: Run) -> None:
         rig.do("enable", controller="cell", axis=1)
         rig.do("jog", controller="cell", axis=1, velocity=5)
         await asyncio.sleep(1)
-        rig.keep_past()
+        rig.begin_time_travel()
         await asyncio.sleep(1)
         told = await rig.why("cell.M1.position")
         assert links(told) == ["cell.M1 began to move"]
@@ -154,7 +158,7 @@ def test_a_moving_axis_began_to_move_before(run: Run) -> None:
 def test_a_world_that_went_back_has_another_past(run: Run) -> None:
     async def scene() -> None:
         rig = Asked()
-        rig.keep_past()
+        rig.begin_time_travel()
         rig.do("snapshot", name="begin")
         await asyncio.sleep(1)
         rig.do("press", button="go")
@@ -170,11 +174,11 @@ def test_a_world_that_went_back_has_another_past(run: Run) -> None:
 
 
 def test_a_question_that_is_too_long_leaves_what_is_known(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kept, "MOST_NOTED", 3)
+    monkeypatch.setattr(pastquestions, "MOST_NOTED", 3)
 
     async def scene() -> None:
         rig = Asked()
-        rig.keep_past()
+        rig.begin_time_travel()
         await asyncio.sleep(1)
         rig.do("press", button="go")
         with pytest.raises(Misuse, match="more than 3 records and statements since 0 s: too many to look at"):
@@ -187,7 +191,7 @@ def test_a_question_that_is_too_long_leaves_what_is_known(run: Run, monkeypatch:
 def test_questions_wait_for_each_other_and_are_bounded(run: Run) -> None:
     async def scene() -> None:
         rig = Asked()
-        rig.keep_past()
+        rig.begin_time_travel()
         await asyncio.sleep(1)
         given = [start(rig.control.answer(read_command("why", {"question": "OUT1"}))) for _ in range(18)]
         told = await asyncio.gather(*(result_of(one) for one in given), return_exceptions=True)

@@ -12,7 +12,7 @@ import pytest
 
 from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse
-from steptwin.files.session import session_of
+from steptwin.files.recording import recording_of
 from steptwin.files.world import World
 from steptwin.live.batches import batches
 from steptwin.live.clock import Clock
@@ -199,9 +199,9 @@ def test_records_of_a_vision_system_are_inputs_of_the_session() -> None:
     assert [port.exchange(data, live.now) for data in (b"N1 X12.5 Y-3 ", b"A90\r\nnonsense\r\n")] == [b"", b""]
     live.advance(2 * MILLISECOND)
     assert [(given.time, given.what) for given in world.inputs] == [(MILLISECOND, See("twin", 1.0, 12.5, -3.0, 90.0))]
-    session = session_of(world)
-    again = session.replay()
-    assert again.trace.digest() == session.digest
+    recording = recording_of(world)
+    again = recording.replay()
+    assert again.trace.digest() == recording.digest
     assert again.mic488["twin"].device.snapshot() == world.mic488["twin"].device.snapshot()
 
 
@@ -267,7 +267,7 @@ def test_a_real_serial_port_has_the_gap_of_a_uart() -> None:
 
 @pytest.mark.parametrize("kind", ["tcp", "rtu"])
 def test_reads_that_change_nothing_are_not_recorded(kind: str) -> None:
-    """Neither in the session nor in the trace; the session replays to the same digest all the same. Writes are in both."""
+    """Neither in the recording nor in the trace; the recording replays to the same digest all the same. Writes are in both."""
     read = READ if kind == "tcp" else bytes.fromhex("01 03 27 24 00 02 8e b4")
     write = bytes.fromhex("00 01 00 00 00 06 01 05 07 d0 ff 00")
     world = World.from_toml(LINE)
@@ -283,8 +283,8 @@ def test_reads_that_change_nothing_are_not_recorded(kind: str) -> None:
     assert [given.what.data for given in world.inputs if isinstance(given.what, Bytes)] == [write]
     assert [record.subject for record in world.trace.frames()] == ["tcp-2/in", "tcp-2/out"]
     assert len(shown) == 42
-    session = session_of(world)
-    assert session.replay().trace.digest() == session.digest
+    recording = recording_of(world)
+    assert recording.replay().trace.digest() == recording.digest
 
 
 def test_a_read_in_pieces_or_under_a_fault_is_recorded() -> None:
@@ -297,5 +297,5 @@ def test_a_read_in_pieces_or_under_a_fault_is_recorded() -> None:
     world.fault("exception code=6 nth=2")
     port.exchange(READ, live.now)
     assert [len(given.what.data) for given in world.inputs if isinstance(given.what, Bytes)] == [5, 7, 12]
-    session = session_of(world)
-    assert session.replay().trace.digest() == session.digest
+    recording = recording_of(world)
+    assert recording.replay().trace.digest() == recording.digest

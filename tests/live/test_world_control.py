@@ -11,7 +11,7 @@ import pytest
 
 from steptwin.controller import SECOND
 from steptwin.errors import Misuse
-from steptwin.files.session import session_of
+from steptwin.files.recording import recording_of
 from steptwin.files.world import World
 from steptwin.live.clock import Clock
 from steptwin.live.pace import Pace
@@ -45,8 +45,8 @@ def scene(run: Run, play: Callable[[Rig], Awaitable[None]]) -> None:
         rig = Rig()
         await play(rig)
         rig.realtime.close()
-        session = session_of(rig.world)
-        assert session.replay().trace.digest() == session.digest
+        recording = recording_of(rig.world)
+        assert recording.replay().trace.digest() == recording.digest
 
     run(played())
 

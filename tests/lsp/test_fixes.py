@@ -6,11 +6,11 @@ import re
 from pathlib import Path
 
 import pytest
-from tests.lsp.test_session import Shelf
+from tests.lsp.test_editorsession import Shelf
 
 from steptwin.diagnostics import Span
 from steptwin.lsp import navigation
-from steptwin.lsp.session import EditorSession
+from steptwin.lsp.editorsession import EditorSession
 from steptwin.lsp.table import UNUSED_ROW
 from steptwin.m1486 import findings
 from steptwin.wbc.findings import FINDINGS

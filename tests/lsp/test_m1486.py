@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import pytest
-from tests.lsp.test_session import Shelf
+from tests.lsp.test_editorsession import Shelf
 
 from steptwin.diagnostics import Span
 from steptwin.errors import Misuse
 from steptwin.lsp import navigation
 from steptwin.lsp.analysis import Analysis
-from steptwin.lsp.session import EditorSession
+from steptwin.lsp.editorsession import EditorSession
 
 URI = "file:///m/drum.m1486"
 PROGRAM = """\

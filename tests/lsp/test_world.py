@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.lsp.test_session import Shelf
+from tests.lsp.test_editorsession import Shelf
 
 from steptwin.diagnostics import Span
 from steptwin.errors import Misuse
 from steptwin.lsp import navigation
 from steptwin.lsp.analysis import Analysis
-from steptwin.lsp.session import EditorSession
+from steptwin.lsp.editorsession import EditorSession
 from steptwin.simulation.describe.tables import all_keys
 
 URI = "file:///m/cell.toml"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from steptwin.errors import Misuse
-from steptwin.files.session import session_of
+from steptwin.files.recording import recording_of
 from steptwin.files.world import World
 from steptwin.wbc.check import check
 from steptwin.wbc.image import build
@@ -35,7 +35,7 @@ def test_programs_go_into_their_banks(keys: str, banks: dict[int, str]) -> None:
     made = world(keys)
     device = made.mic488["a"].device
     assert {bank: program.source.name for bank, program in device.program.banks.programs.items()} == banks
-    assert session_of(made).replay().mic488["a"].device.snapshot() == device.snapshot()
+    assert recording_of(made).replay().mic488["a"].device.snapshot() == device.snapshot()
 
 
 @pytest.mark.parametrize(

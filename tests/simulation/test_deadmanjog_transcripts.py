@@ -1,6 +1,6 @@
 """What dead-man jogs send to controllers, what moves by it and when it stands: golden/deadmanjogs.txt.
 
-Rules have their own tests (test_deadmanjog_*.py); here whole sessions are compared.
+Rules have their own tests (test_deadmanjog_*.py); here whole recordings are compared.
 Regenerate with ``PYTHONPATH=tests/support python tests/simulation/test_deadmanjog_transcripts.py`` and read the diff.
 """
 

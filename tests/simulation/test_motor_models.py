@@ -11,7 +11,7 @@ from math import asin, cos, pi, sin
 import pytest
 
 from steptwin.controller import SECOND
-from steptwin.files.session import load, save, session_of
+from steptwin.files.recording import load, recording_of, save
 from steptwin.files.world import World
 from steptwin.simulation.mechanics.potential import PeriodicPotential
 from steptwin.simulation.toml.reader import WorldError
@@ -406,7 +406,7 @@ def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: object) -> None:
     texts = [text for _, text in events(found, "fall")] + [text for _, text in events(found, "stall")]
     assert len(texts) >= 4
     place = f"{tmp_path}/s.json"
-    save(session_of(found), place)
+    save(recording_of(found), place)
     part = load(place).replay(round(moment_s * SECOND))
     snapshot = part.snapshot()
     again = load(place).replay(0)

@@ -16,7 +16,7 @@ from steptwin.cli import app
 from steptwin.datasheet import plain
 from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.files.export import axis_views, read_trace, write_trace
-from steptwin.files.session import load, save, session_of
+from steptwin.files.recording import load, recording_of, save
 from steptwin.files.world import World
 from steptwin.live import twins
 from steptwin.live.clock import Clock
@@ -124,7 +124,7 @@ def test_a_session_is_replayed(tmp_path: Path) -> None:
     world.run(for_=0.1)
     world.views(TOY)["t"].set_pin("STOP", 1)
     world.run(for_=1)
-    save(session_of(world), tmp_path / "s.json")
+    save(recording_of(world), tmp_path / "s.json")
     assert load(tmp_path / "s.json").replay().trace.digest() == world.trace.digest()
 
 

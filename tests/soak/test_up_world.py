@@ -1,4 +1,4 @@
-"""A world that is up for weeks keeps nothing of what its clients ask, unless a session was asked for."""
+"""A world that is up for weeks keeps nothing of what its clients ask, unless a recording was asked for."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from soak import scaled
 
 from steptwin.controller import MILLISECOND
 from steptwin.errors import Misuse
-from steptwin.files.session import load, save
+from steptwin.files.recording import load, save
 from steptwin.files.world import World
 from steptwin.live import world as live_world_module
 from steptwin.live.world import LiveWorld, PlacePort
@@ -100,12 +100,12 @@ def test_a_recorded_session_ends_where_it_is_full(monkeypatch: pytest.MonkeyPatc
     with clients(live) as work:
         for _ in range(320):
             work()
-    session = live.session()
-    assert told == [f"the session is full and ends at {session.until / 10**9:g} s, after 300 inputs"]
-    assert len(session.inputs) == 300
+    recording = live.recording()
+    assert told == [f"the recording is full and ends at {recording.until / 10**9:g} s, after 300 inputs"]
+    assert len(recording.inputs) == 300
     assert live.world.inputs == []
-    save(session, tmp_path / "s.json")
-    assert load(tmp_path / "s.json").replay().trace.digest() == session.digest
+    save(recording, tmp_path / "s.json")
+    assert load(tmp_path / "s.json").replay().trace.digest() == recording.digest
 
 
 def test_a_recorded_session_is_bounded_in_bytes(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -113,12 +113,12 @@ def test_a_recorded_session_is_bounded_in_bytes(monkeypatch: pytest.MonkeyPatch)
     live = live_world(keep_inputs=True)
     for _ in range(40):
         live.apply_input(Bytes("chips", "raw-1", "raw", b" " * 1000))
-    assert len(live.session().inputs) == 10
+    assert len(live.recording().inputs) == 10
 
 
 def test_without_a_session_there_is_none_to_save() -> None:
-    with pytest.raises(Misuse, match="this world does not record a session: start it with --session FILE"):
-        live_world().session()
+    with pytest.raises(Misuse, match="this world is not recorded: start it with --session FILE"):
+        live_world().recording()
 
 
 def test_clients_that_come_and_go_leave_nothing_behind() -> None:

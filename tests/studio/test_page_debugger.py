@@ -13,7 +13,7 @@ from tests.conftest import until
 from tests.studio.conftest import Process, StudioWorld
 from tests.studio.test_page_program import choose, text_of
 
-from steptwin.files.session import save, session_of
+from steptwin.files.recording import recording_of, save
 from steptwin.files.world import World
 
 WORLD = """
@@ -268,7 +268,7 @@ def test_the_picture_of_the_documentation_and_what_axe_finds(studio: Studio) -> 
 def test_a_recording_is_looked_through(start_studio: Callable[..., Process], browser: Browser, tmp_path: Path) -> None:
     world = World.from_toml('[[mic488]]\nname = "table"\nprogram = "cell.prg"\nstart = true\n', {"cell.prg": PROGRAM.encode()})
     world.run(for_="20s")
-    save(session_of(world), tmp_path / "s.json")
+    save(recording_of(world), tmp_path / "s.json")
     context = browser.new_context(viewport={"width": 1280, "height": 720}, locale="en-US")
     page = context.new_page()
     page.set_default_timeout(WAIT_MS)

@@ -98,9 +98,9 @@ def test_calculator_configuration_faults_recordings_and_devices(studio: Studio) 
     until(lambda: ask(studio, "faults"), "a fault is set")
 
     go(page, "Recordings")
-    tab_to_text(page, "Save session")
+    tab_to_text(page, "Save recording")
     page.keyboard.press("Enter")
-    until(lambda: ask(studio, "recordings")["saved"], "a session is saved")
+    until(lambda: ask(studio, "recordings")["saved"], "a recording is saved")
 
     go(page, "Devices")
     enter(page, "Address of the device", "tcp://127.0.0.1:1")

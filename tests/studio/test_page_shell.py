@@ -149,10 +149,10 @@ def test_nothing_serious_is_wrong_for_assistive_technology(studio: Studio, theme
 
 
 def test_nor_with_the_panels_of_a_machine_open(start_studio: Callable[..., Process], browser: Browser) -> None:
-    """The machine that the demo moves, its wiring, a scope with channels, a saved session."""
+    """The machine that the demo moves, its wiring, a scope with channels, a saved recording."""
     studio = Studio(start_studio("--demo"), browser)
     page = studio.page(panel="Recordings", bypass_csp=True)
-    button(page, "Save session").click()
+    button(page, "Save recording").click()
     expect(page.get_by_role("button", name=re.compile("^Open a view of "))).to_have_count(1)
     found = [f"Recordings: {what}" for what in serious(page)]
     show(page, "Program")

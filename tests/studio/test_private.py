@@ -99,7 +99,7 @@ REFUSED = (
     ("save", {"file": "link.json"}, LINK),
     ("save", {"file": "nowhere.json"}, LINK),
     ("save", {"file": "second.json"}, LINK),
-    ("save", {"file": "settings.json"}, "is not a session of a world"),
+    ("save", {"file": "settings.json"}, "is not a recording of a world"),
     ("save", {"file": "hall.toml"}, THERE),
     ("save", {"file": "table.csv"}, THERE),
     ("save", {"file": "{own}"}, ONLY),

@@ -51,8 +51,8 @@ def test_a_session_is_saved_and_replayed_by_another_process(start_studio: Callab
     found = ask(studio, "recordings")["ok"]
     assert [one["name"] for one in found["saved"]] == ["first"]  # and not the ready file, which is JSON too
     assert found["folder"] == str(studio.directory)
-    assert found["session"]["inputs"] == len(json.loads(path.read_text())["inputs"])
-    assert found["session"]["is_full"] is False
+    assert found["recording"]["inputs"] == len(json.loads(path.read_text())["inputs"])
+    assert found["recording"]["is_full"] is False
     assert found["past"]["from_ns"] == "0"
     assert found["trace"] == {"kind": "none", "file": None, "records": None, "most_records": None, "from_ns": None}
 
@@ -66,7 +66,7 @@ def test_what_the_options_record(start_studio: Callable[..., Process], tmp_path:
     studio = start_studio("--session", str(tmp_path / "s.json"), "--trace", "ring 40")
     move(studio)
     found = ask(studio, "recordings")["ok"]
-    assert found["session"]["file"] == str(tmp_path / "s.json")
+    assert found["recording"]["file"] == str(tmp_path / "s.json")
     assert found["trace"]["kind"] == "ring"
     assert 0 < found["trace"]["records"] <= found["trace"]["most_records"] == 40
     studio.end()
@@ -119,7 +119,7 @@ def test_a_view_of_a_session(start_studio: Callable[..., Process]) -> None:
     points = httpx.get(f"{url}api/points?names=table.M1.position").json()["ok"]
     assert points[0]["value"] == 5.0
     assert httpx.post(f"{url}api/do/save_recording", json={}).status_code == 403  # everybody is a viewer there
-    assert httpx.post(f"{url}api/do/recordings", json={}).json()["ok"]["session"] is None
+    assert httpx.post(f"{url}api/do/recordings", json={}).json()["ok"]["recording"] is None
     assert ask(studio, "view_recording", name="first")["ok"]["url"] == url
     studio.end()
     with pytest.raises(httpx.ConnectError):
@@ -142,14 +142,14 @@ def test_devices_alone_are_not_recorded(start_studio: Callable[..., Process], se
 
 def save_in(page: Page, name: str) -> None:
     page.get_by_label("Name of the file").fill(name)
-    button(page, "Save session").click()
+    button(page, "Save recording").click()
     expect(page.get_by_role("rowheader", name=name, exact=True)).to_be_visible()
 
 
 def test_the_panel_saves_downloads_and_opens(studio: Studio, tmp_path: Path, browser: Browser) -> None:
     page = studio.page(panel="Recordings")
     now = page.get_by_role("table", name="What is recorded now")
-    expect(now.get_by_role("row").filter(has_text="Session")).to_contain_text("of 200000 inputs")
+    expect(now.get_by_role("row").filter(has_text="Recording")).to_contain_text("of 200000 inputs")
     expect(now.get_by_role("row").filter(has_text="Trace")).to_contain_text("nothing")
     studio.master.enable(1)
     save_in(page, "shift-1")

@@ -28,7 +28,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
 
 from steptwin.controller import MILLISECOND
-from steptwin.files.session import save, session_of
+from steptwin.files.recording import recording_of, save
 from steptwin.files.world import World
 from steptwin.simulation.script.steps import Set
 from steptwin.subject.dispatch import LONGEST_REQUEST
@@ -278,9 +278,9 @@ def test_others_reach_it_only_where_that_is_permitted_and_with_a_token(start_stu
         (("--tokens", "/nowhere/tokens"), "/nowhere/tokens"),
         (("--http", "0.0.0.0:0", "--remote", "--open-to-local-users"), "--open-to-local-users is for an --http address of this"),
         (("--tokens", "t", "--open-to-local-users"), "--open-to-local-users and --tokens exclude each other"),
-        (("--view",), "--view shows one session (.json)"),
-        (("--view", "machine.toml"), "machine.toml: --view shows a session (.json)"),
-        (("--view", "s.json", "--speed", "2"), "--speed is not for a session that is only looked at"),
+        (("--view",), "--view shows one recording (.json)"),
+        (("--view", "machine.toml"), "machine.toml: --view shows a recording (.json)"),
+        (("--view", "s.json", "--speed", "2"), "--speed is not for a recording that is only looked at"),
     ],
 )
 def test_options_that_do_not_go_together_are_named(options: tuple[str, ...], message: str, tmp_path: Path) -> None:
@@ -484,14 +484,14 @@ def test_a_recorded_session_is_shown_and_nobody_changes_it(start_studio: Start, 
     world.run(for_="2s")
     world.apply_input(Set((("table", "IN3", 1.0),)))
     world.run(for_="3s")
-    save(session_of(world), tmp_path / "s.json")
+    save(recording_of(world), tmp_path / "s.json")
     tokens = tokens_file(tmp_path, "engineer anna anna-0123456789abcdef\n")
     studio = start_studio("--itself", str(tmp_path / "s.json"), "--view", "--tokens", str(tokens))
     assert list(studio.end_points) == ["http"]
     seen = page(studio, token="anna-0123456789abcdef")
     assert seen.answer["ok"]["role"] == "viewer"
     assert [one["value"] for one in seen.ok("read", points=["time", "table.IN3"])] == [5.0, 1.0]
-    assert seen.ok("look", to_ns="1000000000") == {"time_ns": "1000000000", "from_ns": "0"}
+    assert seen.ok("show_moment", to_ns="1000000000") == {"time_ns": "1000000000", "from_ns": "0"}
     assert [one["value"] for one in seen.ok("read", points=["time", "table.IN3"])] == [1.0, 0.0]
-    seen.ok("look")
+    seen.ok("show_moment")
     assert seen.ask("resume")["error"]["message"] == "resume is for the role operator; anna has the role viewer"

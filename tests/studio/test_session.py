@@ -16,10 +16,10 @@ from steptwin.access.roles import Role
 from steptwin.access.tokens import AccessGate
 from steptwin.controller import MILLISECOND
 from steptwin.errors import Refusal
-from steptwin.studio import session as sessions
+from steptwin.studio import viewersession
 from steptwin.studio.hub import MOST_VIEWERS
 from steptwin.studio.requests import ALL
-from steptwin.studio.session import ViewerSession
+from steptwin.studio.viewersession import ViewerSession
 
 
 def kinds(messages: list[dict[str, Any]]) -> list[str]:
@@ -307,7 +307,7 @@ def test_a_slow_reader_loses_the_oldest_events_and_is_told_how_many() -> None:
         tab.ok("follow", id="a", kinds=["note"], bound=100)
     seen: list[str] = []
     for n in range(1000):
-        studio.world.apply_input(sessions_note(n))
+        studio.world.apply_input(note_input(n))
         if n % 50 == 0:
             studio.run(40)
             seen += [event["note"] for one in quick.read() if "events" in one for event in one["events"]]
@@ -319,7 +319,7 @@ def test_a_slow_reader_loses_the_oldest_events_and_is_told_how_many() -> None:
     assert seen == [str(n) for n in range(1000)]
 
 
-def sessions_note(n: int) -> Any:
+def note_input(n: int) -> Any:
     from steptwin.simulation.script.steps import Note
 
     return Note(str(n))
@@ -413,7 +413,7 @@ def test_too_many_requests_are_refused_but_stops_are_done() -> None:
     studio = Studio()
     tab = studio.open()
     outcomes = [tab.ask("time").get("error", {}).get("code", "ok") for _ in range(1100)]
-    assert outcomes.count("ok") == int(sessions.BURST) - 1
+    assert outcomes.count("ok") == int(viewersession.BURST) - 1
     assert outcomes[-1] == "refusal"
     assert tab.ok("stop", controller="table") == {"program": "stopped"}
     studio.run(1000)

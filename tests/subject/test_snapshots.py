@@ -6,7 +6,7 @@ import pytest
 
 from steptwin.controller import SECOND
 from steptwin.errors import Misuse
-from steptwin.files.session import session_of
+from steptwin.files.recording import recording_of
 from steptwin.files.world import World
 from steptwin.simulation.script.steps import Note, Set
 from steptwin.subject.commands import (
@@ -46,7 +46,7 @@ def test_what_happened_since_is_undone_and_goes_on_alike() -> None:
     assert subject.do(TakeSnapshot()).value == {"name": "1", "time_ns": "1000000000"}
     before = subject.do(ReadState("m")).value
     subject.do(Advance(duration=SECOND))
-    after, digest = subject.do(ReadState("m")).value, session_of(world).digest
+    after, digest = subject.do(ReadState("m")).value, recording_of(world).digest
     subject.do(Set((("m", "IN3", 1.0),)))
     subject.do(Advance(duration=SECOND))
     result = subject.do(RestoreSnapshot("1"))
@@ -54,8 +54,8 @@ def test_what_happened_since_is_undone_and_goes_on_alike() -> None:
     assert subject.do(ReadState("m")).value == before != after
     subject.do(Advance(duration=SECOND))
     assert subject.do(ReadState("m")).value == after
-    # What was set since is no part of the session.
-    assert session_of(world).digest == digest == session_of(world).replay().trace.digest()
+    # What was set since is no part of the recording.
+    assert recording_of(world).digest == digest == recording_of(world).replay().trace.digest()
 
 
 def test_followers_are_told_and_get_the_plans() -> None:

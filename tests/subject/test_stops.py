@@ -10,7 +10,7 @@ from world_rig import small
 from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.drivers.blocking import finish
 from steptwin.errors import Misuse, Refusal
-from steptwin.files.session import load, save, session_of
+from steptwin.files.recording import load, recording_of, save
 from steptwin.files.world import World
 from steptwin.mic488.registermap import DataType
 from steptwin.mic488.registers import register_map
@@ -189,8 +189,8 @@ def test_scripts_end_and_held_buttons_are_released(tmp_path: Path) -> None:
     said = [event.text for event in following.take().events]
     assert "script walk was ended" in said
     assert "go: released" in said or "released" in said[-1]
-    # A session replays the stop.
-    save(session_of(world), tmp_path / "s.json")
+    # A recording replays the stop.
+    save(recording_of(world), tmp_path / "s.json")
     assert load(tmp_path / "s.json").replay().trace.digest() == world.trace.digest()
 
 

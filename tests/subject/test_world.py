@@ -1,4 +1,4 @@
-"""A world in this process as a subject: what it answers, which events it gives, and that sessions replay."""
+"""A world in this process as a subject: what it answers, which events it gives, and that recordings replay."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from world_rig import small
 from steptwin.controller import MILLISECOND, SECOND
 from steptwin.datasheet import Limits
 from steptwin.errors import Misuse, Refusal
-from steptwin.files.session import session_of
+from steptwin.files.recording import recording_of
 from steptwin.files.world import World
 from steptwin.later import start
 from steptwin.simulation.faults import read as read_fault
@@ -281,9 +281,9 @@ def test_any_interleaving_of_commands_bytes_and_scripts_replays_to_the_same_dige
             continue
         if following is not None:
             following.take()
-    session = session_of(world)
-    again = session.replay()
-    assert again.trace.digest() == session.digest
+    recording = recording_of(world)
+    again = recording.replay()
+    assert again.trace.digest() == recording.digest
     assert list(again.trace) == list(world.trace)
 
 

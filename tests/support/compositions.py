@@ -25,7 +25,7 @@ from steptwin.simulation.mechanics.trajectory import Trajectory
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.toml.reader import WorldError
-from steptwin.simulation.world.history import History
+from steptwin.simulation.world.snapshotlog import SnapshotLog
 from steptwin.wire.crc import with_crc
 
 BASE = """
@@ -298,12 +298,12 @@ def _debugger(world: World) -> Callable[[], None]:
 
 
 def _recorder(world: World) -> Callable[[], None]:
-    history, seen = History(world), list[TraceRecord]()
+    snapshots, seen = SnapshotLog(world), list[TraceRecord]()
     world.trace.watchers.append(seen.append)
 
     def leave() -> None:
-        history.take()
-        history.close()
+        snapshots.take()
+        snapshots.close()
         world.trace.watchers.remove(seen.append)
 
     return leave

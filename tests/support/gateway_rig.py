@@ -16,7 +16,7 @@ from tests.conftest import STEPTWIN, until
 from steptwin import World
 from steptwin.access.audit import CommandLog
 from steptwin.errors import LineFailure
-from steptwin.gateways.contract import PastValues
+from steptwin.gateways.contract import HistoryValues
 from steptwin.gateways.sampling import SharedSamples
 from steptwin.simulation.kinds.lines import LineTraffic
 from steptwin.subject import commands as command
@@ -34,7 +34,7 @@ class GatewayWorld:
         self.world = World.from_toml(text)
         self.inner = WorldSubject(self.world)
         self.jogs = WorldJogs(self.inner)
-        self.past: PastValues | None = None
+        self.history: HistoryValues | None = None
         self.audit: CommandLog | None = None
         self.samples = SharedSamples(self)
         self.silent: set[str] = set()

@@ -21,7 +21,7 @@ from pathlib import Path
 
 from steptwin.cli import main
 from steptwin.files.export import write_trace
-from steptwin.files.session import save, session_of
+from steptwin.files.recording import recording_of, save
 from steptwin.files.world import World
 from steptwin.live.studio.drawing import WorldArrangement
 from steptwin.simulation.describe.arrangement import DrawnPlace
@@ -57,12 +57,12 @@ def ways(folder: Path) -> dict[str, tuple[Path, bytes, Act]]:
     command("build", "i.prg")
     world = World.load(folder / "w.toml")
     world.run(until=2.0)
-    session = session_of(world)
+    recording = recording_of(world)
     drawn = WorldArrangement(world.spec, ["table"], folder / "drawn.toml")
     old = b"the old one\n" * 2000
     return {
         "fmt": (folder / "a.prg", PROGRAM.encode(), partial(command, "fmt", "a.prg")),
-        "save": (folder / "s.json", old, partial(save, session, folder / "s.json")),
+        "save": (folder / "s.json", old, partial(save, recording, folder / "s.json")),
         "save arrangement": (folder / "drawn.toml", WORLD.encode(), partial(drawn.save, [DrawnPlace("table", 1, 2)])),
         "build": (folder / "b.wbc", old, partial(command, "build", "i.prg", "-o", "b.wbc")),
         "decompile": (folder / "d.prg", old, partial(command, "decompile", "i.wbc", "-o", "d.prg")),

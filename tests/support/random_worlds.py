@@ -21,7 +21,7 @@ from scenes import Scene
 from steptwin.controller import SECOND, Nanos
 from steptwin.diagnostics import Severity
 from steptwin.errors import Misuse, Refusal
-from steptwin.files.session import session_of
+from steptwin.files.recording import recording_of
 from steptwin.files.world import World
 from steptwin.simulation.describe.pieces import given_files
 from steptwin.simulation.describe.steptable import read_steps
@@ -30,9 +30,9 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.toml.reader import TomlText, WorldError
 from steptwin.simulation.world.actions import ACTIONS
 from steptwin.simulation.world.check import diagnose
-from steptwin.simulation.world.history import History, Past
 from steptwin.simulation.world.inputs import Bytes, Download, Leave, See, SetVariable
 from steptwin.simulation.world.simulation import Simulation
+from steptwin.simulation.world.snapshotlog import PastWorld, SnapshotLog
 from steptwin.simulation.world.unfinished import waiting
 from steptwin.simulation.world.views import MechanicsView
 from steptwin.simulation.world.worldprograms import WorldPrograms
@@ -97,18 +97,18 @@ def check_it_goes_on_alike(name: str, seed: int) -> None:
     files = {file: chance.filled(content).encode() for file, content in scene.files.items()}
     world = World.from_toml(text, files)
     assert [str(read_fault(str(one))) for one in world.spec.faults] == [str(one) for one in world.spec.faults]
-    history = History(world)
+    snapshots = SnapshotLog(world)
     moments = sorted(chance.below(round(END_S * SECOND)) for _ in range(MOMENTS))
     steps = list(zip(moments, from_outside, strict=True))
     cut = chance.below(MOMENTS)
     go_on(world, steps[:cut], moments[cut], files)
     do_from_outside(world, steps[cut][1], files)
-    history.take()
+    snapshots.take()
     snapshot = world.snapshot()
     go_on(world, steps[cut + 1 :], round(END_S * SECOND), files)
     end, digest = shown(world), world.trace.digest()
-    check_past(history, chance.below(round(END_S * SECOND)))
-    assert session_of(world).replay().trace.digest() == digest
+    check_past(snapshots, chance.below(round(END_S * SECOND)))
+    assert recording_of(world).replay().trace.digest() == digest
     other = world if chance.below(2) else world.branch(snapshot)
     other.restore(snapshot)
     go_on(other, steps[cut + 1 :], round(END_S * SECOND), files)
@@ -116,15 +116,15 @@ def check_it_goes_on_alike(name: str, seed: int) -> None:
     assert other.trace.digest() == digest
 
 
-def check_past(history: History, moment: int) -> None:
+def check_past(snapshots: SnapshotLog, moment: int) -> None:
     """Another world that goes back to a moment and then to the end shows the same there."""
-    history.take()
-    past = Past(history)
-    for until in (moment, history.world.now):
+    snapshots.take()
+    past = PastWorld(snapshots)
+    for until in (moment, snapshots.world.now):
         for _ in past.go(until):
             pass
-    history.close()
-    assert seen_of_controllers(past.world) == seen_of_controllers(history.world)
+    snapshots.close()
+    assert seen_of_controllers(past.world) == seen_of_controllers(snapshots.world)
 
 
 def go_on(world: World, steps: list[tuple[int, str]], end: int, files: Mapping[str, bytes]) -> None:

@@ -21,10 +21,10 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
 from steptwin.simulation.world.worldprograms import WorldPrograms, configuration_text
 from steptwin.studio.hub import Hub
-from steptwin.studio.looking import KeptPast
 from steptwin.studio.schema import schema
-from steptwin.studio.session import ViewerSession
 from steptwin.studio.surroundings import PresentMoment, Surroundings
+from steptwin.studio.timetravel import TimeTravel
+from steptwin.studio.viewersession import ViewerSession
 from steptwin.subject.jogs import WorldJogs
 from steptwin.subject.world import WorldSubject
 
@@ -131,7 +131,7 @@ class Studio:
         tokens: bool = False,
         gate: AccessGate | None = None,
         files: Mapping[str, bytes] | None = None,
-        lookback: Callable[[Studio], KeptPast] | None = None,
+        time_travel: Callable[[Studio], TimeTravel] | None = None,
     ) -> None:
         self.world = World.from_toml(dedent(text), files)
         self.subject = WorldSubject(self.world)
@@ -146,7 +146,7 @@ class Studio:
             program="0",
             programs=WorldPrograms(self.world),
             configuration=partial(configuration_text, self.world),
-            lookback=None if lookback is None else lookback(self),
+            time_travel=None if time_travel is None else time_travel(self),
             connections=NoConnections(),
             work=NoWork(),
             on_internal=self.errors.append,

@@ -11,7 +11,7 @@ from mic488_rig import EN, OFFSETS, OUT, STOP, VALUES, coil_pdu, real_words, wor
 
 from steptwin.controller import Nanos
 from steptwin.files.export import AxisChannel, axis_views
-from steptwin.files.session import load, save, session_of
+from steptwin.files.recording import load, recording_of, save
 from steptwin.files.world import World
 from steptwin.m1486.lines import STEP_DIRECTION, Interface
 from steptwin.simulation.describe.generated import LINE, Whole
@@ -71,14 +71,14 @@ def small(more: str = "") -> World:
 
 
 def check_it_can_be_restored(world: World, other: World, moment_s: float, end_s: float, folder: Path) -> None:
-    """From a snapshot of a moment and from a session, all goes on as it did. ``other``: a new world of the same description."""
+    """From a snapshot of a moment and from a recording, all goes on as it did. ``other``: a new world of the same description."""
     world.run(until=moment_s)
     snapshot = world.snapshot()
     world.run(until=end_s)
     other.restore(snapshot)
     other.run(until=end_s)
     assert other.trace.digest() == world.trace.digest()
-    save(session_of(world), folder / "s.json")
+    save(recording_of(world), folder / "s.json")
     assert load(folder / "s.json").replay().trace.digest() == world.trace.digest()
 
 

@@ -10,9 +10,9 @@ from steptwin.controller import MILLISECOND, SECOND
 from steptwin.files.world import World
 from steptwin.simulation.faults import read
 from steptwin.simulation.script import steps as do
-from steptwin.simulation.world.history import History
-from steptwin.why import kept, search
-from steptwin.why.kept import PastQuestions
+from steptwin.simulation.world.snapshotlog import SnapshotLog
+from steptwin.why import pastquestions, search
+from steptwin.why.pastquestions import PastQuestions
 from steptwin.why.question import Why, finish
 
 PROGRAM = """\
@@ -61,11 +61,11 @@ QUESTIONS = (
 
 @pytest.fixture(autouse=True)
 def noted_little(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kept, "FIRST_SPAN_NS", 100 * MILLISECOND)
+    monkeypatch.setattr(pastquestions, "FIRST_SPAN_NS", 100 * MILLISECOND)
 
 
 def past_of(world: World, end: int, step: int = 150 * MILLISECOND) -> PastQuestions:
-    history = History(world)
+    snapshots = SnapshotLog(world)
     inputs = {
         1_000: do.Press("go"),
         1_100: do.Release("go"),
@@ -77,8 +77,8 @@ def past_of(world: World, end: int, step: int = 150 * MILLISECOND) -> PastQuesti
             world.run_to(time * MILLISECOND)
             world.apply_input(inputs.pop(time))
         world.run_to(moment)
-        history.take()
-    return PastQuestions(history)
+        snapshots.take()
+    return PastQuestions(snapshots)
 
 
 def test_answers_are_those_of_what_is_noted_from_the_beginning() -> None:
@@ -100,12 +100,12 @@ def test_flags_of_a_chip_are_set_without_an_event() -> None:
     """``U14`` is the byte with the user flags."""
     program = b"[\nW50\nT81\n@1\nW1\nJ1\n]\n"
     world = World.from_toml('[[m1486]]\nname = "chip"\nprogram = "p.m1486"\n', {"p.m1486": program})
-    history = History(world)
+    snapshots = SnapshotLog(world)
     for moment in range(50, 1000, 50):
         world.run_to(moment * MILLISECOND)
-        history.take()
+        snapshots.take()
     whole = Why(lambda: World(world.blueprint), world.inputs, world.now).ask("chip.U14")
-    found = finish(PastQuestions(history).asking("chip.U14"))
+    found = finish(PastQuestions(snapshots).asking("chip.U14"))
     assert (found.state, found.since, found.links) == (whole.state, whole.since, whole.links)
     assert found.since is not None
     assert found.since < 100 * MILLISECOND
@@ -175,11 +175,11 @@ UNCHANGED = (
 
 def test_what_became_what_it_was_before_the_next_state_has_changed(monkeypatch: pytest.MonkeyPatch) -> None:
     world = World.from_toml(WORLD, {"m.prg": BACK_AGAIN.encode()})
-    history = History(world)
+    snapshots = SnapshotLog(world)
     for moment in range(300, 6000, 300):
         world.run_to(moment * MILLISECOND)
-        history.take()
-    past, whole = PastQuestions(history), Why(lambda: World(world.blueprint), world.inputs, world.now)
+        snapshots.take()
+    past, whole = PastQuestions(snapshots), Why(lambda: World(world.blueprint), world.inputs, world.now)
     changed = ("m.USER_REGISTER[4]", "m.USER_REGISTER[5]", "m.M2_VMAX", "m.M3.status", "m.M3.enabled", "m.M4_POSLIM_L")
     for question in changed:
         found, expected = finish(past.asking(question)), whole.ask(question)
@@ -196,18 +196,18 @@ def test_what_became_what_it_was_before_the_next_state_has_changed(monkeypatch: 
 
 def test_points_that_changed_after_the_world_went_back_are_noted() -> None:
     world = World.from_toml(WORLD, {"m.prg": b"WAIT IN2 = ON\nM3 = ON\nDELAY 100\n"})
-    history = History(world)
+    snapshots = SnapshotLog(world)
     for _ in range(2):
         world.run_to(SECOND)
-        history.take()
+        snapshots.take()
         world.apply_input(do.Set((("m", "IN2", 1.0),)))
         for moment in range(11, 40):
             world.run_to(moment * SECOND // 10)
-            history.take()
-        assert finish(PastQuestions(history).asking("m.M3.enabled")).since is not None
-        if not history.branch:
-            world.restore(history.state_at(SECOND).snapshot)
-            history.gone_back()
+            snapshots.take()
+        assert finish(PastQuestions(snapshots).asking("m.M3.enabled")).since is not None
+        if not snapshots.branch:
+            world.restore(snapshots.state_at(SECOND).snapshot)
+            snapshots.gone_back()
 
 
 HELD = ("IN1", "IN2", "cell.IN1 == 1", "cell.IN2 == 0 and cell.OUT1 == 1", "cell")
@@ -217,15 +217,15 @@ HELD = ("IN1", "IN2", "cell.IN1 == 1", "cell.IN2 == 0 and cell.OUT1 == 1", "cell
 def test_a_fault_that_holds_a_level_is_shown_however_old(since: int) -> None:
     """It began before all that is noted near the moment, and after the level changed or before."""
     world = World.from_toml(WAITS, {"p.prg": WAITS_PROGRAM.encode()})
-    history = History(world)
+    snapshots = SnapshotLog(world)
     for moment in range(0, 60_001, 300):
         world.run_to(moment * MILLISECOND)
-        history.take()
+        snapshots.take()
         if moment <= since < moment + 300:
             world.run_to(since * MILLISECOND)
             world.apply_input(do.SetFault(read("stuck machine=cell pin=IN1 value=1")))
             world.apply_input(do.SetFault(read("stuck machine=cell pin=IN2 value=0 name=cut")))
-    past, whole = PastQuestions(history), Why(lambda: World(world.blueprint), world.inputs, world.now)
+    past, whole = PastQuestions(snapshots), Why(lambda: World(world.blueprint), world.inputs, world.now)
     for question in HELD:
         found, expected = finish(past.asking(question)), whole.ask(question)
         assert (found.state, found.since) == (expected.state, expected.since), question
@@ -239,8 +239,8 @@ def test_a_fault_from_before_the_past_that_is_kept() -> None:
     world.run_to(5 * SECOND)
     world.fault("stuck machine=cell pin=IN2 value=0 name=cut")
     world.run_to(7 * SECOND)
-    history = History(world)
+    snapshots = SnapshotLog(world)
     world.run_to(9 * SECOND)
-    answer = finish(PastQuestions(history).asking("IN2"))
+    answer = finish(PastQuestions(snapshots).asking("IN2"))
     assert [(link.time, link.text) for link in answer.links] == [(5 * SECOND, "cell.IN2 is held at 0 by fault cut")]
     assert (answer.since, answer.known_from) == (None, 7 * SECOND)

@@ -10,10 +10,10 @@ from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.simulation.kinds.mic488.writes import encode_write
 from steptwin.simulation.script import steps as do
-from steptwin.simulation.world.history import History
 from steptwin.simulation.world.inputs import Bytes, Download
-from steptwin.why import causes, kept
-from steptwin.why.kept import PastQuestions
+from steptwin.simulation.world.snapshotlog import SnapshotLog
+from steptwin.why import causes, pastquestions
+from steptwin.why.pastquestions import PastQuestions
 from steptwin.why.question import finish
 from steptwin.wire.rtu import encode_frame
 
@@ -210,11 +210,11 @@ def test_what_changes_by_the_end_of_a_motion_is_so_since_that_end(point: str) ->
 
 def test_a_running_twin_knows_the_end_of_a_motion_that_is_long_past() -> None:
     world = moves()
-    history = History(world)
+    snapshots = SnapshotLog(world)
     for second in range(1, 21):
         world.run(float(second))
-        history.take()
-    questions = PastQuestions(history)
+        snapshots.take()
+    questions = PastQuestions(snapshots)
     for point in ("M1.moving", "M1.position"):
         answer = finish(questions.asking(point))
         assert answer.since == world.why(point).since
@@ -307,11 +307,11 @@ def test_terminals_that_are_held() -> None:
 def test_a_running_twin_knows_a_fault_that_was_set_long_ago() -> None:
     world = waits()
     world.fault("stuck machine=cell pin=IN2 value=0")
-    history = History(world)
+    snapshots = SnapshotLog(world)
     for second in range(5, 20):
         world.run(float(second))
-        history.take()
-    assert finish(PastQuestions(history).asking("IN2")).links[0].text == "cell.IN2 is held at 0 by fault stuck"
+        snapshots.take()
+    assert finish(PastQuestions(snapshots).asking("IN2")).links[0].text == "cell.IN2 is held at 0 by fault stuck"
 
 
 def test_commands_of_an_m1486() -> None:
@@ -428,13 +428,13 @@ def test_a_past_of_many_statements_is_known_near_its_end(monkeypatch: pytest.Mon
         {"p": b"n = 0\nMAIN:\n    n = n + 1\n    IF n = 12000\n        OUT3 = ON\n    ENDIF\nJUMP MAIN\n"},
         keep_trace=False,
     )
-    monkeypatch.setattr(kept, "MOST_NOTED", 20_000)
+    monkeypatch.setattr(pastquestions, "MOST_NOTED", 20_000)
     monkeypatch.setattr(causes, "MOST_UNDECIDED", 20_000)
-    history = History(world)
+    snapshots = SnapshotLog(world)
     for moment in range(1, 11):
         world.run_to(moment * 5 * MILLISECOND)
-        history.take()
-    questions = PastQuestions(history)
+        snapshots.take()
+    questions = PastQuestions(snapshots)
     for _ in range(2):
         answer = finish(questions.asking("OUT3"))
         assert answer.links[1].text == "line 5 `OUT3 = ON` was executed"

@@ -125,7 +125,7 @@ class Campaign:
         return self.runner.run(case if isinstance(case, Case) else self._chosen[case])
 
     def world(self, case: Case | int) -> World:
-        """The world of a case before it begins to vary, with its trace and session: ``run`` it as long as you like."""
+        """The world of a case before it begins to vary, with its trace and recording: ``run`` it as long as you like."""
         return self.runner.begin(case if isinstance(case, Case) else self._chosen[case], keep=True)
 
     def units(self) -> dict[str, str]:

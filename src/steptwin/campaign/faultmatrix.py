@@ -23,7 +23,7 @@ from steptwin.campaign.workers import workers
 from steptwin.controller import SECOND
 from steptwin.coverage.counts import Coverage
 from steptwin.errors import Misuse, SteptwinError
-from steptwin.files import session as sessions
+from steptwin.files import recording as recordings
 from steptwin.files.world import World
 
 LASTING = frozenset({"no-answer"})
@@ -121,7 +121,7 @@ def fault_matrix(
     jobs: int | None = 1,
     progress: Callable[[int, int], object] = lambda done, total: None,
 ) -> FaultMatrix:
-    """Run every fault at every phase, and write the session of each run into ``folder``. Raises `Misuse`."""
+    """Run every fault at every phase, and write the recording of each run into ``folder``. Raises `Misuse`."""
     runner, rules = CaseRunner(description), description.matrix
     nominal_case = without_faults(description)
     coverage = Coverage()
@@ -190,7 +190,7 @@ def _run_row(
         name = ""
         if facts.result.error is None:
             name = f"{CELLS}/{task.name}.json"
-            sessions.save(sessions.session_of(world), folder / name)
+            recordings.save(recordings.recording_of(world), folder / name)
         found.append(_CellResult(facts, name))
     return found, coverage.plain()
 

@@ -1,4 +1,4 @@
-"""A case as files with which it can be seen again: a session that ``steptwin replay`` runs, a timeline, and a test for
+"""A case as files with which it can be seen again: a recording that ``steptwin replay`` runs, a timeline, and a test for
 pytest that fails until the program is mended."""
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from steptwin.campaign.variation import Choice
 from steptwin.controller import SECOND
 from steptwin.durations import duration_text
 from steptwin.errors import Misuse, SteptwinError
-from steptwin.files import session as sessions
+from steptwin.files import recording as recordings
 from steptwin.files.export import axis_views, write_trace
 from steptwin.files.textfiles import write_bytes
 
@@ -30,7 +30,7 @@ LONGEST_NAME = 60
 
 @dataclass(frozen=True, slots=True)
 class Reproduction:
-    """The files of a case. Without a session the world refused the case; without a test the campaign has no file."""
+    """The files of a case. Without a recording the world refused the case; without a test the campaign has no file."""
 
     session: Path | None
     timeline: Path | None
@@ -45,10 +45,10 @@ class Reproduction:
 def reproduce(
     runner: CaseRunner, case: Case, result: CaseResult, folder: Path, name: str, campaign: Path | None = None
 ) -> Reproduction:
-    """Write ``NAME.json`` (session), ``NAME.html`` (timeline) and ``test_NAME.py`` into a folder. Raises `Misuse` where that is
+    """Write ``NAME.json`` (recording), ``NAME.html`` (timeline) and ``test_NAME.py`` into a folder. Raises `Misuse` where that is
     impossible."""
     folder.mkdir(parents=True, exist_ok=True)
-    session = timeline = test = None
+    recording = timeline = test = None
     try:
         world = runner.begin(case, keep=True)
     except Misuse:
@@ -57,16 +57,16 @@ def reproduce(
         try:
             world.run_to(case.end_ns, runner.description.until)
         except SteptwinError:
-            pass  # it is the failure: the session ends there
+            pass  # it is the failure: the recording ends there
         else:
-            session, timeline = folder / f"{name}.json", folder / f"{name}.html"
-            sessions.save(sessions.session_of(world), session)
+            recording, timeline = folder / f"{name}.json", folder / f"{name}.html"
+            recordings.save(recordings.recording_of(world), recording)
             write_trace(world.trace, timeline, views=axis_views(world), title=name, ended=world.now)
     if campaign is not None:
         beside = os.path.relpath(campaign, folder)
         test = folder / f"test_{identifier(name)}.py"
         write_bytes(test, text_of_test(case, result, name, beside, where(case, runner.description)).encode())
-    return Reproduction(session, timeline, test)
+    return Reproduction(recording, timeline, test)
 
 
 def identifier(text: str) -> str:

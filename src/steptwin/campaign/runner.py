@@ -71,7 +71,7 @@ class CaseRunner:
 
     def begin(self, case: Case, *, keep: bool = False) -> World:
         """The world of a case where it begins to vary, with its faults and steps to come; ``keep``: with its trace and its
-        session, from its beginning. Raises `Misuse` for a case that the world refuses."""
+        recording, from its beginning. Raises `Misuse` for a case that the world refuses."""
         world = self._world(case, keep=keep)
         for fault in case.faults:
             self._schedule(world, fault.at_ns, do.SetFault(read_fault(fault.fault)), "fault")

@@ -39,7 +39,7 @@ COMMANDS: Mapping[str, Mapping[str, str]] = {
         "pause": "Pause a running world.",
         "step": "Advance a world by a time, to a condition or to its next event, show what happened, and pause.",
         "resume": "Continue a paused world, or change its speed.",
-        "save": "Save the session of a running world, to replay it or to continue from it with 'run' and 'up'.",
+        "save": "Save the recording of a running world, to replay it or to continue from it with 'run' and 'up'.",
         "certificate": "Make a certificate, signed by itself, and its key: for [gateway.opcua], tls_tcp of a [[line]], steptwin "
         "studio.",
     },
@@ -54,7 +54,7 @@ COMMANDS: Mapping[str, Mapping[str, str]] = {
         "build": "Compile a WBC program to the image of firmware 1.25.",
         "decompile": "Turn a compiled image into a program and a position table that build to the same bytes.",
         "run": "Run a program or a world in virtual time and print its moves, waits, outputs and uploads.",
-        "replay": "Run a recorded session again and compare what happens.",
+        "replay": "Run a recording again and compare what happens.",
         "why": "Show the chain of causes of a value, of a condition or of a wait.",
         "export": "Write a recorded trace as timeline (html), picture (png, svg), signals (vcd), frames (pcapng) or samples "
         "(csv, parquet).",
@@ -85,7 +85,7 @@ COMMANDS: Mapping[str, Mapping[str, str]] = {
         "bridge": "Serve real devices to programs of a plant, by the gateways of a file, until Ctrl-C.",
         "history": "Show, export and compare what a database has kept of twins and devices.",
         "record": "Run a list of requests on a controller and record the answers.",
-        "diff": "Report where two recordings of the same session differ.",
+        "diff": "Report where two transcripts of the same requests differ.",
     },
     "Reference": {
         "calc": "Calculate a move: its times, or with a time the quantity that is not given; and GEAR from the mechanics.",

@@ -102,13 +102,13 @@ def faults(
     phases: Annotated[int | None, typer.Option(help="Largest number of phases. Default: that of the file, or 12.")] = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", metavar="DIR", help="Folder for the table and the sessions. Default: FILE with .faults."),
+        typer.Option("--out", "-o", metavar="DIR", help="Folder for the table and the recordings. Default: FILE with .faults."),
     ] = None,
     json: Json = False,
 ) -> None:
     """Try every fault of sensors, actuators, logic, lines and power in every phase of the cycle: how does the machine react?
 
-    Writes faults.html, faults.csv and a session of each run. Exit code 1 when one was unsafe.
+    Writes faults.html, faults.csv and a recording of each run. Exit code 1 when one was unsafe.
     """
     if not _faults(file, out, typer.echo, jobs=jobs, phases=phases, as_json=json):
         raise typer.Exit(1)

@@ -1,6 +1,6 @@
-"""``steptwin diff``: where two recordings of a session differ.
+"""``steptwin diff``: where two transcripts differ.
 
-From Python: `steptwin.drivers.mic488.session.differences`.
+From Python: `steptwin.drivers.mic488.transcript.differences`.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from steptwin.cli.device import Json, print_json
 
 
 def command(
-    one: Annotated[Path, typer.Argument(help="A recording, of a twin for example.")],
-    two: Annotated[Path, typer.Argument(help="Another of the same session, of the device.")],
+    one: Annotated[Path, typer.Argument(help="A transcript, of a twin for example.")],
+    two: Annotated[Path, typer.Argument(help="Another of the same requests, of the device.")],
     tolerance: Annotated[float, typer.Option(help="How far numbers may be apart.")] = 0.0,
     time: Annotated[
         float | None, typer.Option(help="How far moments may be apart, in seconds. Default: they do not matter.")
     ] = None,
     json: Json = False,
 ) -> None:
-    """Report where two recordings of the same session differ. Exit code 1 if they do."""
-    from steptwin.drivers.mic488.session import differences, from_text
+    """Report where two transcripts of the same requests differ. Exit code 1 if they do."""
+    from steptwin.drivers.mic488.transcript import differences, from_text
     from steptwin.inputfiles import read_recorded
 
     found = differences(

@@ -1,6 +1,6 @@
 """``steptwin lsp``: the editor server.
 
-From Python: `steptwin.lsp.session`, with `steptwin.services` for the tables of gateways and histories.
+From Python: `steptwin.lsp.editorsession`, with `steptwin.services` for the tables of gateways and histories.
 """
 
 from __future__ import annotations

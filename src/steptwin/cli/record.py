@@ -1,6 +1,6 @@
-"""``steptwin record``: a session with a twin or with the device, for 'diff'.
+"""``steptwin record``: requests to a twin or to the device with the answers, for 'diff'.
 
-From Python: `steptwin.drivers.mic488.session`.
+From Python: `steptwin.drivers.mic488.transcript`.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from steptwin.errors import Misuse
 
 def command(
     session: Annotated[
-        Path, typer.Argument(help="The session: get NAME..., set NAME=VALUE, wait AXIS..., sleep SECONDS, raw HEX.")
+        Path, typer.Argument(help="The requests: get NAME..., set NAME=VALUE, wait AXIS..., sleep SECONDS, raw HEX.")
     ],
-    output: Annotated[Path | None, written("-o", "--output", help="Where the recording goes. Default: it is printed.")] = None,
+    output: Annotated[Path | None, written("-o", "--output", help="Where the transcript goes. Default: it is printed.")] = None,
     device: Device = None,
     log_frames: LogFrames = False,
 ) -> None:
@@ -29,7 +29,7 @@ def command(
     """
     from steptwin.drivers.mic488.kind import of_mic488
     from steptwin.drivers.mic488.named import map_of
-    from steptwin.drivers.mic488.session import carry_out, steps_of, to_text
+    from steptwin.drivers.mic488.transcript import carry_out, steps_of, to_text
     from steptwin.files.textfiles import check_writable, write_bytes
     from steptwin.inputfiles import read_recorded
 
@@ -53,5 +53,5 @@ def command(
             complain("all axes were stopped")
             raise
         finally:
-            if output is not None and kept[1:]:  # an earlier recording is not given up for none
+            if output is not None and kept[1:]:  # an earlier transcript is not given up for none
                 write_bytes(output, ("\n".join(kept) + "\n").encode())

@@ -25,9 +25,11 @@ if TYPE_CHECKING:
     from steptwin.files.timedinputs import TimedInput
 
 WORLDS = (".toml", ".json")
-"""Suffixes of worlds and sessions; all other files are programs (`steptwin.languages`)."""
+"""Suffixes of worlds and recordings; all other files are programs (`steptwin.languages`)."""
 
-File = Annotated[Path, typer.Argument(help="File to run: a program (.prg, .wbc, .m1486), a world (.toml) or a session (.json).")]
+File = Annotated[
+    Path, typer.Argument(help="File to run: a program (.prg, .wbc, .m1486), a world (.toml) or a recording (.json).")
+]
 Duration = Annotated[
     str | None,
     typer.Option("--for", metavar="TIME", help="Longest virtual time to run, such as 10s. Default 60s; 1h with --until."),
@@ -112,7 +114,7 @@ def command(
     world: WorldRunOptions,
     shown: ShownOptions,
 ) -> None:
-    """Run a program or a world in virtual time and print its moves, waits, outputs and uploads. A session is continued."""
+    """Run a program or a world in virtual time and print its moves, waits, outputs and uploads. A recording is continued."""
     from steptwin.files.timedinputs import parse_duration, parse_inputs
 
     run_program = None if file.suffix.lower() in WORLDS else _program_runner(file)
@@ -145,16 +147,16 @@ def command(
         raise typer.Exit(1)
 
 
-def _check_targets(trace: Path | None, session: Path | None) -> None:
+def _check_targets(trace: Path | None, recording: Path | None) -> None:
     """Raises `Misuse` if a file cannot be written, before the run begins."""
     if trace is not None:
         from steptwin.files.export import check_target
 
         check_target(trace)
-    if session is not None:
-        from steptwin.files.beginning import check_session_target
+    if recording is not None:
+        from steptwin.files.beginning import check_recording_target
 
-        check_session_target(session)
+        check_recording_target(recording)
 
 
 def _program_runner(

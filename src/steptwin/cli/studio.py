@@ -20,7 +20,9 @@ from steptwin.live.studio.options import StudioOptions
 def command(
     world: Annotated[
         Path | None,
-        typer.Argument(metavar="MACHINE.toml", help="The description of a world, or a session (.json). Default: a demo machine."),
+        typer.Argument(
+            metavar="MACHINE.toml", help="The description of a world, or a recording (.json). Default: a demo machine."
+        ),
     ] = None,
     *,
     ready_file: ReadyFile = None,
@@ -48,6 +50,6 @@ def command(
             group.refuse("devices without a world: give a MACHINE.toml too")
     if page.view:
         for group in (live, options):
-            group.refuse("a session that is only looked at")
+            group.refuse("a recording that is only looked at")
     if not run_studio(page, UpOptions(world=world, ready_file=ready_file, live=live, run=options, log=log)):
         raise typer.Exit(1)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 def command(
     world: Annotated[
         Path | None,
-        typer.Argument(metavar="MACHINE.toml", help="The description of the world, or a session (.json) to continue."),
+        typer.Argument(metavar="MACHINE.toml", help="The description of the world, or a recording (.json) to continue."),
     ] = None,
     *,
     past: Annotated[bool, typer.Option("--past", help="Keep the past, as far as memory permits, for 'steptwin why'.")] = False,
@@ -47,7 +47,7 @@ def command(
         show(sections(), form)
         return
     if world is None:
-        raise Misuse("a world is missing: give its description (.toml) or a session (.json)")
+        raise Misuse("a world is missing: give its description (.toml) or a recording (.json)")
     from steptwin.files.auditfile import audit_into
     from steptwin.live.running import up as run_up
 

@@ -1,6 +1,6 @@
-"""``steptwin why``: why something in a running twin or in a recorded session is as it is.
+"""``steptwin why``: why something in a running twin or in a recording is as it is.
 
-From Python: `steptwin.files.why.why_of_session`, or `steptwin.files.world.World.why`.
+From Python: `steptwin.files.why.why_of_recording`, or `steptwin.files.world.World.why`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def command(
         str,
         typer.Argument(
             metavar="TWIN|SESSION",
-            help="A running twin: its name, file (.toml) or address; or a session (.json) of 'steptwin run' or 'up'.",
+            help="A running twin: its name, file (.toml) or address; or a recording (.json) of 'steptwin run' or 'up'.",
             autocompletion=completion.devices,
         ),
     ],
@@ -46,18 +46,18 @@ def command(
 
 
 def _answer(where: str, question: str, at: str | None, out: Callable[[str], object], *, as_json: bool = False) -> None:
-    """Print the answer. Raises `Misuse` for a file that is no session, and for what is no question there; `Refusal` for a twin
+    """Print the answer. Raises `Misuse` for a file that is no recording, and for what is no question there; `Refusal` for a twin
     whose past is not kept."""
-    found = _of_session(Path(where), question, at) if Path(where).suffix == ".json" else _of_twin(where, question, at)
+    found = _of_recording(Path(where), question, at) if Path(where).suffix == ".json" else _of_twin(where, question, at)
     out(json.dumps(found, ensure_ascii=False, indent=2) if as_json else found["text"])
 
 
-def _of_session(path: Path, question: str, at: str | None) -> Mapping[str, Any]:
+def _of_recording(path: Path, question: str, at: str | None) -> Mapping[str, Any]:
     from steptwin.durations import duration
-    from steptwin.files import session as sessions
-    from steptwin.files.why import why_of_session
+    from steptwin.files import recording as recordings
+    from steptwin.files.why import why_of_recording
 
-    return why_of_session(sessions.load(path)).ask(question, None if at is None else duration(at)).plain()
+    return why_of_recording(recordings.load(path)).ask(question, None if at is None else duration(at)).plain()
 
 
 def _of_twin(text: str, question: str, at: str | None) -> Mapping[str, Any]:

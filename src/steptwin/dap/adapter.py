@@ -117,7 +117,7 @@ class Adapter:
     def _launch_world(self, arguments: Arguments) -> ResponseBody:
         self._check_fresh("launch")
         asked = read_launch(arguments)
-        world = open_world(asked, self._tell)
+        world = open_world(asked, self._output)
         try:
             debugger = Debugger(world)
             sources = Sources(texts_of(debugger, asked.folder))
@@ -205,7 +205,7 @@ class Adapter:
             self._report(end.value)
         except SteptwinError as error:
             self._debugged.travel = None
-            self._tell(f"error: {error}", "stderr")
+            self._output(f"error: {error}", "stderr")
             if self._attached is None:
                 self._report(self._debugged.started().pause())
             else:
@@ -231,7 +231,7 @@ class Adapter:
     def _report(self, stop: Stopped) -> None:
         debugger, asked = self._debugged.started(), self._launch
         if stop.reason is StopReason.IDLE and debugger.has_ended and not (asked is not None and asked.stop_at_end):
-            self._tell(f"{stop.text} at {_seconds(stop.time)}")
+            self._output(f"{stop.text} at {_seconds(stop.time)}")
             self.has_ended = True
             self._send("terminated", {})
             self._send("exited", {"exitCode": 0})
@@ -280,7 +280,7 @@ class Adapter:
 
     # ------------------------------------------------------------------ the console
 
-    def _tell(self, text: str, category: str = "console") -> None:
+    def _output(self, text: str, category: str = "console") -> None:
         self._send("output", {"category": category, "output": f"{text}\n"})
 
     def _log(self, time: int, text: str, location: Location) -> None:

@@ -25,11 +25,11 @@ def serve_stdio() -> None:
 
 
 def serve(source: BinaryIO, target: BinaryIO) -> None:
-    """Serve one session on two streams."""
-    _Session(source, target).run()
+    """Serve one debug session on two streams."""
+    _DebugSession(source, target).run()
 
 
-class _Session:
+class _DebugSession:
     def __init__(self, source: BinaryIO, target: BinaryIO) -> None:
         self._source, self._target = source, target
         self._numbers = count(1)

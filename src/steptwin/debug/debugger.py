@@ -3,7 +3,7 @@
 It stands between two moments of the world. Before the world goes on, a second one, the look-ahead run, goes ahead and finds the
 moment at which the run is to stop (`steptwin.debug.lookahead`); then the world is run to the end of the moment before it. So the
 world itself is only run, as ever. The look-ahead run is also what is looked at in the past, to which it is brought by a state and
-the inputs since (`steptwin.simulation.world.history`).
+the inputs since (`steptwin.simulation.world.snapshotlog`).
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.simulation.kinds.programs import Place, Programs
-from steptwin.simulation.world.history import History, outside_past
 from steptwin.simulation.world.inputs import ExternalInput
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import SimulationSnapshot
+from steptwin.simulation.world.snapshotlog import SnapshotLog, outside_past
 from steptwin.subject.time import next_due
 from steptwin.why.answer import Answer
-from steptwin.why.kept import PastQuestions
+from steptwin.why.pastquestions import PastQuestions
 
 T = TypeVar("T")
 
@@ -60,14 +60,14 @@ class Debugger:
     Methods that go forwards or backwards (``step_in``) give the `Stop`; those of the other form (``stepping_in``) do the same in
     parts (`Travel`). They need a world whose time only the debugger advances. A world in real time calls `look_ahead` before.
 
-    ``history``: the past of the world, where it is kept already. ``apply_input`` and ``go_back`` act on a world that others use,
-    too.
+    ``snapshots``: the past of the world, where it is kept already. ``apply_input`` and ``go_back`` act on a world that others
+    use, too.
     """
 
     def __init__(
         self,
         world: Simulation,
-        history: History | None = None,
+        snapshots: SnapshotLog | None = None,
         apply_input: Callable[[ExternalInput], None] | None = None,
         go_back: Callable[[SimulationSnapshot], None] | None = None,
     ) -> None:
@@ -84,17 +84,17 @@ class Debugger:
         world.sync_all()
         for programs in world.programs.values():
             programs.execute_all(True, world.now)
-        self._is_own_history = history is None
-        self._history = History(world) if history is None else history
-        self._history.take()
-        self._why = PastQuestions(self._history)
-        self._lookahead = LookAheadRun(self._history)
+        self._owns_snapshots = snapshots is None
+        self._snapshots = SnapshotLog(world) if snapshots is None else snapshots
+        self._snapshots.take()
+        self._why = PastQuestions(self._snapshots)
+        self._lookahead = LookAheadRun(self._snapshots)
         self._is_past = False
 
     def close(self) -> None:
         """Debug no more; the world goes on as ever."""
-        if self._is_own_history:
-            self._history.close()
+        if self._owns_snapshots:
+            self._snapshots.close()
         self._world.sync_all()
         for programs in self._world.programs.values():
             programs.execute_all(False, self._world.now)
@@ -127,7 +127,7 @@ class Debugger:
     @property
     def begin(self) -> Nanos:
         """The oldest moment that can be gone back to."""
-        return self._history.begin
+        return self._snapshots.begin
 
     @property
     def is_past(self) -> bool:
@@ -198,7 +198,7 @@ class Debugger:
 
     def _take_back(self, snapshot: SimulationSnapshot) -> None:
         self._world.restore(snapshot)
-        self._history.gone_back()
+        self._snapshots.gone_back()
 
     def gone_back(self) -> None:
         """The world has gone back to its present moment."""
@@ -210,7 +210,7 @@ class Debugger:
     def set_breakpoints(self, points: Sequence[AnyPoint]) -> Sequence[SetPoint]:
         """Set these breakpoints and no others; what became of each."""
         self._lookahead.release()
-        return self._lookahead.points.set(points, self.view if self._is_own_history else None)
+        return self._lookahead.points.set(points, self.view if self._owns_snapshots else None)
 
     def set_events(self, events: Iterable[Events]) -> None:
         """Stop at these events and no others."""
@@ -275,7 +275,7 @@ class Debugger:
         """Go on to the goal, or to what else is a reason to stop, at most to a moment."""
         start = self.now
         if not self._is_past:
-            self._history.take()
+            self._snapshots.take()
         yield from self._lookahead.look_at(start)
         slices = self._slices(goal)
         while until is None or self._lookahead.now < until:
@@ -333,7 +333,7 @@ class Debugger:
     def stand(self) -> None:
         """Look at the present, at which the world stands now."""
         self._is_past = False
-        self._history.take()
+        self._snapshots.take()
         _finished(self._lookahead.look_at(self.present))
 
     # ------------------------------------------------------------------ backwards
@@ -368,10 +368,10 @@ class Debugger:
     def _backwards(self, goal: Goal) -> DebugTravel:
         before = upper = self.now
         if not self._is_past:
-            self._history.take()
+            self._snapshots.take()
         slices = self._slices(goal)
         while upper > self.begin:
-            lower = max(self._history.state_at(upper - 1)[0].now, upper - next(slices))
+            lower = max(self._snapshots.state_at(upper - 1)[0].now, upper - next(slices))
             stop = yield from self._lookahead.find_back(lower, upper, goal, self.begin, before)
             if stop is not None:
                 yield from self._stand_at(stop.time)
@@ -400,7 +400,7 @@ class Debugger:
     def _bring_world(self, moment: Nanos) -> None:
         while self._world.now < moment:
             self._world.run_to(moment)
-        self._history.take()
+        self._snapshots.take()
 
     def _why_idle(self) -> str:
         if self.has_ended:

@@ -16,7 +16,7 @@ from steptwin.debug.breakpoints import Breakpoints
 from steptwin.debug.calculation import ResolvedExpression
 from steptwin.debug.observer import Begun, Logged, Observer
 from steptwin.debug.values import LabelPoint, Stopped, StopReason
-from steptwin.simulation.world.history import History, Past
+from steptwin.simulation.world.snapshotlog import PastWorld, SnapshotLog
 from steptwin.subject.time import next_due
 
 Parts: TypeAlias = Generator[None, None, None]
@@ -43,13 +43,13 @@ class Candidate(NamedTuple):
 
 
 class LookAheadRun:
-    """Look-ahead run of the world of ``history``."""
+    """Look-ahead run of the world of ``snapshots``."""
 
-    def __init__(self, history: History) -> None:
-        self._history = history
-        self._past = Past(history)
+    def __init__(self, snapshots: SnapshotLog) -> None:
+        self._snapshots = snapshots
+        self._past = PastWorld(snapshots)
         self.world = self._past.world
-        self.points = Breakpoints(history.world.programs, partial(ResolvedExpression, self.world))
+        self.points = Breakpoints(snapshots.world.programs, partial(ResolvedExpression, self.world))
         for programs in self.world.programs.values():
             programs.execute_all(True, self.world.now)
         self._observer = Observer(self.world, self.points)
@@ -57,7 +57,7 @@ class LookAheadRun:
         """The values of data breakpoints at the moment up to which was observed; None where it was moved since."""
         self.on_log: Callable[[Logged], None] = lambda logged: None
         """Called with the text of log points, once for each time that they are passed."""
-        self._logged: Nanos = history.world.now
+        self._logged: Nanos = snapshots.world.now
         """Up to this moment they have been."""
 
     @property
@@ -66,7 +66,7 @@ class LookAheadRun:
 
     @property
     def present(self) -> Nanos:
-        return self._history.world.now
+        return self._snapshots.world.now
 
     def stop_at(self, codes: Collection[str]) -> None:
         """At events with these codes and no others."""
@@ -132,8 +132,8 @@ class LookAheadRun:
         happened, so a stop is at the present, too."""
         present = self.present
         if not self._past.is_in_step or not self._past.can_go_on:
-            if not len(self._history):  # more came in than is kept
-                self._history.take()
+            if not len(self._snapshots):  # more came in than is kept
+                self._snapshots.take()
             yield from self.look_at(present)
         if not self._past.lacks_inputs:
             return None

@@ -93,9 +93,9 @@ class DigitalShadow:
         self.problems: list[str] = []
         """Commands that the twin refused."""
         for register, value in twin.values:
-            self._tell(steps.Write(((name, register, value),)))
+            self._forward(steps.Write(((name, register, value),)))
         for number in twin.enabled:
-            self._tell(command.Enable(name, number, on=True))
+            self._forward(command.Enable(name, number, on=True))
 
     @property
     def points(self) -> tuple[str, ...]:
@@ -110,7 +110,7 @@ class DigitalShadow:
 
     # ------------------------------------------------------------------ the twin
 
-    def _tell(self, wanted: Command) -> None:
+    def _forward(self, wanted: Command) -> None:
         try:
             self._subject.do(wanted)
         except SteptwinError as error:
@@ -136,7 +136,7 @@ class DigitalShadow:
             if number in (None, axis.sheet.number):
                 axis.lag_ns = max(ended - begun, LEAST_LAG_NS)
                 axis.takes_over |= _stops(wanted)
-        self._tell(replace(wanted, line=self._twin.line) if isinstance(wanted, steps.Request) else wanted)
+        self._forward(replace(wanted, line=self._twin.line) if isinstance(wanted, steps.Request) else wanted)
 
     def jogs(self, number: int, *, on: bool) -> None:
         """A dead-man jog of an axis begins or has ended. The twin waits where it is."""
@@ -151,7 +151,7 @@ class DigitalShadow:
         for pin in self._inputs:
             level = known.get(f"{self.name}.{pin}")
             if level is not None and self._read(f"{self.name}.{pin}") != [level]:
-                self._tell(steps.Set(((self.name, pin, level),)))
+                self._forward(steps.Set(((self.name, pin, level),)))
         resting = [self._compare_axis(axis, known, begun, ended) for axis in self._axes.values()]
         return all(resting)
 
@@ -186,7 +186,7 @@ class DigitalShadow:
     def _take_over(self, axis: _ComparedAxis, position: float) -> float:
         """The place of the device at rest after a stop or a jog."""
         axis.takes_over = False
-        self._tell(steps.Write(((self.name, f"{axis.sheet.name}_POS_ACT", position),)))
+        self._forward(steps.Write(((self.name, f"{axis.sheet.name}_POS_ACT", position),)))
         return self._read(f"{self.name}.{axis.sheet.name}.position")[0]
 
     def compare_registers(self, known: Known, ended: Nanos) -> None:

@@ -94,11 +94,11 @@ class TaskLine(Generic[Q, A]):
     async def exchange(self, job: Job[Q, A]) -> A:
         if not is_traced():
             return await self._exchanged(job)
-        with span(f"line {self.place}", {"line": self.place, "request": str(job.request)}, is_part=True) as noted:
+        with span(f"line {self.place}", {"line": self.place, "request": str(job.request)}, is_part=True) as traced_span:
             try:
                 return await self._exchanged(job)
             finally:
-                noted.note("failed_attempts", job.attempts)
+                traced_span.set_attribute("failed_attempts", job.attempts)
 
     async def _exchanged(self, job: Job[Q, A]) -> A:
         if self._closed:

@@ -1,4 +1,4 @@
-"""The beginning of a world: its description, or a moment of a session."""
+"""The beginning of a world: its description, or a moment of a recording."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.files import session as sessions
+from steptwin.files import recording as recordings
 from steptwin.files.textfiles import check_writable
 from steptwin.files.world import World
 from steptwin.files.writing import is_written_directly
@@ -16,21 +16,23 @@ from steptwin.simulation.describe.overrides import NO_OVERRIDES, Overrides
 from steptwin.simulation.faults import read as read_fault
 from steptwin.simulation.script import steps as do
 
-SESSION_SUFFIX = ".json"
+RECORDING_SUFFIX = ".json"
 
 
-def is_session(path: Path) -> bool:
-    """Whether a file is a session; others are descriptions."""
-    return path.suffix.lower() == SESSION_SUFFIX
+def is_recording(path: Path) -> bool:
+    """Whether a file is a recording; others are descriptions."""
+    return path.suffix.lower() == RECORDING_SUFFIX
 
 
-WRONG_SUFFIX_OF_A_SESSION = Message("files.wrong-suffix-of-a-session", "{path}: the name of a session must end with {suffix}")
+WRONG_SUFFIX_OF_A_RECORDING = Message(
+    "files.wrong-suffix-of-a-recording", "{path}: the name of a recording must end with {suffix}"
+)
 
 
-def check_session_target(path: Path) -> None:
-    """Check that a session can be written to a path, and that its name ends as that of a session. Raises `Misuse`."""
-    if not is_session(path) and not is_written_directly(path):
-        raise Misuse(WRONG_SUFFIX_OF_A_SESSION(path=path, suffix=SESSION_SUFFIX))
+def check_recording_target(path: Path) -> None:
+    """Check that a recording can be written to a path, and that its name ends as that of a recording. Raises `Misuse`."""
+    if not is_recording(path) and not is_written_directly(path):
+        raise Misuse(WRONG_SUFFIX_OF_A_RECORDING(path=path, suffix=RECORDING_SUFFIX))
     check_writable(path)
 
 
@@ -46,13 +48,13 @@ def begin_world(
     allow_outside: bool = False,
     state: Path | None = None,
 ) -> World:
-    """The world that a file describes; that of a session at its end, or at ``moment`` (ns) with all inputs up to then.
+    """The world that a file describes; that of a recording at its end, or at ``moment`` (ns) with all inputs up to then.
 
     ``warn`` is called with warnings. Raises `Misuse`.
     """
-    if not is_session(path):
+    if not is_recording(path):
         if moment is not None:
-            raise Misuse(f"--from: {path} is not a session; a description begins at 0 s")
+            raise Misuse(f"--from: {path} is not a recording; a description begins at 0 s")
         world = World.load(
             path,
             seed=seed,
@@ -66,16 +68,16 @@ def begin_world(
             warn(warning)
         return world
     if seed is not None:
-        raise Misuse(f"--seed: {path} is a session, which continues with its own seed")
+        raise Misuse(f"--seed: {path} is a recording, which continues with its own seed")
     if overrides:
-        raise Misuse(f"--with: {path} is a session, which continues with its own values")
+        raise Misuse(f"--with: {path} is a recording, which continues with its own values")
     if state is not None:
-        raise Misuse(f"--state: {path} is a session, which continues with its own memory")
-    session = sessions.load(path)
-    world = session.replay(moment, keep_trace=keep_trace, keep_inputs=keep_inputs)
-    if moment is None and world.trace.digest() != session.digest:
+        raise Misuse(f"--state: {path} is a recording, which continues with its own memory")
+    recording = recordings.load(path)
+    world = recording.replay(moment, keep_trace=keep_trace, keep_inputs=keep_inputs)
+    if moment is None and world.trace.digest() != recording.digest:
         warn(
-            f"{path}: the replay differs from the run recorded with steptwin {session.version}; the world continues from the "
+            f"{path}: the replay differs from the run recorded with steptwin {recording.version}; the world continues from the "
             "replay"
         )
     world.go_on()

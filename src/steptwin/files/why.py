@@ -1,11 +1,11 @@
-"""Questions about the past of sessions."""
+"""Questions about the past of recordings."""
 
 from __future__ import annotations
 
-from steptwin.files.session import Session
-from steptwin.why.repeated import RepeatedPast
+from steptwin.files.recording import Recording
+from steptwin.why.replayedrun import ReplayedRun
 
 
-def why_of_session(session: Session) -> RepeatedPast:
+def why_of_recording(recording: Recording) -> ReplayedRun:
     """Raises `Misuse` when its world cannot be made again."""
-    return RepeatedPast(session.world, session.inputs, session.until)
+    return ReplayedRun(recording.world, recording.inputs, recording.until)

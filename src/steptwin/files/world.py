@@ -40,7 +40,7 @@ from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import SimulationSnapshot
 from steptwin.simulation.world.views import LineView, MechanicsView, Views
 from steptwin.why.answer import Answer
-from steptwin.why.repeated import RepeatedPast
+from steptwin.why.replayedrun import ReplayedRun
 
 LONGEST_RUN_NS: Nanos = 3600 * SECOND
 """Default limit of a run with a condition, ns: an hour."""
@@ -67,7 +67,7 @@ Reaction: TypeAlias = do.Step | tuple[do.Step, ...] | Callable[[], object]
 class World(Simulation):
     """A world in virtual time. It begins at 0 s and runs only on request.
 
-    Calls of its methods go into its session and can be replayed; direct changes of a `device` or `chip` cannot.
+    Calls of its methods go into its recording and can be replayed; direct changes of a `device` or `chip` cannot.
     """
 
     def __init__(
@@ -131,9 +131,9 @@ class World(Simulation):
         """The world described by a TOML file. Raises `WorldError` (a `Misuse`).
 
         ``seed`` replaces that of the description, ``overrides`` other values in it: ``{"axis.x.pitch": 4.0}``. Without
-        ``keep_trace`` and ``keep_inputs`` the memory of a long run does not grow; it then has neither trace nor session. Files
+        ``keep_trace`` and ``keep_inputs`` the memory of a long run does not grow; it then has neither trace nor recording. Files
         the description names are read from its folder and those below, with ``allow_outside`` from anywhere: their content
-        becomes part of sessions. ``state`` replaces the directory of non-volatile memory that the description names; the world
+        becomes part of recordings. ``state`` replaces the directory of non-volatile memory that the description names; the world
         owns that directory until `close`, and raises `StateInUse` or `StateFailure` if it cannot be used.
         """
         place = Path(path)
@@ -321,13 +321,13 @@ class World(Simulation):
     # ------------------------------------------------------------------ causes
 
     @property
-    def past(self) -> RepeatedPast:
-        """The past until now, for questions (`RepeatedPast.ask`). Raises `Misuse` for a world that does not keep its inputs."""
+    def past(self) -> ReplayedRun:
+        """The past until now, for questions (`ReplayedRun.ask`). Raises `Misuse` for a world that does not keep its inputs."""
         if not self.keeps_inputs:
             raise Misuse("this world does not keep its inputs, so its past is not known: make it with keep_inputs=True")
         self.advance(self.now)
         self.sync_all()
-        return RepeatedPast(lambda: type(self)(self.blueprint, failing=self.failed_saves), self.inputs, self.now)
+        return ReplayedRun(lambda: type(self)(self.blueprint, failing=self.failed_saves), self.inputs, self.now)
 
     def why(self, question: str, at: Duration | None = None) -> Answer:
         """Why a signal has its value, a condition its truth, or a controller's program waits; now or at a moment.

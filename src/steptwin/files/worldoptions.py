@@ -28,7 +28,7 @@ Coverage: TypeAlias = Annotated[
 
 @dataclass(frozen=True, kw_only=True)
 class WorldRunOptions(OptionGroup):
-    """How a world begins, and the recording of a session."""
+    """How a world begins, and its recording."""
 
     heading = "Options of worlds"
 
@@ -46,10 +46,10 @@ class WorldRunOptions(OptionGroup):
         Path | None,
         Option("Directory of the non-volatile memory. Default: that of the description, or none.", metavar="DIR"),
     ] = None
-    session: Annotated[Path | None, Option("Write a session for 'steptwin replay' when it ends.", is_written=True)] = None
+    session: Annotated[Path | None, Option("Write a recording for 'steptwin replay' when it ends.", is_written=True)] = None
     from_: Annotated[
         str | None,
-        Option("Of a session: continue from this moment, such as 2.5s. Default: its end.", metavar="TIME", flags=("--from",)),
+        Option("Of a recording: continue from this moment, such as 2.5s. Default: its end.", metavar="TIME", flags=("--from",)),
     ] = None
     strict: Annotated[bool, Option("Exit code 1 also for a wait that timed out.")] = False
     allow_outside: Annotated[bool, Option("Permit files outside the folder of the description.")] = False
@@ -63,7 +63,7 @@ class WorldRunOptions(OptionGroup):
 
     @property
     def moment(self) -> Nanos | None:
-        """The moment of a session to continue from. Raises `Misuse`."""
+        """The moment of a recording to continue from. Raises `Misuse`."""
         from steptwin.files.timedinputs import parse_duration
 
         return None if self.from_ is None else parse_duration(self.from_, "--from")

@@ -67,7 +67,7 @@ class GatewayClient:
         """``needed``: the role for it, if not that of its name. A raw request is answered as the controller does it, also if that
         ignores it. Raises `NotPermitted`, `Misuse`, `Refusal` and `LineFailure`."""
         try:
-            with self.noted(subject, wanted):
+            with self.audited(subject, wanted):
                 name = type_of(wanted).name
                 self.check_role(name, PERMITS[name].role if needed is None else needed)
                 return await _done(subject, wanted)
@@ -77,7 +77,7 @@ class GatewayClient:
             raise
 
     @contextmanager
-    def noted(self, subject: GatewaySubject, wanted: Command) -> Generator[None]:
+    def audited(self, subject: GatewaySubject, wanted: Command) -> Generator[None]:
         """Record a command in the audit log of ``subject``, with what becomes of it within. Who looks is not recorded."""
         outcome, name = "internal", type_of(wanted).name
         try:

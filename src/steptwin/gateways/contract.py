@@ -14,7 +14,7 @@ from steptwin.subject.contract import AsyncSubject
 from steptwin.subject.jogs import ExtendableJog
 
 
-class PastValue(NamedTuple):
+class HistoryValue(NamedTuple):
     """A value that held from a moment on; None: it was not known."""
 
     at: datetime
@@ -31,10 +31,10 @@ class OpenGateway(NamedTuple):
     gateway: Gateway
 
 
-class PastValues(Protocol):
+class HistoryValues(Protocol):
     """The values that a history has kept."""
 
-    async def values(self, point: str, begin: datetime | None, end: datetime | None, most: int | None) -> list[PastValue]:
+    async def values(self, point: str, begin: datetime | None, end: datetime | None, most: int | None) -> list[HistoryValue]:
         """Values of ``CONTROLLER.POINT``, oldest first: the one at ``begin``, the others up to ``end``; at most ``most``.
 
         Raises `Misuse` for what has not been kept, `LineFailure`.
@@ -51,7 +51,7 @@ class GatewaySubject(AsyncSubject, Protocol):
         ...
 
     @property
-    def past(self) -> PastValues | None:
+    def history(self) -> HistoryValues | None:
         """None where no history is kept."""
         ...
 

@@ -62,7 +62,7 @@ class JogLeases:
         """
         lease = self._leases.get((wanted.controller, wanted.axis))
         is_new = lease is None or not lease.is_of(owner, wanted)
-        with client.noted(self._subject, wanted) if is_new else nullcontext():
+        with client.audited(self._subject, wanted) if is_new else nullcontext():
             client.check(wanted)
             await self._jog(owner, wanted, lease_s)
 

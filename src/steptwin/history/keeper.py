@@ -16,10 +16,10 @@ from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.points import registers_by_controller
 from steptwin.history.database import read_url, shown
 from steptwin.history.options import HistorySpec
-from steptwin.history.past import KeptValues
 from steptwin.history.recorder import Recorder, WallAndSteady
 from steptwin.history.rows import RowBatch, RunHead
 from steptwin.history.spool import Spool
+from steptwin.history.storedvalues import StoredValues
 from steptwin.history.writer import HistoryWriter
 from steptwin.messages import Message
 from steptwin.simulation.describe.servicetables import HISTORY
@@ -38,7 +38,7 @@ class HistoryKeeper:
         self._subject = subject
         self._notice: Callable[[str], object] = lambda _: None
         self._url = read_url(spec.database, folder)
-        self.past = KeptValues(self._url)
+        self.history = StoredValues(self._url)
         """The values that it has kept."""
         self._folder = folder / (spec.spool or f"{subject.description.name}.spool")
         self._recorder: Recorder | None = None
@@ -112,10 +112,10 @@ class HistoryKeeper:
             self._has_room = False
         return lost
 
-    def note(self, entry: Entry) -> None:
+    def log(self, entry: Entry) -> None:
         """Keep a command that the audit log has been told."""
         if self._recorder is not None:
-            self._recorder.note(entry)
+            self._recorder.log(entry)
 
     @property
     def url(self) -> str:

@@ -1,8 +1,8 @@
 """Reading of a history: runs, points, values as arrays of numpy, events.
 
-with HistoryDatabase("sqlite:///h.db") as past:
-    run = past.runs()[-1]
-    series = past.series("table.M1.position", begin=run.began, end=run.ended, every_s=0.01)
+with HistoryDatabase("sqlite:///h.db") as history:
+    run = history.runs()[-1]
+    series = history.series("table.M1.position", begin=run.began, end=run.ended, every_s=0.01)
 """
 
 from __future__ import annotations

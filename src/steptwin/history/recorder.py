@@ -270,7 +270,7 @@ class Recorder:
         for name in self._due(events, now):
             self._take_sample(await self._sampler.present(name), now, wall)
 
-    def note(self, entry: Entry) -> None:
+    def log(self, entry: Entry) -> None:
         """Keep a command, with who gave it and what became of it."""
         content = json.dumps(entry.plain(), ensure_ascii=False, separators=(",", ":"))
         controller = str(entry.fields.get("controller") or "")

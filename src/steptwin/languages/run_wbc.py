@@ -191,14 +191,14 @@ class RunWatch(ProgramWatch):
         device = world.mic488[NAME].device
         super().__init__(device, world.parts.scheduler_of[NAME], NAME)
         for event in device.events:  # those of power-on
-            self._tell(event.time, event.code, event.text)
+            self._emit(event.time, event.code, event.text)
         world.trace.watchers.append(self._recorded)
 
     def _recorded(self, record: TraceRecord) -> None:
         if record.kind == "event" and record.controller == NAME:
-            self._tell(record.time, record.subject, str(record.value), self._caused(record.time))
+            self._emit(record.time, record.subject, str(record.value), self._caused(record.time))
         elif record.kind == "event" and record.subject == NOTE:
-            self._tell(record.time, "input", str(record.value))
+            self._emit(record.time, "input", str(record.value))
 
     def has_ended(self, due: Nanos | None) -> bool:
         return due is None and self.device.program.state is ProgramState.STOPPED

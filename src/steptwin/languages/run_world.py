@@ -17,7 +17,7 @@ from steptwin.controller import SECOND, Nanos
 from steptwin.controllerstate import ControllerState
 from steptwin.durations import duration
 from steptwin.errors import Misuse
-from steptwin.files import session as sessions
+from steptwin.files import recording as recordings
 from steptwin.files.beginning import begin_world, set_faults
 from steptwin.files.coverage import CoverageReports
 from steptwin.files.export import axis_views, bar, write_trace
@@ -36,7 +36,7 @@ from steptwin.simulation.world.references import check_step
 from steptwin.simulation.world.unfinished import unchanged_inputs, waiting
 
 USUAL_LIMIT_NS: Nanos = 60 * SECOND
-SESSION = "session.json"
+RECORDING = "session.json"
 INTERRUPTED = "Ctrl-C"
 JSON_VERSION = 1
 MOST_WAITS = 20
@@ -53,7 +53,7 @@ class WorldRun:
     """
 
     world: Path
-    """A description, or a session to continue."""
+    """A description, or a recording to continue."""
     run: WorldRunOptions = field(default_factory=WorldRunOptions)
     shown: ShownOptions = field(default_factory=ShownOptions)
     limit: Nanos | None = None
@@ -118,14 +118,14 @@ def _run_and_report(world: World, options: WorldRun, reports: CoverageReports, o
     verdicts = [one.verdict() for one in properties]
     measures = {name: value for one in properties for name, value in one.measures().items()}
     written = _write(world, options)
-    session = sessions.session_of(world)
+    recording = recordings.recording_of(world)
     if options.run.session is not None:
-        sessions.save(session, options.run.session)
+        recordings.save(recording, options.run.session)
         written.append(options.run.session)
     tables: list[str] = []
     written += reports.write(tables.append)
     in_vain = options.until if reason is None else None
-    outcome = WorldRunResult(began, known, reason, in_vain, wall_s, session.digest, written, verdicts, measures)
+    outcome = WorldRunResult(began, known, reason, in_vain, wall_s, recording.digest, written, verdicts, measures)
     if options.as_json:
         _json(world, outcome, out)
     else:
@@ -213,8 +213,8 @@ def _write(world: World, options: WorldRun) -> list[Path]:
         return []
     written = _write_trace(world, options.trace)
     if options.trace.is_dir():
-        where = options.trace / SESSION
-        sessions.save(sessions.session_of(world), where)
+        where = options.trace / RECORDING
+        recordings.save(recordings.recording_of(world), where)
         written.append(where)
     return written
 
@@ -359,21 +359,21 @@ def _json(world: World, outcome: WorldRunResult, out: Print) -> None:
 
 
 def replay(path: Path, trace: Path | None, out: Print, warn: Print, *, as_json: bool = False) -> bool:
-    """Run a session again. Returns whether the result was the same. Raises `Misuse` for a file that is not a session."""
-    session = sessions.load(path)
-    world = session.replay()
+    """Run a recording again. Returns whether the result was the same. Raises `Misuse` for a file that is not a recording."""
+    recording = recordings.load(path)
+    world = recording.replay()
     digest = world.trace.digest()
-    is_same = digest == session.digest
+    is_same = digest == recording.digest
     written = [] if trace is None else _write_trace(world, trace)
     if as_json:
         data = {
             "same": is_same,
             "digest": digest,
-            "recorded_digest": session.digest,
-            "recorded_by": session.version,
+            "recorded_digest": recording.digest,
+            "recorded_by": recording.version,
             "world": world.spec.name,
             "time_s": world.time,
-            "inputs": len(session.inputs),
+            "inputs": len(recording.inputs),
             "files": [str(each) for each in written],
         }
         out(json.dumps(data, ensure_ascii=False, indent=2))
@@ -381,8 +381,8 @@ def replay(path: Path, trace: Path | None, out: Print, warn: Print, *, as_json: 
     for each in written:
         out(f"wrote {each}")
     if is_same:
-        out(f"{world.time:g} s of {world.spec.name}, {len(session.inputs)} inputs: the same, digest {digest}")
+        out(f"{world.time:g} s of {world.spec.name}, {len(recording.inputs)} inputs: the same, digest {digest}")
     else:
-        recorded = f"recorded {session.digest} (steptwin {session.version})"
+        recorded = f"recorded {recording.digest} (steptwin {recording.version})"
         warn(f"{path}: the run differs from the recorded one: digest {digest}, {recorded}")
     return is_same

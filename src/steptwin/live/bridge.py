@@ -16,12 +16,12 @@ from steptwin.devices.device import RECONNECT_S, DeviceSurroundings
 from steptwin.errors import LineFailure
 from steptwin.eventloop import result_of
 from steptwin.files.auditfile import audit_into, wall_clock
-from steptwin.gateways.contract import PastValues
+from steptwin.gateways.contract import HistoryValues
 from steptwin.gateways.sampling import SharedSamples
 from steptwin.inputfiles import read_bytes
 from steptwin.later import start
 from steptwin.live.devicefile import DeviceFile, DeviceSpec, read_device_file
-from steptwin.live.gateways import open_gateways, recording
+from steptwin.live.gateways import command_log_of, open_gateways
 from steptwin.live.keptsettings import keep_settings
 from steptwin.live.options import LogOptions
 from steptwin.live.server import Server
@@ -68,7 +68,7 @@ async def _open(server: Server, wanted: DeviceFile, file: Path, audit: Audit | N
     devices = _Devices(wanted.name, subject, connections)
     if audit is None and wanted.services.history is not None:
         audit = Audit(wall_clock)
-    devices.audit = recording(audit, now)
+    devices.audit = command_log_of(audit, now)
     await open_gateways(server, wanted.services, file.parent, devices, audit, listen_any=listen_any)
 
 
@@ -104,7 +104,7 @@ class _Devices:
     """Devices for gateways. See `steptwin.gateways.contract.GatewaySubject`."""
 
     def __init__(self, name: str, subject: CompositeSubject, connections: DeviceConnections) -> None:
-        self.past: PastValues | None = None
+        self.history: HistoryValues | None = None
         self.audit: CommandLog | None = None
         self._name = name
         self._subject = subject

@@ -20,9 +20,9 @@ from steptwin.debug.lookahead import Goal
 from steptwin.debug.observer import Logged
 from steptwin.debug.values import DataPoint, Events, LabelPoint, LinePoint, SetPoint, ShownValue, Stopped, StopReason
 from steptwin.errors import Misuse, Refusal, SteptwinError
-from steptwin.live.lookback import PART_S, Lookback, take_back
 from steptwin.live.pace import Pace
 from steptwin.live.realtimedriver import RealTimeDriver
+from steptwin.live.timetravel import PART_S, WorldTimeTravel, take_back
 from steptwin.live.world import LiveWorld
 from steptwin.messages import NONE, Message, text_of
 from steptwin.simulation.world.inputs import Download
@@ -229,11 +229,11 @@ class _OpenDebugger:
         self._pace = pace
         self._on_new_text = on_new_text
         self._numbers = numbers
-        self._lookback = Lookback(live, realtime, pace) if live.history is None else None
+        self._time_travel = WorldTimeTravel(live, realtime, pace) if live.snapshots is None else None
         try:
-            self.debugger = Debugger(live.world, live.history, live.apply_input, self._take_back)
+            self.debugger = Debugger(live.world, live.snapshots, live.apply_input, self._take_back)
         except SteptwinError:
-            self._end_lookback()
+            self._end_time_travel()
             raise
         self.debugger.on_log = self._log
         self._goal = Goal()
@@ -268,13 +268,13 @@ class _OpenDebugger:
         self._live.run_control = None
         self._live.world.input_watchers.remove(self._given)
         self.debugger.close()
-        self._end_lookback()
+        self._end_time_travel()
         self._live.is_dirty = True
         self._realtime.leave()
 
-    def _end_lookback(self) -> None:
-        if self._lookback is not None:
-            self._lookback.end()
+    def _end_time_travel(self) -> None:
+        if self._time_travel is not None:
+            self._time_travel.end()
 
     def _given(self, given: RecordedInput) -> None:
         if isinstance(given.what, Download):

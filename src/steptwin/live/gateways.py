@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Protocol
 from steptwin.access.audit import Audit, CommandLog
 from steptwin.controller import Nanos
 from steptwin.extras import libraries_of, missing
-from steptwin.gateways.contract import GatewaySubject, OpenGateway, PastValues
+from steptwin.gateways.contract import GatewaySubject, HistoryValues, OpenGateway
 from steptwin.gateways.kinds import make_gateway
 from steptwin.gateways.sampling import SharedSamples
 from steptwin.history.options import HistorySpec
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 class KeptSubject(GatewaySubject, Protocol):
     """A subject that gets its history."""
 
-    past: PastValues | None
+    history: HistoryValues | None
     audit: CommandLog | None
 
 
@@ -71,9 +71,9 @@ async def open_gateways(
         details = await keeper.open(listen_any=listen_any, notice=server.notice)
         server.join(keeper, EndPoint(HISTORY, str(details["url"]), keeper.protocol, details))
         opened.append(OpenGateway(HISTORY, str(details["url"]), keeper))
-        subject.past = keeper.past
+        subject.history = keeper.history
         if audit is not None:
-            audit.watchers.append(keeper.note)
+            audit.watchers.append(keeper.log)
     with without_collections():
         for spec in services.gateways:
             gateway = make_gateway(spec, subject, folder)
@@ -92,7 +92,7 @@ def _make_keeper(spec: HistorySpec, subject: GatewaySubject, folder: Path) -> Hi
     return HistoryKeeper(spec, subject, folder)
 
 
-def recording(audit: Audit | None, now: Callable[[], Nanos]) -> CommandLog | None:
+def command_log_of(audit: Audit | None, now: Callable[[], Nanos]) -> CommandLog | None:
     """Log of commands of gateways that enters them into ``audit``, at the moment that ``now`` gives."""
     if audit is None:
         return None
@@ -103,7 +103,7 @@ class LiveWorldSubject:
     """A live world for gateways: it answers at once."""
 
     def __init__(self, control: WorldControl, live: LiveWorld) -> None:
-        self.past: PastValues | None = None
+        self.history: HistoryValues | None = None
         self.audit: CommandLog | None = None
         self._control = control
         self._live = live
@@ -118,10 +118,10 @@ class LiveWorldSubject:
 
     async def do(self, wanted: Command, /) -> Result:
         name = type_of(wanted).name
-        with span(f"twin {name}", {"command": name}, is_part=True) as noted:
+        with span(f"twin {name}", {"command": name}, is_part=True) as traced_span:
             result = self._control.do(wanted)
-            noted.note("time_ns", result.time)
-            noted.note("number", result.number)
+            traced_span.set_attribute("time_ns", result.time)
+            traced_span.set_attribute("number", result.number)
         return result
 
     async def begin_jog(self, wanted: Jog, /) -> ExtendableJog:

@@ -109,14 +109,14 @@ class UpOptions:
     """A world in real time, as the commands `up`, `serve` and `studio` run it."""
 
     world: Path | None
-    """A description, or a session to continue; None for a world made from options."""
+    """A description, or a recording to continue; None for a world made from options."""
     run: WorldRunOptions = field(default_factory=WorldRunOptions)
     live: LiveOptions = field(default_factory=LiveOptions)
     shown: ShownOptions = field(default_factory=ShownOptions)
     log: LogOptions = field(default_factory=LogOptions)
     ready_file: Path | None = None
     keeps_inputs: bool = False
-    """Whether a session is recorded that is only written on request."""
+    """Whether the world is recorded, to be written on request only."""
     past: bool = False
     """Whether the past is kept, for questions about it."""
     coverage: tuple[str, ...] = ()
@@ -127,5 +127,5 @@ class UpOptions:
     """Whether nothing is open for other programs: neither lines nor the control endpoint."""
 
     @property
-    def records_session(self) -> bool:
+    def is_recorded(self) -> bool:
         return self.keeps_inputs or self.run.session is not None

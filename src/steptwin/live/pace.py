@@ -1,6 +1,6 @@
-"""Control of the time of a live world: pause, step, another speed, and saving the session.
+"""Control of the time of a live world: pause, step, another speed, and saving the recording.
 
-The world is not affected, because its time only advances later: a session replays independently of its pace.
+The world is not affected, because its time only advances later: a recording replays independently of its pace.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.fields import FASTEST, SLOWEST
-from steptwin.files import session as sessions
-from steptwin.files.beginning import check_session_target, is_session
+from steptwin.files import recording as recordings
+from steptwin.files.beginning import check_recording_target, is_recording
 from steptwin.files.export import axis_views, check_target, write_trace
 from steptwin.files.textfiles import check_folder
 from steptwin.live.realtimedriver import RealTimeDriver
@@ -68,7 +68,7 @@ SPEED_MAX_WITH_CLIENTS = Message(
 FILE_IS_NOT_ABSOLUTE = Message("live.file-is-not-absolute", "file = {file!r}: must be the absolute path of a file")
 NO_LAST_RECORDS = Message(
     "live.no-last-records",
-    "{path}: this world does not keep its last records: start it with --trace 'ring 10000'; for a session, name the file "
+    "{path}: this world does not keep its last records: start it with --trace 'ring 10000'; for a recording, name the file "
     "NAME.json",
 )
 
@@ -283,14 +283,14 @@ class Pace:
         path = Path(wanted.file)
         if not path.is_absolute():
             raise Misuse(FILE_IS_NOT_ABSOLUTE(file=wanted.file))
-        if not is_session(path):
+        if not is_recording(path):
             return self._save_ring(path)
-        check_session_target(path)
+        check_recording_target(path)
         check_folder(path)
         self._realtime.enter()
-        session = self._live.session()
-        sessions.save(session, path)
-        return {**self.where(), "file": wanted.file, "inputs": len(session.inputs), "digest": session.digest}
+        recording = self._live.recording()
+        recordings.save(recording, path)
+        return {**self.where(), "file": wanted.file, "inputs": len(recording.inputs), "digest": recording.digest}
 
     def _save_ring(self, path: Path) -> object:
         """The last records, in the format of the file's suffix."""

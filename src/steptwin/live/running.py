@@ -16,9 +16,9 @@ from typing import TypeAlias
 from steptwin.access.audit import Audit
 from steptwin.controller import Nanos, SendingPort
 from steptwin.errors import Misuse
-from steptwin.files import session as sessions
+from steptwin.files import recording as recordings
 from steptwin.files.auditfile import wall_clock
-from steptwin.files.beginning import begin_world, check_session_target, is_session, set_faults
+from steptwin.files.beginning import begin_world, check_recording_target, is_recording, set_faults
 from steptwin.files.coverage import CoverageReports
 from steptwin.files.export import axis_views, check_target, growing_file, read_trace, write_trace
 from steptwin.files.export.tracefile import Kept, Ring, TraceFile, read_kept
@@ -26,8 +26,7 @@ from steptwin.files.world import World
 from steptwin.gateways.contract import OpenGateway
 from steptwin.live.clock import Clock
 from steptwin.live.display import Display, Lines, Notices, banner, remarks_on
-from steptwin.live.gateways import LiveWorldSubject, open_gateways, recording
-from steptwin.live.lookback import Lookback
+from steptwin.live.gateways import LiveWorldSubject, command_log_of, open_gateways
 from steptwin.live.options import UpOptions
 from steptwin.live.output import Output
 from steptwin.live.pace import Pace, read_speed
@@ -35,6 +34,7 @@ from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.rfc2217 import TwinLine
 from steptwin.live.server import Server, clear_ready_file
 from steptwin.live.serving import check_name, shows_live_view
+from steptwin.live.timetravel import WorldTimeTravel
 from steptwin.live.tracedport import TracedPort
 from steptwin.live.transports import TRANSPORTS, VISION
 from steptwin.live.world import LiveWorld, PlacePort, VisionPort, announced
@@ -73,7 +73,7 @@ def up(options: UpOptions, addition: Addition | None = None) -> bool:
     Raises `Misuse` or another `SteptwinError` with a text for the user.
     """
     if options.world is None:
-        raise Misuse("a world is missing: give its description (.toml) or a session (.json)")
+        raise Misuse("a world is missing: give its description (.toml) or a recording (.json)")
     check_name(options.live.name or options.world.stem)
     read_speed(options.live.speed, least=0)
     with begin_world(
@@ -82,8 +82,8 @@ def up(options: UpOptions, addition: Addition | None = None) -> bool:
         moment=options.run.moment,
         seed=options.run.seed,
         overrides=options.run.overrides,
-        keep_trace=options.live.trace not in (None, "off") or not is_session(options.world),
-        keep_inputs=options.records_session,
+        keep_trace=options.live.trace not in (None, "off") or not is_recording(options.world),
+        keep_inputs=options.is_recorded,
         allow_outside=options.run.allow_outside,
         state=options.run.state,
     ) as world:
@@ -100,7 +100,7 @@ def up_with(world: World, options: UpOptions, addition: Addition | None = None) 
     kept = read_kept(options.live.trace or world.spec.trace or "off")
     if kept is None:
         world.trace.let_go()
-        if not options.records_session:
+        if not options.is_recorded:
             world.stop_recording()
     set_faults(world, options.run.fault)
     reports = CoverageReports(options.coverage)
@@ -115,7 +115,7 @@ def up_with(world: World, options: UpOptions, addition: Addition | None = None) 
     if isinstance(kept, Path):
         check_target(kept)
     if options.run.session is not None:
-        check_session_target(options.run.session)
+        check_recording_target(options.run.session)
     if options.ready_file is not None:
         clear_ready_file(options.ready_file)
     asyncio.run(_serve(replace(options, live=replace(options.live, name=name)), world, past, kept, reports, addition))
@@ -123,7 +123,7 @@ def up_with(world: World, options: UpOptions, addition: Addition | None = None) 
 
 
 def send_away(world: World) -> None:
-    """Disconnect the clients of a continued session: they are not connected now."""
+    """Disconnect the clients of a continued recording: they are not connected now."""
     for line in world.lines.values():
         for place in [place for place in line.places if place != SCRIPTS]:
             world.apply_input(Leave(line.name, place))
@@ -192,13 +192,14 @@ def _recorder(live: LiveWorld, kept: Kept) -> TraceFile | None:
 def _keep(
     options: UpOptions, live: LiveWorld, output: Output, recorder: TraceFile | None, kept: Kept, reports: CoverageReports
 ) -> None:
-    """Write session, trace and coverage at the end: the session first, because a trace can be made from it. Raises `Misuse`."""
+    """Write recording, trace and coverage at the end: the recording first, because a trace can be made from it. Raises
+    `Misuse`."""
     world = live.world
     world.advance(world.now)
     world.sync_all()
     failures: list[str] = []
-    session = options.run.session
-    writing: list[Callable[[], list[Path]]] = [] if session is None else [partial(_write_session, session, live)]
+    recording = options.run.session
+    writing: list[Callable[[], list[Path]]] = [] if recording is None else [partial(_write_recording, recording, live)]
     if recorder is not None and isinstance(kept, Path):
         writing.append(partial(_write_trace, recorder, kept, world.now))
     writing.append(partial(reports.write, output.line))
@@ -209,15 +210,15 @@ def _keep(
         except Misuse as error:
             failures.append(str(error))
     ended = "" if world.stopped is None else f", ended by: {world.stopped}"
-    inputs = f", {len(live.session().inputs)} inputs" if options.run.session is not None else ""
+    inputs = f", {len(live.recording().inputs)} inputs" if options.run.session is not None else ""
     digest = f", digest {world.trace.digest()}" if world.trace.is_recorded else ""
     output.line(f"ran for {world.time:.3f} s{inputs}{ended}{digest}")
     if failures:
         raise Misuse("\n".join(failures))
 
 
-def _write_session(where: Path, live: LiveWorld) -> list[Path]:
-    sessions.save(live.session(), where)
+def _write_recording(where: Path, live: LiveWorld) -> list[Path]:
+    recordings.save(live.recording(), where)
     return [where]
 
 
@@ -243,11 +244,11 @@ async def _open(server: Server, live: LiveWorld, pace: Pace, options: UpOptions,
     services = read_services(live.world.spec.text)
     if options.audit is None and services.history is not None:
         options = replace(options, audit=Audit(wall_clock))
-    server.audit = recording(options.audit, lambda: live.world.now)
+    server.audit = command_log_of(options.audit, lambda: live.world.now)
     if not options.is_closed:
         await _open_for_others(server, live, control, options)
     if options.past:
-        server.join(Lookback(live, server.realtime, pace))
+        server.join(WorldTimeTravel(live, server.realtime, pace))
     running = Running(server, live, pace, control)
     if addition is not None:
         await addition(running)

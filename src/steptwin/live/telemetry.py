@@ -53,7 +53,7 @@ def traces_to(processor: SpanProcessor, subject: str) -> Generator[None]:
         with tracer.start_as_current_span(
             name, attributes={f"steptwin.{key}": value for key, value in attributes.items()}
         ) as made:
-            yield _NotedSpan(made)
+            yield _OpenTelemetrySpan(made)
 
     try:
         with traced_by(span):
@@ -62,11 +62,11 @@ def traces_to(processor: SpanProcessor, subject: str) -> Generator[None]:
         provider.shutdown()
 
 
-class _NotedSpan:
+class _OpenTelemetrySpan:
     def __init__(self, span: SdkSpan) -> None:
         self._span = span
 
-    def note(self, name: str, value: Attribute) -> None:
+    def set_attribute(self, name: str, value: Attribute) -> None:
         self._span.set_attribute(f"steptwin.{name}", value)
 
 

@@ -37,10 +37,10 @@ class TracedPort:
 
     def exchange(self, data: bytes, now: Nanos) -> bytes:
         known = {"line": self._line, "source": self._source, "request": data.hex()}
-        with span(f"line {self._line}", known) as noted:
+        with span(f"line {self._line}", known) as traced_span:
             answer = self._port.exchange(data, now)
-            noted.note("answer", answer.hex())
-            noted.note("time_ns", now)
+            traced_span.set_attribute("answer", answer.hex())
+            traced_span.set_attribute("time_ns", now)
         return answer
 
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
@@ -61,9 +61,9 @@ class _TracedDevice:
 
     def execute(self, pdu: bytes, now: Nanos) -> bytes:
         known = {"controller": self._name, "unit": self._unit, "function": pdu[0], "time_ns": now}
-        with span(f"device {self._name}", known) as noted:
+        with span(f"device {self._name}", known) as traced_span:
             answer = self._execute(pdu, now)
-            noted.note("outcome", "refusal" if answer and answer[0] >= REFUSED else "done")
+            traced_span.set_attribute("outcome", "refusal" if answer and answer[0] >= REFUSED else "done")
         return answer
 
 

@@ -1,4 +1,4 @@
-"""Questions about a world that goes on in real time (`steptwin.why.kept`)."""
+"""Questions about a world that goes on in real time (`steptwin.why.pastquestions`)."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from time import perf_counter
 
 from steptwin.errors import Refusal, SteptwinError
 from steptwin.later import Later
-from steptwin.live.lookback import PART_S
+from steptwin.live.timetravel import PART_S
 from steptwin.live.world import LiveWorld
 from steptwin.messages import Message
-from steptwin.simulation.world.history import History
+from steptwin.simulation.world.snapshotlog import SnapshotLog
 from steptwin.subject.debugcommands import AskWhy as Wanted
-from steptwin.why.kept import PastQuestions
+from steptwin.why.pastquestions import PastQuestions
 from steptwin.why.question import Asking
 
 MOST_QUESTIONS = 16
@@ -31,12 +31,12 @@ class LiveWhy:
         self._live = live
         self._waiting: list[tuple[Wanted, Later[object]]] = []
         self._asking: Asking | None = None
-        self._past: tuple[History, PastQuestions] | None = None
+        self._past: tuple[SnapshotLog, PastQuestions] | None = None
         self._timer: asyncio.TimerHandle | None = None
 
     def ask(self, wanted: Wanted) -> Later[object]:
         """The answer as plain data. Raises `Refusal` where no past is kept, and for too many questions at once."""
-        if self._live.history is None:
+        if self._live.snapshots is None:
             raise Refusal(NO_PAST())
         if len(self._waiting) >= MOST_QUESTIONS:
             raise Refusal(TOO_MANY_QUESTIONS(most=MOST_QUESTIONS))
@@ -79,9 +79,9 @@ class LiveWhy:
 
     def _kept_past(self) -> PastQuestions:
         """Raises `Refusal` where no past is kept any more."""
-        history = self._live.history
-        if history is None:
+        snapshots = self._live.snapshots
+        if snapshots is None:
             raise Refusal(NO_PAST())
-        if self._past is None or self._past[0] is not history:
-            self._past = history, PastQuestions(history)
+        if self._past is None or self._past[0] is not snapshots:
+            self._past = snapshots, PastQuestions(snapshots)
         return self._past[1]

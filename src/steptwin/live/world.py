@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol
 
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse, Refusal
-from steptwin.files import session as sessions
+from steptwin.files import recording as recordings
 from steptwin.files.export.tracefile import Ring
 from steptwin.files.world import World
 from steptwin.live.realtimedriver import RealTimeDriver
@@ -20,10 +20,10 @@ from steptwin.simulation.kinds.lines import LineEndPoint
 from steptwin.simulation.kinds.registry import line_kinds
 from steptwin.simulation.scheduler.runqueue import Deadlines
 from steptwin.simulation.scheduler.scheduler import Scheduler
-from steptwin.simulation.world.history import History
 from steptwin.simulation.world.inputs import Bytes, ExternalInput, Leave, See, size_of
 from steptwin.simulation.world.model import WORLD
 from steptwin.simulation.world.snapshot import SimulationSnapshot
+from steptwin.simulation.world.snapshotlog import SnapshotLog
 from steptwin.subject.payloads import StatusPayload
 from steptwin.subject.world import WorldSubject
 from steptwin.tracing import is_traced
@@ -33,7 +33,7 @@ MOST_PASSED = 100
 """Stops of scripts that are passed in one advance; a script that stops once more does so for good."""
 MOST_INPUTS = 200_000
 MOST_INPUT_BYTES = 16 << 20
-"""Size at which a recorded session ends, so that memory and file stay bounded."""
+"""Size at which a recording ends, so that memory and file stay bounded."""
 
 
 def announced(world: World) -> list[dict[str, object]]:
@@ -47,8 +47,8 @@ def announced(world: World) -> list[dict[str, object]]:
     return found
 
 
-class RecordedSession(NamedTuple):
-    """How much of a session is recorded so far."""
+class RecordedExtent(NamedTuple):
+    """How much is recorded so far."""
 
     until: Nanos
     inputs: int
@@ -95,9 +95,7 @@ TRACE_FILE_CANNOT_GO_BACK = Message(
 )
 AXIS_IS_JOGGED = Message("live.axis-is-jogged", "an axis is being jogged: end the jog first")
 SCRIPT_ENDS_THE_RUN = Message("live.script-ends-the-run", "a script would end the run here: {reason}")
-NO_SESSION_IS_RECORDED = Message(
-    "live.no-session-is-recorded", "this world does not record a session: start it with --session FILE"
-)
+NOTHING_IS_RECORDED = Message("live.nothing-is-recorded", "this world is not recorded: start it with --session FILE")
 
 
 class LiveWorld:
@@ -108,7 +106,7 @@ class LiveWorld:
         self.show = show
         """Called with notices for the user."""
         self._recorded_bytes = sum(size_of(given.what) for given in world.inputs)
-        self._full: sessions.Session | None = None
+        self._full: recordings.Recording | None = None
         self.is_dirty = True
         """Whether the deadline must be computed again, because something may have happened."""
         self._next: Nanos | None = None
@@ -117,7 +115,7 @@ class LiveWorld:
         world.watch_schedulers(self._changed)
         self.ring: Ring | None = None
         """The ring of last records, if kept."""
-        self.history: History | None = None
+        self.snapshots: SnapshotLog | None = None
         """Its past, if kept."""
         self.subject = WorldSubject(world, self.apply_input)
         self.trace_file: Path | None = None
@@ -149,25 +147,25 @@ class LiveWorld:
     # ------------------------------------------------------------------ what comes from outside
 
     def apply_input(self, what: ExternalInput) -> None:
-        """Apply an input at the present moment; it is recorded if there is a session. Raises `Misuse`."""
+        """Apply an input at the present moment; it is recorded if the world is. Raises `Misuse`."""
         self.make_room(what)
         self.world.apply_input(what)
 
     def make_room(self, what: ExternalInput) -> None:
-        """End the session if it has no room for one more input."""
+        """End the recording if it has no room for one more input."""
         world = self.world
         if world.keeps_inputs:
             if len(world.inputs) >= MOST_INPUTS or self._recorded_bytes >= MOST_INPUT_BYTES:
-                self._end_session()
+                self._end_recording()
             else:
                 self._recorded_bytes += size_of(what)
 
-    def _end_session(self) -> None:
+    def _end_recording(self) -> None:
         world = self.world
-        self._full = sessions.session_of(world)
+        self._full = recordings.recording_of(world)
         world.keeps_inputs = False
         world.inputs.clear()
-        self.show(f"the session is full and ends at {world.time:g} s, after {len(self._full.inputs)} inputs")
+        self.show(f"the recording is full and ends at {world.time:g} s, after {len(self._full.inputs)} inputs")
 
     def go_back(self, snapshot: SimulationSnapshot, name: str | None) -> None:
         """Go back to a state, under its name where it has one.
@@ -194,28 +192,28 @@ class LiveWorld:
                 self.apply_input(Leave(line.name, place))
         for port in list(self.ports):
             port.join()
-        if self.history is not None:
-            self.history.gone_back()
+        if self.snapshots is not None:
+            self.snapshots.gone_back()
         if self.run_control is not None:
             self.run_control.restored()
         self.is_dirty = True
 
-    def session(self) -> sessions.Session:
-        """The session up to now, or to the moment at which it was full. Raises `Misuse` if none is recorded."""
+    def recording(self) -> recordings.Recording:
+        """The recording up to now, or to the moment at which it was full. Raises `Misuse` if there is none."""
         if self._full is not None:
             return self._full
         if not self.world.keeps_inputs:
-            raise Misuse(NO_SESSION_IS_RECORDED())
-        return sessions.session_of(self.world)
+            raise Misuse(NOTHING_IS_RECORDED())
+        return recordings.recording_of(self.world)
 
     @property
-    def recorded(self) -> RecordedSession | None:
-        """How much there is of the session; None if none is recorded."""
+    def recorded(self) -> RecordedExtent | None:
+        """How much is recorded so far; None if nothing is."""
         if self._full is not None:
-            return RecordedSession(self._full.until, len(self._full.inputs), self._recorded_bytes, is_full=True)
+            return RecordedExtent(self._full.until, len(self._full.inputs), self._recorded_bytes, is_full=True)
         if not self.world.keeps_inputs:
             return None
-        return RecordedSession(self.now, len(self.world.inputs), self._recorded_bytes, is_full=False)
+        return RecordedExtent(self.now, len(self.world.inputs), self._recorded_bytes, is_full=False)
 
     def traffic(self) -> list[dict[str, object]]:
         """Traffic of each line: the programs that are connected, and what has been sent, as JSON."""
@@ -394,7 +392,7 @@ class PlacePort:
         place = self._places.get(self._name)
         if place is None or place.on_output is None:
             place = self._connected()
-        if world.notes_inputs or world.trace.is_recorded:
+        if world.records_inputs or world.trace.is_recorded:
             answer = self._recorded(place, data, now)
         else:
             answer = self._line.exchange(self._name, place, data, now)
@@ -404,7 +402,7 @@ class PlacePort:
         return answer
 
     def _recorded(self, place: LineEndPoint, data: bytes, now: Nanos) -> bytes:
-        """An exchange that is recorded in session and trace, unless it changes nothing."""
+        """An exchange that is recorded in recording and trace, unless it changes nothing."""
         world, line = self._live.world, self._line
         if line.is_idle_read(place, data):
             return line.exchange_unrecorded(self._name, place, data, now)
@@ -412,7 +410,7 @@ class PlacePort:
         if world.keeps_inputs:
             self._live.make_room(given)
         answer = line.exchange(self._name, place, data, now)
-        world.note(given)
+        world.record_input(given)
         return answer
 
     def _with_the_rest(self, place: LineEndPoint, answer: bytes, now: Nanos) -> bytes:

@@ -1,8 +1,8 @@
 """The editor server: `steptwin lsp` speaks the Language Server Protocol.
 
-`steptwin.lsp.session` is what a client sees, without input and output: open texts and questions about them, in characters of the
-text. `steptwin.lsp.handlers` puts the protocol around it: a function for each message. Each language is an `Analysis` of a text.
-Only `protocol`, `editorserver`, `handlers`, `server`, `stdio`, `messages` and `convert` know the types of the protocol.
+`steptwin.lsp.editorsession` is what a client sees, without input and output: open texts and questions about them, in characters
+of the text. `steptwin.lsp.handlers` puts the protocol around it: a function for each message. Each language is an `Analysis` of a
+text. Only `protocol`, `editorserver`, `handlers`, `server`, `stdio`, `messages` and `convert` know the types of the protocol.
 """
 
 from __future__ import annotations

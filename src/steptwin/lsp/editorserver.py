@@ -21,10 +21,10 @@ from steptwin.diagnostics import Diagnostic, Severity
 from steptwin.lsp.analysis import Analysis
 from steptwin.lsp.answers import TextLocation
 from steptwin.lsp.convert import Converter
+from steptwin.lsp.editorsession import EditorSession
 from steptwin.lsp.files import DiskFiles, Files, normal
 from steptwin.lsp.positions import Encoding
 from steptwin.lsp.protocol import Protocol
-from steptwin.lsp.session import EditorSession
 
 FIRST_DELAY_S = 0.004
 LONGEST_DELAY_S = 0.5

@@ -9,9 +9,9 @@ from steptwin.diagnostics import Diagnostic, Span
 from steptwin.errors import Misuse
 from steptwin.lsp.analysis import Analysis
 from steptwin.lsp.answers import SHARED, CallEdge, CodeAction, Edit, OutlineItem, TextLocation
+from steptwin.lsp.editorsession import EditorSession
 from steptwin.lsp.files import normal
 from steptwin.lsp.letters import has_letters
-from steptwin.lsp.session import EditorSession
 from steptwin.messages import Message, MessageText
 from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
 

@@ -47,7 +47,7 @@ _CAUSE = members(
         "what": {**TEXT, "description": "What failed."},
         "where": {**or_null(TEXT), "description": "The simplest case that fails so, in words."},
         "runs": WHOLE,
-        "session": {**or_null(TEXT), "description": "The simplest run that fails in this way, among the files of the results."},
+        "recording": {**or_null(TEXT), "description": "The simplest run that fails in this way, among the files of the results."},
         "timeline": {**or_null(TEXT), "description": "Of that run."},
     }
 )

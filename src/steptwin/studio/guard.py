@@ -11,8 +11,8 @@ from steptwin.access.rate import RateLimits
 from steptwin.controller import Nanos
 from steptwin.errors import Refusal
 from steptwin.messages import Message
-from steptwin.studio.session import TOO_MANY_REQUESTS
 from steptwin.studio.viewers import AsgiReceive, AsgiScope, AsgiSend
+from steptwin.studio.viewersession import TOO_MANY_REQUESTS
 from steptwin.subject.dispatch import failure
 
 RATE, BURST = 100.0, 400.0

@@ -1,6 +1,6 @@
 """State shared by all viewers: list of viewers, control, dead-man jogs, watched points, streams of events, the clock.
 
-Pure: moments of the wall clock are arguments; sessions (`steptwin.studio.session`) fetch the messages to send.
+Pure: moments of the wall clock are arguments; sessions (`steptwin.studio.viewersession`) fetch the messages to send.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from steptwin.studio.requests import (
     OF_DRAWINGS,
     OF_RECORDINGS,
     OF_SERVICES,
-    OF_THE_PAST,
+    OF_TIME_TRAVEL,
     REQUESTS,
     permit_of,
 )
@@ -218,7 +218,7 @@ class Hub:
         of_subject = [name for name in COMMANDS if name in self.subject.description.commands]
         around = self.around
         needed = (
-            (around.lookback, OF_THE_PAST),
+            (around.time_travel, OF_TIME_TRAVEL),
             (around.recordings, OF_RECORDINGS),
             (around.branches, OF_BRANCHES),
             (around.arrangement, OF_DRAWINGS),

@@ -127,13 +127,13 @@ _ROWS = (
     MessageRow("clock", "The present moment: once a second, and whenever time stands or goes on.", CLOCK),
     MessageRow(
         "past",
-        "The moment of the past that this viewer looks at from now on; null for the present. Events go on as they happen.",
+        "The moment of the past that is shown to this viewer from now on; null for the present. Events go on as they happen.",
         or_null(
             members(
                 {
                     "time_ns": MOMENT,
                     "from_ns": {**MOMENT, "description": "The oldest moment that is kept. [ns]"},
-                    "may": {**_MAY, "description": "Names of requests that can be done while the past is looked at."},
+                    "may": {**_MAY, "description": "Names of requests that can be done while the past is shown."},
                     **_PRESENT,
                 }
             )

@@ -1,4 +1,4 @@
-"""Requests for what is recorded of a world: its session, to be saved, exported and looked at."""
+"""Requests for what is recorded of a world, to be saved, exported and viewed."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Recordings(Protocol):
         ...
 
     def place(self, file: str) -> str:
-        """The absolute path at which the request ``save`` may write ``file``; a session may be there already. Raises `Misuse`
+        """The absolute path at which the request ``save`` may write ``file``; a recording may be there already. Raises `Misuse`
         for a place outside of the folder of the world, `Refusal` for another file."""
         ...
 
@@ -33,7 +33,7 @@ class Recordings(Protocol):
         ...
 
     async def file(self, name: str) -> str:
-        """The path of a saved session, ``NAME.json``, or of what is made of it: ``NAME.vcd``. Raises `Misuse`, `Refusal`."""
+        """The path of a saved recording, ``NAME.json``, or of what is made of it: ``NAME.vcd``. Raises `Misuse`, `Refusal`."""
         ...
 
 
@@ -45,7 +45,7 @@ _SAVED = members(
         "until_ns": MOMENT,
     }
 )
-_SESSION = members(
+_RECORDING = members(
     {
         "until_ns": MOMENT,
         "inputs": WHOLE,
@@ -68,23 +68,23 @@ _TRACE = members(
 )
 _RECORDINGS = members(
     {
-        "session": {**or_null(_SESSION), "description": "Inputs from outside since the beginning; null: none is recorded."},
-        "past": {**or_null(_PAST), "description": "What look can show."},
+        "recording": {**or_null(_RECORDING), "description": "Inputs from outside since the beginning; null: none is recorded."},
+        "past": {**or_null(_PAST), "description": "What show_moment can show."},
         "trace": {**_TRACE, "description": "What happened, as --trace keeps it."},
-        "folder": {**TEXT, "description": "Where sessions are saved."},
+        "folder": {**TEXT, "description": "Where recordings are saved."},
         "saved": {**list_of(_SAVED), "description": "Sessions there, the newest first."},
         "formats": {**list_of(TEXT), "description": "What GET /api/recordings/NAME.FORMAT makes of them."},
     }
 )
 
 
-@request("recordings", LOOK, "What is recorded of the world, and which sessions are saved.", _RECORDINGS)
+@request("recordings", LOOK, "What is recorded of the world, and which recordings are saved.", _RECORDINGS)
 @dataclass(frozen=True, slots=True)
 class ReadRecordings:
     pass
 
 
-@request("save_recording", KEEP, "Save the session up to now as a file beside the world. Nothing changes in the world.", _SAVED)
+@request("save_recording", KEEP, "Save the recording up to now as a file beside the world. Nothing changes in the world.", _SAVED)
 @dataclass(frozen=True, slots=True)
 class SaveRecording:
     name: Annotated[str | None, Meaning("Of the file, without .json; the world and the time of day without.")] = None
@@ -93,12 +93,12 @@ class SaveRecording:
 @request(
     "view_recording",
     KEEP,
-    "Open a saved session as a page of its own, as steptwin studio FILE --view does; at a loopback address only.",
+    "Open a saved recording as a page of its own, as steptwin studio FILE --view does; at a loopback address only.",
     members({"url": TEXT}),
 )
 @dataclass(frozen=True, slots=True)
 class ViewRecording:
-    name: Annotated[str, Meaning("Of a saved session.")]
+    name: Annotated[str, Meaning("Of a saved recording.")]
 
 
 RecordingRequest: TypeAlias = ReadRecordings | SaveRecording | ViewRecording

@@ -147,11 +147,11 @@ class LetGo:
 
 
 @request(
-    "look",
+    "show_moment",
     LOOK,
-    "Look at a moment of the past while the world goes on. The message past and values of all watches follow. Until the "
-    "present is looked at again, state, read, pins, encoders, faults and programs are of that moment, and nothing can be "
-    "changed but by stop.",
+    "Show a moment of the past to this viewer while the world goes on. The message past and values of all watches follow. "
+    "Until the present is shown again, state, read, pins, encoders, faults and programs are of that moment, and nothing can "
+    "be changed but by stop.",
     or_null(members({"time_ns": MOMENT, "from_ns": MOMENT})),
     is_of_connection=True,
 )
@@ -186,7 +186,7 @@ class ReadPastEvents:
 @request(
     "go_back",
     ACT,
-    "The world itself goes back to the moment that this viewer looks at; time stands there. What happened since is undone.",
+    "The world itself goes back to the moment that is shown to this viewer; time stands there. What happened since is undone.",
     is_of_connection=True,
 )
 @dataclass(frozen=True, slots=True)
@@ -262,7 +262,7 @@ class Disconnect:
 @request(
     "traffic",
     LOOK,
-    "How much each line of the world has carried since its beginning. Counted at present, also while the past is looked at.",
+    "How much each line of the world has carried since its beginning. Counted at present, also while the past is shown.",
     members({"time_ns": MOMENT, "lines": list_of(_LINE)}),
 )
 @dataclass(frozen=True, slots=True)
@@ -324,7 +324,7 @@ StudioRequest: TypeAlias = (
     | DeviceRequest
 )
 """In the order in which they are listed. Another request is a class, its place here, and what does it in
-`steptwin.studio.session`."""
+`steptwin.studio.viewersession`."""
 
 
 def _names(union: Any) -> frozenset[str]:
@@ -334,12 +334,12 @@ def _names(union: Any) -> frozenset[str]:
 REQUESTS: Mapping[str, ViewerRequestType] = {one.name: one for one in map(declared, get_args(StudioRequest))}
 ALL: Mapping[str, RequestType] = {**COMMANDS, **REQUESTS}
 """Every request by name."""
-OF_THE_PAST = frozenset({"look", "go_back", "past_events"})
+OF_TIME_TRAVEL = frozenset({"show_moment", "go_back", "past_events"})
 """Requests that need a past that is kept."""
-IN_THE_PAST = OF_THE_PAST | {"breakpoint", "clear_breakpoint", "stop_on", "step_program", "run", "look_at", "branch"}
-"""Requests that change something and are possible while the past is looked at: a debugger goes forwards from there, too."""
+IN_THE_PAST = OF_TIME_TRAVEL | {"breakpoint", "clear_breakpoint", "stop_on", "step_program", "run", "look_at", "branch"}
+"""Requests that change something and are possible while the past is shown: a debugger goes forwards from there, too."""
 OF_RECORDINGS = _names(RecordingRequest)
-"""Requests that need a world whose sessions are kept."""
+"""Requests that need a world whose recordings are kept."""
 OF_BRANCHES, OF_DRAWINGS, OF_SERVICES = _names(BranchRequest), _names(DrawingRequest), _names(ServiceRequest)
 """Requests that need a world."""
 OF_CAMPAIGNS = _names(CampaignRequest)

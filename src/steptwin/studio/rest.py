@@ -24,7 +24,7 @@ from steptwin.messages import Message
 from steptwin.studio.hub import Hub
 from steptwin.studio.requests import ALL, OF_CONNECTION, permit_of
 from steptwin.studio.schema import answer_schemas
-from steptwin.studio.session import STOPS, ViewerSession
+from steptwin.studio.viewersession import STOPS, ViewerSession
 from steptwin.subject.commands import COMMANDS
 from steptwin.subject.dispatch import LONGEST_REQUEST, JsonObject, failure
 from steptwin.subject.schema import definitions, request_schema
@@ -81,8 +81,8 @@ class Rest:
         for one in reading:
             one.add_to(app)
         if self._hub.around.recordings is not None:
-            what = "A saved session, or an export of one, as a file."
-            _Reading("/api/recordings/{file}", self._recording, "get_recording", what, SESSION_FILE, is_file=True).add_to(app)
+            what = "A saved recording, or an export of one, as a file."
+            _Reading("/api/recordings/{file}", self._recording, "get_recording", what, RECORDING_FILE, is_file=True).add_to(app)
         if self._hub.around.campaigns is not None:
             what = "A file of the results of a campaign."
             _Reading("/api/campaigns/{file:path}", self._result, "get_result", what, RESULT_FILE, is_file=True).add_to(app)
@@ -188,7 +188,7 @@ def _parameter(name: str, place: str, meaning: str | None = None, *, is_required
 
 CONTROLLER = _parameter("controller", "query", is_required=False)
 POINT_NAMES = _parameter("names", "query", "Points with commas between them, such as table.M1.position,time.")
-SESSION_FILE = _parameter("file", "path", "NAME.json: a saved session; NAME.vcd and so on: what is made of it.")
+RECORDING_FILE = _parameter("file", "path", "NAME.json: a saved recording; NAME.vcd and so on: what is made of it.")
 RESULT_FILE = _parameter(
     "file", "path", "The folder of results in the answer to campaigns, and a file there: press.results/report.html."
 )

@@ -14,10 +14,10 @@ from steptwin.diagnostics import SourceText
 from steptwin.studio.branchrequests import Branches
 from steptwin.studio.campaignrequests import Campaigns
 from steptwin.studio.drawingrequests import Arrangement
-from steptwin.studio.looking import KeptPast
 from steptwin.studio.programs import ProgramTexts
 from steptwin.studio.recordingrequests import Recordings
 from steptwin.studio.servicerequests import WorldServices
+from steptwin.studio.timetravel import TimeTravel
 from steptwin.subject.contract import AsyncSubject, Result
 
 
@@ -119,7 +119,7 @@ class Surroundings:
     work: LongWork
     configuration: Callable[[str], SourceText | None] = lambda controller: None
     """The configuration file of a twin by name; None without one."""
-    lookback: KeptPast | None = None
+    time_travel: TimeTravel | None = None
     """The past, where one is kept."""
     recordings: Recordings | None = None
     """None without a world."""

@@ -16,7 +16,7 @@ from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.studio.hub import Hub
-from steptwin.studio.session import ViewerSession
+from steptwin.studio.viewersession import ViewerSession
 from steptwin.subject.dispatch import JsonObject, failure
 
 AsgiScope: TypeAlias = MutableMapping[str, Any]

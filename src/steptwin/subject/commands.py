@@ -192,7 +192,7 @@ class DropSnapshot:
 
 @command(
     "save",
-    "Write the session, or the last records, to a file.",
+    "Write the recording, or the last records, to a file.",
     "as time; file, inputs, digest, or files, records for the last records",
 )
 @dataclass(frozen=True, slots=True)

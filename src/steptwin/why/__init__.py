@@ -2,6 +2,6 @@
 
 `steptwin.why.log` runs the past of a world again and notes what can be a cause; `steptwin.why.replayed` remembers what is in no
 trace; `steptwin.why.question` finds the last change of what is asked for; `steptwin.why.causes` follows the causes of a change;
-`steptwin.why.answer` has the result; `steptwin.why.kept` asks about a past that is kept in states and inputs, as that of a
-running world.
+`steptwin.why.answer` has the result; `steptwin.why.pastquestions` asks about a past that is kept in states and inputs, as that of
+a running world.
 """

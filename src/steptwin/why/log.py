@@ -20,10 +20,10 @@ from steptwin.simulation.faults.active import HeldLevel
 from steptwin.simulation.kinds.programs import Place, Programs
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.script import steps as do
-from steptwin.simulation.world.history import SLICE_NS, replay
 from steptwin.simulation.world.inputs import Download, ExternalInput
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput
+from steptwin.simulation.world.snapshotlog import SLICE_NS, replay
 from steptwin.statements import StatementHook
 from steptwin.why import points
 

@@ -16,9 +16,9 @@ from steptwin.simulation.kinds.programs import Resource, ResourceKind
 from steptwin.simulation.logic.condition import Signal, SignalCondition
 from steptwin.simulation.logic.expression import parse_condition
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.world.history import outside_past
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput
+from steptwin.simulation.world.snapshotlog import outside_past
 from steptwin.why import points
 from steptwin.why.answer import MOST_LINKS, Answer, ChainLink, since_before
 from steptwin.why.causes import IS, IS_SINCE, Cause, Causes, nothing
@@ -28,7 +28,7 @@ from steptwin.why.search import Asked
 from steptwin.why.sentences import statement
 from steptwin.why.states import Interval, StatesOnTheWay, rest_of
 
-MOST_STATES = 5
+MOST_SNAPSHOTS = 5
 """Limit of the signals whose present levels are shown of what a program waits for."""
 
 SWITCH = "switch"
@@ -428,7 +428,7 @@ class Why:
     def _states(self, signal: str, at: Nanos) -> Iterator[ChainLink]:
         """The level of a signal and, one after the other, of the signals that drive it."""
         waiting, seen = [signal], set[str]()
-        while waiting and len(seen) < MOST_STATES:
+        while waiting and len(seen) < MOST_SNAPSHOTS:
             name = waiting.pop(0)
             if name in seen:
                 continue

@@ -13,10 +13,10 @@ from steptwin.points import MemoryCells
 from steptwin.simulation.kinds.programs import Place, Programs, Resource, ResourceKind
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.scheduler.trace import TraceRecord
-from steptwin.simulation.world.history import ACTED, MOVED, PastState
 from steptwin.simulation.world.inputs import Bytes, Download
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
+from steptwin.simulation.world.snapshotlog import ACTED, MOVED, LoggedSnapshot
 from steptwin.statements import StatementHook
 from steptwin.why import points
 from steptwin.why.log import in_parts, levels_of
@@ -47,8 +47,8 @@ class Found(NamedTuple):
     known_from: Nanos
 
 
-class PastStates(Protocol):
-    """The past of a world as a search needs it; see `steptwin.simulation.world.history.History`."""
+class Snapshots(Protocol):
+    """The past of a world as a search needs it; see `steptwin.simulation.world.snapshotlog.SnapshotLog`."""
 
     @property
     def world(self) -> Simulation: ...
@@ -56,7 +56,7 @@ class PastStates(Protocol):
     def begin(self) -> Nanos: ...
     @property
     def branch(self) -> int: ...
-    def state_at(self, moment: Nanos) -> PastState: ...
+    def state_at(self, moment: Nanos) -> LoggedSnapshot: ...
     def inputs_from(self, number: int) -> Collection[RecordedInput]: ...
 
 
@@ -65,12 +65,12 @@ FoundChange: TypeAlias = Generator[None, None, "Nanos | None"]
 
 
 class LastChanges:
-    """Search in the past in ``history``. ``second_world`` makes one like it, at a snapshot."""
+    """Search in the past in ``snapshots``. ``second_world`` makes one like it, at a snapshot."""
 
-    def __init__(self, history: PastStates, second_world: Callable[[Simulation, SimulationSnapshot], Simulation]) -> None:
-        self._history = history
+    def __init__(self, snapshots: Snapshots, second_world: Callable[[Simulation, SimulationSnapshot], Simulation]) -> None:
+        self._snapshots = snapshots
         self._make = second_world
-        self._branch = history.branch
+        self._branch = snapshots.branch
         self._known: dict[str, tuple[Nanos, Found]] = {}
         """Results of searches before a moment, by question."""
         self._world: Simulation | None = None
@@ -81,13 +81,13 @@ class LastChanges:
 
     def before(self, asked: Asked, moment: Nanos) -> Searching:
         """The last change before ``moment``, that of a state, in parts."""
-        history = self._history
-        if history.branch != self._branch:
-            self._branch = history.branch
+        snapshots = self._snapshots
+        if snapshots.branch != self._branch:
+            self._branch = snapshots.branch
             self._known.clear()
-        until, found = self._known.get(asked.text, (history.begin, Found(None, history.begin)))
-        if found.since is not None and not history.begin <= found.since <= moment:
-            until, found = history.begin, Found(None, history.begin)
+        until, found = self._known.get(asked.text, (snapshots.begin, Found(None, snapshots.begin)))
+        if found.since is not None and not snapshots.begin <= found.since <= moment:
+            until, found = snapshots.begin, Found(None, snapshots.begin)
         if until < moment:
             try:
                 found = yield from self._search(asked, until, moment, found)
@@ -99,12 +99,12 @@ class LastChanges:
 
     def _search(self, asked: Asked, lower: Nanos, upper: Nanos, before: Found) -> Searching:
         """Between two moments, from the later one back; ``before``: what is known of the time before the earlier one."""
-        history, after = self._history, self._history.state_at(upper)
+        snapshots, after = self._snapshots, self._snapshots.state_at(upper)
         tried, parts = 0, 0
         while after.snapshot.now > lower:
             first, changes = after, False
             for _ in range(max(1, tried)):
-                before_it = history.state_at(first.snapshot.now - 1)
+                before_it = snapshots.state_at(first.snapshot.now - 1)
                 if not changes and self._may_change(asked, before_it, first):
                     if first is not after:
                         break  # what is after it does not change
@@ -132,7 +132,7 @@ class LastChanges:
             after = first
         return before
 
-    def _may_change(self, asked: Asked, state: PastState, after: PastState) -> bool:
+    def _may_change(self, asked: Asked, state: LoggedSnapshot, after: LoggedSnapshot) -> bool:
         """Whether something that is asked about may change between two states, one after the other."""
         if any(name in asked.edges for controller, subject in after.changed for name in (subject, f"{controller}.{subject}")):
             return True
@@ -140,12 +140,12 @@ class LastChanges:
             return True
         return bool(asked.moving) and not self._stands(asked, state, after)
 
-    def _may_take_another(self, name: str, state: PastState, after: PastState) -> bool:
+    def _may_take_another(self, name: str, state: LoggedSnapshot, after: LoggedSnapshot) -> bool:
         """The same for a signal without edges, which does not move."""
         owner, _, path = name.partition(".")
         if (owner, path) in after.changed:
             return True
-        present = self._history.world
+        present = self._snapshots.world
         point = present.kind(owner).point(present.controller(owner), path) if owner in present.controllers else None
         if point is None or point.read is None or point.turning_points is not None:
             return True
@@ -158,7 +158,7 @@ class LastChanges:
             return True
         return self._writes(self._at(state), owner, path, point.memory)
 
-    def _value_at(self, state: PastState, name: str) -> float:
+    def _value_at(self, state: LoggedSnapshot, name: str) -> float:
         key = name, state.snapshot.now
         if key not in self._values:
             world = self._at(state)
@@ -189,7 +189,7 @@ class LastChanges:
                 return True
         return not values
 
-    def _stands(self, asked: Asked, state: PastState, after: PastState) -> bool:
+    def _stands(self, asked: Asked, state: LoggedSnapshot, after: LoggedSnapshot) -> bool:
         """Whether all that may move stands at the moment of a state, and nothing begins to move until the next one."""
         world = self._at(state)
         signals = [signal for name in asked.moving if isinstance(signal := world.signal(name), SignalOf)]
@@ -203,17 +203,17 @@ class LastChanges:
             return False
         return all(rest_of(signal, world.now) is not None for signal in signals)
 
-    def _at(self, state: PastState) -> Simulation:
+    def _at(self, state: LoggedSnapshot) -> Simulation:
         """The second world at a state."""
-        world = self._world = self._world or self._make(self._history.world, state.snapshot)
+        world = self._world = self._world or self._make(self._snapshots.world, state.snapshot)
         world.restore(state.snapshot)
         return world
 
-    def _run(self, asked: Asked, state: PastState, end: Nanos) -> FoundChange:
+    def _run(self, asked: Asked, state: LoggedSnapshot, end: Nanos) -> FoundChange:
         """The last change from a state to a moment."""
-        history = self._history
+        snapshots = self._snapshots
         world = self._at(state)
-        inputs = list(history.inputs_from(state.inputs))
+        inputs = list(snapshots.inputs_from(state.inputs))
         if asked.moving:
             series: TimeSeries = []
             world.start("why", partial(watch_truth, world, asked.text, series), is_external=True)

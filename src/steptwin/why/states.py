@@ -10,8 +10,8 @@ from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.points import FARTHEST_NS
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.world.history import PastState, StatesByAge
 from steptwin.simulation.world.simulation import Simulation
+from steptwin.simulation.world.snapshotlog import LoggedSnapshot, SnapshotsByAge
 
 MOST_KEPT = 64
 LEAST_DISTANCE_NS: Nanos = SECOND // 2
@@ -21,7 +21,7 @@ LEAST_DISTANCE_NS: Nanos = SECOND // 2
 class Interval(NamedTuple):
     """From a state to the moment of the next one, or to the present."""
 
-    state: PastState
+    state: LoggedSnapshot
     end: Nanos
 
 
@@ -39,7 +39,7 @@ class StatesOnTheWay:
         self._world = world
         self._moving = dict(_moving(world))
         self._begin = world.now
-        self._states = StatesByAge(MOST_KEPT)
+        self._states = SnapshotsByAge(MOST_KEPT)
         self._rests: dict[Nanos, Mapping[str, Standing]] = {}
         """Signals that stand at the moments of the states."""
         self.pass_by(0)
@@ -50,7 +50,7 @@ class StatesOnTheWay:
         distance = max(LEAST_DISTANCE_NS, (now - self._begin) // MOST_KEPT)
         if newest is not None and now < newest.snapshot.now + distance:
             return
-        removed = self._states.add(PastState(self._world.snapshot(with_inputs=False), inputs))
+        removed = self._states.add(LoggedSnapshot(self._world.snapshot(with_inputs=False), inputs))
         if removed is not None:
             del self._rests[removed.snapshot.now]
         self._rests[now] = {name: rest for name, signal in self._moving.items() if (rest := rest_of(signal, now)) is not None}
@@ -62,7 +62,7 @@ class StatesOnTheWay:
             end = rest_of(self._moving[name], self._world.now)
         return begin.value if begin is not None and begin == end else None
 
-    def until(self, moment: Nanos) -> Iterator[PastState]:
+    def until(self, moment: Nanos) -> Iterator[LoggedSnapshot]:
         """The states by a moment, the last one first."""
         return self._states.back_from(moment)
 

@@ -14,7 +14,7 @@ import pytest
 from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse
 from steptwin.files.export import axis_views, read_trace, write_trace
-from steptwin.files.export.recording import sort_out
+from steptwin.files.export.tracetracks import sort_out
 from steptwin.files.world import World
 from steptwin.simulation.mechanics.channels import MovedChannel
 
@@ -146,8 +146,8 @@ def test_channels_say_what_the_world_said(world: World) -> None:
         for name, values in said.items():
             values.append((world.now, world.read(name)))
     world.run(until=6)
-    recording = sort_out(world.trace, axis_views(world), 0, world.now)
-    tracks = {track.view.name.replace(" ", "."): track for track in recording.moved}
+    tracks = sort_out(world.trace, axis_views(world), 0, world.now)
+    tracks = {track.view.name.replace(" ", "."): track for track in tracks.moved}
     assert set(tracks) == set(CHANNELS)
     for name, values in said.items():
         for now, value in values:
@@ -189,10 +189,10 @@ def test_every_format_has_them(tmp_path: Path) -> None:
 def test_a_picture_ends_after_the_swing() -> None:
     world = World.from_toml(MACHINE.replace("SIGN", ""))
     world.run(until=8)
-    recording = sort_out(world.trace, axis_views(world), 0, world.now)
+    tracks = sort_out(world.trace, axis_views(world), 0, world.now)
     quiet = world.read("tool.settled")
     assert quiet == 1.0
-    assert recording.axes[0].plans[-1].end < recording.last < world.now  # type: ignore[union-attr, operator]
+    assert tracks.axes[0].plans[-1].end < tracks.last < world.now  # type: ignore[union-attr, operator]
 
 
 @pytest.mark.parametrize(

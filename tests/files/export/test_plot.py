@@ -12,7 +12,7 @@ from world_rig import Run
 from steptwin.controller import SECOND, Nanos
 from steptwin.files.export import write_trace
 from steptwin.files.export.polyline import curve
-from steptwin.files.export.recording import sort_out
+from steptwin.files.export.tracetracks import sort_out
 from steptwin.motion import MotionState, plan_position, plan_velocity
 from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 

@@ -17,8 +17,8 @@ from world_rig import Run
 from steptwin.controller import SECOND, Nanos
 from steptwin.files.export import axis_views, write_trace
 from steptwin.files.export.progress import silent
-from steptwin.files.export.recording import sort_out
 from steptwin.files.export.timeline import write_timeline
+from steptwin.files.export.tracetracks import sort_out
 from steptwin.files.world import World
 from steptwin.motion import MotionState, plan_position
 from steptwin.motion.divisions import StepTrain, profile_of

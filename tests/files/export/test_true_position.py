@@ -15,8 +15,8 @@ import pytest
 from steptwin.controller import MILLISECOND, SECOND
 from steptwin.files.export import AxisViews, axis_views, read_trace, write_trace
 from steptwin.files.export.progress import silent
-from steptwin.files.export.recording import sort_out
 from steptwin.files.export.timeline import write_timeline
+from steptwin.files.export.tracetracks import sort_out
 from steptwin.files.world import World
 from steptwin.simulation.faults import read
 from steptwin.simulation.script import steps as do

@@ -18,7 +18,7 @@ from world_rig import Run
 from steptwin.controller import SECOND, Nanos
 from steptwin.files.export import vcd
 from steptwin.files.export.progress import silent
-from steptwin.files.export.recording import Recording, sort_out
+from steptwin.files.export.tracetracks import TraceTracks, sort_out
 from steptwin.files.export.vcdtext import changes_text
 from steptwin.motion import MotionState, Profile, plan_position
 from steptwin.motion.divisions import StepTrain
@@ -29,9 +29,9 @@ Changes = dict[str, list[tuple[Nanos, object]]]
 """By name of the variable; the first is its value at the beginning."""
 
 
-def dumped(recording: Recording) -> bytes:
+def dumped(tracks: TraceTracks) -> bytes:
     file = io.BytesIO()
-    vcd.write_vcd(recording, file, silent)
+    vcd.write_vcd(tracks, file, silent)
     return file.getvalue()
 
 
@@ -58,7 +58,7 @@ def read(text: bytes) -> Changes:
     return changes
 
 
-def recording_of(run: Run, begin: Nanos = 0, until: Nanos | None = None) -> Recording:
+def recording_of(run: Run, begin: Nanos = 0, until: Nanos | None = None) -> TraceTracks:
     return sort_out(run.trace, run.views, begin, run.until if until is None else until)
 
 
@@ -177,10 +177,10 @@ def signed(value: object) -> int:
 def test_the_size_of_the_windows_does_not_show(
     name: str, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    recording = recording_of(request.getfixturevalue(name))
-    whole = dumped(recording)
+    tracks = recording_of(request.getfixturevalue(name))
+    whole = dumped(tracks)
     monkeypatch.setattr(vcd, "_WINDOW_CHANGES", 1000)
-    assert dumped(recording) == whole
+    assert dumped(tracks) == whole
 
 
 @pytest.mark.parametrize("name", ["mic488", "m1486", "m1486_with_converters"])
@@ -243,9 +243,9 @@ def test_without_texts_there_are_no_signals_of_type_string() -> None:
     trace.add(TraceRecord(1, "a", "edge", "OUT1", 1.0))
     trace.add(TraceRecord(2, "a", "event", "note", "a text"))
     trace.add(TraceRecord(3, "a", "statement", "program", 7))
-    recording = sort_out(trace, {})
+    tracks = sort_out(trace, {})
     file = io.BytesIO()
-    vcd.write_vcd(recording, file, silent, texts=False)
-    assert b"$var string" in dumped(recording)
+    vcd.write_vcd(tracks, file, silent, texts=False)
+    assert b"$var string" in dumped(tracks)
     assert b"$var string" not in file.getvalue()
     assert b"$var integer" in file.getvalue()

@@ -16,7 +16,7 @@ from steptwin.errors import Misuse
 from steptwin.files import export
 from steptwin.files.export import FORMATS, bar, write_trace
 from steptwin.files.export.progress import TimeProgress
-from steptwin.files.export.recording import sort_out
+from steptwin.files.export.tracetracks import sort_out
 from steptwin.motion import MotionState, plan_position
 from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 
@@ -127,13 +127,13 @@ def test_before_its_first_change_a_pin_had_the_other_level_and_an_axis_stood() -
     trace.add(TraceRecord(5, "a", "edge", "IN1", 0.0))
     trace.add(TraceRecord(6, "a", "edge", "AIN1", 4.0))
     trace.add(TraceRecord(7, "a", "plan", "1", plan_position(MotionState(7, 30, 0.0, 0.0), 50, 100.0, 100.0, 100.0)))
-    recording = sort_out(trace, {})
-    ain, in1 = recording.pins
+    tracks = sort_out(trace, {})
+    ain, in1 = tracks.pins
     assert [in1.level(t) for t in (0, 4, 5)] == [1.0, 1.0, 0.0]
     assert [ain.level(t) for t in (0, 5, 6)] == [None, None, 4.0]
-    plan = recording.axes[0].plan(0)
+    plan = tracks.axes[0].plan(0)
     assert plan.count(3) == 30
-    assert recording.until == trace_end(trace)
+    assert tracks.until == trace_end(trace)
 
 
 def trace_end(trace: Trace) -> Nanos | None:

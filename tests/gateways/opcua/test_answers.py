@@ -15,7 +15,7 @@ from asyncua.ua.ua_binary import struct_from_binary
 from gateway_rig import GatewayWorld
 from virtual_loop import run_virtually
 
-from steptwin.gateways.contract import PastValue
+from steptwin.gateways.contract import HistoryValue
 from steptwin.gateways.kinds import read_gateways
 from steptwin.gateways.opcua.addressspace import node_id
 from steptwin.gateways.opcua.gateway import OpcUaGateway
@@ -36,13 +36,13 @@ ARRAY = "registers.USER_REGISTER"
 BEGIN = datetime(2026, 3, 1, tzinfo=UTC)
 
 
-class Past:
+class StoredHistory:
     """Ten values, one a second, of which the fourth to sixth have the same moment."""
 
     moments = tuple(BEGIN + timedelta(seconds=n if n not in (4, 5) else 3) for n in range(10))
 
-    async def values(self, point: str, begin: datetime | None, end: datetime | None, most: int | None) -> list[PastValue]:
-        kept = [PastValue(at, float(n)) for n, at in enumerate(self.moments) if end is None or at <= end]
+    async def values(self, point: str, begin: datetime | None, end: datetime | None, most: int | None) -> list[HistoryValue]:
+        kept = [HistoryValue(at, float(n)) for n, at in enumerate(self.moments) if end is None or at <= end]
         held = [one for one in kept if begin is not None and one.at < begin]
         return [*held[-1:], *(one for one in kept if begin is None or one.at >= begin)][:most]
 
@@ -330,7 +330,7 @@ def test_answers_over_a_socket() -> None:
 
     async def story() -> None:
         world = GatewayWorld(WORLD)
-        world.past = Past()
+        world.history = StoredHistory()
         async with connected(world) as client:
             for check in CHECKS:
                 await check(client, world)

@@ -1,4 +1,4 @@
-"""Recorded sessions to look at."""
+"""Recorded recordings to look at."""
 
 from __future__ import annotations
 
@@ -9,31 +9,31 @@ import pytest
 
 from steptwin.controller import SECOND
 from steptwin.errors import Misuse
-from steptwin.files.session import save, session_of
+from steptwin.files.recording import recording_of, save
 from steptwin.files.world import World
 from steptwin.live.studio.recorded import recorded
 from steptwin.simulation.script import steps as do
-from steptwin.simulation.world.history import Past
+from steptwin.simulation.world.snapshotlog import PastWorld
 
 TEXT = '[[mic488]]\nname = "table"\nprogram = "cell.prg"\nstart = true\n'
 PROGRAM = b"n = 0\nLOOP:\nn = n + 1\n$R4 = n\nDELAY 0.2\nJUMP LOOP\n"
 POINTS = ("time", "table.USER_REGISTER[4]:real", "table.IN3")
 
 
-def shown(world: World | Past) -> tuple[float, ...]:
-    simulation = world.world if isinstance(world, Past) else world
+def shown(world: World | PastWorld) -> tuple[float, ...]:
+    simulation = world.world if isinstance(world, PastWorld) else world
     return tuple(simulation.read(point) for point in POINTS)
 
 
 def make(path: Path) -> dict[int, tuple[float, ...]]:
-    """Record a session of 10 s; what was seen at some of its moments."""
+    """Record a recording of 10 s; what was seen at some of its moments."""
     world = World.from_toml(TEXT, {"cell.prg": PROGRAM})
     seen: dict[int, tuple[float, ...]] = {}
     for step in range(20):
         world.run(for_="0.5s")
         world.apply_input(do.Set((("table", "IN3", step % 2),)))
         seen[world.now] = shown(world)
-    save(session_of(world), path)
+    save(recording_of(world), path)
     return seen
 
 
@@ -41,11 +41,11 @@ def test_every_moment_of_a_session_can_be_looked_at(tmp_path: Path) -> None:
     path = tmp_path / "s.json"
     seen = make(path)
     warned: list[str] = []
-    world, history = recorded(path, warned.append)
+    world, snapshots = recorded(path, warned.append)
     assert warned == []
-    assert (world.now, history.begin) == (10 * SECOND, 0)
-    assert len(history) == 11
-    past = Past(history)
+    assert (world.now, snapshots.begin) == (10 * SECOND, 0)
+    assert len(snapshots) == 11
+    past = PastWorld(snapshots)
     for moment in sorted(seen, key=lambda one: one % 700_000_001):
         for _ in past.go(moment):
             pass
@@ -65,5 +65,5 @@ def test_a_session_that_ran_otherwise_is_shown_with_a_warning(tmp_path: Path) ->
 
 
 def test_a_description_is_no_recording() -> None:
-    with pytest.raises(Misuse, match=r"machine\.toml: --view shows a session"):
+    with pytest.raises(Misuse, match=r"machine\.toml: --view shows a recording"):
         recorded(Path("machine.toml"), print)

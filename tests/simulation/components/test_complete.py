@@ -15,7 +15,7 @@ from toy import lamp
 from whole_world import everything
 
 from steptwin.files.export import axis_views, plot, write_trace
-from steptwin.files.export.recording import sort_out
+from steptwin.files.export.tracetracks import sort_out
 from steptwin.motion.divisions import profile_of
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.mechanics.channels import AxisViews

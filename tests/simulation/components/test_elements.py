@@ -17,7 +17,7 @@ from steptwin.cli import app
 from steptwin.controller import MILLISECOND
 from steptwin.errors import Misuse
 from steptwin.files.export import axis_views, read_trace, write_trace
-from steptwin.files.session import load, save, session_of
+from steptwin.files.recording import load, recording_of, save
 from steptwin.files.world import World
 from steptwin.live.options import LiveOptions, UpOptions
 from steptwin.live.running import up
@@ -136,7 +136,7 @@ def test_a_snapshot_a_session_and_a_file_have_it(moment_s: float, tmp_path: Path
     other.restore(snapshot)
     other.run(until=1.0)
     assert other.trace.digest() == world.trace.digest()
-    save(session_of(world), tmp_path / "s.json")
+    save(recording_of(world), tmp_path / "s.json")
     assert load(tmp_path / "s.json").digest == world.trace.digest()
     write_trace(world.trace, tmp_path / "t.jsonl", views=axis_views(world))
     assert read_trace(tmp_path / "t.jsonl").trace.digest() == world.trace.digest()

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from steptwin.controller import SECOND
-from steptwin.files.session import load, save, session_of
+from steptwin.files.recording import load, recording_of, save
 from steptwin.files.world import World
 from steptwin.simulation.toml.reader import WorldError
 
@@ -246,7 +246,7 @@ def test_faults_and_sessions(tmp_path: Path) -> None:
     found.run(until=1.1)
     assert found.read("g.share") == 10
     assert events(found, "stall")[0][0] == 1.0
-    save(session_of(found), tmp_path / "s.json")
+    save(recording_of(found), tmp_path / "s.json")
     again = load(tmp_path / "s.json")
     assert again.replay().trace.digest() == found.trace.digest()
 

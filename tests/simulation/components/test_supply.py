@@ -8,7 +8,7 @@ import pytest
 
 from steptwin.controller import SECOND
 from steptwin.errors import Misuse
-from steptwin.files.session import load, save, session_of
+from steptwin.files.recording import load, recording_of, save
 from steptwin.files.world import World
 from steptwin.simulation.components.supply import SUPPLY, Ramp
 from steptwin.simulation.toml.reader import WorldError
@@ -216,7 +216,7 @@ def test_it_can_be_restored_anywhere(moment_s: float, tmp_path: Path) -> None:
         assert other.trace.digest() == found.trace.digest()
     found.run(until=5.0)
     assert len(edges(found, "logic.good")) == 3
-    save(session_of(found), place)
+    save(recording_of(found), place)
     assert load(place).replay().trace.digest() == found.trace.digest()
 
 

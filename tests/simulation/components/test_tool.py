@@ -15,7 +15,7 @@ from world_rig import check_it_can_be_restored
 
 from steptwin.controller import MILLISECOND, SECOND
 from steptwin.files.export import axis_views, write_trace
-from steptwin.files.export.recording import sort_out
+from steptwin.files.export.tracetracks import sort_out
 from steptwin.files.world import World
 from steptwin.motion.divisions import profile_of
 from steptwin.simulation.components.coordinate import rests

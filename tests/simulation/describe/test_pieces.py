@@ -1,4 +1,4 @@
-"""Files of tables that a description uses: names, parameters, places of errors, overrides, sessions."""
+"""Files of tables that a description uses: names, parameters, places of errors, overrides, recordings."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from steptwin.errors import Misuse
-from steptwin.files import session as sessions
+from steptwin.files import recording as recordings
 from steptwin.files.world import World
 from steptwin.simulation.describe import pieces
 from steptwin.simulation.describe.description import describe
@@ -253,9 +253,9 @@ def test_sessions_snapshots_and_pickles_have_the_files(tmp_path: Path) -> None:
     world.mic488["table"].axis[1].move_to(2000)
     world.run(for_="0.3 s")
     twin = pickle.loads(pickle.dumps(world))
-    sessions.save(sessions.session_of(world), tmp_path / "s.json")
+    recordings.save(recordings.recording_of(world), tmp_path / "s.json")
     (tmp_path / "parts/station.toml").unlink()
-    again = sessions.load(tmp_path / "s.json").replay()
+    again = recordings.load(tmp_path / "s.json").replay()
     other = world.branch()
     for one in (world, twin, again, other):
         one.go_on()

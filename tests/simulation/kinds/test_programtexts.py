@@ -10,7 +10,7 @@ import pytest
 
 from steptwin.controller import SECOND
 from steptwin.errors import Misuse, Refusal, SourceErrors
-from steptwin.files.session import session_of
+from steptwin.files.recording import recording_of
 from steptwin.files.world import World
 from steptwin.mic488.config import read_config
 from steptwin.mic488.inifile import IniFile
@@ -141,8 +141,8 @@ def test_a_session_has_what_was_downloaded() -> None:
     there.apply_input(Download("feeder", "program", "f640\nr\n"))
     start(there)
     there.run(for_="5 s")
-    session = session_of(there)
-    assert session.replay().trace.digest() == session.digest
+    recording = recording_of(there)
+    assert recording.replay().trace.digest() == recording.digest
 
 
 def test_a_program_is_typed_to_a_chip_and_runs_then() -> None:

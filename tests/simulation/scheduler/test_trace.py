@@ -150,7 +150,7 @@ def test_every_number_of_an_arc_is_in_the_digest() -> None:
 
     digests = [digest(), digest(centre_p=101.0), digest(radius_p=501.0), digest(angle_q=0.26), digest(turn_q=-0.001)]
     assert len(set(digests)) == len(digests)
-    # Sessions that were recorded keep their digests.
+    # Recordings that were recorded keep their digests.
     assert digests[0] == "9842b60c5b6366a442434f84b1e4c49b"
 
 

@@ -61,7 +61,7 @@ class Lamp(Stateful):
     def _show(self, lit: bool) -> None:
         if lit is not self.lit:
             self.lit = lit
-            self.scheduler.report(self.source.controller, "edge", self._spec.name, float(lit))
+            self.scheduler.record(self.source.controller, "edge", self._spec.name, float(lit))
 
     def deadline(self) -> Nanos | None:
         return self._due

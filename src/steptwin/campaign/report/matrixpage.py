@@ -56,7 +56,7 @@ def matrix_page(matrix: FaultMatrix) -> str:
         f"<p>{len(matrix.rows)} faults at {len(matrix.phases)} phases. The run without a fault takes "
         f"{matrix.nominal.result.end_ns / SECOND:.9g} s{escape(ended)}. {percent_text(covered)} % of the statements and "
         f"branches of the programs were executed.</p>\n{legend}<h2>Phases</h2>\n{_phases(matrix)}"
-        f"<h2>Matrix</h2>\n<p>Each cell is a session: <code>steptwin replay cells/…</code>, "
+        f"<h2>Matrix</h2>\n<p>Each cell is a recording: <code>steptwin replay cells/…</code>, "
         f"<code>steptwin studio --view cells/…</code>.</p>\n{_matrix(matrix)}"
         f"<h2>Effects</h2>\n{_effects(matrix)}"
     )
@@ -123,7 +123,7 @@ def _effects(matrix: FaultMatrix) -> str:
             escape(cell.judgement.why),
             escape(cell.judgement.detection),
             "" if cell.judgement.after_ns is None else f"{cell.judgement.after_ns / SECOND:.4g}",
-            link(cell.session, "session") if cell.session else "",
+            link(cell.session, "recording") if cell.session else "",
         )
         for _, row, cell in sorted(found, key=lambda one: one[0])
     ]

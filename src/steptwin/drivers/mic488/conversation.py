@@ -1,4 +1,4 @@
-"""A MIC488 at a terminal: registers by name, and steps of a session. See
+"""A MIC488 at a terminal: registers by name, and requests as of a transcript. See
 `steptwin.drivers.kind.DeviceTerminal`."""
 
 from __future__ import annotations
@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager
 
 from steptwin.drivers.mic488.named import map_of, read, writing
-from steptwin.drivers.mic488.session import carry_out_one
 from steptwin.drivers.mic488.sync import Mic488
+from steptwin.drivers.mic488.transcript import carry_out_one
 from steptwin.drivers.typed import shown
 
 HELP = """\

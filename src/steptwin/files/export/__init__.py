@@ -25,8 +25,8 @@ from steptwin.errors import Misuse
 from steptwin.extras import missing
 from steptwin.files.export.axes import axis_views, controller_views
 from steptwin.files.export.progress import ShowExport, TimeProgress, bar, unwatched
-from steptwin.files.export.recording import Recording, sort_out
 from steptwin.files.export.records import SavedTrace, read_records, write_records
+from steptwin.files.export.tracetracks import TraceTracks, sort_out
 from steptwin.files.textfiles import check_writable, new_file
 from steptwin.files.writing import as_text, is_written_directly
 from steptwin.inputfiles import open_regular
@@ -69,7 +69,7 @@ class Exporter(NamedTuple):
     meaning: str
     needs: tuple[str, ...]
     extra: str
-    write: Callable[[Recording, IO[bytes], _Options], None] | None
+    write: Callable[[TraceTracks, IO[bytes], _Options], None] | None
     """None: written from the records themselves."""
 
     @property
@@ -77,51 +77,51 @@ class Exporter(NamedTuple):
         return [module for module in self.needs if find_spec(module) is None]
 
 
-def _html(recording: Recording, file: IO[bytes], options: _Options) -> None:
+def _html(tracks: TraceTracks, file: IO[bytes], options: _Options) -> None:
     from steptwin.files.export.timeline import write_timeline
 
     with as_text(file) as text:
-        write_timeline(recording, text, options.progress)
+        write_timeline(tracks, text, options.progress)
 
 
-def _vcd(recording: Recording, file: IO[bytes], options: _Options) -> None:
+def _vcd(tracks: TraceTracks, file: IO[bytes], options: _Options) -> None:
     from steptwin.files.export.vcd import write_vcd
 
-    write_vcd(recording, file, options.progress, texts=options.texts)
+    write_vcd(tracks, file, options.progress, texts=options.texts)
 
 
-def _pcapng(recording: Recording, file: IO[bytes], options: _Options) -> None:
+def _pcapng(tracks: TraceTracks, file: IO[bytes], options: _Options) -> None:
     def captured(record: TraceRecord) -> CapturedFrame:
         options.progress(record.time)
         client, _, direction = record.subject.rpartition("/")
         return CapturedFrame(record.time, record.controller, client, direction == "in", record.data())
 
-    file.writelines(capture(map(captured, recording.of("frame"))))
+    file.writelines(capture(map(captured, tracks.of("frame"))))
 
 
-def _csv(recording: Recording, file: IO[bytes], options: _Options) -> None:
+def _csv(tracks: TraceTracks, file: IO[bytes], options: _Options) -> None:
     from steptwin.files.export.tables import write_csv
 
     with as_text(file) as text:
-        write_csv(recording, text, options.period, options.progress)
+        write_csv(tracks, text, options.period, options.progress)
 
 
-def _parquet(recording: Recording, file: IO[bytes], options: _Options) -> None:
+def _parquet(tracks: TraceTracks, file: IO[bytes], options: _Options) -> None:
     from steptwin.files.export.tables import write_parquet
 
-    write_parquet(recording, file, options.period, options.progress)
+    write_parquet(tracks, file, options.period, options.progress)
 
 
-def _png(recording: Recording, file: IO[bytes], options: _Options) -> None:
+def _png(tracks: TraceTracks, file: IO[bytes], options: _Options) -> None:
     from steptwin.files.export.plot import write_plot
 
-    write_plot(recording if options.window else recording.to_last_change(), file, "png", options.progress)
+    write_plot(tracks if options.window else tracks.to_last_change(), file, "png", options.progress)
 
 
-def _svg(recording: Recording, file: IO[bytes], options: _Options) -> None:
+def _svg(tracks: TraceTracks, file: IO[bytes], options: _Options) -> None:
     from steptwin.files.export.plot import write_plot
 
-    write_plot(recording if options.window else recording.to_last_change(), file, "svg", options.progress)
+    write_plot(tracks if options.window else tracks.to_last_change(), file, "svg", options.progress)
 
 
 FORMATS: Mapping[str, Exporter] = {
@@ -172,16 +172,16 @@ def write_trace(
         raise Misuse(f"period = {period} ns: must be 1 ns or more")
     if len(trace) and next(iter(trace), None) is None:
         raise Misuse("this trace has kept nothing but its digest: there is nothing to write")
-    recording = replace(sort_out(trace, views, begin, ended if until is None else until, controllers), title=title)
-    ended = recording.until if ended is None else ended
+    tracks = replace(sort_out(trace, views, begin, ended if until is None else until, controllers), title=title)
+    ended = tracks.until if ended is None else ended
     for name, path in targets:
         write = FORMATS[name].write
-        with new_file(path) as file, watch(path.name, recording.begin, recording.until) as progress:
+        with new_file(path) as file, watch(path.name, tracks.begin, tracks.until) as progress:
             if write is None:
                 with as_text(file) as text:
                     write_records(trace, views, text, progress, title=title, until=ended)
             else:
-                write(recording, file, _Options(period, progress, until is not None, texts))
+                write(tracks, file, _Options(period, progress, until is not None, texts))
     return [path for _, path in targets]
 
 

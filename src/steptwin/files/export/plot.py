@@ -19,7 +19,7 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 from steptwin.controller import SECOND, Nanos
 from steptwin.files.export.polyline import curve
 from steptwin.files.export.progress import TimeProgress
-from steptwin.files.export.recording import Recording
+from steptwin.files.export.tracetracks import TraceTracks
 from steptwin.files.export.tracks import AxisTrack, PinTrack
 from steptwin.motion.divisions import profile_of
 from steptwin.motion.pulses import Reals
@@ -68,37 +68,37 @@ class _PlotRow(NamedTuple):
     moments: Sequence[Nanos] = ()
 
 
-def write_plot(recording: Recording, file: IO[bytes], form: str, progress: TimeProgress) -> None:
+def write_plot(tracks: TraceTracks, file: IO[bytes], form: str, progress: TimeProgress) -> None:
     """``form`` is png or svg."""
-    begin, until = recording.begin, recording.until
-    moving = [track for track in recording.axes if _moves(track, recording)]
+    begin, until = tracks.begin, tracks.until
+    moving = [track for track in tracks.axes if _moves(track, tracks)]
     axes = moving[:MOST_AXES]
-    rows = _rows(recording)
+    rows = _rows(tracks)
     left_out = len(moving) - len(axes), max(len(rows) - MOST_ROWS, 0)
     rows = rows[:MOST_ROWS]
     loads = [track.true() for track in axes]
     panels_each = [2 if load is None else 3 for load in loads]
-    moved = [track for track in recording.moved if _moves(track, recording)][:MOST_AXES]
+    moved = [track for track in tracks.moved if _moves(track, tracks)][:MOST_AXES]
     heights = [_MOTION_IN] * (sum(panels_each) + len(moved)) + ([_ROW_IN * len(rows)] if rows else [])
     with rc_context(STYLE):
-        labels = [_label(track, recording) + " velocity" for track in axes] + [row.label for row in rows]
-        labels += [_label(track, recording) for track in moved]
+        labels = [_label(track, tracks) + " velocity" for track in axes] + [row.label for row in rows]
+        labels += [_label(track, tracks) for track in moved]
         labels += [text for load in loads if load is not None for text in (f"{load.view.name} position", _GREY)]
         left = max(_LEFT_IN, _room(labels))
-        figure, panels = _figure(recording, heights, left)
+        figure, panels = _figure(tracks, heights, left)
         rest = iter(panels)
         for i, (track, load) in enumerate(zip(axes, loads, strict=True)):
-            _motion(next(rest), next(rest), track, recording)
+            _motion(next(rest), next(rest), track, tracks)
             if load is not None:
-                _true(next(rest), track, load, recording)
+                _true(next(rest), track, load, tracks)
             progress(begin + (until - begin) * (i + 1) // (len(axes) + 1))
         for track in moved:
             panel = next(rest)
-            times, positions, _ = _points(track, recording)
+            times, positions, _ = _points(track, tracks)
             panel.plot(*_thinned(times, positions), color=_TRUE, linewidth=1.1)
-            _scale(panel, f"{_label(track, recording)}\n{track.view.unit}", _TRUE)
+            _scale(panel, f"{_label(track, tracks)}\n{track.view.unit}", _TRUE)
         if rows:
-            _channels(panels[-1], rows, recording)
+            _channels(panels[-1], rows, tracks)
         if not panels:
             figure.text(left / _WIDTH_IN, 0.5, "nothing moved or changed", color=_FRAME)
         if any(left_out):
@@ -108,22 +108,22 @@ def write_plot(recording: Recording, file: IO[bytes], form: str, progress: TimeP
     progress(until)
 
 
-def _moves(track: AxisTrack, recording: Recording) -> bool:
+def _moves(track: AxisTrack, tracks: TraceTracks) -> bool:
     return len(track.loads) > 0 or any(
-        profile_of(plan).moving(after) for plan, after, _ in track.intervals(recording.begin, recording.until)
+        profile_of(plan).moving(after) for plan, after, _ in track.intervals(tracks.begin, tracks.until)
     )
 
 
-def _rows(recording: Recording) -> list[_PlotRow]:
+def _rows(tracks: TraceTracks) -> list[_PlotRow]:
     """Pins that changed, then links, events and faults."""
-    one = len(recording.controllers) == 1
+    one = len(tracks.controllers) == 1
     rows = [
         _PlotRow(pin.pin if one else pin.name, _ANALOG if pin.analog else _LEVEL, pin)
-        for pin in recording.pins
-        if any(recording.begin < time <= recording.until for time in pin.times)
+        for pin in tracks.pins
+        if any(tracks.begin < time <= tracks.until for time in pin.times)
     ]
     marks: dict[tuple[str, str, str], list[Nanos]] = {}
-    for record in recording.marks:
+    for record in tracks.marks:
         if record.kind in {"frame", "event", "fault"}:
             name = record.subject.partition("/")[0] if record.kind == "frame" else f"{record.kind}s"
             marks.setdefault((record.controller, name, record.kind), []).append(record.time)
@@ -140,11 +140,11 @@ def _room(labels: list[str]) -> float:
     return _SCALE_IN + widest / 72 + _MARGIN_IN
 
 
-def _label(track: AxisTrack, recording: Recording) -> str:
-    return track.view.name if len(recording.controllers) == 1 else track.name
+def _label(track: AxisTrack, tracks: TraceTracks) -> str:
+    return track.view.name if len(tracks.controllers) == 1 else track.name
 
 
-def _figure(recording: Recording, heights: list[float], left: float) -> tuple[Figure, list[Axes]]:
+def _figure(tracks: TraceTracks, heights: list[float], left: float) -> tuple[Figure, list[Axes]]:
     """One panel of each height (inches), one below the other, ``left`` inches from the edge."""
     height = _TOP_IN + _BOTTOM_IN + sum(heights) + _GAP_IN * max(len(heights) - 1, 0)
     figure = Figure(figsize=(_WIDTH_IN, max(height, 1.6)), facecolor="white")
@@ -154,21 +154,21 @@ def _figure(recording: Recording, heights: list[float], left: float) -> tuple[Fi
     for panel_height in heights:
         at -= panel_height
         panel = figure.add_axes((left / _WIDTH_IN, at / height, width, panel_height / height))
-        _dress(panel, recording)
+        _dress(panel, tracks)
         panels.append(panel)
         at -= _GAP_IN
     if panels:
         panels[-1].tick_params(axis="x", labelbottom=True, length=3)
-        panels[-1].set_xlabel(_time_unit(recording))
-    names = ", ".join(recording.controllers[:8]) + (" …" if len(recording.controllers) > 8 else "")
-    figure.text(left / _WIDTH_IN, 1 - 0.3 / max(height, 1.6), recording.title or names, fontsize=11, fontweight="bold")
+        panels[-1].set_xlabel(_time_unit(tracks))
+    names = ", ".join(tracks.controllers[:8]) + (" …" if len(tracks.controllers) > 8 else "")
+    figure.text(left / _WIDTH_IN, 1 - 0.3 / max(height, 1.6), tracks.title or names, fontsize=11, fontweight="bold")
     return figure, panels
 
 
-def _dress(panel: Axes, recording: Recording) -> None:
-    panel.set_xlim(recording.begin / SECOND, max(recording.until, recording.begin + 1) / SECOND)
-    if _in_clock_time(recording):
-        span = (recording.until - recording.begin) / SECOND
+def _dress(panel: Axes, tracks: TraceTracks) -> None:
+    panel.set_xlim(tracks.begin / SECOND, max(tracks.until, tracks.begin + 1) / SECOND)
+    if _in_clock_time(tracks):
+        span = (tracks.until - tracks.begin) / SECOND
         panel.xaxis.set_major_locator(MultipleLocator(next((s for s in _CLOCK_STEPS_S if 12 * s >= span), span)))
         panel.xaxis.set_major_formatter(FuncFormatter(lambda seconds, _: _clock(seconds)))
     else:
@@ -181,12 +181,12 @@ def _dress(panel: Axes, recording: Recording) -> None:
         panel.spines[side].set_visible(False)
 
 
-def _in_clock_time(recording: Recording) -> bool:
-    return recording.until - recording.begin > 300 * SECOND
+def _in_clock_time(tracks: TraceTracks) -> bool:
+    return tracks.until - tracks.begin > 300 * SECOND
 
 
-def _time_unit(recording: Recording) -> str:
-    return "time (h:min:s)" if _in_clock_time(recording) else "time (s)"
+def _time_unit(tracks: TraceTracks) -> str:
+    return "time (h:min:s)" if _in_clock_time(tracks) else "time (s)"
 
 
 def _clock(seconds: float) -> str:
@@ -194,10 +194,10 @@ def _clock(seconds: float) -> str:
     return f"{whole // 3600}:{whole // 60 % 60:02}:{whole % 60:02}"
 
 
-def _motion(above: Axes, below: Axes, track: AxisTrack, recording: Recording) -> None:
+def _motion(above: Axes, below: Axes, track: AxisTrack, tracks: TraceTracks) -> None:
     view = track.view
-    times, positions, velocities = _points(track.coordinate() or track, recording)
-    name = _label(track, recording)
+    times, positions, velocities = _points(track.coordinate() or track, tracks)
+    name = _label(track, tracks)
     for panel, values, color, label in (
         (above, positions, POSITION_COLOR, f"{name} position\n{view.unit}"),
         (below, velocities, VELOCITY_COLOR, f"{name} velocity\n{view.unit}/s"),
@@ -206,22 +206,22 @@ def _motion(above: Axes, below: Axes, track: AxisTrack, recording: Recording) ->
         _scale(panel, label, color)
 
 
-def _true(panel: Axes, track: AxisTrack, load: AxisTrack, recording: Recording) -> None:
+def _true(panel: Axes, track: AxisTrack, load: AxisTrack, tracks: TraceTracks) -> None:
     """The position of the load, in front of the commanded one."""
     view = load.view
     mechanics = track.view.mechanics
     zero_p = 0 if mechanics is None else mechanics.zero_p
-    times, commanded, _ = _points(track, recording)
+    times, commanded, _ = _points(track, tracks)
     panel.plot(*_thinned(times, (commanded + zero_p) / view.pulses_per_unit), color=_FAINT, linewidth=2.2)
-    times, positions, _ = _points(load, recording)
+    times, positions, _ = _points(load, tracks)
     panel.plot(*_thinned(times, positions / view.pulses_per_unit), color=_TRUE, linewidth=1.1)
     _scale(panel, f"{view.name} position\n{view.unit}\n{_GREY}", _TRUE)
 
 
-def _points(track: AxisTrack, recording: Recording) -> tuple[Reals, Reals, Reals]:
+def _points(track: AxisTrack, tracks: TraceTracks) -> tuple[Reals, Reals, Reals]:
     """Seconds, positions and velocities in pulses."""
-    resolution = (recording.until - recording.begin) // _COLUMNS
-    points = curve(track, recording.begin, recording.until, resolution)
+    resolution = (tracks.until - tracks.begin) // _COLUMNS
+    points = curve(track, tracks.begin, tracks.until, resolution)
     return np.array(points.times) / SECOND, np.array(points.positions), np.array(points.velocities)
 
 
@@ -235,13 +235,13 @@ def _scale(panel: Axes, label: str, color: str) -> None:
         panel.set_ylim(panel.dataLim.y0 - 1, panel.dataLim.y0 + 1)
 
 
-def _channels(panel: Axes, rows: list[_PlotRow], recording: Recording) -> None:
+def _channels(panel: Axes, rows: list[_PlotRow], tracks: TraceTracks) -> None:
     panel.set_ylim(len(rows), 0)
     panel.set_yticks([i + 0.5 for i in range(len(rows))], [row.label for row in rows], fontsize=8)
     for i, row in enumerate(rows):
         panel.axhline(i + 0.86, color=_FAINT, linewidth=0.5, zorder=1)
         if row.pin is not None:
-            times, levels, note = _levels(row.pin, recording)
+            times, levels, note = _levels(row.pin, tracks)
             times, levels = _thinned(times, levels)
             base, top = i + 0.86, i + 0.18
             drawn = base + (top - base) * levels
@@ -256,11 +256,11 @@ def _channels(panel: Axes, rows: list[_PlotRow], recording: Recording) -> None:
             panel.add_collection(LineCollection(ticks, colors=row.color, linewidths=0.7, zorder=3), autolim=False)
 
 
-def _levels(pin: PinTrack, recording: Recording) -> tuple[Reals, Reals, str]:
+def _levels(pin: PinTrack, tracks: TraceTracks) -> tuple[Reals, Reals, str]:
     """The corners of the curve of a pin, scaled to 0…1, and what 1 is if it is analog: its greatest value."""
-    level = pin.level(recording.begin)
-    times, levels = [recording.begin], [np.nan if level is None else level]
-    for time, value in pin.changes(recording.begin, recording.until):
+    level = pin.level(tracks.begin)
+    times, levels = [tracks.begin], [np.nan if level is None else level]
+    for time, value in pin.changes(tracks.begin, tracks.until):
         times += [time, time]
         levels += [levels[-1], value]
     drawn = np.array([*levels, levels[-1]])
@@ -269,7 +269,7 @@ def _levels(pin: PinTrack, recording: Recording) -> tuple[Reals, Reals, str]:
         most = float(np.nanmax(np.abs(drawn))) or 1.0
         drawn = drawn / most
         note = f"max\n{most:.3g}"
-    return np.array([*times, recording.until]) / SECOND, drawn, note
+    return np.array([*times, tracks.until]) / SECOND, drawn, note
 
 
 def _thinned(times: Reals, values: Reals) -> tuple[Reals, Reals]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.files.export.progress import TimeProgress
-from steptwin.files.export.recording import Recording
+from steptwin.files.export.tracetracks import TraceTracks
 from steptwin.files.export.tracks import AxisTrack, PinTrack
 from steptwin.motion.divisions import profile_of
 from steptwin.motion.pulses import PulseTimes, Reals, positions, velocities
@@ -28,15 +28,15 @@ _ROWS = 1 << 15
 Columns: TypeAlias = dict[str, NDArray[Any]]
 
 
-def samples(recording: Recording, period: Nanos) -> Iterator[tuple[Nanos, Columns]]:
+def samples(tracks: TraceTracks, period: Nanos) -> Iterator[tuple[Nanos, Columns]]:
     """The table in parts: the moment of the last row, and the columns. There is at least one row."""
-    at = recording.begin
-    others = [(axis.coordinate(), axis.true()) for axis in recording.axes]
-    while at <= recording.until:
-        rows = min((recording.until - at) // period + 1, _ROWS)
+    at = tracks.begin
+    others = [(axis.coordinate(), axis.true()) for axis in tracks.axes]
+    while at <= tracks.until:
+        rows = min((tracks.until - at) // period + 1, _ROWS)
         times = at + period * np.arange(rows, dtype=np.int64)
         columns: Columns = {"time_s": times / SECOND}
-        for axis, (coordinate, load) in zip(recording.axes, others, strict=True):
+        for axis, (coordinate, load) in zip(tracks.axes, others, strict=True):
             view = axis.view
             moved = _motion(coordinate or axis, times)
             columns[f"{axis.controller}.{view.position_name}"], columns[f"{axis.controller}.{view.velocity_name}"] = moved
@@ -44,9 +44,9 @@ def samples(recording: Recording, period: Nanos) -> Iterator[tuple[Nanos, Column
                 columns[f"{axis.controller}.{view.counted_name}"], _ = _motion(axis, times)
             if load is not None and view.mechanics is not None:
                 columns[f"{axis.controller}.{view.mechanics.position_name}"], _ = _motion(load, times)
-        for track in recording.moved:
+        for track in tracks.moved:
             columns[f"{track.controller}.{track.plain_name}"], _ = _motion(track, times)
-        columns |= {pin.name: _levels(pin, times) for pin in recording.pins}
+        columns |= {pin.name: _levels(pin, times) for pin in tracks.pins}
         yield int(times[-1]), columns
         at += period * rows
 
@@ -72,10 +72,10 @@ def _levels(pin: PinTrack, times: PulseTimes) -> NDArray[Any]:
     return levels[np.searchsorted(pin.times, times, side="right")]
 
 
-def write_csv(recording: Recording, file: IO[str], period: Nanos, progress: TimeProgress) -> None:
+def write_csv(tracks: TraceTracks, file: IO[str], period: Nanos, progress: TimeProgress) -> None:
     """Numbers have as many digits as give them back exactly."""
     names: list[str] | None = None
-    for done, columns in samples(recording, period):
+    for done, columns in samples(tracks, period):
         if names is None:
             names = list(columns)
             file.write(",".join(names) + "\n")
@@ -84,13 +84,13 @@ def write_csv(recording: Recording, file: IO[str], period: Nanos, progress: Time
         progress(done)
 
 
-def write_parquet(recording: Recording, file: IO[bytes], period: Nanos, progress: TimeProgress) -> None:
+def write_parquet(tracks: TraceTracks, file: IO[bytes], period: Nanos, progress: TimeProgress) -> None:
     import pyarrow as pa
     from pyarrow import parquet
 
     writer: parquet.ParquetWriter | None = None
     try:
-        for done, columns in samples(recording, period):
+        for done, columns in samples(tracks, period):
             table = pa.table({name: pa.array(column, from_pandas=True) for name, column in columns.items()})
             if writer is None:
                 writer = parquet.ParquetWriter(file, table.schema, compression="zstd")

@@ -15,7 +15,7 @@ from typing import IO
 from steptwin.controller import Nanos
 from steptwin.files.export.polyline import PolylinePiece, pieces_of
 from steptwin.files.export.progress import TimeProgress
-from steptwin.files.export.recording import Recording
+from steptwin.files.export.tracetracks import TraceTracks
 from steptwin.files.export.tracks import AxisTrack, PinTrack
 from steptwin.motion.divisions import Plan, StepTrain, profile_of
 from steptwin.motion.plain import plain_plan
@@ -26,16 +26,16 @@ _MOST_BYTES = 64
 """Most bytes of a frame in the page."""
 
 
-def write_timeline(recording: Recording, file: IO[str], progress: TimeProgress) -> None:
-    names = recording.title or ", ".join(recording.controllers[:4]) + (" …" if len(recording.controllers) > 4 else "")
+def write_timeline(tracks: TraceTracks, file: IO[str], progress: TimeProgress) -> None:
+    names = tracks.title or ", ".join(tracks.controllers[:4]) + (" …" if len(tracks.controllers) > 4 else "")
     data = {
-        "begin": recording.begin,
-        "span": recording.until - recording.begin,
-        "controllers": recording.controllers,
-        "axes": [_axis(track, recording, progress, i) for i, track in enumerate(recording.axes)],
-        "moved": [_moved(track, recording) for track in recording.moved],
-        "pins": [_pin(pin, recording) for pin in recording.pins],
-        "marks": [_mark(record, recording.begin) for record in recording.marks if record.time <= recording.until],
+        "begin": tracks.begin,
+        "span": tracks.until - tracks.begin,
+        "controllers": tracks.controllers,
+        "axes": [_axis(track, tracks, progress, i) for i, track in enumerate(tracks.axes)],
+        "moved": [_moved(track, tracks) for track in tracks.moved],
+        "pins": [_pin(pin, tracks) for pin in tracks.pins],
+        "marks": [_mark(record, tracks.begin) for record in tracks.marks if record.time <= tracks.until],
     }
     parts = {
         "title": escape(names),
@@ -45,7 +45,7 @@ def write_timeline(recording: Recording, file: IO[str], progress: TimeProgress) 
         "data": json.dumps(data, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"),
     }
     file.write(re.sub(r"/\*(\w+)\*/", lambda found: parts[found[1]], _part("timeline.html")))
-    progress(recording.until)
+    progress(tracks.until)
 
 
 def _part(name: str) -> str:
@@ -55,28 +55,28 @@ def _part(name: str) -> str:
 # ---------------------------------------------------------------------- axes
 
 
-def _axis(track: AxisTrack, recording: Recording, progress: TimeProgress, number: int) -> dict[str, object]:
+def _axis(track: AxisTrack, tracks: TraceTracks, progress: TimeProgress, number: int) -> dict[str, object]:
     """The coordinate; if they can differ, ``counted`` is the count since power-on, and ``true`` the position of the load."""
-    progress(recording.begin + (recording.until - recording.begin) * (number + 1) // (len(recording.axes) + 1))
+    progress(tracks.begin + (tracks.until - tracks.begin) * (number + 1) // (len(tracks.axes) + 1))
     coordinate, load = track.coordinate(), track.true()
-    counted = {} if coordinate is None else {"counted": _motion(track, recording)}
-    return _motion(coordinate or track, recording) | counted | ({} if load is None else {"true": _motion(load, recording)})
+    counted = {} if coordinate is None else {"counted": _motion(track, tracks)}
+    return _motion(coordinate or track, tracks) | counted | ({} if load is None else {"true": _motion(load, tracks)})
 
 
-def _motion(track: AxisTrack, recording: Recording) -> dict[str, object]:
+def _motion(track: AxisTrack, tracks: TraceTracks) -> dict[str, object]:
     """The ``plans``, as `steptwin.motion.plain` writes them, and flat ``pieces`` of them, six numbers each: begin (ns from that
     of the window), number of the plan and of its segment (-1: at rest), counted position, direction (0: no pulses), pulses of
     the profile for one STEP pulse.
     """
     plans: list[dict[str, object]] = []
     pieces: list[int] = []
-    for plan, after, until in track.intervals(recording.begin, recording.until):
+    for plan, after, until in track.intervals(tracks.begin, tracks.until):
         profile = profile_of(plan)
         for piece, grid, count in _divided(plan, after, until):
             number, direction = -1, 0
             if piece.segment is not None:
                 number, direction = profile.segments.index(piece.segment), piece.segment.direction
-            pieces += [piece.begin - recording.begin, len(plans), number, count, direction, grid]
+            pieces += [piece.begin - tracks.begin, len(plans), number, count, direction, grid]
         plans.append(plain_plan(profile))
     view = track.view
     return {
@@ -85,12 +85,12 @@ def _motion(track: AxisTrack, recording: Recording) -> dict[str, object]:
     }  # fmt: skip
 
 
-def _moved(track: AxisTrack, recording: Recording) -> dict[str, object]:
+def _moved(track: AxisTrack, tracks: TraceTracks) -> dict[str, object]:
     """As `_motion`, without pulses."""
     plans: list[dict[str, object]] = []
     pieces: list[int] = []
-    for plan, after, _ in track.intervals(recording.begin, recording.until):
-        pieces += [after - recording.begin, len(plans), 0 if profile_of(plan).segments else -1, 0, 0, 1]
+    for plan, after, _ in track.intervals(tracks.begin, tracks.until):
+        pieces += [after - tracks.begin, len(plans), 0 if profile_of(plan).segments else -1, 0, 0, 1]
         plans.append(plain_plan(plan))
     view = track.view
     return {
@@ -121,14 +121,14 @@ def _divided(plan: Plan, after: Nanos, until: Nanos) -> Iterator[tuple[PolylineP
 # ---------------------------------------------------------------------- pins and marks
 
 
-def _pin(pin: PinTrack, recording: Recording) -> dict[str, object]:
-    begin = recording.begin
+def _pin(pin: PinTrack, tracks: TraceTracks) -> dict[str, object]:
+    begin = tracks.begin
     return {
         "controller": pin.controller,
         "name": pin.pin,
         "analog": pin.analog,
         "before": pin.level(begin),
-        "changes": [x for time, level in pin.changes(begin, recording.until) for x in (time - begin, level)],
+        "changes": [x for time, level in pin.changes(begin, tracks.until) for x in (time - begin, level)],
     }
 
 

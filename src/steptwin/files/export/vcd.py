@@ -20,7 +20,7 @@ from steptwin import __version__
 from steptwin.controller import MILLISECOND, Nanos
 from steptwin.files.export.polyline import curve
 from steptwin.files.export.progress import TimeProgress
-from steptwin.files.export.recording import Recording
+from steptwin.files.export.tracetracks import TraceTracks
 from steptwin.files.export.tracks import AxisTrack, PinTrack
 from steptwin.files.export.vcdtext import Times, Tokens, changes_text
 from steptwin.motion import Profile
@@ -38,23 +38,23 @@ _Quiet: TypeAlias = list[tuple[Nanos, bytes]]
 """Single changes: moments and tokens."""
 
 
-def write_vcd(recording: Recording, file: IO[bytes], progress: TimeProgress, *, texts: bool = True) -> None:
+def write_vcd(tracks: TraceTracks, file: IO[bytes], progress: TimeProgress, *, texts: bool = True) -> None:
     """Without ``texts`` there are no signals of type string, an extension of GTKWave that sigrok does not read."""
-    dump = _Dump(recording if texts else replace(recording, marks=recording.of("statement")))
+    dump = _Dump(tracks if texts else replace(tracks, marks=tracks.of("statement")))
     file.write(dump.header())
-    for after, until in _windows(recording):
+    for after, until in _windows(tracks):
         file.writelines(dump.changes(after, until))
         progress(until)
-    if recording.until > dump.latest:
-        file.write(b"#%d\n" % recording.until)
+    if tracks.until > dump.latest:
+        file.write(b"#%d\n" % tracks.until)
 
 
-def _windows(recording: Recording) -> Iterator[tuple[Nanos, Nanos]]:
+def _windows(tracks: TraceTracks) -> Iterator[tuple[Nanos, Nanos]]:
     """Consecutive windows of time with few enough changes each."""
-    after, size = recording.begin, recording.until - recording.begin
-    while after < recording.until:
-        until = min(after + size, recording.until)
-        pulses = sum(track.most_pulses(after, until) for track in recording.axes)
+    after, size = tracks.begin, tracks.until - tracks.begin
+    while after < tracks.until:
+        until = min(after + size, tracks.until)
+        pulses = sum(track.most_pulses(after, until) for track in tracks.axes)
         if 2 * pulses > _WINDOW_CHANGES and size > 1:
             size //= 2
             continue
@@ -67,11 +67,11 @@ def _windows(recording: Recording) -> Iterator[tuple[Nanos, Nanos]]:
 class _Dump:
     """All variables of a dump, and the sources of their changes."""
 
-    def __init__(self, recording: Recording) -> None:
-        self._begin = recording.begin
-        self.latest = recording.begin
+    def __init__(self, tracks: TraceTracks) -> None:
+        self._begin = tracks.begin
+        self.latest = tracks.begin
         """The moment of the last change given."""
-        self._declared: dict[str, list[str]] = {name: [] for name in recording.controllers}
+        self._declared: dict[str, list[str]] = {name: [] for name in tracks.controllers}
         self._initial: list[bytes] = []
         self._codes = 0
         self._tokens: list[bytes] = []
@@ -79,16 +79,16 @@ class _Dump:
         self._trains: list[_Train] = []
         self._phases: list[_Phases] = []
         quiet: _Quiet = []
-        pins = {(pin.controller, pin.pin): pin for pin in recording.pins}
-        for track in recording.axes:
-            self._add_outputs(track, pins, recording, quiet)
-            self._add_motion(track, recording, quiet)
-        for track in recording.moved:
-            points = curve(track, recording.begin, recording.until)
+        pins = {(pin.controller, pin.pin): pin for pin in tracks.pins}
+        for track in tracks.axes:
+            self._add_outputs(track, pins, tracks, quiet)
+            self._add_motion(track, tracks, quiet)
+        for track in tracks.moved:
+            points = curve(track, tracks.begin, tracks.until)
             self._add_real(track.controller, track.plain_name, points.times, points.positions, quiet)
-        for pin in recording.pins:
-            self._add_pin(pin, recording, quiet)
-        self._add_texts(recording, quiet)
+        for pin in tracks.pins:
+            self._add_pin(pin, tracks, quiet)
+        self._add_texts(tracks, quiet)
         quiet.sort(key=lambda change: change[0])
         self._quiet_times: Times = np.array([time for time, _ in quiet], dtype=np.int64)
         self._quiet_tokens = [token for _, token in quiet]
@@ -112,7 +112,7 @@ class _Dump:
         head = "".join(lines) + f"$enddefinitions $end\n#{self._begin}\n$dumpvars\n"
         return head.encode() + b"".join(self._initial) + b"$end\n"
 
-    def _add_outputs(self, track: AxisTrack, pins: dict[tuple[str, str], PinTrack], recording: Recording, quiet: _Quiet) -> None:
+    def _add_outputs(self, track: AxisTrack, pins: dict[tuple[str, str], PinTrack], tracks: TraceTracks, quiet: _Quiet) -> None:
         outputs = track.view.outputs
         first = len(self._tokens)
         if isinstance(outputs, StepOutputs):
@@ -123,8 +123,8 @@ class _Dump:
             self._trains.append(_Train(track, first, outputs.width_ns))
             if outputs.dir is not None:
                 code = self._declare(track.controller, "wire", 1, outputs.dir)
-                reversals = _reversals(track, recording.until, outputs.width_ns)
-                done = bisect_right(reversals, recording.begin, key=itemgetter(0))
+                reversals = _reversals(track, tracks.until, outputs.width_ns)
+                done = bisect_right(reversals, tracks.begin, key=itemgetter(0))
                 direction = reversals[max(done - 1, 0)][1] if reversals else 1
                 self._initial.append(_bit(direction > 0, code))
                 quiet += [(time, _bit(direction > 0, code)) for time, direction in reversals[max(done, 1) :]]
@@ -133,22 +133,22 @@ class _Dump:
                 code = self._declare(track.controller, "integer", 8, phase)
                 self._tokens += [b"b%s %s\n" % (format(value & 255, "08b").encode(), code) for value in range(-127, 128)]
             phases = _Phases(track, first, outputs, pins.get((track.controller, outputs.characteristic_pin)))
-            self._initial += [self._tokens[token] for token in phases.at(recording.begin)]
+            self._initial += [self._tokens[token] for token in phases.at(tracks.begin)]
             self._phases.append(phases)
 
-    def _add_motion(self, track: AxisTrack, recording: Recording, quiet: _Quiet) -> None:
+    def _add_motion(self, track: AxisTrack, tracks: TraceTracks, quiet: _Quiet) -> None:
         view = track.view
         coordinate = track.coordinate()
-        points = curve(coordinate or track, recording.begin, recording.until)
+        points = curve(coordinate or track, tracks.begin, tracks.until)
         scale = view.pulses_per_unit
         self._add_real(track.controller, view.position_name, points.times, [p / scale for p in points.positions], quiet)
         self._add_real(track.controller, view.velocity_name, points.times, [v / scale for v in points.velocities], quiet)
         if coordinate is not None:
-            points = curve(track, recording.begin, recording.until)
+            points = curve(track, tracks.begin, tracks.until)
             self._add_real(track.controller, view.counted_name, points.times, [p / scale for p in points.positions], quiet)
         load = track.true()
         if load is not None and view.mechanics is not None:
-            points, scale = curve(load, recording.begin, recording.until), load.view.pulses_per_unit
+            points, scale = curve(load, tracks.begin, tracks.until), load.view.pulses_per_unit
             name = view.mechanics.position_name
             self._add_real(track.controller, name, points.times, [p / scale for p in points.positions], quiet)
 
@@ -158,21 +158,21 @@ class _Dump:
         self._initial.append(tokens[0] if tokens else b"r0.0 %s\n" % code)
         quiet += _drawn_to(times, tokens)
 
-    def _add_pin(self, pin: PinTrack, recording: Recording, quiet: _Quiet) -> None:
+    def _add_pin(self, pin: PinTrack, tracks: TraceTracks, quiet: _Quiet) -> None:
         code = self._declare(pin.controller, *(("real", 64) if pin.analog else ("wire", 1)), pin.pin)
-        level = pin.level(recording.begin)
+        level = pin.level(tracks.begin)
         if pin.analog:
             if level is not None:
                 self._initial.append(b"r%r %s\n" % (level, code))
-            quiet += [(time, b"r%r %s\n" % (value, code)) for time, value in pin.changes(recording.begin, recording.until)]
+            quiet += [(time, b"r%r %s\n" % (value, code)) for time, value in pin.changes(tracks.begin, tracks.until)]
         else:
             self._initial.append(_bit(level == 1.0, code))
-            quiet += [(time, _bit(value == 1.0, code)) for time, value in pin.changes(recording.begin, recording.until)]
+            quiet += [(time, _bit(value == 1.0, code)) for time, value in pin.changes(tracks.begin, tracks.until)]
 
-    def _add_texts(self, recording: Recording, quiet: _Quiet) -> None:
+    def _add_texts(self, tracks: TraceTracks, quiet: _Quiet) -> None:
         """One variable for each link and direction, for the lines of each program, for events, faults and inputs."""
         changes: dict[tuple[str, str, str], _Quiet] = {}
-        for time, controller, kind, subject, value, _ in recording.marks:
+        for time, controller, kind, subject, value, _ in tracks.marks:
             name = f"{kind}s" if kind in {"event", "fault", "input"} else f"{subject}_line" if kind == "statement" else subject
             text = value.hex(" ") if isinstance(value, bytes) else str(value) if kind == "statement" else f"{subject} {value}"
             changes.setdefault((controller, kind, name), []).append((time, text.encode()))
@@ -187,7 +187,7 @@ class _Dump:
             for i, (time, text) in enumerate(texts):
                 quiet.append((time, b"s%s %s\n" % (_escaped(text), code)))
                 gone = time + _TEXT_NS
-                if gone < recording.until and (i + 1 == len(texts) or gone < texts[i + 1][0]):
+                if gone < tracks.until and (i + 1 == len(texts) or gone < texts[i + 1][0]):
                     quiet.append((gone, b"s %s\n" % code))
 
     # ------------------------------------------------------------------ changes

@@ -295,7 +295,7 @@ class SparkplugFace:
         except Misuse:
             return
         if len(self._doing) >= MOST_COMMANDS:
-            self._tell(device, f"{MOST_COMMANDS} commands are being done already")
+            self._publish_answer(device, f"{MOST_COMMANDS} commands are being done already")
             return
         task = asyncio.create_task(self._do_all(device, metrics))
         self._doing.add(task)
@@ -337,16 +337,16 @@ class SparkplugFace:
             wanted = _command(row, metric)
         except Misuse as error:
             self._anybody.refused(self._subject, "write", {"controller": name, "metric": called, "value": str(metric.value)})
-            self._tell(name, f"{called}: {error}")
+            self._publish_answer(name, f"{called}: {error}")
             return
         try:
             await self._anybody.do(self._subject, wanted)
             result = f"{called}: done"
         except SteptwinError as error:
             result = f"{called}: {error}"
-        self._tell(name, result)
+        self._publish_answer(name, result)
 
-    def _tell(self, name: str | None, result: str) -> None:
+    def _publish_answer(self, name: str | None, result: str) -> None:
         for one in self._devices[name].rows:
             if one.name == RESULT:
                 self._change(name, one, result, _now())

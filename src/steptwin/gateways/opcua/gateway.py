@@ -16,10 +16,10 @@ from steptwin.eventloop import endless
 from steptwin.files.certificate import APPLICATION_URI
 from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.opcua.addressspace import NAMESPACE, NAMESPACE_URI, AddressSpaceBuilder
+from steptwin.gateways.opcua.historyread import HistoryNodes
 from steptwin.gateways.opcua.limits import tell_limits
 from steptwin.gateways.opcua.notifications import Notifications
 from steptwin.gateways.opcua.options import OpcUaSpec
-from steptwin.gateways.opcua.past import PastNodes
 from steptwin.gateways.opcua.security import Security
 from steptwin.gateways.opcua.service import NodeService
 from steptwin.gateways.opcua.session import GatewayServer
@@ -75,11 +75,11 @@ class OpcUaGateway:
         if await server.register_namespace(NAMESPACE_URI) != NAMESPACE:
             raise AssertionError
         await security.apply(server)
-        builder = AddressSpaceBuilder(self._subject.description, registers, is_kept=self._subject.past is not None)
+        builder = AddressSpaceBuilder(self._subject.description, registers, is_kept=self._subject.history is not None)
         await builder.add_to(server)
         self._sampler = Sampler(self._subject.samples, registers, self._spec.interval)
-        past = None if self._subject.past is None else PastNodes(self._subject.past, builder.nodes())
-        service = NodeService(server, self._subject, self._sampler, builder, past)
+        history = None if self._subject.history is None else HistoryNodes(self._subject.history, builder.nodes())
+        service = NodeService(server, self._subject, self._sampler, builder, history)
         inside.service = self._service = service
         await service.refresh_all()
         self._notifications = await Notifications.open(server, self._subject)

@@ -15,9 +15,9 @@ from steptwin.gateways.clients import GatewayClient
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.leases import JogLeases
 from steptwin.gateways.opcua.addressspace import AddressSpaceBuilder, BoundMethod, PointNode
+from steptwin.gateways.opcua.historyread import HistoryNodes
 from steptwin.gateways.opcua.limits import AT_ONCE
 from steptwin.gateways.opcua.nodetypes import data_value, number_of, status
-from steptwin.gateways.opcua.past import PastNodes
 from steptwin.gateways.points import PointValue, State
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.subject.commands import Jog, ReadPoints, StopAxes
@@ -81,7 +81,12 @@ class NodeService:
     """The `SessionRequests` of sessions, for the nodes that ``builder`` has added to ``server``."""
 
     def __init__(
-        self, server: Server, subject: GatewaySubject, sampler: Sampler, builder: AddressSpaceBuilder, past: PastNodes | None
+        self,
+        server: Server,
+        subject: GatewaySubject,
+        sampler: Sampler,
+        builder: AddressSpaceBuilder,
+        history: HistoryNodes | None,
     ) -> None:
         self._server = server
         self._subject = subject
@@ -89,7 +94,7 @@ class NodeService:
         self._points = builder.points
         self._methods = builder.methods
         self._arrays = builder.arrays
-        self._past = past
+        self._history = history
         self._watched_arrays: dict[ua.NodeId, int] = {}
         """Subscribed arrays, and publications until they are read again."""
         self._of_node = builder.nodes()
@@ -173,9 +178,9 @@ class NodeService:
         await self._server.write_attribute_value(node, fresh)
 
     async def history(self, params: ua.HistoryReadParameters, one: ua.HistoryReadValueId) -> ua.HistoryReadResult:
-        if self._past is None:
+        if self._history is None:
             raise ua.UaStatusCodeError(ua.StatusCodes.BadHistoryOperationUnsupported)
-        return await self._past.read(params.HistoryReadDetails, one, release=params.ReleaseContinuationPoints)
+        return await self._history.read(params.HistoryReadDetails, one, release=params.ReleaseContinuationPoints)
 
     # ------------------------------------------------------------------ commands
 

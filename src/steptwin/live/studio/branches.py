@@ -13,10 +13,10 @@ from typing import NamedTuple
 from steptwin.controller import MILLISECOND, Nanos
 from steptwin.errors import Misuse, Refusal
 from steptwin.eventloop import later
-from steptwin.live.lookback import Lookback
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.studio.options import StudioOptions
 from steptwin.live.studio.processes import ChildProcesses, Process
+from steptwin.live.timetravel import WorldTimeTravel
 from steptwin.live.world import LiveWorld
 from steptwin.messages import NONE, Message
 from steptwin.simulation.scheduler.trace import Mark
@@ -59,10 +59,12 @@ class WorldBranches:
     """See `steptwin.studio.branchrequests.Branches`. A `Link` of the server. ``own``: how their pages are served; None: they
     cannot be reached, so there are none."""
 
-    def __init__(self, live: LiveWorld, realtime: RealTimeDriver, lookback: Lookback, own: StudioOptions | None) -> None:
+    def __init__(
+        self, live: LiveWorld, realtime: RealTimeDriver, time_travel: WorldTimeTravel, own: StudioOptions | None
+    ) -> None:
         self._live = live
         self._realtime = realtime
-        self._lookback = lookback
+        self._time_travel = time_travel
         self._own = own
         self._processes = ChildProcesses()
         self._open: dict[int, _OpenBranch] = {}
@@ -85,7 +87,7 @@ class WorldBranches:
         self._starting += 1
         try:
             self._realtime.enter()
-            snapshot = await self._lookback.state_at(self._live.now if moment is None else moment)
+            snapshot = await self._time_travel.state_at(self._live.now if moment is None else moment)
             number = next(self._numbers)
             branch = await later(asyncio.to_thread(self._begin, self._own, number, snapshot))
         finally:

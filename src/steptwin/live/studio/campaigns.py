@@ -203,4 +203,4 @@ def _result(report: Path) -> dict[str, object] | None:
 def _cause(one: Mapping[str, Any]) -> dict[str, object]:
     files = one["files"]
     head = {"what": one["what"], "where": one["where"], "runs": one["count"]}
-    return {**head, "session": files.get("session"), "timeline": files.get("timeline")}
+    return {**head, "recording": files.get("session"), "timeline": files.get("timeline")}

@@ -32,7 +32,7 @@ def demo_world(options: UpOptions, *, free_ports: bool = False) -> World:
         name=NAME,
         seed=options.run.seed,
         overrides=options.run.overrides,
-        keep_inputs=options.records_session,
+        keep_inputs=options.is_recorded,
         state=None if options.run.state is None else str(options.run.state),
     )
 

@@ -44,7 +44,7 @@ class StudioOptions(OptionGroup):
             completion="devices",
         ),
     ] = ()
-    view: Annotated[bool, Option("Show a session as it was: paused at its end, and nothing can be changed.")] = False
+    view: Annotated[bool, Option("Show a recording as it was: paused at its end, and nothing can be changed.")] = False
     browser: Annotated[bool, Option("Open the page where there is a desktop.")] = True
     is_demo: bool = False
     """Whether no file of the user is behind it: only what reaches a device needs a token."""

@@ -13,16 +13,16 @@ from pathlib import Path
 
 from steptwin.errors import Misuse, Refusal
 from steptwin.eventloop import later
-from steptwin.files import session as sessions
-from steptwin.files.beginning import SESSION_SUFFIX, is_session
+from steptwin.files import recording as recordings
+from steptwin.files.beginning import RECORDING_SUFFIX, is_recording
 from steptwin.files.export import FORMATS
 from steptwin.files.ownfolder import place_in
-from steptwin.files.savedsessions import SavedSession, path_of, read_saved, saved_sessions
+from steptwin.files.savedrecordings import SavedRecording, path_of, read_saved, saved_recordings
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.studio.processes import ChildProcesses, Process, last_words
 from steptwin.live.world import MOST_INPUT_BYTES, MOST_INPUTS, LiveWorld
 from steptwin.messages import Message, text_of
-from steptwin.simulation.world import history
+from steptwin.simulation.world import snapshotlog
 
 EXPORT_S = 300.0
 """Longest duration of an export."""
@@ -33,13 +33,13 @@ VIEW_FROM_ELSEWHERE = Message(
     "a view is reached from the computer of the studio only: start it with steptwin studio {path} --view",
 )
 UNKNOWN_FORMAT = Message("live.unknown-format", "{name}: formats are {names}")
-UNKNOWN_SESSION = Message("live.unknown-session", "no session is called {name!r} in {folder}")
+UNKNOWN_RECORDING = Message("live.unknown-recording", "no recording is called {name!r} in {folder}")
 
 
 class WorldRecordings:
     """See `steptwin.studio.recordingrequests.Recordings`. A `Link` of the server.
 
-    ``folder``: where sessions are saved; ``stem``: how their names begin; ``access``: options of views about tokens. Views are
+    ``folder``: where recordings are saved; ``stem``: how their names begin; ``access``: options of views about tokens. Views are
     served at a loopback address; None: they cannot be reached, so there are none.
     """
 
@@ -57,9 +57,9 @@ class WorldRecordings:
     # ------------------------------------------------------------------ requests
 
     async def plain(self) -> Mapping[str, object]:
-        saved = await later(asyncio.to_thread(saved_sessions, self._folder))
+        saved = await later(asyncio.to_thread(saved_recordings, self._folder))
         return {
-            "session": self._session(),
+            "recording": self._recorded(),
             "past": self._past(),
             "trace": self._trace(),
             "folder": str(self._folder),
@@ -70,12 +70,12 @@ class WorldRecordings:
     async def save(self, name: str | None) -> Mapping[str, object]:
         path = place_in(self._folder, path_of(self._folder, name or f"{self._stem}-{datetime.now(UTC):%Y%m%d-%H%M%S}").name)
         self._realtime.enter()
-        return _plain(await later(asyncio.to_thread(_save, self._live.session(), path)))
+        return _plain(await later(asyncio.to_thread(_save, self._live.recording(), path)))
 
     def place(self, file: str) -> str:
         path = place_in(self._folder, file)
         if path.exists():
-            if not is_session(path):
+            if not is_recording(path):
                 raise Refusal(FILE_IS_THERE(path=path))
             read_saved(path)  # whatever else is there is not overwritten
         return str(path)
@@ -89,23 +89,23 @@ class WorldRecordings:
     async def file(self, name: str) -> str:
         stem, _, form = name.rpartition(".")
         path = self._saved(stem)
-        if f".{form}" == SESSION_SUFFIX:
+        if f".{form}" == RECORDING_SUFFIX:
             return str(path)
         if form not in FORMATS:
-            raise Misuse(UNKNOWN_FORMAT(name=name, names=[SESSION_SUFFIX[1:], *FORMATS]))
+            raise Misuse(UNKNOWN_FORMAT(name=name, names=[RECORDING_SUFFIX[1:], *FORMATS]))
         return str(await later(asyncio.to_thread(self._processes.export, path, form)))
 
     def _saved(self, name: str) -> Path:
-        """Raises `Misuse` where there is no such session."""
+        """Raises `Misuse` where there is no such recording."""
         path = path_of(self._folder, name)
         if not path.is_file():
-            raise Misuse(UNKNOWN_SESSION(name=name, folder=self._folder))
+            raise Misuse(UNKNOWN_RECORDING(name=name, folder=self._folder))
         read_saved(path)  # whatever else is there is nobody's business
         return path
 
     # ------------------------------------------------------------------ what is recorded
 
-    def _session(self) -> Mapping[str, object] | None:
+    def _recorded(self) -> Mapping[str, object] | None:
         recorded = self._live.recorded
         if recorded is None:
             return None
@@ -120,10 +120,10 @@ class WorldRecordings:
         }
 
     def _past(self) -> Mapping[str, object] | None:
-        past = self._live.history
+        past = self._live.snapshots
         if past is None:
             return None
-        limits = {"inputs": past.kept_inputs, "most_inputs": history.MOST_INPUTS}
+        limits = {"inputs": past.kept_inputs, "most_inputs": snapshotlog.MOST_INPUTS}
         return {"from_ns": str(past.begin), "states": len(past), **limits}
 
     def _trace(self) -> Mapping[str, object]:
@@ -191,13 +191,13 @@ class _Processes(ChildProcesses):
             return url
 
 
-def _save(session: sessions.Session, path: Path) -> SavedSession:
+def _save(recording: recordings.Recording, path: Path) -> SavedRecording:
     """Raises `Refusal` where there is such a file, `Misuse` where it cannot be written."""
     if path.exists():
         raise Refusal(FILE_IS_THERE(path=path))
-    sessions.save(session, path)
+    recordings.save(recording, path)
     return read_saved(path)
 
 
-def _plain(saved: SavedSession) -> Mapping[str, object]:
+def _plain(saved: SavedRecording) -> Mapping[str, object]:
     return {"name": saved.name, "bytes": saved.size, "saved": saved.saved, "until_ns": str(saved.until)}

@@ -26,13 +26,12 @@ from steptwin.devices.worldpart import WorldPart
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.files.auditfile import AuditFile, wall_clock
-from steptwin.files.beginning import is_session
+from steptwin.files.beginning import is_recording
 from steptwin.files.export.tracefile import read_kept
 from steptwin.files.tokenfiles import tokens_in
 from steptwin.files.world import World
 from steptwin.httpservice import Tls, listen
 from steptwin.live.keptsettings import keep_settings, state_directory
-from steptwin.live.lookback import Lookback
 from steptwin.live.options import LiveOptions, UpOptions
 from steptwin.live.ports import serial_ports, twin_ports
 from steptwin.live.running import Running, send_away, up, up_with
@@ -48,6 +47,7 @@ from steptwin.live.studio.recorded import recorded
 from steptwin.live.studio.recordings import WorldRecordings
 from steptwin.live.studio.services import LiveServices
 from steptwin.live.studio.work import LineWork
+from steptwin.live.timetravel import WorldTimeTravel
 from steptwin.live.twins import find_device
 from steptwin.live.withoutworld import serve_without_world
 from steptwin.live.world import LiveWorld
@@ -56,7 +56,7 @@ from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.description import read_world
 from steptwin.simulation.describe.pieces import given_files
 from steptwin.simulation.toml.addresses import Address, is_loopback, parse_address
-from steptwin.simulation.world.history import History
+from steptwin.simulation.world.snapshotlog import SnapshotLog
 from steptwin.simulation.world.worldprograms import WorldPrograms, configuration_text
 from steptwin.studio.hub import Hub
 from steptwin.studio.service import StudioService
@@ -75,7 +75,7 @@ def studio(own: StudioOptions, options: UpOptions) -> bool:
     Raises `Misuse` or another `SteptwinError` with a text for the user.
     """
     if own.view and (options.world is None or own.device):
-        raise Misuse("--view shows one session (.json), and no device: name its file")
+        raise Misuse("--view shows one recording (.json), and no device: name its file")
     own = replace(own, is_demo=options.world is None and not own.device and not _keeps_files(own, options))
     entrance = _entrance(own)
     with ExitStack() as stack:
@@ -83,9 +83,9 @@ def studio(own: StudioOptions, options: UpOptions) -> bool:
         listening = stack.enter_context(listen(entrance.address, is_fixed=own.http is not None))
         page = _Page(own, entrance, listening, audit)
         if own.view and options.world is not None:
-            world, history = recorded(options.world, lambda text: sys.stderr.write(f"{text}\n"))
+            world, snapshots = recorded(options.world, lambda text: sys.stderr.write(f"{text}\n"))
             stack.enter_context(world)
-            opening = partial(page.open, beside=options, history=history)
+            opening = partial(page.open, beside=options, snapshots=snapshots)
             return up_with(world, replace(options, live=replace(options.live, speed="0"), is_closed=True), opening)
         if options.world is not None:
             return up(replace(options, keeps_inputs=True, audit=audit), partial(page.open, beside=options))
@@ -199,9 +199,9 @@ class _Page:
         self._listening = listening
         self._audit = audit
 
-    async def open(self, running: Running, *, beside: UpOptions | None = None, history: History | None = None) -> None:
+    async def open(self, running: Running, *, beside: UpOptions | None = None, snapshots: SnapshotLog | None = None) -> None:
         """Serve it in the event loop of a world, with the past of one that has one already. ``beside``: of the world whose
-        sessions are saved; a branch has none."""
+        recordings are saved; a branch has none."""
         live, pace, server = running.live, running.pace, running.server
 
         def moment() -> PresentMoment:
@@ -217,10 +217,10 @@ class _Page:
         def configuration(controller: str) -> SourceText | None:
             return configuration_text(live.world, controller) if controller in live.world.controllers else None
 
-        lookback = Lookback(live, server.realtime, pace, history)
-        server.join(lookback)
+        time_travel = WorldTimeTravel(live, server.realtime, pace, snapshots)
+        server.join(time_travel)
         recordings = None if beside is None else self._recordings(running, beside)
-        branches = WorldBranches(live, server.realtime, lookback, self._branch_options())
+        branches = WorldBranches(live, server.realtime, time_travel, self._branch_options())
         server.join(branches)
         campaigns = _campaigns(None if beside is None else beside.world)
         if campaigns is not None:
@@ -229,7 +229,7 @@ class _Page:
             Surroundings,
             programs=WorldPrograms(live.world),
             configuration=configuration,
-            lookback=lookback,
+            time_travel=time_travel,
             branches=branches,
             recordings=recordings,
             services=None if beside is None else LiveServices(running.gateways),
@@ -329,15 +329,15 @@ class _Page:
 
 
 def _arrangement(live: LiveWorld, path: Path | None) -> WorldArrangement:
-    """Arrangement of the description at ``path``, or of a session, whose description is in no file."""
+    """Arrangement of the description at ``path``, or of a recording, whose description is in no file."""
     shown = live.subject.description
     names = [part.name for part in (*shown.axes, *shown.elements)]
-    return WorldArrangement(live.world.spec, names, None if path is None or is_session(path) else path)
+    return WorldArrangement(live.world.spec, names, None if path is None or is_recording(path) else path)
 
 
 def _campaigns(path: Path | None) -> FolderCampaigns | None:
     """Those in the folder of a description, or below it."""
-    return None if path is None or is_session(path) else FolderCampaigns(path)
+    return None if path is None or is_recording(path) else FolderCampaigns(path)
 
 
 @dataclass(slots=True)

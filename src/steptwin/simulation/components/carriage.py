@@ -69,7 +69,7 @@ class Carriage(Stateful):
         """Let the belt have a share of its frequency."""
         self._spring = Spring(self.spec.frequency * share, self.spec.damping)
         self._renew(now)
-        self.axis.scheduler.report(self.axis.mechanism.controller, "edge", f"{self.spec.name}.{SPRING_SHARE}", share)
+        self.axis.scheduler.record(self.axis.mechanism.controller, "edge", f"{self.spec.name}.{SPRING_SHARE}", share)
 
     # ------------------------------------------------------------------ part of a scheduler
 

@@ -214,7 +214,7 @@ class Conveyor(BoardPart):
         """Something has happened to a workpiece."""
         scheduler = self.board.scheduler
         facts = ("workpiece", name), ("element", self.spec.name), ("what", what)
-        scheduler.report(scheduler.owner(self.board.name), "event", "workpiece", text, *facts)
+        scheduler.record(scheduler.owner(self.board.name), "event", "workpiece", text, *facts)
 
     def _hold(self, now: Nanos) -> None:
         """Let workpieces stand where they cannot go on, and let those go on that can."""
@@ -329,7 +329,7 @@ FEEDER_WORKS_AGAIN = Message("simulation.feeder-works-again", "the feeder of {na
 def _stop_feeder(active: ActiveFault, conveyor: Conveyor, begins: bool, now: Nanos) -> str:
     conveyor.feeder_stands = begins
     scheduler, name = conveyor.board.scheduler, conveyor.spec.name
-    scheduler.report(scheduler.owner(name), "edge", f"{name}.{FEEDER_STANDS}", float(begins))
+    scheduler.record(scheduler.owner(name), "edge", f"{name}.{FEEDER_STANDS}", float(begins))
     return (FEEDER_FAILS if begins else FEEDER_WORKS_AGAIN)(name=name)
 
 

@@ -145,7 +145,7 @@ class Follower(Stateful):
 
     def _report(self, what: str, level: float) -> None:
         axis = self.shaft.axis
-        axis.scheduler.report(axis.mechanism.controller, "edge", f"{self.spec.name}.{what}", level)
+        axis.scheduler.record(axis.mechanism.controller, "edge", f"{self.spec.name}.{what}", level)
 
     @property
     def moved(self) -> tuple[str, MovedChannel]:

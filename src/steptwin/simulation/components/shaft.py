@@ -105,7 +105,7 @@ class GearedShaft(Stateful):
     def slip(self, slips: bool, now: Nanos) -> None:
         """Let the coupling slip, or grip again where the shaft is then."""
         scheduler, mechanism = self.axis.scheduler, self.axis.mechanism
-        scheduler.report(mechanism.controller, "edge", f"{self.spec.name}.{SLIPS}", float(slips))
+        scheduler.record(mechanism.controller, "edge", f"{self.spec.name}.{SLIPS}", float(slips))
         if slips:
             self._held = self.place(now)
         elif self._held is not None:

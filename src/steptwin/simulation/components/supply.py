@@ -190,7 +190,7 @@ class Supply(BoardPart):
         fed = self._spec.feeds
         text = (SUPPLY_IS_ON if self.is_good else SUPPLY_IS_OFF)(supply=name, fed=list(fed))
         facts = ("element", name), ("on", self.is_good), ("fed", ", ".join(fed))
-        scheduler.report(scheduler.owner(name), "event", "supply", text, *facts)
+        scheduler.record(scheduler.owner(name), "event", "supply", text, *facts)
 
     def deadline(self) -> Nanos | None:
         now = self.board.scheduler.now

@@ -105,7 +105,7 @@ class Tool(Stateful):
         elif its.held is not None:
             self._pulled[n] = Pulled(None, pulled_to(axis, Pulled(), now) - its.held)
         scheduler = axis.scheduler
-        scheduler.report(self.axes[0].mechanism.controller, "edge", f"{self.spec.name}.{belt}.{SLIPS}", float(slips))
+        scheduler.record(self.axes[0].mechanism.controller, "edge", f"{self.spec.name}.{belt}.{SLIPS}", float(slips))
         scheduler.notify(self.spec.name)
         return self._pulled[n].behind
 

@@ -90,7 +90,7 @@ class Touch(BoardPart):
     def _report(self, text: str, *, touches: bool) -> None:
         scheduler = self.board.scheduler
         facts = ("element", self.board.name), ("touches", touches), ("jams", self._jams)
-        scheduler.report(scheduler.owner(self.board.name), "event", "collision", text, *facts)
+        scheduler.record(scheduler.owner(self.board.name), "event", "collision", text, *facts)
 
     def deadline(self) -> Nanos | None:
         return self._due

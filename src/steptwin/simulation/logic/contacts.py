@@ -154,7 +154,7 @@ class Circuit:
 
     def report(self, channel: str, level: float) -> None:
         """The level of one contact, apart from the others of the input."""
-        self._scheduler.report(self.controller, "edge", channel, level)
+        self._scheduler.record(self.controller, "edge", channel, level)
 
 
 class Contact(Stateful):

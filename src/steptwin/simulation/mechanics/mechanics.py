@@ -227,12 +227,12 @@ class Mechanism(Stateful):
             moved = Profile(
                 coasting.start, coasting.base + (state.load - state.rotor) * self.build.sign, coasting.segments, coasting.final_p
             )
-            self._scheduler.report(self.controller, "free", str(self.number), moved)
+            self._scheduler.record(self.controller, "free", str(self.number), moved)
             return
         pieces = _from(trajectory.load_pieces(), now)
         if self._reported is None or pieces != _from(self._reported, now):
             self._reported = pieces
-            self._scheduler.report(self.controller, "load", str(self.number), pieces)
+            self._scheduler.record(self.controller, "load", str(self.number), pieces)
 
     def deadline(self) -> Nanos | None:
         """Trajectories are computed in advance: what is due is to be reported, or concerns followers and the current of the
@@ -255,7 +255,7 @@ class Mechanism(Stateful):
                 ("stalled", stalled),
                 ("lost", 0 if stalled else self.lost(now)),
             )
-            self._scheduler.report(self.controller, "event", "stall", text, *facts)
+            self._scheduler.record(self.controller, "event", "stall", text, *facts)
         self._stall_due = self._trajectory.next_stall(now)
 
     def _watch_stops(self, now: Nanos) -> None:
@@ -269,7 +269,7 @@ class Mechanism(Stateful):
             else:
                 text = (LEAVES_UPPER if side == "upper" else LEAVES_LOWER)(axis=self._name, pulses=lost)
             facts = ("axis", self.number), ("element", self._name), ("stop", side), ("pushes", pushes), ("lost", lost)
-            self._scheduler.report(self.controller, "event", "hard-stop", text, *facts)
+            self._scheduler.record(self.controller, "event", "hard-stop", text, *facts)
             self._stop = stop
         self._stop_due = self._trajectory.next_stop(now)
 
@@ -332,7 +332,7 @@ class Mechanism(Stateful):
             lost = self.lost(now)
             text = self._hold.why(axis=self._name) if falls else STANDS(axis=self._name, pulses=lost)
             facts = ("axis", self.number), ("element", self._name), ("falls", falls), ("lost", lost)
-            self._scheduler.report(self.controller, "event", "fall", text, *facts)
+            self._scheduler.record(self.controller, "event", "fall", text, *facts)
         self._rest_due = coasting.end if coasting is not None and falls else None
 
     def brake(self, torque: float, now: Nanos) -> None:

@@ -366,12 +366,12 @@ class Scheduler:
 
     def put(self, element: str, output: str, level: float) -> None:
         """An output of an element has another level now, or its first one."""
-        self.report(self.owner(element), "edge", f"{element}.{output.lower()}", level)
+        self.record(self.owner(element), "edge", f"{element}.{output.lower()}", level)
         self.wires.transmit(PinName(element, output), level, self.now)
         self.notify(element)
 
-    def report(self, controller: str, kind: str, subject: str, value: object, *facts: Fact) -> None:
-        """Record an event of a controller at the present moment."""
+    def record(self, controller: str, kind: str, subject: str, value: object, *facts: Fact) -> None:
+        """Add a record of a controller to the trace, at the present moment."""
         if self._record is not None and not self.is_blank:
             self._record(TraceRecord(self.now, controller, kind, subject, value, facts))
 

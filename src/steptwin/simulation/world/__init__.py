@@ -1,1 +1,1 @@
-"""A running world: model, scripts, actions, history and views. Sees all other rooms."""
+"""A running world: model, scripts, actions, snapshots and views. Sees all other rooms."""

@@ -35,7 +35,7 @@ from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.toml.names import Unknown
-from steptwin.simulation.world.reports import Reports
+from steptwin.simulation.world.boundedlog import BoundedLog
 
 WORLD = "world"
 """The controller name in records that belong to no controller."""
@@ -66,9 +66,9 @@ class Model:
         self.now: Nanos = 0
         self.stopped: str | None = None
         """The reason a script gave for ending the run; None if none did."""
-        self.failures = Reports()
+        self.failures = BoundedLog()
         """Expectations that did not hold."""
-        self.overdue = Reports()
+        self.overdue = BoundedLog()
         """Conditions that scripts of the description waited for until their time-out."""
         self.synced_first: Sequence[Scheduler] = ()
         """Schedulers that are advanced before the others where the order is free, so that what observes them can read the
@@ -269,7 +269,7 @@ class Model:
         """Report that a wait of a script of the description timed out."""
         self._report(self.overdue, "overdue", text)
 
-    def _report(self, reports: Reports, code: str, text: str) -> None:
+    def _report(self, log: BoundedLog, code: str, text: str) -> None:
         record = TraceRecord(self.now, WORLD, "event", code, text)
-        reports.add(record)
+        log.add(record)
         self.trace.add(record)

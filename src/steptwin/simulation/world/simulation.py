@@ -21,10 +21,10 @@ from steptwin.simulation.scheduler.observing import WorldObserver
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.actions import act
+from steptwin.simulation.world.boundedlog import BoundedLog
 from steptwin.simulation.world.inputs import ExternalInput
 from steptwin.simulation.world.model import Model
 from steptwin.simulation.world.references import check_faults, check_scripts, check_step
-from steptwin.simulation.world.reports import Reports
 from steptwin.simulation.world.running import Script
 from steptwin.simulation.world.scripts import MOST_STEPS_PER_INSTANT, Scripts
 from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
@@ -49,7 +49,8 @@ class Simulation(Model):
         super().__init__(blueprint, keep_trace=keep_trace, keep_memory=keep_memory, is_blank=at is not None)
         spec = self.spec
         self.keeps_inputs = keep_inputs
-        """Whether external inputs are kept, as a session needs; off for worlds that run for weeks, where memory would fill up."""
+        """Whether external inputs are kept, as a recording needs; off for worlds that run for weeks, where memory would fill
+        up."""
         self.inputs: list[RecordedInput] = []
         """All external inputs so far, if they are kept."""
         self.input_watchers: list[Callable[[RecordedInput], None]] = []
@@ -108,16 +109,16 @@ class Simulation(Model):
         """Apply an external input at the present moment and record it for replay. If it raises `Misuse`, nothing has changed."""
         check_step(self, what)
         self.perform(what)
-        self.note(what)
+        self.record_input(what)
 
     @property
-    def notes_inputs(self) -> bool:
+    def records_inputs(self) -> bool:
         """Whether anything wants to know of what comes from outside."""
         return self.keeps_inputs or bool(self.input_watchers)
 
-    def note(self, what: ExternalInput) -> None:
+    def record_input(self, what: ExternalInput) -> None:
         """Keep what was done from outside at the present moment, where inputs are kept, and tell watchers."""
-        if self.notes_inputs:
+        if self.records_inputs:
             given = RecordedInput(self.now, what, self.is_settled)
             if self.keeps_inputs:
                 self.inputs.append(given)
@@ -179,7 +180,7 @@ class Simulation(Model):
         self._scripts.watch_schedulers(self.schedulers, watch)
 
     def stop_recording(self) -> None:
-        """Record nothing from now on: no trace, digest or session. Watchers of the trace are called, but not with frames."""
+        """Record nothing from now on: no trace, digest or recording. Watchers of the trace are called, but not with frames."""
         self.keeps_inputs = False
         self.inputs.clear()
         self.trace.stop()
@@ -243,7 +244,7 @@ class Simulation(Model):
         for scheduler, state in zip(self.schedulers, snapshot.schedulers, strict=True):
             scheduler.restore(state)
         self.inputs, self.is_settled = list(snapshot.inputs), snapshot.is_settled
-        self.failures, self.overdue = Reports(snapshot.failures), Reports(snapshot.overdue)
+        self.failures, self.overdue = BoundedLog(snapshot.failures), BoundedLog(snapshot.overdue)
         self.downloaded.clear()
         self.downloaded.update(snapshot.downloaded)
         self._conditions.clear()

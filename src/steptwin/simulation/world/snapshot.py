@@ -12,8 +12,8 @@ from steptwin.simulation.describe.overrides import Overrides
 from steptwin.simulation.faults import Fault
 from steptwin.simulation.scheduler.scheduledpart import SchedulerState
 from steptwin.simulation.scheduler.trace import Mark
+from steptwin.simulation.world.boundedlog import BoundedLogState
 from steptwin.simulation.world.inputs import ExternalInput
-from steptwin.simulation.world.reports import ReportsState
 from steptwin.simulation.world.scripts import ScriptsState
 
 
@@ -40,8 +40,8 @@ class SimulationSnapshot:
     scripts: ScriptsState
     inputs: tuple[RecordedInput, ...]
     is_settled: bool
-    failures: ReportsState
-    overdue: ReportsState
+    failures: BoundedLogState
+    overdue: BoundedLogState
     trace: Mark
     scheduled: frozenset[str]
     """Names of the scheduled steps that can still be cancelled."""

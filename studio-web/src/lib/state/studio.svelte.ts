@@ -15,8 +15,8 @@ import { AxisState } from "./axis.svelte";
 import { WorldClock, type Pace } from "./clock";
 import { Edges } from "./edges";
 import { EventLog } from "./events.svelte";
-import { EarlierEvents, type PastEvents } from "./history";
-import { Lookback, plansOf, type Past } from "./lookback.svelte";
+import { EarlierEvents, type PastEvents } from "./earlierevents";
+import { TimeTravel, plansOf, type Past } from "./timetravel.svelte";
 import { modelOf, type AxisModel, type ControllerModel, type Model } from "./model";
 import { levelsOf, Pins } from "./pins.svelte";
 import { severityOf, type Severity } from "./severity";
@@ -95,7 +95,7 @@ export class Studio {
   /** By `table.M1`. */
   axes = $state.raw<ReadonlyMap<string, AxisState>>(new Map());
   private readonly watches = new Watches((name, fields) => this.ask(name, fields));
-  readonly lookback = new Lookback((name, fields, within_ms) => this.ask(name, fields, within_ms), {
+  readonly timeTravel = new TimeTravel((name, fields, within_ms) => this.ask(name, fields, within_ms), {
     show: (past) => this.showPast(past),
     moments: () => this.moments(),
     present: () => this.present(),
@@ -134,7 +134,7 @@ export class Studio {
 
   /** The moment that is shown: the present, or one that is looked at. Virtual time. [ns] */
   now(): bigint {
-    return this.lookback.moment ?? this.present();
+    return this.timeTravel.moment ?? this.present();
   }
 
   /** Where the world is. Virtual time. [ns] */
@@ -152,7 +152,7 @@ export class Studio {
 
   /** Whether the role of this viewer permits a request, and the studio can do it here and now. */
   may(name: RequestName): boolean {
-    return (this.lookback.past ?? this.hello)?.may.includes(name) ?? false;
+    return (this.timeTravel.past ?? this.hello)?.may.includes(name) ?? false;
   }
 
   /** Whether a request is possible only after a token has been given. */
@@ -209,14 +209,14 @@ export class Studio {
 
   /** What a key does with time. Back and on go to where something happened; on from the present is a step of the world. */
   turnTime(how: "live" | "pause" | "back" | "on"): void {
-    const isBack = this.lookback.moment !== null;
+    const isBack = this.timeTravel.moment !== null;
     if (how === "back") {
-      if (this.may("look")) this.lookback.step(-1);
+      if (this.may("show_moment")) this.timeTravel.step(-1);
     } else if (how === "on") {
-      if (isBack) this.lookback.step(1);
+      if (isBack) this.timeTravel.step(1);
       else if (this.may("step")) void this.act("step", {});
     } else if (how === "live" && isBack) {
-      this.lookback.live();
+      this.timeTravel.live();
     } else if (how === "pause" && this.pace.running) {
       if (this.may("pause")) void this.act("pause", {});
     } else if (!this.pace.running && this.may("resume")) {
@@ -254,7 +254,7 @@ export class Studio {
     for (const [pin, level] of levelsOf(hello.state)) this.edges.take(pin, BigInt(hello.time_ns), level);
     if (!hello.virtual) this.askPins();
     if (!isNewConnection) return;
-    this.lookback.forget();
+    this.timeTravel.forget();
     this.earlier.begin(BigInt(hello.time_ns));
     for (const following of this.followings) this.beginFollowing(following);
     this.watches.renew();
@@ -304,7 +304,7 @@ export class Studio {
     if ("events" in message) this.happened(message.events, message.missed, BigInt(message.time_ns));
     else if ("values" in message) this.watches.take(message.values);
     else if ("clock" in message) this.tellClock(BigInt(message.clock.time_ns), message.clock, false);
-    else if ("past" in message) this.lookback.take(message.past);
+    else if ("past" in message) this.timeTravel.take(message.past);
     else if ("control" in message) this.control = message.control;
     else if ("viewers" in message) this.viewers = message.viewers;
     else if ("leases" in message) this.leases = message.leases;

@@ -30,7 +30,7 @@ export const t = texts(
     causes: "Failures by cause",
     runsOf: "{runs} runs",
     simplest: "Simplest run that fails so",
-    session: "Session",
+    recording: "Recording",
     timeline: "Timeline",
   },
   {
@@ -62,7 +62,7 @@ export const t = texts(
     causes: "Niepowodzenia według przyczyn",
     runsOf: "przebiegi: {runs}",
     simplest: "Najprostszy przebieg, który tak zawodzi",
-    session: "Sesja",
+    recording: "Nagranie",
     timeline: "Oś czasu",
   },
 );

@@ -91,11 +91,11 @@ class ProgramWatch:
         step = steps[number] if number < len(steps) else None
         match step:
             case None | s.EndStep():
-                self._tell(now, "end", "the program ends", number)
+                self._emit(now, "end", "the program ends", number)
             case s.ProgResetStep():
-                self._tell(now, "reset", "drives off, the program begins again", number)
+                self._emit(now, "reset", "drives off, the program begins again", number)
             case s.InterruptStep():
-                self._tell(now, "interrupt", f"interrupt of {step.event.name}", number)
+                self._emit(now, "interrupt", f"interrupt of {step.event.name}", number)
             case s.ProgramStep(waits=s.StepWait.CONDITION | s.StepWait.MOTION):
                 self._pending = partial(self._waits, now, number)
             case s.ProgramStep(waits=s.StepWait.TIME):
@@ -113,7 +113,7 @@ class ProgramWatch:
     def _waits(self, now: Nanos, number: int) -> None:
         if self.device.program.interpreter.waiting:
             what = ", ".join(self._awaited(now, number))
-            self._tell(now, "wait", f"waits for {what}" if what else "waits", number)
+            self._emit(now, "wait", f"waits for {what}" if what else "waits", number)
 
     def _awaited(self, now: Nanos, number: int) -> Iterable[str]:
         """The inputs, axes and values that decide how long a statement waits."""
@@ -127,12 +127,12 @@ class ProgramWatch:
 
     def _delays(self, now: Nanos, number: int) -> None:
         duration = self.device.program.interpreter.not_before - now
-        self._tell(now, "delay", f"waits {real_text(duration / SECOND)} s", number)
+        self._emit(now, "delay", f"waits {real_text(duration / SECOND)} s", number)
 
     def _sets(self, now: Nanos, number: int, name: str, read: RegisterReader, before: float) -> None:
         after = read(self.device.program, now)
         if after != before:
-            self._tell(now, "register", f"{name} = {real_text(after)}", number)
+            self._emit(now, "register", f"{name} = {real_text(after)}", number)
 
     def line(self, step: int) -> int:
         """Line of the program's text, from 1."""
@@ -141,7 +141,7 @@ class ProgramWatch:
 
     # ------------------------------------------------------------------ what the controller does
 
-    def _tell(self, now: Nanos, code: str, text: str, step: int | None = None) -> None:
+    def _emit(self, now: Nanos, code: str, text: str, step: int | None = None) -> None:
         self.happened.append(ProgramEvent(now, code, text, step, self.program))
 
     def _caused(self, now: Nanos) -> int | None:
@@ -151,7 +151,7 @@ class ProgramWatch:
 
     def _edge(self, name: str, edge: PinEdge) -> None:
         if name == self._name and (edge.pin.startswith("OUT") or edge.pin == "ERR"):
-            self._tell(edge.time, "output", f"{edge.pin} {'on' if edge.value else 'off'}", self._caused(edge.time))
+            self._emit(edge.time, "output", f"{edge.pin} {'on' if edge.value else 'off'}", self._caused(edge.time))
 
     def deadline(self) -> Nanos | None:
         """None: the part of the scheduler only watches the axes."""
@@ -168,9 +168,9 @@ class ProgramWatch:
                 self._axes[index] = axis.status, axis.revision, axis.velocity_p
                 follows = axis.control.is_following and axis.status is AxisStatus.POSITION
                 (self._following.add if follows else self._following.discard)(index)
-                self._tell_of(axis, known[0], known[2], now)
+                self._emit_axis(axis, known[0], known[2], now)
 
-    def _tell_of(self, axis: Axis, before: AxisStatus, velocity_p: float, now: Nanos) -> None:
+    def _emit_axis(self, axis: Axis, before: AxisStatus, velocity_p: float, now: Nanos) -> None:
         """Report a changed status or motion of an axis; ``before``: its status at the last report."""
         step = self._caused(now)
         kind = None if step is None or step >= len(self.program.steps) else self.program.steps[step]
@@ -178,7 +178,7 @@ class ProgramWatch:
         moves = effect.on_drives and not effect.everything
         if axis.status is not before or moves or (axis.status is AxisStatus.VELOCITY and axis.velocity_p != velocity_p):
             caused = effect.on_drives or isinstance(kind, s.SetStep)
-            self._tell(now, "axis", _words(axis, before, now), step if caused else None)
+            self._emit(now, "axis", _words(axis, before, now), step if caused else None)
 
     def copy_state(self) -> Plain:
         return ()

@@ -15,7 +15,7 @@ from steptwin.simulation.script import steps as do
 
 
 class Mic488View(ControllerView):
-    """A MIC488. ``device`` is the controller itself: what is changed there directly is not part of a session."""
+    """A MIC488. ``device`` is the controller itself: what is changed there directly is not part of a recording."""
 
     def __init__(self, world: RunningWorld, name: str, device: Mic488Device) -> None:
         super().__init__(world, name)

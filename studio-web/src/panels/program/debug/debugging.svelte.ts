@@ -118,8 +118,8 @@ export class Debugging {
     const before = this.stop;
     if (JSON.stringify(stop) === JSON.stringify(before)) return;
     this.stop = stop;
-    if (stop?.past) this.studio.lookback.go(BigInt(stop.time_ns));
-    else if (before?.past) this.studio.lookback.live();
+    if (stop?.past) this.studio.timeTravel.go(BigInt(stop.time_ns));
+    else if (before?.past) this.studio.timeTravel.live();
   }
 
   async refresh(): Promise<void> {

@@ -1,4 +1,4 @@
-"""The moment of the past that one viewer is shown, while the world continues for the others."""
+"""Time travel of one viewer: it sees a moment of the past, while the world goes on for the others."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ OF_A_MOMENT = frozenset({ReadPoints, ReadPins, ReadState, Encoders, ListFaults})
 """Commands whose answer is about a moment."""
 
 
-class PastMoment(Protocol):
+class PastView(Protocol):
     """A moment of the past, in a world whose time advances only on request."""
 
     @property
@@ -46,13 +46,13 @@ class PastMoment(Protocol):
     def close(self) -> None: ...
 
 
-class KeptPast(Protocol):
+class TimeTravel(Protocol):
     """The past of a world that is kept."""
 
     @property
     def begin(self) -> Nanos: ...
 
-    def open(self) -> PastMoment:
+    def open(self) -> PastView:
         """For one more viewer. Raises `Refusal` where there are too many."""
         ...
 
@@ -66,20 +66,20 @@ class KeptPast(Protocol):
         ...
 
 
-NO_PAST_TO_LOOK_AT = Message("studio.no-past-to-look-at", "look: no past is kept here")
-VIEWER_IS_AT_PRESENT = Message("studio.viewer-is-at-present", "this viewer looks at the present")
+NO_PAST_TO_SHOW = Message("studio.no-past-to-show", "show_moment: no past is kept here")
+VIEWER_IS_AT_PRESENT = Message("studio.viewer-is-at-present", "this viewer is at the present")
 NO_PAST_EVENTS = Message("studio.no-past-events", "past_events: no past is kept here")
 PAST_TOO_LONG = Message(
     "studio.past-too-long", "past_events from {from_s:g} s to {to_s:g} s: permitted is up to {most_s} s in one answer"
 )
 
 
-class Looking:
+class ShownMoment:
     """The shown moment of one viewer: the present until `go`."""
 
-    def __init__(self, lookback: KeptPast | None) -> None:
-        self._lookback = lookback
-        self._look: PastMoment | None = None
+    def __init__(self, time_travel: TimeTravel | None) -> None:
+        self._time_travel = time_travel
+        self._view: PastView | None = None
         self._going: Later[None] | None = None
         self.is_changed = False
         """Whether the viewer has to be sent `message`."""
@@ -87,50 +87,50 @@ class Looking:
         """Numbers of the watches whose values of the moment have to be sent."""
 
     @property
-    def is_back(self) -> bool:
+    def is_past(self) -> bool:
         """Whether it is the past."""
-        return self._look is not None
+        return self._view is not None
 
     async def go(self, moment: Nanos, watches: Mapping[int, Watched]) -> dict[str, object]:
         """Show a moment. Raises `Misuse`, and `Refusal` if no past is kept."""
-        if self._lookback is None:
-            raise Refusal(NO_PAST_TO_LOOK_AT())
-        look = self._look or self._lookback.open()
+        if self._time_travel is None:
+            raise Refusal(NO_PAST_TO_SHOW())
+        view = self._view or self._time_travel.open()
         try:
-            self._going = look.go(moment)
+            self._going = view.go(moment)
             await self._going
         except SteptwinError:
-            if self._look is None:
-                look.close()
+            if self._view is None:
+                view.close()
             raise
-        self._look = look
+        self._view = view
         self.is_changed = True
         self.unsent = set(watches)
-        return {"time_ns": str(look.now), "from_ns": str(self._lookback.begin)}
+        return {"time_ns": str(view.now), "from_ns": str(self._time_travel.begin)}
 
     def leave(self) -> None:
         """Back to the present."""
-        if self._look is not None:
-            self._look.close()
-            self._look = None
+        if self._view is not None:
+            self._view.close()
+            self._view = None
             self.is_changed = True
             self.unsent.clear()
 
-    async def _there(self) -> PastMoment:
+    async def _there(self) -> PastView:
         """The moment requested last, when it has been computed."""
         while self._going is not None and not self._going.is_done:
             try:
                 await self._going
             except SteptwinError:
-                continue  # another moment is wanted by now
-        if self._look is None:
+                continue  # another moment was requested meanwhile
+        if self._view is None:
             raise Refusal(VIEWER_IS_AT_PRESENT())
-        return self._look
+        return self._view
 
     async def do(self, wanted: Command) -> Result:
         """The answer to one of `OF_A_MOMENT`."""
-        look = await self._there()
-        return look.subject.do(wanted)
+        view = await self._there()
+        return view.subject.do(wanted)
 
     async def programs(self) -> ProgramTexts:
         return (await self._there()).programs
@@ -142,13 +142,13 @@ class Looking:
 
     async def events(self, begin: Nanos, end: Nanos, kinds: tuple[str, ...] | None) -> dict[str, object]:
         """Events between two moments, whichever is shown. Raises `Misuse`, and `Refusal` if no past is kept."""
-        lookback = self._lookback
-        if lookback is None:
+        time_travel = self._time_travel
+        if time_travel is None:
             raise Refusal(NO_PAST_EVENTS())
-        begin = max(begin, lookback.begin)
+        begin = max(begin, time_travel.begin)
         if not begin <= end <= begin + LONGEST_PAST:
             raise Misuse(PAST_TOO_LONG(from_s=begin / SECOND, to_s=end / SECOND, most_s=LONGEST_PAST // SECOND))
-        present, batch = await lookback.events(begin, end, filter_of(kinds), MOST_PAST_EVENTS, _present)
+        present, batch = await time_travel.events(begin, end, filter_of(kinds), MOST_PAST_EVENTS, _present)
         if batch.missed:  # what held at the begin says nothing of the first event that is left
             begin, present = batch.events[0].time, {"state": {}, "faults": [], "plans": []}
         events = [event.plain() for event in batch.events]
@@ -159,11 +159,11 @@ class Looking:
     def message(self, may: list[str]) -> dict[str, object] | None:
         """Message of the moment that is shown; None for the present."""
         self.is_changed = False
-        look, lookback = self._look, self._lookback
-        if look is None or lookback is None:
+        view, time_travel = self._view, self._time_travel
+        if view is None or time_travel is None:
             return None
-        moments = {"time_ns": str(look.now), "from_ns": str(lookback.begin)}
-        return {**moments, "may": may, **_present(look.subject)}
+        moments = {"time_ns": str(view.now), "from_ns": str(time_travel.begin)}
+        return {**moments, "may": may, **_present(view.subject)}
 
     def take(self, watches: Mapping[int, Watched]) -> dict[int, str]:
         """Values of the moment by watch, as JSON."""
@@ -171,9 +171,9 @@ class Looking:
         return {number: self._values(watches[number]) for number in sorted(numbers)}
 
     def _values(self, watched: Watched) -> str:
-        look = self._look
-        points = () if look is None else watched.values.points
-        return json.dumps([[index, _value(look, point)] for index, point in enumerate(points)], separators=(",", ":"))
+        view = self._view
+        points = () if view is None else watched.values.points
+        return json.dumps([[index, _value(view, point)] for index, point in enumerate(points)], separators=(",", ":"))
 
 
 def _present(subject: PlannedSubject) -> dict[str, object]:
@@ -181,9 +181,9 @@ def _present(subject: PlannedSubject) -> dict[str, object]:
     return {**present_of(subject), "plans": plans}
 
 
-def _value(look: PastMoment | None, point: str) -> float | None:
+def _value(view: PastView | None, point: str) -> float | None:
     """The value at a moment; None if unknown, as for a device, of which no past is kept."""
     try:
-        return None if look is None else look.subject.read(point)[0].value
+        return None if view is None else view.subject.read(point)[0].value
     except Misuse:
         return None

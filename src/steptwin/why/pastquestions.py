@@ -1,4 +1,4 @@
-"""Questions about the past of a world, as far as that is kept (`steptwin.simulation.world.history`).
+"""Questions about the past of a world, as far as that is kept (`steptwin.simulation.world.snapshotlog`).
 
 What may be a cause is noted in a second world, which runs through the past: from the newest state that is old enough, and from
 older ones where the causes are older. It stays for further questions, which only need what happened since.
@@ -12,12 +12,12 @@ from typing import Protocol
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.simulation.world.history import outside_past
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
+from steptwin.simulation.world.snapshotlog import outside_past
 from steptwin.why.answer import MOST_LINKS, Answer
 from steptwin.why.question import Asking, Why
-from steptwin.why.search import Asked, LastChanges, PastStates
+from steptwin.why.search import Asked, LastChanges, Snapshots
 
 FIRST_SPAN_NS: Nanos = 5 * SECOND
 """So much of the past is looked at first, and `FURTHER` times as much where the causes are older."""
@@ -28,36 +28,36 @@ MOST_NOTED = 500_000
 """Limit of the records and statements that are noted: some 100 MB."""
 
 
-class StatesAndInputs(PastStates, Protocol):
-    """The past of a world in `steptwin.simulation.world.history.History`."""
+class SnapshotsAndInputs(Snapshots, Protocol):
+    """The past of a world in `steptwin.simulation.world.snapshotlog.SnapshotLog`."""
 
     def keeps_inputs_from(self, number: int) -> bool: ...
     def inputs_from(self, number: int) -> Sequence[RecordedInput]: ...
 
 
 class PastQuestions:
-    """Answers questions about the past in ``history``. ``most``: limit of what is noted."""
+    """Answers questions about the past in ``snapshots``. ``most``: limit of what is noted."""
 
-    def __init__(self, history: StatesAndInputs, most: int | None = None) -> None:
-        self._history = history
+    def __init__(self, snapshots: SnapshotsAndInputs, most: int | None = None) -> None:
+        self._snapshots = snapshots
         self._most = MOST_NOTED if most is None else most
         self._known: _Known | None = None
-        self._changes = LastChanges(history, _second_world)
+        self._changes = LastChanges(snapshots, _second_world)
 
     def asking(self, question: str, at: Nanos | None = None) -> Asking:
         """The answer for a moment, by default the present. Raises `Misuse` for what is no question here."""
-        history = self._history
-        now = history.world.now
+        snapshots = self._snapshots
+        now = snapshots.world.now
         at = now if at is None else at
-        if not history.begin <= at <= now:
-            raise Misuse(outside_past(at, history.begin, now))
-        known, span = self._known, first_span(history.world)
+        if not snapshots.begin <= at <= now:
+            raise Misuse(outside_past(at, snapshots.begin, now))
+        known, span = self._known, first_span(snapshots.world)
         if known is None or not known.fits(at, now - span):
-            known = self._known = _Known(history, max(history.begin, at - span), self._most)
+            known = self._known = _Known(snapshots, max(snapshots.begin, at - span), self._most)
         answer = yield from known.asking(question, at)
         if answer.is_cut and answer.since is None and (asked := known.asked(question)) is not None:
             found = yield from self._changes.before(asked, known.begin)
-            if answer.links and history.begin <= answer.links[0].time < known.begin:  # a fault has held it since then
+            if answer.links and snapshots.begin <= answer.links[0].time < known.begin:  # a fault has held it since then
                 answer = (yield from self._then(question, answer.links[0].time))._replace(at=at, since=None)
             if found.since is None:
                 begin = found.known_from
@@ -69,8 +69,8 @@ class PastQuestions:
 
     def _then(self, question: str, at: Nanos, *, further: bool = False) -> Asking:
         """The answer for a moment from what is noted near it; ``further``: and from older states, as `_further`."""
-        history = self._history
-        known = _Known(history, max(history.begin, at - first_span(history.world)), self._most)
+        snapshots = self._snapshots
+        known = _Known(snapshots, max(snapshots.begin, at - first_span(snapshots.world)), self._most)
         return (yield from self._further(known, question, at) if further else known.asking(question, at))
 
     def _further(self, known: _Known, question: str, at: Nanos, answer: Answer | None = None) -> Asking:
@@ -80,7 +80,7 @@ class PastQuestions:
         while answer.is_cut and (older := known.older(at)) is not None:
             yield
             try:
-                known = _Known(self._history, older, self._most)
+                known = _Known(self._snapshots, older, self._most)
                 answer = yield from known.asking(question, at)
             except Misuse:
                 break
@@ -92,18 +92,18 @@ class PastQuestions:
 class _Known:
     """Log of the past from a state of it on. ``moment``: from the newest state at or before it."""
 
-    def __init__(self, history: StatesAndInputs, moment: Nanos, most: int) -> None:
-        state = history.state_at(moment)
+    def __init__(self, snapshots: SnapshotsAndInputs, moment: Nanos, most: int) -> None:
+        state = snapshots.state_at(moment)
         self._taken = state.inputs
-        self._history = history
-        self._branch = history.branch
+        self._snapshots = snapshots
+        self._branch = snapshots.branch
         self._most = most
-        self._why = Why(partial(_second_world, history.world, state.snapshot), (), state.snapshot.now, most)
+        self._why = Why(partial(_second_world, snapshots.world, state.snapshot), (), state.snapshot.now, most)
 
     def fits(self, at: Nanos, not_before: Nanos) -> bool:
         """Whether a question about a moment can be answered from it. ``not_before``: up to when it must have come."""
-        history, log = self._history, self._why.log
-        is_same = history.branch == self._branch and history.keeps_inputs_from(self._taken)
+        snapshots, log = self._snapshots, self._why.log
+        is_same = snapshots.branch == self._branch and snapshots.keeps_inputs_from(self._taken)
         has_room = log.noted < self._most // 2 or at <= self._why.end
         return is_same and log.begin <= at and not_before <= self._why.end and has_room
 
@@ -117,19 +117,19 @@ class _Known:
         return self._why.asked(question)
 
     def asking(self, question: str, at: Nanos) -> Asking:
-        inputs = self._history.inputs_from(self._taken)
+        inputs = self._snapshots.inputs_from(self._taken)
         self._taken += len(inputs)
         self._why.go_on(inputs, max(at, self._why.end))
         return (yield from self._why.asking(question, at))
 
     def older(self, at: Nanos) -> Nanos | None:
         """From where to look at the past instead; None if nothing older is kept, or too much has happened since."""
-        history, log, end = self._history, self._why.log, self._why.end
+        snapshots, log, end = self._snapshots, self._why.log, self._why.end
         span = FURTHER * max(at - log.begin, 1)
         if log.noted:
             span = min(span, self._most * (end - log.begin) // (2 * log.noted) - (end - at))
-        moment = max(history.begin, at - span)
-        return moment if moment < log.begin and history.state_at(moment)[0].now < log.begin else None
+        moment = max(snapshots.begin, at - span)
+        return moment if moment < log.begin and snapshots.state_at(moment)[0].now < log.begin else None
 
 
 def _joined(answer: Answer, before: Answer) -> Answer:

@@ -1,4 +1,4 @@
-"""A session with a controller as lines of text, for the terminal, for recordings and for comparing devices.
+"""Requests to a controller as lines of text, for the terminal, and transcripts with its answers, for comparing devices.
 
 | line | does |
 |---|---|
@@ -8,7 +8,7 @@
 | ``wait AXIS...`` | waits until axes are at rest, and records why they stopped |
 | ``raw HEX`` | sends a PDU (function and data) |
 
-``#`` begins a comment. A refusal by the controller is a result; the session continues.
+``#`` begins a comment. A refusal by the controller is a result; the next line follows.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ FORMAT = "steptwin session 1"
 
 
 @dataclass(frozen=True, slots=True)
-class SessionStep:
-    """An executed line, the time ``at_s`` since the beginning of the session, and its results."""
+class TranscriptStep:
+    """An executed line, the time ``at_s`` since the first line, and its results."""
 
     line: str
     at_s: float
@@ -46,7 +46,7 @@ Action = Callable[[Mic488], dict[str, Any]]
 
 
 def steps_of(text: str, registers: RegisterMap) -> list[tuple[str, Action]]:
-    """The lines of a session for a controller with these registers. Raises `Misuse` for the first invalid line."""
+    """The lines of a text for a controller with these registers. Raises `Misuse` for the first invalid line."""
     steps = []
     for number, raw in enumerate(text.splitlines(), start=1):
         line = raw.partition("#")[0].strip()
@@ -60,12 +60,12 @@ def steps_of(text: str, registers: RegisterMap) -> list[tuple[str, Action]]:
     return steps
 
 
-def carry_out(mic: Mic488, steps: Iterable[tuple[str, Action]]) -> Iterator[SessionStep]:
+def carry_out(mic: Mic488, steps: Iterable[tuple[str, Action]]) -> Iterator[TranscriptStep]:
     """Execute all steps in order. Raises `Refusal` for a step that is not possible after those before it, and `LineFailure`."""
     begin = time.monotonic()
     for line, action in steps:
         try:
-            yield SessionStep(line, time.monotonic() - begin, _result(mic, action))
+            yield TranscriptStep(line, time.monotonic() - begin, _result(mic, action))
         except Misuse as error:
             raise Refusal(f"{line!r}: {error}") from error
 
@@ -166,30 +166,30 @@ _STEPS: dict[str, Callable[[list[str], RegisterMap], Action]] = {
 }
 
 
-# ---------------------------------------------------------------------- recordings
+# ---------------------------------------------------------------------- transcripts
 
 
-def to_text(steps: Iterable[SessionStep], about: dict[str, Any]) -> Iterator[str]:
-    """The recording as text: a header, then a line of JSON for each step."""
+def to_text(steps: Iterable[TranscriptStep], about: dict[str, Any]) -> Iterator[str]:
+    """The transcript as text: a header, then a line of JSON for each step."""
     yield json.dumps({"format": FORMAT, **about}, ensure_ascii=False)
     for step in steps:
         yield json.dumps({"line": step.line, "at_s": round(step.at_s, 4), "result": step.result}, ensure_ascii=False)
 
 
-def from_text(text: str, name: str) -> list[SessionStep]:
-    """The steps of a recording. Raises `Misuse` for text that is not a recording."""
+def from_text(text: str, name: str) -> list[TranscriptStep]:
+    """The steps of a transcript. Raises `Misuse` for text that is not one."""
     head, *lines = text.splitlines() or [""]
     try:
         if json.loads(head)["format"] != FORMAT:
             raise ValueError
-        return [SessionStep(str(data["line"]), float(data["at_s"]), dict(data["result"])) for data in map(json.loads, lines)]
+        return [TranscriptStep(str(data["line"]), float(data["at_s"]), dict(data["result"])) for data in map(json.loads, lines)]
     except (ValueError, KeyError, TypeError, RecursionError):
-        raise Misuse(f"{name} is not a recording of a session ('steptwin record' makes them)") from None
+        raise Misuse(f"{name} is not a transcript ('steptwin record' makes them)") from None
 
 
 @dataclass(frozen=True, slots=True)
-class SessionDifference:
-    """A difference between two recordings of the same session. ``step`` counts from 1."""
+class TranscriptDifference:
+    """A difference between two transcripts of the same requests. ``step`` counts from 1."""
 
     step: int
     line: str
@@ -206,23 +206,23 @@ def _said(value: Any) -> str:
 
 
 def differences(
-    one: list[SessionStep], two: list[SessionStep], *, tolerance: float = 0.0, time_s: float | None = None
-) -> list[SessionDifference]:
+    one: list[TranscriptStep], two: list[TranscriptStep], *, tolerance: float = 0.0, time_s: float | None = None
+) -> list[TranscriptDifference]:
     """Values that differ by more than ``tolerance``; with ``time_s`` also steps whose times differ by more than that.
 
-    Raises `Misuse` for recordings of different sessions.
+    Raises `Misuse` for transcripts of different requests.
     """
     if [step.line for step in one] != [step.line for step in two]:
-        raise Misuse("the recordings are of different sessions: their lines differ")
+        raise Misuse("the transcripts have different requests: their lines differ")
     found = []
     for number, (a, b) in enumerate(zip(one, two, strict=True), start=1):
         flat_a, flat_b = dict(_flat(a.result)), dict(_flat(b.result))
         for what in flat_a | flat_b:
             first, second = flat_a.get(what), flat_b.get(what)
             if not _alike(first, second, tolerance):
-                found.append(SessionDifference(number, a.line, what, first, second))
+                found.append(TranscriptDifference(number, a.line, what, first, second))
         if time_s is not None and abs(a.at_s - b.at_s) > time_s:
-            found.append(SessionDifference(number, a.line, "time in s", a.at_s, b.at_s))
+            found.append(TranscriptDifference(number, a.line, "time in s", a.at_s, b.at_s))
     return found
 
 

@@ -31,11 +31,11 @@ from steptwin.studio import toolrequests as tool
 from steptwin.studio import workrequests as work
 from steptwin.studio.calculations import gear
 from steptwin.studio.hub import Hub
-from steptwin.studio.looking import OF_A_MOMENT, Looking
 from steptwin.studio.messages import VERSION
 from steptwin.studio.programs import ProgramTexts
 from steptwin.studio.requests import IN_THE_PAST, OF_CONNECTION, REQUESTS, WITH_TOKEN, permit_of, request_called
 from steptwin.studio.streams import Batch, StreamPosition
+from steptwin.studio.timetravel import OF_A_MOMENT, ShownMoment
 from steptwin.studio.watches import Watched
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Command
@@ -76,7 +76,7 @@ HELLO_IS_FIRST_REQUEST = Message("studio.hello-is-first-request", "{request}: th
 NEEDS_A_TOKEN = Message("studio.needs-a-token", "{request} needs the token of this studio, which is in its file of tokens")
 ABOUT_A_CONNECTION = Message("studio.about-a-connection", "{request} is about a connection: ask it over the WebSocket")
 PAST_CANNOT_BE_CHANGED = Message(
-    "studio.past-cannot-be-changed", "{request}: the past is looked at, which cannot be changed: look at the present first"
+    "studio.past-cannot-be-changed", "{request}: the past cannot be changed: return to the present first"
 )
 SECOND_HELLO = Message("studio.second-hello", "hello: this connection has said hello already; resync asks for the state again")
 TOO_MANY_WATCHES = Message("studio.too-many-watches", "watch: there are {most} already, which is the most")
@@ -121,7 +121,7 @@ class ViewerSession:
         self._missed = 0
         self._events_due: Nanos = 0
         self._now: Nanos = 0
-        self._looking = Looking(hub.around.lookback)
+        self._shown_moment = ShownMoment(hub.around.time_travel)
         self._of_subject: Mapping[object, Callable[[Any, Identity], Awaitable[Result]]] = {
             command.Jog: lambda wanted, _: self._jog(wanted),
             command.StopAxes: lambda wanted, _: hub.stop(wanted),
@@ -183,8 +183,8 @@ class ViewerSession:
         if own is not None:
             value = own(self, wanted)
             return self._hub.subject.result_of(await value if isawaitable(value) else value)
-        if type(wanted) in OF_A_MOMENT and self._looking.is_back:
-            return await self._looking.do(wanted)
+        if type(wanted) in OF_A_MOMENT and self._shown_moment.is_past:
+            return await self._shown_moment.do(wanted)
         action = self._of_subject.get(type(wanted))
         return await (self._hub.subject.do(wanted) if action is None else action(wanted, identity))
 
@@ -221,7 +221,7 @@ class ViewerSession:
 
     async def _permitted(self, wanted: Wanted, permit: Permit, identity: Identity) -> Result:
         hub = self._hub
-        if self._looking.is_back and permit.control and wanted.name not in IN_THE_PAST:
+        if self._shown_moment.is_past and permit.control and wanted.name not in IN_THE_PAST:
             raise Refusal(PAST_CANNOT_BE_CHANGED(request=wanted.name))
         takes = check(wanted.name, permit, self.viewer, hub.control) and not self.is_rest
         if takes:
@@ -272,21 +272,21 @@ class ViewerSession:
             self._place = None
         if self.has_entered and not self.is_rest:
             self._hub.leave(self.viewer)
-        self._looking.leave()
+        self._shown_moment.leave()
         self.has_entered = False
 
     # ------------------------------------------------------------------ the past
 
     async def _look_at(self, wanted: ask.ShowMoment) -> object:
         if wanted.moment is not None:
-            return await self._looking.go(wanted.moment, self._watches)
-        if self._looking.is_back:
-            self._looking.leave()
+            return await self._shown_moment.go(wanted.moment, self._watches)
+        if self._shown_moment.is_past:
+            self._shown_moment.leave()
             self._forget_values()
         return None
 
     async def _go_back(self, _: ask.GoBack) -> None:
-        await self._looking.go_back()
+        await self._shown_moment.go_back()
         self._forget_values()
 
     def _forget_values(self) -> None:
@@ -295,7 +295,7 @@ class ViewerSession:
             watched.forget()
 
     async def _programs(self) -> ProgramTexts:
-        return await self._looking.programs() if self._looking.is_back else self._hub.around.programs
+        return await self._shown_moment.programs() if self._shown_moment.is_past else self._hub.around.programs
 
     async def _list_programs(self, _: ask.ListPrograms) -> object:
         return (await self._programs()).list()
@@ -316,8 +316,8 @@ class ViewerSession:
         readings = self._hub.read(wanted.points)
         number = next(self._watch_numbers)
         self._watches[number] = self._hub.watches.add(number, readings, wanted.rate)
-        if self._looking.is_back:
-            self._looking.unsent.add(number)
+        if self._shown_moment.is_past:
+            self._shown_moment.unsent.add(number)
         return {"watch": number, "points": [{"point": one.point, "unit": one.unit} for one in readings]}
 
     def _unwatch(self, wanted: ask.Unwatch) -> None:
@@ -374,7 +374,7 @@ class ViewerSession:
             parts = hub.shared.since(self._seen)
             self._seen = hub.shared.changes
             found += [f'{{"seq":{next(self._seq)},"{name}":{text}}}' for name, text in parts]
-        if self._looking.is_changed:
+        if self._shown_moment.is_changed:
             found.append(self._past())
         values = ",".join([f'"{number}":{text}' for number, text in self._take_values(now)])
         if values:
@@ -387,8 +387,8 @@ class ViewerSession:
         return bool(self._left_over) or self._missed > 0 or (self._place is not None and self._place.has_news)
 
     def _take_values(self, now: Nanos) -> list[tuple[int, str]]:
-        if self._looking.is_back:
-            return list(self._looking.take(self._watches).items())
+        if self._shown_moment.is_past:
+            return list(self._shown_moment.take(self._watches).items())
         return [(one.number, one.take(now)) for one in self._watches.values() if one.is_due(now)]
 
     def _may(self) -> list[str]:
@@ -398,7 +398,7 @@ class ViewerSession:
 
     def _past(self) -> str:
         may = [name for name in self._may() if name in IN_THE_PAST or not permit_of(name).control]
-        return json.dumps({"seq": next(self._seq), "past": self._looking.message(may)}, separators=(",", ":"))
+        return json.dumps({"seq": next(self._seq), "past": self._shown_moment.message(may)}, separators=(",", ":"))
 
     def _events(self, now: Nanos) -> str:
         self._events_due = max(self._events_due + EVENTS_NS, now + EVENTS_NS // 2)
@@ -418,8 +418,8 @@ class ViewerSession:
         self._seq = count(1)
         self._seen = hub.shared.changes
         self._forget_values()
-        if self._looking.is_back:
-            self._looking.is_changed, self._looking.unsent = True, set(self._watches)
+        if self._shown_moment.is_past:
+            self._shown_moment.is_changed, self._shown_moment.unsent = True, set(self._watches)
         present, number = hub.present()
         if self._place is not None:
             self._place.take()
@@ -461,7 +461,7 @@ class ViewerSession:
             ask.LetGo: lambda self, wanted: self._hub.let_go(self.viewer, wanted.lease),
             ask.ShowMoment: _look_at,
             ask.GoBack: _go_back,
-            ask.ReadPastEvents: lambda self, one: self._looking.events(one.begin, one.end, one.kinds),
+            ask.ReadPastEvents: lambda self, one: self._shown_moment.events(one.begin, one.end, one.kinds),
             ask.ListPrograms: _list_programs,
             ask.ReadProgram: _read_program,
             ask.ReadMemory: _read_memory,

@@ -28,9 +28,9 @@ from steptwin.simulation.describe.pieces import given_files
 from steptwin.simulation.faults import Fault, parse
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.actions import ACTIONS
-from steptwin.simulation.world.history import replay
 from steptwin.simulation.world.inputs import ExternalInput
 from steptwin.simulation.world.snapshot import RecordedInput
+from steptwin.simulation.world.snapshotlog import replay
 
 FORMAT = 1
 LONGEST_NUMBER = 100
@@ -39,14 +39,14 @@ LONGEST_NUMBER = 100
 _STEPS = {kind.__name__: kind for kind in ACTIONS}
 
 
-SESSION_ENDS_BEFORE = Message("files.session-ends-before", "the session ends at {until:g} s, before {end:g} s")
-SESSION_ENDS_BEFORE_AN_INPUT = Message(
-    "files.session-ends-before-an-input", "the session ends at {until} ns, before an input at {time} ns"
+RECORDING_ENDS_BEFORE = Message("files.recording-ends-before", "the recording ends at {until:g} s, before {end:g} s")
+RECORDING_ENDS_BEFORE_AN_INPUT = Message(
+    "files.recording-ends-before-an-input", "the recording ends at {until} ns, before an input at {time} ns"
 )
 
 
 @dataclass(frozen=True, slots=True)
-class Session:
+class Recording:
     """A run of a world. ``digest`` is that of its trace at ``until``; ``firmware`` is that of each MIC488, or the type of an
     M1486: the variant of its data sheet."""
 
@@ -75,27 +75,27 @@ class Session:
         ran = _firmwares(world)
         for name, firmware in self.firmware.items():
             if ran.get(name) != firmware:
-                raise Misuse(f"{name} is {firmware} in the session, but its world has {ran.get(name, 'no such controller')}")
+                raise Misuse(f"{name} is {firmware} in the recording, but its world has {ran.get(name, 'no such controller')}")
         return world
 
     def replay(self, until: Nanos | None = None, *, keep_trace: bool = True, keep_inputs: bool = True) -> World:
         """The world after all inputs, or after those up to the moment ``until`` (ns), from which it may continue differently.
 
-        Raises `Misuse` where inputs do not fit the world, and for a moment after the session's end.
+        Raises `Misuse` where inputs do not fit the world, and for a moment after the end of the recording.
         """
         end = self.until if until is None else until
         if end > self.until:
-            raise Misuse(SESSION_ENDS_BEFORE(until=self.until / SECOND, end=end / SECOND))
+            raise Misuse(RECORDING_ENDS_BEFORE(until=self.until / SECOND, end=end / SECOND))
         world = self.world(keep_trace=keep_trace, keep_inputs=keep_inputs)
         if self.inputs and self.inputs[-1].time > self.until:
-            raise Misuse(SESSION_ENDS_BEFORE_AN_INPUT(until=self.until, time=self.inputs[-1].time))
+            raise Misuse(RECORDING_ENDS_BEFORE_AN_INPUT(until=self.until, time=self.inputs[-1].time))
         for _ in replay(world, self.inputs, end):
             pass
         return world
 
 
 def _settle(world: World) -> None:
-    """A session ends when everything of its last moment has happened."""
+    """A recording ends when everything of its last moment has happened."""
     world.advance(world.now)
     world.sync_all()
 
@@ -106,21 +106,19 @@ def _firmwares(world: World) -> dict[str, str]:
     return {name: sheet.variant for name, sheet in sheets.items() if sheet.variant}
 
 
-NO_SESSION_IS_RECORDED = Message(
-    "files.no-session-is-recorded", "this world does not record a session: it does not keep its inputs"
-)
+NOTHING_IS_RECORDED = Message("files.nothing-is-recorded", "this world is not recorded: it does not keep its inputs")
 
 
-def session_of(world: World) -> Session:
-    """The session of a world up to now. It contains the inputs of Python code, not the code.
+def recording_of(world: World) -> Recording:
+    """The recording of a world up to now. It contains the inputs of Python code, not the code.
 
     Raises `Misuse` for a world that does not keep its inputs.
     """
     if not world.keeps_inputs:
-        raise Misuse(NO_SESSION_IS_RECORDED())
+        raise Misuse(NOTHING_IS_RECORDED())
     _settle(world)
     spec = world.spec
-    return Session(
+    return Recording(
         spec.text.source.name,
         spec.text.source.text,
         world.files,
@@ -134,45 +132,45 @@ def session_of(world: World) -> Session:
     )
 
 
-def save(session: Session, path: Path | str) -> None:
-    """Write a session, as JSON. Raises `Misuse` when the file cannot be written."""
+def save(recording: Recording, path: Path | str) -> None:
+    """Write a recording, as JSON. Raises `Misuse` when the file cannot be written."""
     data = {
         "steptwin_session": FORMAT,
-        "version": session.version,
-        "name": session.name,
-        "seed": session.seed,
-        "overrides": dict(session.overrides),
-        "firmware": dict(session.firmware),
-        "until_ns": session.until,
-        "digest": session.digest,
-        "world": session.text,
-        "files": {name: b64encode(content).decode() for name, content in session.files.items()},
+        "version": recording.version,
+        "name": recording.name,
+        "seed": recording.seed,
+        "overrides": dict(recording.overrides),
+        "firmware": dict(recording.firmware),
+        "until_ns": recording.until,
+        "digest": recording.digest,
+        "world": recording.text,
+        "files": {name: b64encode(content).decode() for name, content in recording.files.items()},
         "failed_saves": [
-            {"time_ns": time, "machine": controller, "reason": text} for time, controller, text in session.failed_saves
+            {"time_ns": time, "machine": controller, "reason": text} for time, controller, text in recording.failed_saves
         ],
         "inputs": [
             {"time_ns": time, "settled": settled, "do": type(what).__name__, **_plain(what)}
-            for time, what, settled in session.inputs
+            for time, what, settled in recording.inputs
         ],
     }
     write_bytes(Path(path), (json.dumps(data, indent=1) + "\n").encode())
 
 
-SESSION_OF_ANOTHER_FORMAT = Message(
-    "files.session-of-another-format", "{path} is a session of format {format}: this version reads {own}"
+RECORDING_OF_ANOTHER_FORMAT = Message(
+    "files.recording-of-another-format", "{path} is a recording of format {format}: this version reads {own}"
 )
 
 
-def load(path: Path | str) -> Session:
-    """Read a session. Raises `Misuse` for a file that cannot be read or is not a session."""
+def load(path: Path | str) -> Recording:
+    """Read a recording. Raises `Misuse` for a file that cannot be read or is not a recording."""
     content = read_recorded(Path(path))
     try:
         data = json.loads(content, parse_int=_whole, parse_constant=_finite)
         if data["steptwin_session"] != FORMAT:
-            raise Misuse(SESSION_OF_ANOTHER_FORMAT(path=path, format=data["steptwin_session"], own=FORMAT))
-        return _session(data)
+            raise Misuse(RECORDING_OF_ANOTHER_FORMAT(path=path, format=data["steptwin_session"], own=FORMAT))
+        return _recording(data)
     except (LookupError, TypeError, ValueError, RecursionError, OverflowError, AttributeError) as error:
-        raise error if isinstance(error, Misuse) else Misuse(f"{path} is not a session of a world: {_why(error)}") from None
+        raise error if isinstance(error, Misuse) else Misuse(f"{path} is not a recording of a world: {_why(error)}") from None
 
 
 def _whole(text: str) -> int:
@@ -182,7 +180,7 @@ def _whole(text: str) -> int:
 
 
 def _finite(text: str) -> float:
-    raise ValueError(f"{text} is not a number of a session")
+    raise ValueError(f"{text} is not a number of a recording")
 
 
 def _why(error: Exception) -> str:
@@ -191,8 +189,8 @@ def _why(error: Exception) -> str:
     return "it is nested too deeply" if isinstance(error, RecursionError) else str(error)
 
 
-def _session(data: Mapping[str, Any]) -> Session:
-    """Raises `LookupError`, `TypeError` and `ValueError` for what is not a session."""
+def _recording(data: Mapping[str, Any]) -> Recording:
+    """Raises `LookupError`, `TypeError` and `ValueError` for what is not a recording."""
     until = fitting("until_ns", data["until_ns"], int)
     if not 0 <= until <= LONGEST_NS:
         raise ValueError(f"until_ns is {until}: permitted are 0 to {LONGEST_NS}")
@@ -200,7 +198,7 @@ def _session(data: Mapping[str, Any]) -> Session:
     times = [given.time for given in inputs]
     if times != sorted(times) or (times and times[0] < 0):
         raise ValueError("the moments of the inputs are not in order")
-    return Session(
+    return Recording(
         fitting("name", data["name"], str),
         fitting("world", data["world"], str),
         {name: b64decode(content) for name, content in fitting("files", data["files"], dict).items()},

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse, SteptwinError
-from steptwin.files.session import load, save, session_of
+from steptwin.files.recording import load, recording_of, save
 from steptwin.files.world import World
 from steptwin.simulation.faults import read
 from steptwin.simulation.script import steps as do
@@ -52,15 +52,15 @@ def busy() -> World:
 
 def test_a_session_replays_from_its_file_alone(tmp_path: Path) -> None:
     world = busy()
-    session = session_of(world)
-    save(session, tmp_path / "s.json")
+    recording = recording_of(world)
+    save(recording, tmp_path / "s.json")
     loaded = load(tmp_path / "s.json")
-    assert loaded == session
+    assert loaded == recording
     assert loaded.firmware == {"table": "1.70", "drum": "B"}
     again = loaded.replay()
-    assert again.trace.digest() == session.digest
+    assert again.trace.digest() == recording.digest
     assert list(again.trace) == list(world.trace)
-    assert session_of(again) == session
+    assert recording_of(again) == recording
 
 
 def test_what_python_code_did_is_in_the_session_and_the_code_is_not(tmp_path: Path) -> None:
@@ -75,9 +75,9 @@ def test_what_python_code_did_is_in_the_session_and_the_code_is_not(tmp_path: Pa
     world.at(2.5, lambda: world.release("start"))
     world.when("table.M3.position > 20", do.Set((("table", "IN8", 1.0),)))
     world.run(for_=20)
-    session = session_of(world)
-    assert len(session.inputs) == 4
-    assert session.replay().trace.digest() == session.digest
+    recording = recording_of(world)
+    assert len(recording.inputs) == 4
+    assert recording.replay().trace.digest() == recording.digest
 
 
 def test_requests_of_python_are_in_the_session() -> None:
@@ -88,9 +88,9 @@ def test_requests_of_python_are_in_the_session() -> None:
     world = World.load(EXAMPLES / "feeder.toml")
     world.script(operator)
     world.run(for_=2)
-    session = session_of(world)
-    assert [type(given.what).__name__ for given in session.inputs] == ["Request"]
-    assert session.replay().trace.digest() == session.digest
+    recording = recording_of(world)
+    assert [type(given.what).__name__ for given in recording.inputs] == ["Request"]
+    assert recording.replay().trace.digest() == recording.digest
 
 
 def test_what_commands_of_python_did_not_reach_is_in_the_session(tmp_path: Path) -> None:
@@ -110,10 +110,10 @@ def test_what_commands_of_python_did_not_reach_is_in_the_session(tmp_path: Path)
         "drum is not at rest (waits for the end of the move): wait, or stop it",
         "table.M2.status == 4; table.M2.status is 0",
     ]
-    save(session_of(world), tmp_path / "s.json")
-    session = load(tmp_path / "s.json")
-    assert [type(given.what).__name__ for given in session.inputs] == ["Send", "Refused", "Expect"]
-    assert session.replay().trace.digest() == session.digest
+    save(recording_of(world), tmp_path / "s.json")
+    recording = load(tmp_path / "s.json")
+    assert [type(given.what).__name__ for given in recording.inputs] == ["Send", "Refused", "Expect"]
+    assert recording.replay().trace.digest() == recording.digest
 
 
 TICKING = """
@@ -137,13 +137,13 @@ def test_runs_that_were_stopped_replay(how: dict[str, Any]) -> None:
     world = World.from_toml(TICKING)
     assert world.run(**how) == "enough"
     assert [record.value for record in world.trace if record.subject == "note"] == ["after that"]
-    stopped = session_of(world)
+    stopped = recording_of(world)
     assert stopped.until == SECOND
     assert stopped.replay().trace.digest() == stopped.digest
     world.mic488["a"].set_pin("IN3", 1)
     assert world.run(for_=2) is None
     assert [record.value for record in world.trace if record.subject == "note"] == ["after that", "gone on"]
-    assert session_of(world).replay().trace.digest() == session_of(world).digest
+    assert recording_of(world).replay().trace.digest() == recording_of(world).digest
 
 
 def test_a_world_that_was_stopped_goes_on_from_a_snapshot() -> None:
@@ -196,9 +196,9 @@ def test_what_comes_at_the_nanosecond_of_other_steps_replays(changes: list[Any],
         world.mic488["t"].set_pin("IN2", 1)
     world.run(until="t.IN2", for_=4)
     world.run(for_=4)
-    session = session_of(world)
-    assert list(session.replay().trace) == list(world.trace)
-    assert session.replay().inputs == world.inputs
+    recording = recording_of(world)
+    assert list(recording.replay().trace) == list(world.trace)
+    assert recording.replay().inputs == world.inputs
 
 
 @pytest.mark.parametrize(
@@ -228,10 +228,10 @@ def test_what_is_refused_leaves_no_mark(step: ExternalInput, message: str) -> No
 def test_a_session_has_the_seed_it_ran_with(tmp_path: Path) -> None:
     world = World.load(EXAMPLES / "feeder.toml", seed=8)
     world.run(for_=30)
-    session = session_of(world)
-    assert session.digest != GOLDEN["feeder"]
-    save(session, tmp_path / "s.json")
-    assert load(tmp_path / "s.json").replay().trace.digest() == session.digest
+    recording = recording_of(world)
+    assert recording.digest != GOLDEN["feeder"]
+    save(recording, tmp_path / "s.json")
+    assert load(tmp_path / "s.json").replay().trace.digest() == recording.digest
     assert world.branch().spec.seed == 8
     with pytest.raises(Misuse, match="seed -1: permitted are whole numbers from 0 to"):
         World.load(EXAMPLES / "feeder.toml", seed=-1)
@@ -240,47 +240,47 @@ def test_a_session_has_the_seed_it_ran_with(tmp_path: Path) -> None:
 
 
 def test_a_session_goes_another_way_from_any_moment() -> None:
-    session = session_of(busy())
+    recording = recording_of(busy())
     moment = 3 * SECOND
-    world = session.replay(moment)
+    world = recording.replay(moment)
     assert world.now == moment
-    assert [given.time for given in world.inputs] == [given.time for given in session.inputs if given.time <= moment]
+    assert [given.time for given in world.inputs] == [given.time for given in recording.inputs if given.time <= moment]
     world.mic488["table"].set_pin("IN9", 0)
     world.run(for_=2)
-    other = session_of(world)
-    assert other.digest != session.digest
+    other = recording_of(world)
+    assert other.digest != recording.digest
     assert other.replay().trace.digest() == other.digest
-    with pytest.raises(Misuse, match=r"the session ends at 10\.25 s, before 11 s"):
-        session.replay(11 * SECOND)
+    with pytest.raises(Misuse, match=r"the recording ends at 10\.25 s, before 11 s"):
+        recording.replay(11 * SECOND)
 
 
 def test_a_session_ends_when_what_its_last_input_led_to_has_happened() -> None:
     world = World.from_toml(TICKING)
     world.run(for_=0.5)
     world.mic488["a"].set_pin("IN2", 1)
-    session = session_of(world)
+    recording = recording_of(world)
     assert [record.value for record in world.trace if record.subject == "note"] == ["after that"]
-    assert session.replay().trace.digest() == session.digest
+    assert recording.replay().trace.digest() == recording.digest
 
 
 def test_another_run_has_another_digest() -> None:
-    session = session_of(busy())
-    world = session.world()
-    for time, what, _ in session.inputs[:-1]:
+    recording = recording_of(busy())
+    world = recording.world()
+    for time, what, _ in recording.inputs[:-1]:
         world.advance(time)
         world.apply_input(what)
-    world.run(until=session.until / SECOND)
-    assert world.trace.digest() != session.digest
+    world.run(until=recording.until / SECOND)
+    assert world.trace.digest() != recording.digest
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("{", "is not a session of a world"),
-        ("[]", "is not a session of a world"),
-        ('{"steptwin_session": 99}', "is a session of format 99: this version reads 1"),
-        ('{"steptwin_session": 1}', "is not a session of a world: 'until_ns' is missing"),
-        ("[" * 100_000, "is not a session of a world: it is nested too deeply"),
+        ("{", "is not a recording of a world"),
+        ("[]", "is not a recording of a world"),
+        ('{"steptwin_session": 99}', "is a recording of format 99: this version reads 1"),
+        ('{"steptwin_session": 1}', "is not a recording of a world: 'until_ns' is missing"),
+        ("[" * 100_000, "is not a recording of a world: it is nested too deeply"),
     ],
 )
 def test_what_is_no_session_is_misuse(tmp_path: Path, text: str, message: str) -> None:
@@ -326,7 +326,7 @@ def test_a_damaged_session_is_misuse(tmp_path: Path, change: dict[str, Any], mes
     path.write_text(json.dumps(whole | {"world": "", "files": {}, "inputs": [put(levels=[["t", "IN1", 1]])]}))
     load(path)
     path.write_text(json.dumps(whole | {"world": "", "files": {}, "inputs": []} | change))
-    with pytest.raises(Misuse, match=rf"s\.json is not a session of a world: .*{message}"):
+    with pytest.raises(Misuse, match=rf"s\.json is not a recording of a world: .*{message}"):
         load(path)
 
 
@@ -334,8 +334,8 @@ def test_a_damaged_session_is_misuse(tmp_path: Path, change: dict[str, Any], mes
     ("change", "message"),
     [
         ({"seed": -8}, "seed -8: permitted are whole numbers from 0 to"),
-        ({"firmware": {"table": "1.40"}}, "table is 1.40 in the session, but its world has 1.70"),
-        ({"until_ns": SECOND}, "the session ends at 1000000000 ns, before an input at 2000000000 ns"),
+        ({"firmware": {"table": "1.40"}}, "table is 1.40 in the recording, but its world has 1.70"),
+        ({"until_ns": SECOND}, "the recording ends at 1000000000 ns, before an input at 2000000000 ns"),
     ],
 )
 def test_a_session_that_contradicts_itself_is_misuse(tmp_path: Path, change: dict[str, object], message: str) -> None:
@@ -343,7 +343,7 @@ def test_a_session_that_contradicts_itself_is_misuse(tmp_path: Path, change: dic
     world.run(for_=2)
     world.press("start", 0.3)
     file = tmp_path / "s.json"
-    save(session_of(world), file)
+    save(recording_of(world), file)
     file.write_text(json.dumps(json.loads(file.read_text()) | change))
     with pytest.raises(Misuse, match=message):
         load(file).replay()
@@ -368,9 +368,9 @@ def test_a_session_of_other_values_is_refused_or_replayed(way: list[int], value:
     world.line["l"].send(b"\x01")
     world.run(for_=0.5)
     path = tmp_path / "s.json"
-    save(session_of(world), path)
+    save(recording_of(world), path)
     path.write_text(json.dumps(damaged(json.loads(path.read_text()), way, value)))
     with suppress(SteptwinError):
-        session = load(path)
-        if session.until <= world.now:
-            assert session.replay().now == session.until
+        recording = load(path)
+        if recording.until <= world.now:
+            assert recording.replay().now == recording.until

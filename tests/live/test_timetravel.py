@@ -12,10 +12,10 @@ from tests.live.test_pace import READ_POSITION, Rig, feeder
 from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse, Refusal
 from steptwin.eventloop import result_of
-from steptwin.files.session import session_of
+from steptwin.files.recording import recording_of
 from steptwin.files.world import World
-from steptwin.live import lookback as module
-from steptwin.live.lookback import Look, Lookback
+from steptwin.live import timetravel as module
+from steptwin.live.timetravel import WorldPastView, WorldTimeTravel
 from steptwin.live.world import PlacePort
 from steptwin.subject.commands import ReadPoints, ReadState, TakeSnapshot
 
@@ -34,20 +34,20 @@ class Back(Rig):
 
     def __init__(self, world: World) -> None:
         super().__init__(world)
-        self.lookback = Lookback(self.live, self.realtime, self.pace)
+        self.time_travel = WorldTimeTravel(self.live, self.realtime, self.pace)
 
     def shown(self) -> tuple[Any, ...]:
         subject = self.control
         return (subject.do(ReadPoints(POINTS)).value, subject.do(ReadState("table")).value, subject.do(ReadState("drum")).value)
 
     async def end(self) -> World:
-        await self.lookback.close()
+        await self.time_travel.close()
         return self.close()
 
 
-async def at(look: Look, moment: Nanos) -> tuple[Any, ...]:
-    await result_of(look.go(moment))
-    subject = look.subject
+async def at(view: WorldPastView, moment: Nanos) -> tuple[Any, ...]:
+    await result_of(view.go(moment))
+    subject = view.subject
     return (subject.do(ReadPoints(POINTS)).value, subject.do(ReadState("table")).value, subject.do(ReadState("drum")).value)
 
 
@@ -65,18 +65,18 @@ def test_every_moment_is_as_it_was_seen_while_the_world_goes_on(run: Run) -> Non
             if step == 3:
                 rig.do("press", button="start")
             seen[rig.world.now] = rig.shown()
-        look = rig.lookback.open()
+        view = rig.time_travel.open()
         for moment in sorted(seen, key=lambda one: one % 1_300_000_007):
-            assert await at(look, moment) == seen[moment]
+            assert await at(view, moment) == seen[moment]
         rig.realtime.enter()
         now = rig.world.now
         assert now >= max(seen)
         await asyncio.sleep(1)
         rig.realtime.enter()
         assert rig.world.now == now + SECOND
-        look.close()
+        view.close()
         await rig.end()
-        assert rig.live.history is None
+        assert rig.live.snapshots is None
         assert not rig.world.input_watchers
 
     run(scene())
@@ -89,15 +89,15 @@ def test_another_moment_that_is_wanted_meanwhile_wins(run: Run, monkeypatch: pyt
         rig = Back(feeder())
         await asyncio.sleep(9.5)
         rig.realtime.enter()
-        look = rig.lookback.open()
-        first = look.go(9 * SECOND + SECOND // 2)
-        second = look.go(4 * SECOND + SECOND // 2)
+        view = rig.time_travel.open()
+        first = view.go(9 * SECOND + SECOND // 2)
+        second = view.go(4 * SECOND + SECOND // 2)
         with pytest.raises(Refusal, match="another moment"):
             await result_of(first)
         await result_of(second)
-        assert look.now == 4 * SECOND + SECOND // 2
-        third = look.go(9 * SECOND + SECOND // 2)
-        look.close()
+        assert view.now == 4 * SECOND + SECOND // 2
+        third = view.go(9 * SECOND + SECOND // 2)
+        view.close()
         with pytest.raises(Refusal, match="the view of the past was closed"):
             await result_of(third)
         await rig.end()
@@ -110,14 +110,14 @@ def test_what_is_not_kept_is_refused_and_looks_are_bounded(run: Run) -> None:
         rig = Back(feeder())
         await asyncio.sleep(2)
         rig.realtime.enter()
-        looks = [rig.lookback.open() for _ in range(module.MOST_LOOKS)]
-        with pytest.raises(Refusal, match="8 viewers look back already"):
-            rig.lookback.open()
+        views = [rig.time_travel.open() for _ in range(module.MOST_VIEWS)]
+        with pytest.raises(Refusal, match="too many views of the past: at most 8 viewers"):
+            rig.time_travel.open()
         with pytest.raises(Misuse, match="the past is kept from 0 s to 2 s"):
-            await result_of(looks[0].go(3 * SECOND))
-        await result_of(looks[0].go(SECOND))
-        looks[0].close()
-        rig.lookback.open().close()
+            await result_of(views[0].go(3 * SECOND))
+        await result_of(views[0].go(SECOND))
+        views[0].close()
+        rig.time_travel.open().close()
         await rig.end()
 
     run(scene())
@@ -139,10 +139,10 @@ def test_the_world_goes_back_to_what_is_looked_at_and_its_session_replays(run: R
         rig.do("set", levels={"table.IN9": 0})
         await asyncio.sleep(2)
         rig.realtime.enter()
-        look = rig.lookback.open()
-        await result_of(look.go(moment))
-        look.go_back()
-        look.close()
+        view = rig.time_travel.open()
+        await result_of(view.go(moment))
+        view.go_back()
+        view.close()
         assert rig.do("time")["paused"]
         assert rig.world.now == moment
         assert rig.shown() == seen
@@ -151,15 +151,15 @@ def test_the_world_goes_back_to_what_is_looked_at_and_its_session_replays(run: R
         await asyncio.sleep(1)
         rig.realtime.enter()
         assert rig.world.now == moment + SECOND
-        later = rig.lookback.open()
+        later = rig.time_travel.open()
         assert await at(later, moment) == seen
         with pytest.raises(Misuse, match="is kept from 0 s to"):
             await result_of(later.go(moment + 2 * SECOND))
         later.close()
         return await rig.end()
 
-    session = session_of(run(scene()))
-    assert session.replay().trace.digest() == session.digest
+    recording = recording_of(run(scene()))
+    assert recording.replay().trace.digest() == recording.digest
 
 
 def test_a_snapshot_that_is_restored_is_the_past_from_then_on(run: Run) -> None:
@@ -171,10 +171,10 @@ def test_a_snapshot_that_is_restored_is_the_past_from_then_on(run: Run) -> None:
         await asyncio.sleep(1)
         rig.do("restore", name="here")
         rig.do("step", for_ns=2 * SECOND)
-        look = rig.lookback.open()
-        ((_, _, level, _, _), *_) = await at(look, 3 * SECOND)
+        view = rig.time_travel.open()
+        ((_, _, level, _, _), *_) = await at(view, 3 * SECOND)
         assert level["value"] == 0.0
-        look.close()
+        view.close()
         await rig.end()
 
     run(scene())

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import { RequestError } from "../protocol/connection";
-import { EarlierEvents, type PastEvents } from "./history";
+import { EarlierEvents, type PastEvents } from "./earlierevents";
 import type { Ask } from "./watch.svelte";
 
 const SECOND = 1_000_000_000n;

@@ -18,7 +18,7 @@ from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 
 
 @dataclass(slots=True)
-class Recording:
+class TraceTracks:
     """The tracks from ``begin`` to ``until``."""
 
     begin: Nanos
@@ -34,7 +34,7 @@ class Recording:
     """When something changed last, analog inputs apart: their sources never end; ``until`` where something moves on."""
     title: str = ""
 
-    def to_last_change(self) -> Recording:
+    def to_last_change(self) -> TraceTracks:
         """The same, ending shortly after the last change; all of it where nothing changes."""
         if self.last == self.begin:
             return self
@@ -50,7 +50,7 @@ def sort_out(
     begin: Nanos = 0,
     until: Nanos | None = None,
     controllers: Collection[str] | None = None,
-) -> Recording:
+) -> TraceTracks:
     """The tracks of ``controllers`` (all of them by default) in a window of time; without ``until`` up to where all is at rest.
 
     Raises `Misuse` for controllers that are not in the trace and for a window that ends before it begins.
@@ -66,7 +66,7 @@ def sort_out(
         if until is not None and record.time > until:
             break
         sorting.add(record)
-    return sorting.recording(chosen, until)
+    return sorting.tracks(chosen, until)
 
 
 class _Sorting:
@@ -109,7 +109,7 @@ class _Sorting:
             track = self._axes[controller, subject] = AxisTrack(controller, view)
         return track
 
-    def recording(self, controllers: list[str], until: Nanos | None) -> Recording:
+    def tracks(self, controllers: list[str], until: Nanos | None) -> TraceTracks:
         """Raises `Misuse` for a window that ends before it begins."""
         for track in self._axes.values():
             _stand_before(track, self._begin)
@@ -122,7 +122,7 @@ class _Sorting:
         moved = self._moved(end)
         changed = max([changed, *(_last_motion(track, end) for track in moved)])
         order = {name: i for i, name in enumerate(controllers)}
-        return Recording(
+        return TraceTracks(
             self._begin,
             end,
             controllers,

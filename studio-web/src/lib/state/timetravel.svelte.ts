@@ -19,11 +19,11 @@ const ANSWER_MS = 60_000;
 /** A step where nothing is known to have happened. */
 const STEP_NS = 1_000_000_000n;
 
-/** The moment that the page looks at: one for all its panels. */
-export class Lookback {
+/** The moment that the page shows: one for all its panels. */
+export class TimeTravel {
   /** What the page wants to show; null: the present. */
   moment = $state.raw<bigint | null>(null);
-  /** What the studio has answered; of another moment while it looks for it. */
+  /** What the studio has answered; of another moment until the next answer. */
   past = $state.raw<Past | null>(null);
   private isAsking = false;
 
@@ -36,13 +36,13 @@ export class Lookback {
   go(time_ns: bigint): void {
     const present = this.shown.present();
     this.moment = time_ns < 0n ? 0n : time_ns > present ? present : time_ns;
-    void this.look();
+    void this.showMoment();
   }
 
   live(): void {
     if (this.moment === null) return;
     this.moment = null;
-    void this.look();
+    void this.showMoment();
   }
 
   /** To the moment at which something happened last before, or next; behind the last one is the present. */
@@ -66,14 +66,14 @@ export class Lookback {
   }
 
   /** Moments are asked for one after the other; of those that were wanted meanwhile only the last. */
-  private async look(): Promise<void> {
+  private async showMoment(): Promise<void> {
     if (this.isAsking) return;
     this.isAsking = true;
     try {
       let asked: bigint | null | undefined;
       while (asked !== this.moment) {
         asked = this.moment;
-        await this.ask("look", { to_ns: asked === null ? null : String(asked) }, ANSWER_MS);
+        await this.ask("show_moment", { to_ns: asked === null ? null : String(asked) }, ANSWER_MS);
       }
     } catch (error) {
       if (!(error instanceof RequestError && error.code === "closed")) this.shown.report(error);

@@ -6,19 +6,26 @@ from collections.abc import Callable, Sequence
 
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.simulation.world.history import MOST_STATES, ChangedSince, PastState, StatesByAge, outside_past, replay
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput
+from steptwin.simulation.world.snapshotlog import (
+    MOST_SNAPSHOTS,
+    ChangedSince,
+    LoggedSnapshot,
+    SnapshotsByAge,
+    outside_past,
+    replay,
+)
 from steptwin.why.answer import Answer
-from steptwin.why.kept import PastQuestions, first_span
 from steptwin.why.log import MOST_NOTED
+from steptwin.why.pastquestions import PastQuestions, first_span
 from steptwin.why.question import finish
 
 STATES = 16
 """Number of states at equal distances; further ones are near the end, about which most questions are."""
 
 
-class RepeatedPast:
+class ReplayedRun:
     """Answers questions about the past until ``end``. ``make`` gives the world at its beginning, ``inputs`` are what came from
     outside since."""
 
@@ -31,14 +38,14 @@ class RepeatedPast:
     def ask(self, question: str, at: Nanos | None = None) -> Answer:
         """The answer for a moment (ns), the end by default. Raises `Misuse` for what is no question here."""
         if self._questions is None:
-            states = StatesOfRun(self._make(), self._inputs, self._end)
+            states = SnapshotsOfRun(self._make(), self._inputs, self._end)
             states.run()
             self._questions = PastQuestions(states, MOST_NOTED)
         return finish(self._questions.asking(question, at))
 
 
-class StatesOfRun:
-    """States of a world that is run to ``end``. As `steptwin.simulation.world.history.History`, with all inputs."""
+class SnapshotsOfRun:
+    """States of a world that is run to ``end``. As `steptwin.simulation.world.snapshotlog.SnapshotLog`, with all inputs."""
 
     branch = 0
 
@@ -47,8 +54,8 @@ class StatesOfRun:
         self.begin = world.now
         self._inputs = inputs
         self._end = end
-        self._states = StatesByAge(MOST_STATES)
-        self._states.add(PastState(world.snapshot(with_inputs=False), 0))
+        self._states = SnapshotsByAge(MOST_SNAPSHOTS)
+        self._states.add(LoggedSnapshot(world.snapshot(with_inputs=False), 0))
 
     def run(self) -> None:
         """Run the world."""
@@ -57,7 +64,7 @@ class StatesOfRun:
         done = 0
         for moment in self._moments():
             done += sum(replay(self.world, self._inputs[done:], moment))
-            self._states.add(PastState(self.world.snapshot(with_inputs=False), done, changed.take()))
+            self._states.add(LoggedSnapshot(self.world.snapshot(with_inputs=False), done, changed.take()))
 
     def _moments(self) -> Sequence[Nanos]:
         """Those of the states after the first one."""
@@ -68,7 +75,7 @@ class StatesOfRun:
             span *= 2
         return sorted(moments)
 
-    def state_at(self, moment: Nanos) -> PastState:
+    def state_at(self, moment: Nanos) -> LoggedSnapshot:
         state = self._states.at(moment)
         if state is None:
             raise Misuse(outside_past(moment, self.begin, self._end))

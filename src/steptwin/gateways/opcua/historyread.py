@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from asyncua import ua
 
 from steptwin.errors import LineFailure, Misuse
-from steptwin.gateways.contract import PastValues
+from steptwin.gateways.contract import HistoryValues
 from steptwin.gateways.opcua.addressspace import PointNode
 from steptwin.gateways.opcua.nodetypes import data_value, status
 
@@ -27,8 +27,8 @@ _NEVER = -(1 << 63)
 
 
 class _Reading(NamedTuple):
-    """A request for past values. Moments in µs since 1970; None: open. ``at`` and ``skip``: go on with the value at this moment
-    that comes behind so many others of it."""
+    """A request for values of the history. Moments in µs since 1970; None: open. ``at`` and ``skip``: go on with the value at
+    this moment that comes behind so many others of it."""
 
     begin: int | None
     end: int | None
@@ -51,11 +51,11 @@ class _Kept(NamedTuple):
     value: ua.DataValue
 
 
-class PastNodes:
-    """Reads the variables ``nodes``, with their controllers, from ``past``."""
+class HistoryNodes:
+    """Reads the variables ``nodes``, with their controllers, from ``history``."""
 
-    def __init__(self, past: PastValues, nodes: Mapping[ua.NodeId, tuple[str, PointNode]]) -> None:
-        self._past = past
+    def __init__(self, history: HistoryValues, nodes: Mapping[ua.NodeId, tuple[str, PointNode]]) -> None:
+        self._history = history
         self._nodes = nodes
 
     async def read(self, details: Any, wanted: ua.HistoryReadValueId, *, release: bool) -> ua.HistoryReadResult:
@@ -85,10 +85,10 @@ class PastNodes:
         begin = low if backwards or reading.at is None else reading.at
         bound = most + reading.skip + 2  # the one that held at the begin, and the first of the next page
         try:
-            values = await self._past.values(point, _date(begin), _date(high), None if backwards else bound)
+            values = await self._history.values(point, _date(begin), _date(high), None if backwards else bound)
             after = []
             if reading.has_bounds and high is not None:
-                after = [one for one in await self._past.values(point, _date(high), None, 2) if _micros(one.at) > high][:1]
+                after = [one for one in await self._history.values(point, _date(high), None, 2) if _micros(one.at) > high][:1]
         except Misuse:
             return []
         except LineFailure:

@@ -1,7 +1,7 @@
 """The past of a running world: snapshots at intervals and the external inputs since, from which the world at any moment since the
 oldest snapshot is computed again.
 
-Memory is bounded (`StatesByAge`). With the oldest snapshot, the inputs before the next one are removed.
+Memory is bounded (`SnapshotsByAge`). With the oldest snapshot, the inputs before the next one are removed.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from steptwin.simulation.world.inputs import ExternalInput, size_of
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
 
-MOST_STATES = 256
+MOST_SNAPSHOTS = 256
 MOST_CONTROLLER_STATES = 4096
 """Limit of the states of controllers in all snapshots: a world of more than 16 controllers keeps fewer snapshots."""
-LEAST_STATES = 16
+LEAST_SNAPSHOTS = 16
 MOST_NEAR = 128
 MOST_INPUTS = 100_000
 MOST_INPUT_BYTES = 16 << 20
@@ -79,7 +79,7 @@ ACTED: Changed = ("", "")
 """A script acted, or something came from outside."""
 
 
-class PastState(NamedTuple):
+class LoggedSnapshot(NamedTuple):
     snapshot: SimulationSnapshot
     inputs: int
     """Number of inputs before it."""
@@ -87,7 +87,7 @@ class PastState(NamedTuple):
     """Things that have changed since the state before, or may have."""
 
 
-class StatesByAge:
+class SnapshotsByAge:
     """States of a world in the order of their moments, at most ``most`` (3 or more).
 
     If there are too many, those whose neighbours are close for their age are removed first, so that the distance between two
@@ -96,20 +96,20 @@ class StatesByAge:
 
     def __init__(self, most: int) -> None:
         self._most = most
-        self._states: list[PastState] = []
+        self._states: list[LoggedSnapshot] = []
 
     def __len__(self) -> int:
         return len(self._states)
 
     @property
-    def oldest(self) -> PastState | None:
+    def oldest(self) -> LoggedSnapshot | None:
         return self._states[0] if self._states else None
 
     @property
-    def newest(self) -> PastState | None:
+    def newest(self) -> LoggedSnapshot | None:
         return self._states[-1] if self._states else None
 
-    def add(self, state: PastState) -> PastState | None:
+    def add(self, state: LoggedSnapshot) -> LoggedSnapshot | None:
         """Add a state, unless there is one of its moment; the state that was removed for it."""
         index = self._count_until(state.snapshot.now)
         if index and self._states[index - 1].snapshot.now == state.snapshot.now:
@@ -125,17 +125,17 @@ class StatesByAge:
         self._states[index] = after._replace(changed=after.changed | removed.changed)
         return removed
 
-    def at(self, moment: Nanos) -> PastState | None:
+    def at(self, moment: Nanos) -> LoggedSnapshot | None:
         """The newest state at or before a moment, ns."""
         index = self._count_until(moment)
         return self._states[index - 1] if index else None
 
-    def after(self, moment: Nanos) -> PastState | None:
+    def after(self, moment: Nanos) -> LoggedSnapshot | None:
         """The oldest state after a moment, ns."""
         index = self._count_until(moment)
         return self._states[index] if index < len(self._states) else None
 
-    def back_from(self, moment: Nanos) -> Iterator[PastState]:
+    def back_from(self, moment: Nanos) -> Iterator[LoggedSnapshot]:
         """The states at or before a moment (ns), the newest first."""
         return reversed(self._states[: self._count_until(moment)])
 
@@ -222,8 +222,8 @@ class _ChangedPoints:
 PAST_IS_KEPT_FROM = Message("simulation.past-is-kept-from", "the past is kept from {begin} to {now}")
 
 
-class History:
-    """The past of ``world`` from the present on. Inputs are recorded automatically, snapshots by `take`.
+class SnapshotLog:
+    """Snapshots of ``world`` and its inputs, from the present on. Inputs are recorded automatically, snapshots by `take`.
 
     Each snapshot has all records of a trace that is kept: for a long run, drop them before (`Trace.let_go`).
     """
@@ -232,19 +232,19 @@ class History:
         self.world = world
         self.branch = 0
         """Counts how often the world has gone back; each time, the past after that moment is replaced."""
-        most = max(LEAST_STATES, min(MOST_STATES, MOST_CONTROLLER_STATES // max(1, len(world.controllers))))
-        self._states = StatesByAge(most)
+        most = max(LEAST_SNAPSHOTS, min(MOST_SNAPSHOTS, MOST_CONTROLLER_STATES // max(1, len(world.controllers))))
+        self._states = SnapshotsByAge(most)
         self._inputs: deque[RecordedInput] = deque()
         self._bytes = 0
         self._dropped = 0
         """Number of inputs that were removed."""
         self._changed = ChangedSince(world)
-        world.input_watchers.append(self._noted)
+        world.input_watchers.append(self._input_came)
         self.take()
 
     def close(self) -> None:
         """End the recording."""
-        self.world.input_watchers.remove(self._noted)
+        self.world.input_watchers.remove(self._input_came)
         self._changed.close()
 
     def __len__(self) -> int:
@@ -266,9 +266,9 @@ class History:
         """Take a snapshot, unless there is one of this moment."""
         newest = self._states.newest
         if newest is None or newest.snapshot.now != self.world.now:
-            self._states.add(PastState(self.world.snapshot(with_inputs=False), self.inputs_so_far, self._changed.take()))
+            self._states.add(LoggedSnapshot(self.world.snapshot(with_inputs=False), self.inputs_so_far, self._changed.take()))
 
-    def _noted(self, given: RecordedInput) -> None:
+    def _input_came(self, given: RecordedInput) -> None:
         self._inputs.append(given)
         self._bytes += size_of(given.what)
         while len(self._inputs) > MOST_INPUTS or self._bytes > MOST_INPUT_BYTES:
@@ -291,7 +291,7 @@ class History:
         self.branch += 1
         self.take()
 
-    def state_at(self, moment: Nanos) -> PastState:
+    def state_at(self, moment: Nanos) -> LoggedSnapshot:
         """The newest snapshot at or before a moment, and the number of inputs before it. Raises `Misuse` if there is none."""
         state = self._states.at(moment)
         if state is None:
@@ -316,21 +316,21 @@ class History:
         return newest
 
 
-class Past:
+class PastWorld:
     """A second world without ports, which shows a moment of the past of the first. It takes as much memory as the first."""
 
-    def __init__(self, history: History) -> None:
-        self._history = history
-        world = history.world
+    def __init__(self, snapshots: SnapshotLog) -> None:
+        self._snapshots = snapshots
+        world = snapshots.world
         self.world = Simulation(world.blueprint, keep_trace=world.trace.is_kept, keep_inputs=False)
         if not world.trace.is_recorded:
             self.world.stop_recording()
         self._branch: int | None = None
-        """Number of the branch of the history, when it was brought there."""
+        """Number of the branch of the snapshot log, when it was brought there."""
         self._inputs = 0
         """Number of inputs applied to it."""
-        self._near = StatesByAge(MOST_NEAR)
-        """States on the way to the last moment, because those of the history may be far apart."""
+        self._near = SnapshotsByAge(MOST_NEAR)
+        """States on the way to the last moment, because those of the log may be far apart."""
 
     def forget(self) -> None:
         """Let the next `go` begin with a snapshot, because the world was used for something else."""
@@ -339,51 +339,51 @@ class Past:
     @property
     def is_in_step(self) -> bool:
         """Whether it is at the present moment and has been brought there; inputs of this moment may be missing still."""
-        history = self._history
-        return self._branch == history.branch and self.world.now == history.world.now
+        snapshots = self._snapshots
+        return self._branch == snapshots.branch and self.world.now == snapshots.world.now
 
     @property
     def lacks_inputs(self) -> bool:
         """Whether inputs have come since."""
-        return self._inputs != self._history.inputs_so_far
+        return self._inputs != self._snapshots.inputs_so_far
 
     @property
     def can_go_on(self) -> bool:
         """Whether the inputs since are still kept."""
-        return self._history.keeps_inputs_from(self._inputs)
+        return self._snapshots.keeps_inputs_from(self._inputs)
 
     def go(self, moment: Nanos) -> Iterator[None]:
         """Go to a moment, in parts: it yields after each.
 
         Raises `Misuse` for a moment before the oldest snapshot or after the present.
         """
-        history = self._history
-        if moment > history.world.now:
-            raise Misuse(outside_past(moment, history.begin, history.world.now))
-        state = near = self._nearest(moment) if self._branch == history.branch else None
+        snapshots = self._snapshots
+        if moment > snapshots.world.now:
+            raise Misuse(outside_past(moment, snapshots.begin, snapshots.world.now))
+        state = near = self._nearest(moment) if self._branch == snapshots.branch else None
         if state is None:
-            state = history.state_at(moment)
-        if not self.can_go_on or self._branch != history.branch or not state.snapshot.now <= self.world.now <= moment:
+            state = snapshots.state_at(moment)
+        if not self.can_go_on or self._branch != snapshots.branch or not state.snapshot.now <= self.world.now <= moment:
             if near is None:
                 self._near.clear()
             self.world.restore(state.snapshot)
-            self._branch, self._inputs = history.branch, state.inputs
+            self._branch, self._inputs = snapshots.branch, state.inputs
         kept = state.snapshot.now
         for _ in self.go_on(moment):
             if kept + SLICE_NS <= self.world.now < moment:
                 kept = self.world.now
-                self._near.add(PastState(self.world.snapshot(), self._inputs))
+                self._near.add(LoggedSnapshot(self.world.snapshot(), self._inputs))
             yield
 
     def go_on(self, moment: Nanos) -> Iterator[None]:
         """Go on from its present moment to a later one, without using snapshots."""
-        for is_input in replay(self.world, self._history.inputs_from(self._inputs), moment, SLICE_NS):
+        for is_input in replay(self.world, self._snapshots.inputs_from(self._inputs), moment, SLICE_NS):
             self._inputs += is_input
             yield
 
-    def _nearest(self, moment: Nanos) -> PastState | None:
-        """The newest state on the way at or before a moment; None where the history has a newer one or its inputs are gone."""
-        kept, near = self._history.state_at(moment), self._near.at(moment)
-        if near is None or near.snapshot.now <= kept.snapshot.now or not self._history.keeps_inputs_from(near.inputs):
+    def _nearest(self, moment: Nanos) -> LoggedSnapshot | None:
+        """The newest state on the way at or before a moment; None where the log has a newer one or its inputs are gone."""
+        kept, near = self._snapshots.state_at(moment), self._near.at(moment)
+        if near is None or near.snapshot.now <= kept.snapshot.now or not self._snapshots.keeps_inputs_from(near.inputs):
             return None
         return near

@@ -1,4 +1,4 @@
-"""Sessions with a controller: what each line does, recordings, and where two of them differ. The twin lives in virtual time."""
+"""Transcripts: what each line does, and where two of them differ. The twin lives in virtual time."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import dataclasses
 import pytest
 from host_rig import Wire, driver
 
-from steptwin.drivers.mic488 import session
-from steptwin.drivers.mic488.session import (
-    SessionDifference,
-    SessionStep,
+from steptwin.drivers.mic488 import transcript
+from steptwin.drivers.mic488.transcript import (
+    TranscriptDifference,
+    TranscriptStep,
     carry_out,
     carry_out_one,
     differences,
@@ -21,7 +21,7 @@ from steptwin.drivers.mic488.session import (
 from steptwin.errors import Misuse, Refusal
 from steptwin.mic488.registers import register_map
 
-SESSION = """
+STEPS = """
 set M1_EN=on           # the drive
 set M1_POS_ABS=8
 wait M1
@@ -31,11 +31,11 @@ sleep 0
 """
 
 
-def recorded(wire: Wire) -> list[SessionStep]:
-    return list(carry_out(driver(wire), steps_of(SESSION, register_map())))
+def recorded(wire: Wire) -> list[TranscriptStep]:
+    return list(carry_out(driver(wire), steps_of(STEPS, register_map())))
 
 
-def test_a_session() -> None:
+def test_a_transcript() -> None:
     steps = recorded(Wire())
     assert [step.line for step in steps][:2] == ["set M1_EN=on", "set M1_POS_ABS=8"]
     assert [step.result for step in steps] == [
@@ -82,7 +82,7 @@ def test_what_is_no_step(line: str, text: str) -> None:
         carry_out_one(driver(Wire()), line)
 
 
-def test_a_session_is_read_before_it_is_begun() -> None:
+def test_all_lines_are_read_before_the_first_is_sent() -> None:
     for line in ("fly M1", "set M1_ACC=x", "set M1_ACC=0", "get M1_NONE", "raw 99"):
         with pytest.raises(Misuse, match=f"line 2: '{line}': "):
             steps_of(f"get M1_ACC\n{line}\n", register_map())
@@ -96,7 +96,7 @@ def test_a_step_that_those_before_it_make_senseless() -> None:
         list(steps)
 
 
-def test_two_recordings() -> None:
+def test_two_transcripts() -> None:
     one, wire = recorded(Wire()), Wire()
     wire.twin.axes[0].set_coordinate(900, wire.now)
     assert differences(one, recorded(wire)) == []
@@ -106,15 +106,15 @@ def test_two_recordings() -> None:
     assert (found.step, found.line, found.what) == (5, one[4].line, "time in s")
     assert (found.one, found.two) == (one[4].at_s, slow[4].at_s)
     other = list(one)
-    other[2] = SessionStep("wait M1", 0.0, {"M1": {"reason": "stopped at limit R", "position": 7.99}})
-    other[3] = SessionStep(one[3].line, 0.0, {"M1_STATUS": 4})
+    other[2] = TranscriptStep("wait M1", 0.0, {"M1": {"reason": "stopped at limit R", "position": 7.99}})
+    other[3] = TranscriptStep(one[3].line, 0.0, {"M1_STATUS": 4})
     assert [str(d) for d in differences(one, other)] == [
         'step 3, wait M1: M1 reason: "target reached" | "stopped at limit R"',
         "step 3, wait M1: M1 position: 8.0 | 7.99",
         "step 4, get M1_POS_ACT M1_STATUS: M1_POS_ACT: 8.0 | nothing",
     ]
     assert len(differences(one, other, tolerance=0.011)) == 2
-    with pytest.raises(Misuse, match="recordings are of different sessions"):
+    with pytest.raises(Misuse, match="the transcripts have different requests"):
         differences(one, one[1:])
 
 
@@ -130,8 +130,8 @@ def test_two_recordings() -> None:
         '{"format": "steptwin session 1"}\nx',
     ],
 )
-def test_what_is_no_recording(text: str) -> None:
-    with pytest.raises(Misuse, match=r"a.json is not a recording"):
+def test_what_is_no_transcript(text: str) -> None:
+    with pytest.raises(Misuse, match=r"a.json is not a transcript"):
         from_text(text, "a.json")
 
 
@@ -146,7 +146,7 @@ def test_a_motion_that_did_not_arrive_is_a_result() -> None:
 
 
 def test_differences_are_shown_as_they_are_written() -> None:
-    assert str(SessionDifference(2, "get X", "X", "5 °C", None)) == 'step 2, get X: X: "5 °C" | nothing'
+    assert str(TranscriptDifference(2, "get X", "X", "5 °C", None)) == 'step 2, get X: X: "5 °C" | nothing'
 
 
 @pytest.mark.parametrize("seconds", ["0", "3600", "0.25"])
@@ -154,7 +154,7 @@ def test_a_sleep(seconds: str, monkeypatch: pytest.MonkeyPatch) -> None:
     slept: list[float] = []
     mic = driver(Wire())
     with monkeypatch.context() as patched:
-        patched.setattr(session.time, "sleep", slept.append)
+        patched.setattr(transcript.time, "sleep", slept.append)
         assert carry_out_one(mic, f"sleep {seconds}") == {}
     assert slept == [float(seconds)]
 
@@ -165,13 +165,13 @@ def test_what_is_no_sleep(line: str) -> None:
         carry_out_one(driver(Wire()), line)
 
 
-def test_times_count_from_the_beginning_of_the_session(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_times_count_from_the_first_line(monkeypatch: pytest.MonkeyPatch) -> None:
     mic, clock = driver(Wire()), iter([100.0, 100.25, 107.5])
     steps = steps_of("get M1_STATUS\nget M2_STATUS", register_map())
     with monkeypatch.context() as patched:
-        patched.setattr(session.time, "monotonic", lambda: next(clock))
+        patched.setattr(transcript.time, "monotonic", lambda: next(clock))
         assert [step.at_s for step in carry_out(mic, steps)] == [0.25, 7.5]
-    (_, line) = to_text([SessionStep("get X", 1.23456789, {"X": "5 °C"})], {"device": "a"})
+    (_, line) = to_text([TranscriptStep("get X", 1.23456789, {"X": "5 °C"})], {"device": "a"})
     assert line == '{"line": "get X", "at_s": 1.2346, "result": {"X": "5 °C"}}'
 
 
@@ -190,14 +190,16 @@ def test_times_count_from_the_beginning_of_the_session(monkeypatch: pytest.Monke
     ],
 )
 def test_values_that_are_alike(one: object, two: object, tolerance: float, alike: bool) -> None:
-    found = differences([SessionStep("get X", 0.0, {"X": one})], [SessionStep("get X", 0.0, {"X": two})], tolerance=tolerance)
+    found = differences(
+        [TranscriptStep("get X", 0.0, {"X": one})], [TranscriptStep("get X", 0.0, {"X": two})], tolerance=tolerance
+    )
     assert (found == []) is alike
 
 
 @pytest.mark.parametrize(("time_s", "differ"), [(None, False), (0.5, False), (0.49, True)])
 def test_times_that_are_alike(time_s: float | None, differ: bool) -> None:
     for at_s in (1.5, 0.5):
-        found = differences([SessionStep("wait", 1.0)], [SessionStep("wait", at_s)], time_s=time_s)
+        found = differences([TranscriptStep("wait", 1.0)], [TranscriptStep("wait", at_s)], time_s=time_s)
         assert bool(found) is differ
 
 

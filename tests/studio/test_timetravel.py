@@ -11,9 +11,9 @@ from tests.support.studio_rig import OPERATOR, VIEWER, Studio, Tab
 from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.errors import Refusal
 from steptwin.later import Later
-from steptwin.simulation.world.history import History, Past
+from steptwin.simulation.world.snapshotlog import PastWorld, SnapshotLog
 from steptwin.simulation.world.worldprograms import WorldPrograms
-from steptwin.studio import looking
+from steptwin.studio import timetravel
 from steptwin.subject.debugcommands import (
     Branch,
     ClearBreakpoint,
@@ -35,24 +35,24 @@ class Kept:
     """The past of the world of a studio, looked at at once."""
 
     def __init__(self, studio: Studio) -> None:
-        self.history = History(studio.world)
-        self.open_looks = 0
+        self.snapshots = SnapshotLog(studio.world)
+        self.open_views = 0
         self._studio = studio
 
     @property
     def begin(self) -> Nanos:
-        return self.history.begin
+        return self.snapshots.begin
 
-    def open(self) -> _Look:
-        if self.open_looks:
+    def open(self) -> _View:
+        if self.open_views:
             raise Refusal("too many")
-        self.open_looks += 1
-        return _Look(self, Past(self.history), self._studio.subject)
+        self.open_views += 1
+        return _View(self, PastWorld(self.snapshots), self._studio.subject)
 
     def events(
         self, begin: Nanos, end: Nanos, what: Filter, bound: int, at_begin: Callable[[WorldSubject], T]
     ) -> Later[tuple[T, EventBatch]]:
-        past = Past(self.history)
+        past = PastWorld(self.snapshots)
         for _ in past.go(begin):
             pass
         subject = WorldSubject(past.world)
@@ -65,8 +65,8 @@ class Kept:
         return later
 
 
-class _Look:
-    def __init__(self, kept: Kept, past: Past, real: WorldSubject) -> None:
+class _View:
+    def __init__(self, kept: Kept, past: PastWorld, real: WorldSubject) -> None:
         self._kept, self._past, self._real = kept, past, real
         self.subject = WorldSubject(past.world)
         self.programs = WorldPrograms(past.world)
@@ -84,16 +84,16 @@ class _Look:
 
     def go_back(self) -> None:
         self._real.go_back(self._past.world.snapshot(), None)
-        self._kept.history.gone_back()
+        self._kept.snapshots.gone_back()
 
     def close(self) -> None:
-        self._kept.open_looks -= 1
+        self._kept.open_views -= 1
 
 
 @pytest.fixture
 def studio() -> Studio:
     """M1 has moved from 0 mm to 20 mm from 1 s on; now it is 4 s later."""
-    made = Studio(lookback=Kept)
+    made = Studio(time_travel=Kept)
     tab = made.open()
     made.run(1000)
     tab.ok("enable", controller="table", axis=1)
@@ -112,7 +112,7 @@ def test_the_past_is_shown_while_the_world_goes_on(studio: Studio) -> None:
     tab.ok("watch", points=["table.M1.position", "table.M1.status", "time"])
     tab.read()
     assert values(tab) == {0: 20.0, 1: 4, 2: 5.0}
-    assert tab.ok("look", to_ns=str(1200 * MILLISECOND)) == {"time_ns": "1200000000", "from_ns": "0"}
+    assert tab.ok("show_moment", to_ns=str(1200 * MILLISECOND)) == {"time_ns": "1200000000", "from_ns": "0"}
     tab.read()
     past = tab.newest("past")
     assert (past["time_ns"], past["from_ns"]) == ("1200000000", "0")
@@ -136,10 +136,10 @@ def test_the_past_is_shown_while_the_world_goes_on(studio: Studio) -> None:
     assert [event["note"] for message in messages for event in message.get("events", ())] == ["later"]
     assert not any("values" in message for message in messages)
     # Another moment, then the present.
-    tab.ok("look", to_ns="0")
+    tab.ok("show_moment", to_ns="0")
     tab.read()
     assert values(tab) == {0: 0.0, 1: 0, 2: 0.0}
-    assert tab.ok("look") is None
+    assert tab.ok("show_moment") is None
     studio.run(40)
     tab.read()
     assert tab.newest("past") is None
@@ -149,16 +149,16 @@ def test_the_past_is_shown_while_the_world_goes_on(studio: Studio) -> None:
 
 def test_who_looks_back_changes_nothing_but_may_stop(studio: Studio) -> None:
     tab = studio.open()
-    tab.ok("look", to_ns=str(SECOND))
+    tab.ok("show_moment", to_ns=str(SECOND))
     tab.read()
     may = tab.newest("past")["may"]
-    assert {"read", "stop", "stop_all", "look", "go_back"} <= set(may)
+    assert {"read", "stop", "stop_all", "show_moment", "go_back"} <= set(may)
     assert not {"move", "write", "pause", "set", "jog"} & set(may)
     code, message = tab.error("move", controller="table", axis=1, to=3)
-    assert (code, message) == ("refusal", "move: the past is looked at, which cannot be changed: look at the present first")
+    assert (code, message) == ("refusal", "move: the past cannot be changed: return to the present first")
     assert tab.ok("stop", controller="table") == {"program": "stopped"}
     assert tab.ok("stop_all")["controllers"]
-    tab.ok("look")
+    tab.ok("show_moment")
     tab.ok("move", controller="table", axis=1, to=3)
 
 
@@ -167,7 +167,7 @@ def test_a_debugger_steps_from_the_past_but_values_are_not_set_there(studio: Stu
     kinds: tuple[type, ...] = (SetBreakpoint, ClearBreakpoint, StopOn, StepProgram, RunProgram, LookAt, Branch, SetValue)
     studio.subject.dispatcher.add(dict.fromkeys(kinds, asked.append))
     tab, other = studio.open(), studio.open("Anna")
-    tab.ok("look", to_ns=str(SECOND))
+    tab.ok("show_moment", to_ns=str(SECOND))
     tab.read()
     forwards = {"breakpoint", "clear_breakpoint", "stop_on", "step_program", "run", "look_at", "branch"}
     may = set(tab.newest("past")["may"])
@@ -176,7 +176,9 @@ def test_a_debugger_steps_from_the_past_but_values_are_not_set_there(studio: Stu
     tab.ok("step_program", controller="table", way="over")
     tab.ok("breakpoint", label="MAIN")
     assert asked == [StepProgram("table", "over"), SetBreakpoint(label="MAIN")]
-    assert tab.error("set_value", controller="table", name="n", expression="1")[1].startswith("set_value: the past is looked at")
+    assert tab.error("set_value", controller="table", name="n", expression="1")[1].startswith(
+        "set_value: the past cannot be changed"
+    )
     # It needs control, as what else changes the machine.
     assert other.error("run")[0] == "refusal"
     other.ok("take_control", over=True)
@@ -200,7 +202,7 @@ def test_a_viewer_sees_breakpoints_and_sets_none() -> None:
 def test_the_whole_state_and_the_past_with_it(studio: Studio) -> None:
     tab = studio.open()
     tab.ok("watch", points=["time"])
-    tab.ok("look", to_ns=str(SECOND))
+    tab.ok("show_moment", to_ns=str(SECOND))
     tab.read()
     tab.ok("resync")
     messages = tab.read()
@@ -211,16 +213,16 @@ def test_the_whole_state_and_the_past_with_it(studio: Studio) -> None:
 
 def test_moments_that_are_not_kept_are_refused(studio: Studio) -> None:
     tab = studio.open()
-    assert tab.error("look", to_ns=str(60 * SECOND)) == (
+    assert tab.error("show_moment", to_ns=str(60 * SECOND)) == (
         "misuse",
         "60 s: the past is kept from 0 s to 5 s",
     )
-    assert tab.error("go_back") == ("refusal", "this viewer looks at the present")
-    tab.ok("look", to_ns="0")  # the first one has left nothing open
+    assert tab.error("go_back") == ("refusal", "this viewer is at the present")
+    tab.ok("show_moment", to_ns="0")  # the first one has left nothing open
     other = studio.open()
-    assert other.error("look", to_ns="0") == ("refusal", "too many")
+    assert other.error("show_moment", to_ns="0") == ("refusal", "too many")
     tab.close()
-    other.ok("look", to_ns="0")
+    other.ok("show_moment", to_ns="0")
 
 
 def test_the_world_goes_back_for_all(studio: Studio) -> None:
@@ -228,7 +230,7 @@ def test_the_world_goes_back_for_all(studio: Studio) -> None:
     other.ok("watch", points=["table.M1.position"])
     other.ok("follow", kinds=["restored"], id=71)
     other.read()
-    tab.ok("look", to_ns=str(1200 * MILLISECOND))
+    tab.ok("show_moment", to_ns=str(1200 * MILLISECOND))
     seen = tab.ok("read", points=["table.M1.position"])[0]["value"]
     tab.ok("go_back")
     tab.read()
@@ -245,14 +247,14 @@ def test_the_world_goes_back_for_all(studio: Studio) -> None:
 def test_going_back_is_for_who_holds_control(studio: Studio) -> None:
     tab, other = studio.open(), studio.open("Anna")
     other.ok("take_control")
-    tab.ok("look", to_ns="0")
+    tab.ok("show_moment", to_ns="0")
     assert tab.error("go_back")[1].startswith("go_back needs control, which Anna")
 
 
 def test_where_no_past_is_kept_nothing_is_offered() -> None:
     tab = Studio().open()
-    assert not {"look", "go_back"} & set(tab.messages[0]["hello"]["may"])
-    assert tab.error("look", to_ns="0") == ("refusal", "look: no past is kept here")
+    assert not {"show_moment", "go_back"} & set(tab.messages[0]["hello"]["may"])
+    assert tab.error("show_moment", to_ns="0") == ("refusal", "show_moment: no past is kept here")
 
 
 def test_what_happened_before_a_viewer_came_can_be_asked_for(studio: Studio) -> None:
@@ -278,7 +280,7 @@ def test_how_much_of_the_past_is_read_at_once_is_limited(studio: Studio) -> None
 
 
 def test_of_too_many_events_the_last_ones_are_left(studio: Studio, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(looking, "MOST_PAST_EVENTS", 1)
+    monkeypatch.setattr(timetravel, "MOST_PAST_EVENTS", 1)
     found = studio.open().ok("past_events", from_ns="0", to_ns=str(4 * SECOND))
     assert (found["plans"], found["state"], len(found["events"])) == ([], {}, 1)
     assert found["from_ns"] == found["events"][0]["time_ns"]

@@ -1,4 +1,4 @@
-"""Failures and warnings that are reported at the end of a run."""
+"""A log of bounded length: failures and warnings that are shown at the end of a run."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ MOST_KEPT = 1000
 """A script may fail once a second for months: further records are only counted. The trace has all of them."""
 
 
-class ReportsState(NamedTuple):
+class BoundedLogState(NamedTuple):
     first: tuple[TraceRecord, ...]
     count: int
 
 
-class Reports:
+class BoundedLog:
     """The first records of something, and how many there were."""
 
-    def __init__(self, state: ReportsState | None = None) -> None:
+    def __init__(self, state: BoundedLogState | None = None) -> None:
         self._first = [] if state is None else list(state.first)
         self._count = 0 if state is None else state.count
 
@@ -44,5 +44,5 @@ class Reports:
         """How many are counted only."""
         return self._count - len(self._first)
 
-    def state(self) -> ReportsState:
-        return ReportsState(tuple(self._first), self._count)
+    def state(self) -> BoundedLogState:
+        return BoundedLogState(tuple(self._first), self._count)

@@ -1,4 +1,4 @@
-"""The past of a live world, recorded from its start; viewers look at moments of it while the world continues."""
+"""Time travel in a live world: its past is recorded from the start, and viewers visit moments of it while the world goes on."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from steptwin.live.pace import Pace
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.world import LiveWorld
 from steptwin.messages import Message
-from steptwin.simulation.world.history import History, Past
 from steptwin.simulation.world.snapshot import SimulationSnapshot
+from steptwin.simulation.world.snapshotlog import PastWorld, SnapshotLog
 from steptwin.simulation.world.worldprograms import WorldPrograms
 from steptwin.subject.following import EventBatch, Filter
 from steptwin.subject.world import WorldSubject
@@ -25,27 +25,27 @@ from steptwin.subject.world import WorldSubject
 STATE_S = 1.0
 """A state is kept so often, in real time: what is replayed from it then took no longer when it happened."""
 PART_S = 0.01
-"""While a moment is looked for, clients of the world wait at most so long, and are served as long. [real time]"""
-MOST_LOOKS = 8
+"""While a moment is computed, clients of the world wait at most so long, and are served as long. [real time]"""
+MOST_VIEWS = 8
 """Worlds besides the one that goes on."""
 T = TypeVar("T")
-TOO_MANY_LOOK_BACK = Message("live.too-many-look-back", "{most} viewers look back already, which is the most")
+TOO_MANY_PAST_VIEWS = Message("live.too-many-past-views", "too many views of the past: at most {most} viewers")
 
 
-class Lookback:
-    """Past of ``live``, from now on, or with ``history`` from its beginning. A `Link` of its server."""
+class WorldTimeTravel:
+    """Past of ``live``, from now on, or with ``snapshots`` from its beginning. A `Link` of its server."""
 
-    def __init__(self, live: LiveWorld, realtime: RealTimeDriver, pace: Pace, history: History | None = None) -> None:
+    def __init__(self, live: LiveWorld, realtime: RealTimeDriver, pace: Pace, snapshots: SnapshotLog | None = None) -> None:
         self._live = live
         self._realtime = realtime
         self._pace = pace
-        self._looks = 0
-        self._history = live.history = history or History(live.world)
+        self._views = 0
+        self._snapshots = live.snapshots = snapshots or SnapshotLog(live.world)
         self._timer = asyncio.get_running_loop().call_later(STATE_S, self._keep)
 
     def _keep(self) -> None:
         self._realtime.enter()
-        self._history.take()
+        self._snapshots.take()
         self._live.is_dirty = True
         self._realtime.leave()
         self._timer = asyncio.get_running_loop().call_later(STATE_S, self._keep)
@@ -56,13 +56,13 @@ class Lookback:
     def end(self) -> None:
         """Keep the past no longer."""
         self._timer.cancel()
-        self._live.history = None
-        self._history.close()
+        self._live.snapshots = None
+        self._snapshots.close()
 
     @property
     def begin(self) -> Nanos:
-        """The oldest moment that can be looked at."""
-        return self._history.begin
+        """The oldest moment that can be visited."""
+        return self._snapshots.begin
 
     def events(
         self, begin: Nanos, end: Nanos, what: Filter, bound: int, at_begin: Callable[[WorldSubject], T]
@@ -71,27 +71,27 @@ class Lookback:
 
         Raises `Refusal` where there are too many viewers of the past, `Misuse` for moments that are not kept.
         """
-        look = self.open()
-        later = look.events(begin, end, what, bound, at_begin)
-        later.then(look.close)
+        view = self.open()
+        later = view.events(begin, end, what, bound, at_begin)
+        later.then(view.close)
         return later
 
     def state_at(self, moment: Nanos) -> Later[SimulationSnapshot]:
         """The state of a moment, without inputs before it. Raises as `events`."""
-        look = self.open()
-        later = look.state_at(moment)
-        later.then(look.close)
+        view = self.open()
+        later = view.state_at(moment)
+        later.then(view.close)
         return later
 
-    def open(self) -> Look:
+    def open(self) -> WorldPastView:
         """For another viewer of the past. Raises `Refusal` where there are too many."""
-        if self._looks >= MOST_LOOKS:
-            raise Refusal(TOO_MANY_LOOK_BACK(most=MOST_LOOKS))
-        self._looks += 1
-        return Look(Past(self._history), partial(take_back, self._live, self._pace), self._closed)
+        if self._views >= MOST_VIEWS:
+            raise Refusal(TOO_MANY_PAST_VIEWS(most=MOST_VIEWS))
+        self._views += 1
+        return WorldPastView(PastWorld(self._snapshots), partial(take_back, self._live, self._pace), self._closed)
 
     def _closed(self) -> None:
-        self._looks -= 1
+        self._views -= 1
 
 
 def take_back(live: LiveWorld, pace: Pace, snapshot: SimulationSnapshot) -> None:
@@ -100,14 +100,14 @@ def take_back(live: LiveWorld, pace: Pace, snapshot: SimulationSnapshot) -> None
     pace.go_back(replace(snapshot, inputs=inputs))
 
 
-ANOTHER_MOMENT_IS_WANTED = Message("live.another-moment-is-wanted", "another moment is looked for by now")
+ANOTHER_MOMENT_IS_WANTED = Message("live.another-moment-is-wanted", "another moment was requested meanwhile")
 VIEW_OF_THE_PAST_WAS_CLOSED = Message("live.view-of-the-past-was-closed", "the view of the past was closed")
 
 
-class Look:
-    """A moment of the past, to be looked at in `subject` and `programs`."""
+class WorldPastView:
+    """A view of the past: one moment, as `subject` and `programs` show it."""
 
-    def __init__(self, past: Past, go_back: Callable[[SimulationSnapshot], None], closed: Callable[[], None]) -> None:
+    def __init__(self, past: PastWorld, go_back: Callable[[SimulationSnapshot], None], closed: Callable[[], None]) -> None:
         self._past = past
         self._go_back = go_back
         self._closed = closed
@@ -127,11 +127,11 @@ class Look:
     def events(
         self, begin: Nanos, end: Nanos, what: Filter, bound: int, at_begin: Callable[[WorldSubject], T]
     ) -> Later[tuple[T, EventBatch]]:
-        """To ``end``; see `Lookback.events`."""
+        """To ``end``; see `WorldTimeTravel.events`."""
         return self._begin(self._follow(begin, end, what, bound, at_begin))
 
     def state_at(self, moment: Nanos) -> Later[SimulationSnapshot]:
-        """See `Lookback.state_at`."""
+        """See `WorldTimeTravel.state_at`."""
         return self._begin(self._state_at(moment))
 
     def _state_at(self, moment: Nanos) -> Generator[None, None, SimulationSnapshot]:
@@ -178,7 +178,7 @@ class Look:
         self._go_back(self._past.world.snapshot())
 
     def close(self) -> None:
-        """End looking back."""
+        """Leave the past."""
         if self._going is not None:
             self._going.fail(Refusal(VIEW_OF_THE_PAST_WAS_CLOSED()))
         self._closed()

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import { RequestError } from "../protocol/connection";
-import { Lookback, type Past } from "./lookback.svelte";
+import { TimeTravel, type Past } from "./timetravel.svelte";
 import type { Ask } from "./watch.svelte";
 
 /** A studio that answers when it is told to. */
@@ -13,7 +13,7 @@ function rig(moments: bigint[] = []) {
     asked.push(to_ns);
     return new Promise<unknown>((done, failed) => answers.push({ done: () => done(null), failed }));
   }) as unknown as Ask;
-  const lookback = new Lookback(ask, {
+  const timeTravel = new TimeTravel(ask, {
     show: (past) => void shown.push(past?.time_ns ?? null),
     moments: () => moments,
     present: () => 10_000_000_000n,
@@ -23,7 +23,7 @@ function rig(moments: bigint[] = []) {
     for (let turn = 0; turn < 5; turn++) await Promise.resolve();
   };
   return {
-    lookback,
+    timeTravel,
     asked,
     shown,
     reported,
@@ -33,57 +33,57 @@ function rig(moments: bigint[] = []) {
 }
 
 test("of the moments that were wanted meanwhile the last is asked for", async () => {
-  const { lookback, asked, answer } = rig();
-  for (const moment of [1n, 2n, 3n]) lookback.go(moment);
+  const { timeTravel, asked, answer } = rig();
+  for (const moment of [1n, 2n, 3n]) timeTravel.go(moment);
   expect(asked).toEqual(["1"]);
   await answer();
   expect(asked).toEqual(["1", "3"]);
-  lookback.live();
-  lookback.live();
+  timeTravel.live();
+  timeTravel.live();
   await answer();
   await answer();
   expect(asked).toEqual(["1", "3", null]);
-  expect(lookback.moment).toBeNull();
+  expect(timeTravel.moment).toBeNull();
 });
 
 test("a moment lies between the beginning and the present", () => {
-  const { lookback } = rig();
-  lookback.go(-5n);
-  expect(lookback.moment).toBe(0n);
-  lookback.go(99_000_000_000n);
-  expect(lookback.moment).toBe(10_000_000_000n);
+  const { timeTravel } = rig();
+  timeTravel.go(-5n);
+  expect(timeTravel.moment).toBe(0n);
+  timeTravel.go(99_000_000_000n);
+  expect(timeTravel.moment).toBe(10_000_000_000n);
 });
 
 test("steps go to where something happened, and behind the last to the present", () => {
-  const { lookback } = rig([4_000_000_000n, 7_000_000_000n]);
-  lookback.step(-1);
-  expect(lookback.moment).toBe(7_000_000_000n);
-  lookback.step(-1);
-  lookback.step(-1);
-  expect(lookback.moment).toBe(3_000_000_000n);
-  lookback.step(1);
-  lookback.step(1);
-  expect(lookback.moment).toBe(7_000_000_000n);
-  lookback.step(1);
-  expect(lookback.moment).toBeNull();
+  const { timeTravel } = rig([4_000_000_000n, 7_000_000_000n]);
+  timeTravel.step(-1);
+  expect(timeTravel.moment).toBe(7_000_000_000n);
+  timeTravel.step(-1);
+  timeTravel.step(-1);
+  expect(timeTravel.moment).toBe(3_000_000_000n);
+  timeTravel.step(1);
+  timeTravel.step(1);
+  expect(timeTravel.moment).toBe(7_000_000_000n);
+  timeTravel.step(1);
+  expect(timeTravel.moment).toBeNull();
 });
 
 test("what is refused is reported, and the page shows what the studio shows", async () => {
-  const { lookback, reported, refuse } = rig();
-  lookback.go(5n);
+  const { timeTravel, reported, refuse } = rig();
+  timeTravel.go(5n);
   await refuse(new RequestError("misuse", "to_ns = 5: the past is kept from 7 to 9 ns"));
-  expect(lookback.moment).toBeNull();
+  expect(timeTravel.moment).toBeNull();
   expect(reported).toHaveLength(1);
-  lookback.take({ time_ns: "8" } as Past);
-  lookback.go(5n);
+  timeTravel.take({ time_ns: "8" } as Past);
+  timeTravel.go(5n);
   await refuse(new RequestError("misuse", "no"));
-  expect(lookback.moment).toBe(8n);
+  expect(timeTravel.moment).toBe(8n);
 });
 
-test("a connection that is lost is no error of looking back", async () => {
-  const { lookback, reported, refuse, shown } = rig();
-  lookback.go(5n);
-  lookback.forget();
+test("a connection that is lost is no error of time travel", async () => {
+  const { timeTravel, reported, refuse, shown } = rig();
+  timeTravel.go(5n);
+  timeTravel.forget();
   await refuse(new RequestError("closed", "gone"));
-  expect([lookback.moment, reported, shown]).toEqual([null, [], [null]]);
+  expect([timeTravel.moment, reported, shown]).toEqual([null, [], [null]]);
 });

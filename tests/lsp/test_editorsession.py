@@ -19,8 +19,8 @@ from steptwin.errors import Misuse
 from steptwin.lsp import navigation
 from steptwin.lsp.analysis import Analysis
 from steptwin.lsp.documents import TextChange
+from steptwin.lsp.editorsession import EditorSession
 from steptwin.lsp.positions import Encoding, LineIndex
-from steptwin.lsp.session import EditorSession
 
 PRG, CSV, CFG = "file:///m/machine.prg", "file:///m/machine.csv", "file:///m/machine.cfg"
 CHIP = "file:///m/drum.m1486"
