@@ -18,7 +18,7 @@ from steptwin.live.tracedport import traced
 from steptwin.messages import Message
 from steptwin.simulation.kinds.lines import LineEndPoint
 from steptwin.simulation.kinds.registry import line_kinds
-from steptwin.simulation.scheduler.runqueue import Deadlines
+from steptwin.simulation.scheduler.deadlines import Deadlines
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.world.inputs import Bytes, ExternalInput, Leave, See, size_of
 from steptwin.simulation.world.model import WORLD

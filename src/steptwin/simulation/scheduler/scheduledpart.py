@@ -1,12 +1,10 @@
-"""Parts that a scheduler runs between its controllers, and the state of a scheduler as plain values."""
+"""Parts that a scheduler runs between its controllers."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import Protocol
 
 from steptwin.controller import Nanos
-from steptwin.simulation.scheduler.wires import DelayedLevel, PinName
 from steptwin.state import Plain
 
 
@@ -24,13 +22,3 @@ class ScheduledPart(Protocol):
 
     def copy_state(self) -> Plain: ...
     def set_state(self, plain: Plain) -> None: ...
-
-
-class SchedulerState(NamedTuple):
-    """State of a scheduler, its controllers and its parts."""
-
-    now: Nanos
-    controllers: tuple[Any, ...]
-    parts: tuple[Plain, ...]
-    levels: Mapping[PinName, float]
-    delayed: tuple[DelayedLevel, ...]

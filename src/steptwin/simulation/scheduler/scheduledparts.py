@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from steptwin.simulation.scheduler.deadlines import Deadlines
 from steptwin.simulation.scheduler.order import successors, update_order
-from steptwin.simulation.scheduler.runqueue import Deadlines, RunQueue
+from steptwin.simulation.scheduler.runqueue import RunQueue
 from steptwin.simulation.scheduler.scheduledpart import ScheduledPart
 from steptwin.simulation.scheduler.wires import Wire
 

@@ -14,11 +14,13 @@ from steptwin.controller import Fact, Nanos, PinEdge
 from steptwin.errors import Misuse, Runaway, TimeReversal
 from steptwin.messages import NONE, Message
 from steptwin.motioncontroller import Drive, MotionController
+from steptwin.simulation.scheduler.deadlines import Deadlines
 from steptwin.simulation.scheduler.followers import SchedulerFollower, SchedulerFollowers
 from steptwin.simulation.scheduler.recordedplans import RecordedPlans
-from steptwin.simulation.scheduler.runqueue import Deadlines, RunQueue
-from steptwin.simulation.scheduler.scheduledpart import ScheduledPart, SchedulerState
+from steptwin.simulation.scheduler.runqueue import RunQueue
+from steptwin.simulation.scheduler.scheduledpart import ScheduledPart
 from steptwin.simulation.scheduler.scheduledparts import ScheduledParts
+from steptwin.simulation.scheduler.schedulerstate import SchedulerState
 from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
 from steptwin.simulation.scheduler.wires import PinName, Wire, Wires
 from steptwin.state import Stateful

@@ -13,8 +13,8 @@ from itertools import count
 from typing import Generic, TypeAlias, TypeVar
 
 from steptwin.controller import Nanos
+from steptwin.simulation.scheduler.deadlines import Deadlines
 from steptwin.simulation.scheduler.observing import WorldObserver
-from steptwin.simulation.scheduler.runqueue import Deadlines
 from steptwin.simulation.scheduler.scheduler import Scheduler, Source
 from steptwin.simulation.world.running import Script
 

@@ -10,7 +10,7 @@ from steptwin.diagnostics import SourceText
 from steptwin.simulation.describe.blueprint import FileContents
 from steptwin.simulation.describe.overrides import Overrides
 from steptwin.simulation.faults import Fault
-from steptwin.simulation.scheduler.scheduledpart import SchedulerState
+from steptwin.simulation.scheduler.schedulerstate import SchedulerState
 from steptwin.simulation.scheduler.trace import Mark
 from steptwin.simulation.world.boundedlog import BoundedLogState
 from steptwin.simulation.world.inputs import ExternalInput
