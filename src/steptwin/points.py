@@ -13,11 +13,11 @@ from steptwin.motion import Profile
 
 FARTHEST_NS: Nanos = 1 << 55
 """A moment more than a year ahead counts as never."""
-MOST_TURNS = 3
-"""Most turns of a wrapping count in one segment: within two rounds it takes every value."""
+MOST_WRAPS = 3
+"""Most wraps of a count in one segment: within two rounds it takes every value."""
 
 TurningPoints: TypeAlias = Callable[[Nanos], Iterator[Nanos]]
-"""Moments after one, in order, between which (and after the last of which) a value goes one way only."""
+"""Moments after one, in order, between which (and after the last of which) a value is monotonic."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +45,7 @@ class LivePoint:
     version: Callable[[], object] | None = None
     """A value that changes whenever ``turning_points`` may have changed; None if that is unknown."""
     freeze: Callable[[Nanos], Callable[[Nanos], float]] | None = None
-    """Gives the trajectory at a moment as a function that stays as it is; None where there is none."""
+    """Gives the trajectory at a moment as a function that does not change any more; None where there is none."""
     is_kept: bool = False
     """Whether a write, by a request or a statement, only keeps the value, which is not an event of the controller. Besides, it
     becomes what it is after power-on."""
@@ -93,7 +93,7 @@ def _jumps(count: Callable[[Nanos], int], size: int, begin: Nanos, end: Nanos) -
     """Moments before and at which a count that goes one way from ``begin`` to ``end`` jumps."""
     at = count(begin) // size
     last = count(end) // size
-    for _ in range(MOST_TURNS):
+    for _ in range(MOST_WRAPS):
         if at == last:
             return
         low, high = begin, end

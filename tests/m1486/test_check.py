@@ -382,7 +382,7 @@ def test_dividends_above_65000() -> None:
     assert codes(":65001\n/3") == ["M114"]
 
 
-def test_dead_code_is_one_finding_per_stretch() -> None:
+def test_dead_code_is_one_finding_per_section() -> None:
     text = "[\n@1\nR\nJ1\nW1\nW2\n@2\nW3\n]"
     found = check(text, A).diagnostics
     assert [(d.code, text[d.span.start : d.span.end]) for d in found] == [("M207", "W1\nW2\n@2\nW3"), ("M206", "@2")]

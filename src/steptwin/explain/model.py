@@ -62,7 +62,7 @@ class MemoryPart(NamedTuple):
 
 
 class MemorySection(NamedTuple):
-    """A stretch of the program from a label to the next, with what it takes. ``line``: of its first statement."""
+    """A section of the program from a label to the next, with what it takes. ``line``: of its first statement."""
 
     name: str
     line: int

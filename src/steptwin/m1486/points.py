@@ -174,7 +174,7 @@ def _turning_points(chip: M1486Chip, row: _PointRow) -> TurningPoints | None:
     profile = partial(_profile, chip)
     if row.bits is None:
         return turning_points_of(profile)
-    # During a move the counter shows its end (M-16): there are then turns at which nothing changes.
+    # During a move the counter shows its end (M-16): there are then turning points at which nothing changes.
     return turning_points_of_round(profile, lambda now: chip.drive.true_u(now) + chip.drive.offset_u, 2**row.bits)
 
 

@@ -14,7 +14,7 @@ from steptwin.motion import MotionState, Profile, plan_position, plan_stop
 from steptwin.motion.paths import Circular, Straight
 
 NEAR_W = 1e-6
-"""A braking that would end this close behind the end of the travel ends on it."""
+"""A braking that would end this close behind the end of the path ends on it."""
 
 
 class PathAxis(Protocol):

@@ -110,7 +110,7 @@ def row_motion(device: ProgramDevice, row: ChosenRow, lin_acc_u: float | None, n
 
 
 class _Pace(NamedTuple):
-    """Speed and acceleration along a path, as far as they are given; ``steepest``: most pulses per unit of the travel."""
+    """Speed and acceleration along a path, as far as they are given; ``steepest``: most pulses per unit of the path."""
 
     speed_u: float | None
     acc_u: float | None

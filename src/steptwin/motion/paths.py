@@ -1,10 +1,10 @@
 """Straight lines and circular arcs of two axes: a path profile drives both, and each follows a profile of its own.
 
-The *travel* is a profile of the position along the path, in any unit of length; it only goes forward. A curve gives
-the place of one axis at every position of the travel. Axes along a line follow ordinary profiles; along an arc they follow an
+The *travel* is a profile of the position along the path, in any unit of length; it only goes forward. A *curve* gives
+the place of one axis at each position along the path. Axes along a line follow ordinary profiles; along an arc they follow an
 `ArcProfile`.
 
-Suffixes as in `steptwin.motion.profile`; ``_q`` quarter turns, counted from +X towards +Y; ``w`` positions of the travel.
+Suffixes as in `steptwin.motion.profile`; ``_q`` quarter turns, counted from +X towards +Y; ``w`` positions along the path.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from steptwin.motion.profile import NEAR_P, Profile, Segment
 from steptwin.motion.trig import QUARTER, arcsine_below_45, cosine, direction, length, sine
 
 MOST_TURNS = 1000
-"""Most turns of one arc, which bounds the number of its segments."""
+"""Most revolutions of one arc, which bounds the number of its segments."""
 
 BEYOND_P = 1e-6
 """An axis crosses an edge when it is farther beyond it than this (pulses): more than rounding errors, less than any pulse."""
@@ -114,7 +114,7 @@ def _check(radius: float, sweep_q: float = 0.0) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Straight:
-    """One axis along a line. It is at ``origin_p`` where the travel begins and moves ``slope`` pulses per unit of the travel."""
+    """One axis along a line. It is at ``origin_p`` where the path begins and moves ``slope`` pulses per unit of the path."""
 
     origin_p: float
     slope: float
@@ -123,7 +123,7 @@ class Straight:
         return self.origin_p + self.slope * w
 
     def first_beyond(self, edge_p: float, side: int, begin_w: float, end_w: float) -> float | None:
-        """Position of the travel at which the axis first goes beyond ``edge_p`` towards ``side`` (±1); None if it does not."""
+        """Position along the path at which the axis first goes beyond ``edge_p`` towards ``side`` (±1); None if it does not."""
         if self.slope * side <= 0.0 or (self.position(end_w) - edge_p) * side <= BEYOND_P:
             return None
         return max((edge_p - self.origin_p) / self.slope, begin_w)

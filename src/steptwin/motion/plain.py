@@ -11,6 +11,8 @@ the anchor, the position is
 A segment holds until its ``end_s``, seconds since the start; an end or a limit that never comes is null. The velocity is the
 derivative, in pulses per second. A plan whose drive does not give a pulse for every unit of position has ``microstepping`` (units
 per pulse below a speed, above it, the speed) and ``divisions`` (position, units per pulse from there on) besides.
+
+Traces and databases keep these keys: ``way`` is the travel along a path, ``course`` the curve of an axis.
 """
 
 from __future__ import annotations

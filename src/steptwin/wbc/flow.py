@@ -68,7 +68,7 @@ def interrupt_ends(flow: ControlFlow, executable: s.Executable) -> list[Diagnost
 
 
 def unreached(flow: ControlFlow, executable: s.Executable) -> list[Diagnostic]:
-    """The first line of every unreachable stretch of code. A single RETURN or END at the end of a stretch is not reported."""
+    """The first line of every unreachable section of code. A single RETURN or END at the end of a section is not reported."""
     seen = reached(flow, executable)
     found: list[Diagnostic] = []
     reported = False

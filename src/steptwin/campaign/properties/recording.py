@@ -1,6 +1,6 @@
 """The values of one comparison in a running world over time, exact at every event, turn and crossing.
 
-While signals go on as they did, nothing is computed: a way is looked at as a whole once another one follows. Signals of one
+While signals go on as they did, nothing is computed: a trajectory is read as a whole once another one follows. Signals of one
 scheduler are followed by that scheduler (`steptwin.simulation.scheduler.followers`).
 """
 
@@ -42,7 +42,8 @@ DEVIATION = 0.001
 """By how much of the scale a straight interval may deviate from what moves, where its shape counts."""
 SHARES = (0.25, 0.5, 0.75)
 PROBES = (0.0625, *SHARES, 0.9375)
-"""Where an interval is looked at for a place where it turns back: one that these miss is less than a hundredth of `DEVIATION`."""
+"""Shares of an interval at which it is searched for a turning point; one that these miss is less than a hundredth of
+`DEVIATION`."""
 
 
 class ComparisonRecord:
@@ -70,20 +71,20 @@ class ComparisonRecord:
         self._only = next(iter(self._moving.values())).versions if len(self._signals) == len(self._moving) == 1 else None
         """The version of all, where that is one signal."""
         self._stays = all(signal.freeze is not None for signal in self._moving.values())
-        """Whether a way can be read after another one has followed."""
+        """Whether a trajectory can be read after another one has followed."""
         self._is_monotonic = len(self._moving) == 1 and _is_alone(self.node.left, self.node.right, *self._moving)
-        """Whether it goes one way between turning points, so that its extremes are there."""
+        """Whether it is monotonic between turning points, so that its extremes are there."""
         self._is_fine = is_fine or not self._is_monotonic
         self.scheduler, self.names = self._followed()
         self._closed: Shape = []
         self._known: object = None
-        """Version of the sources of the present way."""
+        """Version of the sources of the present trajectory."""
         self._begin: Nanos | None = None
         """Begin of the interval that is not closed."""
         self._first = 0.0
         """The value at `_begin`."""
         self._seen: Nanos = 0
-        """Up to here the way has been looked at since `_begin`: it has crossed nothing, nor turned back."""
+        """Up to here the trajectory has been read since `_begin`: it has crossed nothing, nor turned back."""
         self._there, self._side = 0.0, 0
         """The value at `_seen`, and on which side of its limit that is."""
         self._left: Nanos = -1
@@ -188,14 +189,14 @@ class ComparisonRecord:
         self._begin, self._first, self._known = now, self._value(now), sides
 
     def _version(self, now: Nanos) -> object:
-        """Version of the sources of the way; None if it is unknown."""
+        """Version of the sources of the trajectory; None if it is unknown."""
         versions = [one.version() for one in self._moving.values()]
         if None in versions:
             return None
         return (*versions, *(one.value(now) for one in self._standing.values()))
 
     def _go_on(self, now: Nanos) -> None:
-        """Begin another way."""
+        """Begin another trajectory."""
         for name, signal in self._standing.items():
             self._reads[name] = _constant(signal.value(now))
         turning_points: Iterator[Nanos] | None = None
@@ -219,8 +220,8 @@ class ComparisonRecord:
         self._first = self._there
 
     def _go_to(self, last: Nanos) -> float:
-        """Close all intervals that end before ``last`` on the present way. Returns the value there, to which it has come or
-        further."""
+        """Close all intervals that end before ``last`` on the present trajectory. Returns the value there, to which it has come
+        or further."""
         if last < self._seen:
             return self._value(last)
         while self._seen < last:

@@ -29,8 +29,7 @@ class SignalOf:
     is_kept: bool = False
     """Whether a request may change it without an event of its scheduler."""
     freeze: Callable[[Nanos], Callable[[Nanos], float]] | None = None
-    """Gives the trajectory at a moment as a function that stays as it is, also when the signal goes another way; None: it
-    cannot."""
+    """Gives the trajectory at a moment as a function that does not change when another trajectory follows; None: it cannot."""
     check: Callable[[], None] = lambda: None
     """Raises `Misuse` if conditions cannot use it, because it changes between events at unknown moments."""
 

@@ -1,11 +1,11 @@
-"""A rotor in the wells of a torque that repeats with its angle: the field of a stepper motor that stands, or its detent.
+"""The potential of a torque that repeats with the angle of a rotor: the field of a stepper motor at rest, or its detent.
 
 The torque is T·sin(2π·x/λ) towards the middle of each well, the period λ in pulses. A constant torque R, of load and friction,
-acts against the motion. Nothing else damps, so the way of a rotor follows from its energy: what it needs to leave a well is
+acts against the motion. Nothing else damps, so the travel of a rotor follows from its energy: what it needs to leave a well is
 
     T·λ/2π · (2·√(1 − r²) + r·(π + 2·arcsin r)),  r = R/T,
 
-and R·λ for each further one. Between wells the rotor is taken to go with its mean energy.
+and R·λ for each further one. Between wells the model gives the rotor its mean energy.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from steptwin.motion.trig import PI, QUARTER, arcsine
 
 
 class PeriodicPotential(NamedTuple):
-    """``torque`` in N·m, ``period`` in pulses."""
+    """A sine of ``torque`` N·m with ``period`` pulses, and its potential wells."""
 
     torque: float
     period: float

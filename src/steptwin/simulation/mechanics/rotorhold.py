@@ -1,4 +1,4 @@
-"""When the rotor of a motor moves otherwise than its field, and how: without current, with too little of it, or after a stop
+"""The hold of a field on its rotor: when the rotor coasts, and how: without current, with too little of it, or after a stop
 without ramp."""
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ MOVES_WITHOUT_CURRENT = Message("simulation.moves-without-current", "{axis} move
 
 
 class RotorHold(Stateful):
-    """Whether a rotor is held by its field, from moment to moment."""
+    """Whether the field holds its rotor, from moment to moment."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("_build", "_motor")
     __slots__ = (*FIXED, "_on_since", "_overruns", "due", "has_current", "is_coasting")

@@ -1,1 +1,1 @@
-"""Schedulers in virtual time, wires, parts and records of what happens. Sees `toml`."""
+"""Event schedulers in virtual time, wires, parts and records of what happens. Sees `toml`."""

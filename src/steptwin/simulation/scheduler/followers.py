@@ -12,7 +12,7 @@ class SchedulerFollower(Protocol):
     """It reads signals of one scheduler only, and changes nothing."""
 
     def leave(self, moment: Nanos) -> None:
-        """Before anything happens at ``moment``: what moves is still on the way that it had before."""
+        """Before anything happens at ``moment``: what moves still has the trajectory from before."""
         ...
 
     def look(self, now: Nanos) -> None:

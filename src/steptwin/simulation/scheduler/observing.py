@@ -21,7 +21,7 @@ class WorldObserver(Protocol):
     """The controllers, lines and elements on which what it sees depends."""
 
     def leave(self, moment: Nanos) -> None:
-        """Before anything happens at ``moment``: what moves is still on the way that it had before."""
+        """Before anything happens at ``moment``: what moves still has the trajectory from before."""
         ...
 
     def look(self, now: Nanos) -> tuple[Source, ...]:

@@ -112,8 +112,8 @@ SIGNALS_DO_NOT_SETTLE = Message(
 class Scheduler:
     """Runs controllers together. Ties in time are broken by the order in which controllers and parts were added.
 
-    An event costs what it changes: only controllers and parts that are due, or that something they watch has changed (`notify`),
-    are looked at.
+    An event costs what it changes: it visits only controllers and parts that are due, or that were notified of a change of what
+    they watch (`notify`).
 
     Before a controller is changed directly (by a request or a pin), the scheduler must be advanced to that moment, so that
     delayed levels arrive in order; the effects propagate with the next `advance`, `deadline` or `propagate`.
@@ -145,7 +145,7 @@ class Scheduler:
         self.followers: SchedulerFollowers | None = None
         """Followers that are notified of each event; None: there have been none yet."""
         self._changed: set[str] = set()
-        """The controllers, lines and elements that were looked at since the last `take_changed`."""
+        """The controllers, lines and elements that were visited since the last `take_changed`."""
         self._is_checked, self.is_blank = is_checked, is_blank
         self._record = record
         self.wires = Wires(self.drive)
@@ -197,7 +197,7 @@ class Scheduler:
         self.notify(name)
 
     def _join(self) -> None:
-        """Something joins the controllers: from now on it is scheduled what has to be looked at."""
+        """Leave the shortcut for a single controller: from now on everything is scheduled."""
         if self._alone is not None:
             self._alone = None
             self.notify()
@@ -310,7 +310,7 @@ class Scheduler:
     def notify(self, name: str | None = None) -> None:
         """Register a change of a controller, a line or an element, or of anything: the signals have to settle."""
         if self._alone is not None or self.is_blank:
-            pass  # it is looked at whenever the scheduler propagates, all of it after `restore`
+            pass  # each `propagate` visits it, and all of it after `restore`
         elif name is None:
             for number in range(len(self._names)):
                 self._controller_queue.add(number)
@@ -507,7 +507,7 @@ class Scheduler:
                 self._edge(name, edge)
 
     def _find_deadlines(self) -> None:
-        """Record new plans of the controllers that were looked at, and find when anything is due next."""
+        """Record new plans of the controllers that were visited, and find when anything is due next."""
         followers = self.followers
         for number in sorted(self._controllers_visited):
             if self._record is not None:

@@ -131,7 +131,11 @@ export class AxisState {
   }
 
   private plan(time_ns: bigint, plan: Plan, origin: number | null): void {
-    this.add({ from_ns: time_ns, trajectory: new Trajectory(plan), origin: origin ?? this.intervals.at(-1)?.origin ?? 0 });
+    this.add({
+      from_ns: time_ns,
+      trajectory: new Trajectory(plan),
+      origin: origin ?? this.intervals.at(-1)?.origin ?? 0,
+    });
   }
 
   private coordinate(time_ns: bigint, origin: number): void {

@@ -23,7 +23,12 @@ for (const { name, plan, at } of vectors.plans) {
 }
 
 test("it moves from its start to its end", () => {
-  const trajectory = new Trajectory({ start_ns: "1000000000", base: 0, final: 10, segments: [[0.5, 0, 0, 20, 0, 0, 1]] });
+  const trajectory = new Trajectory({
+    start_ns: "1000000000",
+    base: 0,
+    final: 10,
+    segments: [[0.5, 0, 0, 20, 0, 0, 1]],
+  });
   expect(trajectory.isMoving(1_499_999_999n)).toBe(true);
   expect(trajectory.isMoving(1_500_000_000n)).toBe(false);
   expect(trajectory.at(0n)).toEqual({ position: 0, velocity: 20 });

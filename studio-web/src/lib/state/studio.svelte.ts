@@ -346,7 +346,9 @@ export class Studio {
     }
     const first = levelsOf(state).map(([pin, level]) => [pin, BigInt(from_ns), level] as const);
     const edges = events.filter((event) => event.kind === "edge");
-    const later = edges.map((event) => [`${event.controller}.${event.pin}`, BigInt(event.time_ns), event.level] as const);
+    const later = edges.map(
+      (event) => [`${event.controller}.${event.pin}`, BigInt(event.time_ns), event.level] as const,
+    );
     this.edges.takeEarlier([...first, ...later]);
   }
 

@@ -48,7 +48,9 @@ export class Jogging {
   /** A jog of anybody sets the register of the greatest velocity to its own, until the axis stands again. */
   private greatestOf(axis: AxisModel): number | null {
     const found = this.watch()?.get(axis.fastest) ?? null;
-    const isJogged = this.studio.leases.some((lease) => lease.controller === axis.controller && lease.axis === axis.number);
+    const isJogged = this.studio.leases.some(
+      (lease) => lease.controller === axis.controller && lease.axis === axis.number,
+    );
     const before = this.greatest.get(axis.id) ?? null;
     if (before !== null && (isJogged || this.studio.axis(axis).isMoving(this.studio.now()) === true)) return before;
     if (found !== null) this.greatest.set(axis.id, found);

@@ -56,7 +56,13 @@ export function sendable(frames: readonly Frame[]): Requests["capture"]["request
   let room = ROOM;
   const rows = [];
   for (const { time_ns, line, client, direction, data } of [...frames].reverse()) {
-    const row = { time_ns: String(time_ns), controller: line, client, direction, data: hexOf(data).replaceAll(" ", "") };
+    const row = {
+      time_ns: String(time_ns),
+      controller: line,
+      client,
+      direction,
+      data: hexOf(data).replaceAll(" ", ""),
+    };
     room -= JSON.stringify(row).length + 1;
     if (room < 0) break;
     rows.push(row);

@@ -16,7 +16,14 @@ export interface Channel {
 export const frameCode = (isAnswer: boolean, isError: boolean): number => Number(isAnswer) + 2 * Number(isError);
 
 /** A stroke for each frame, at most two in a column: up to the controllers, down from them; errors are thick. */
-export function drawFrames(pen: Pen, channel: Channel, passed: Passed, source: string, colour: string, danger: string): void {
+export function drawFrames(
+  pen: Pen,
+  channel: Channel,
+  passed: Passed,
+  source: string,
+  colour: string,
+  danger: string,
+): void {
   const middle = (channel.high + channel.low) / 2;
   for (const isError of [false, true]) {
     pen.strokeStyle = isError ? danger : colour;

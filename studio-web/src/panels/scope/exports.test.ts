@@ -3,7 +3,14 @@ import { csvOf, vcdOf } from "./exports";
 import type { Signal } from "./signals";
 
 const lamp: Signal = { id: "table.IN3", label: "IN3", unit: "", controller: null, kind: "level", pin: "table.IN3" };
-const volts: Signal = { id: "table.AIN1", label: "AIN1", unit: "V", controller: null, kind: "voltage", pin: "table.AIN1" };
+const volts: Signal = {
+  id: "table.AIN1",
+  label: "AIN1",
+  unit: "V",
+  controller: null,
+  kind: "voltage",
+  pin: "table.AIN1",
+};
 const value = (signal: Signal, at: bigint) =>
   signal === lamp ? (at < 500n ? 0 : 1) : at === 0n ? NaN : Number(at) / 1000;
 

@@ -188,7 +188,9 @@ export class Debugging {
   }
 
   at(controller: string, program: string, line: number): Breakpoint | undefined {
-    return this.breakpoints.find((one) => one.controller === controller && one.program === program && one.line === line);
+    return this.breakpoints.find(
+      (one) => one.controller === controller && one.program === program && one.line === line,
+    );
   }
 
   async stopOn(event: Event, isOn: boolean): Promise<void> {
