@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import hypot, inf
 
 import pytest
 from space_scenes import bodies_of, motion_of, random_scene
@@ -13,6 +13,7 @@ from steptwin.simulation.space import contacts
 from steptwin.simulation.space.bodies import Body, Box, Cylinder
 from steptwin.simulation.space.contacts import NEVER, Look, Pair
 from steptwin.simulation.space.frames import FLOOR, Direction, Frame, Joint
+from steptwin.simulation.space.pieces import standing
 
 MM = 10**6
 CUBE = Box((10 * MM, 10 * MM, 10 * MM))
@@ -72,6 +73,57 @@ def test_an_arm_meets_a_post_at_an_angle() -> None:
     assert begins == pytest.approx(936_231_440, abs=3)
     assert (begins + ends) / 2 == pytest.approx(SECOND, abs=2)
     assert pair.next_change(ends).at == pytest.approx(begins + 4 * SECOND, abs=2), "in the next revolution"
+
+
+def test_one_that_overtakes_another_for_a_moment_touches_it(looks: list[Nanos]) -> None:
+    """One begins slowly behind one that goes steadily: halfway it has lost 1 m/s² · (1 s)² / 8, no more. Both ends are alike."""
+    slow = Profile(0, 0, (ramp(0.0, 0.0, 0.0, 1e9, 1e9),), 5e8)
+    behind = 20 * MM + 125 * MM
+    for gap, touches in ((-1, True), (0, False)):
+        rear = Body("rear", axis(at_speed(5e8, 1.0), "rear"), CUBE)
+        pair = Pair(rear, Body("front", axis(slow, "front", (behind + gap, 0, 0)), CUBE))
+        found = pair.next_change(0)
+        assert found.changes is touches
+        assert not touches or abs((found.at or 0) - SECOND // 2) < 100_000
+    assert len(looks) < 200
+
+
+@pytest.mark.parametrize(("reach", "touches"), [(100 * MM - 1, True), (100 * MM, False)])
+def test_a_tip_that_passes_a_wall_on_its_highest_point_touches_it(reach: int, touches: bool) -> None:
+    """From 45° before the wall to 45° behind it in one piece: both of its ends are as far away."""
+    turning = Frame("arm", FLOOR, (0, 0, 0), Joint(motion_of(at_speed(1.0, 1.0)), Direction(2, 1), turns=True))
+    tip = Body(
+        "tip", Frame("start", turning, (0, 0, 0), Joint(standing(-0.5), Direction(2, 1), turns=True)), Box((100 * MM, 0, 5 * MM))
+    )
+    found = Pair(tip, Body("wall", FLOOR, CUBE, (reach + 10 * MM, 0, 0))).next_change(0)
+    assert found.changes is touches
+    assert not touches or abs((found.at or 0) - SECOND // 2) < 100_000
+
+
+def test_no_point_of_a_body_bends_or_goes_faster_than_its_bounds() -> None:
+    """Differences over 20 µs of all corners, seen from the frame of the search; the bounds are not all far above them."""
+    nearest = 0.0
+    for seed in range(80):
+        pair = Pair(*bodies_of(random_scene(seed)))
+        motions = list(pair.moving.values())
+        begin, end = 1_000_000, 4_000_000
+        pieces = [next(motion.pieces(begin)) for motion in motions]
+        if not motions or any(piece.end is None or piece.end <= end for piece in pieces):
+            continue
+        interval = contacts._Stretch(pair, pieces, begin, end)
+        for body in range(2) if interval._turns else ():
+            bounds, step = interval._bounds(body, begin, end), 20_000
+            s = step / SECOND
+            for now in range(begin, end - 2 * step, 300_000):
+                looks = [interval.look(now + n * step).placed[body].corners() for n in range(3)]
+                for places in zip(*looks, strict=True):
+                    (u0, v0), (u1, v1), (u2, v2) = places
+                    bend = hypot(u2 - 2 * u1 + u0, v2 - 2 * v1 + v0) / s / s
+                    assert bend <= bounds.bend * (1.0 + 1e-6) + 1e4
+                    assert hypot(u1 - u0, v1 - v0) / s <= bounds.speed * (1.0 + 1e-6) + 1.0
+                    assert hypot(u1, v1) <= bounds.far + 1e-3
+                    nearest = max(nearest, bend / bounds.bend if bounds.bend > 1e7 else 0.0)
+    assert nearest > 0.7
 
 
 def test_two_that_move_alike_are_apart_however_near_they_are(looks: list[Nanos]) -> None:

@@ -70,7 +70,7 @@ def test_near_ones_are_those_of_a_comparison_with_all() -> None:
             sweeps.remove(name)
         else:
             low = [float(chance.randrange(100)) for _ in range(3)]
-            high = [one + chance.choice((1.0, 5.0, 60.0)) for one in low]
+            high = [one + chance.choice((1.0, 5.0, 60.0, inf)) for one in low]
             those[name] = Sweep((low[0], low[1], low[2]), (high[0], high[1], high[2]))
             sweeps.put(name, those[name])
         for one, its in those.items() if step % 10 == 0 else ():

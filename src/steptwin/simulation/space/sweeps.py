@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left, insort
+from math import frexp, inf, ldexp
 from typing import NamedTuple, TypeAlias
 
 from steptwin.controller import Nanos
@@ -60,44 +61,54 @@ def _carry(joint: Joint, low: list[float], high: list[float], now: Nanos) -> Non
 
 
 class Sweeps:
-    """The sweeps of bodies by name, each axis in order."""
+    """The sweeps of bodies by name.
 
-    __slots__ = ("_by_name", "_highs", "_lows")
+    Along each axis those whose width has the same next power of two are in the order of their lower ends: those that may meet
+    another one begin within that width before it, or in it.
+    """
+
+    __slots__ = ("_by_name", "_lows")
 
     def __init__(self) -> None:
         self._by_name: dict[str, Sweep] = {}
-        self._lows: tuple[list[tuple[float, str]], ...] = ([], [], [])
-        self._highs: tuple[list[tuple[float, str]], ...] = ([], [], [])
+        self._lows: tuple[dict[float, list[tuple[float, str]]], ...] = ({}, {}, {})
 
     def put(self, name: str, its: Sweep) -> None:
         """In place of an earlier one of the same name."""
         if name in self._by_name:
             self.remove(name)
         self._by_name[name] = its
-        for ends, values in ((self._lows, its.low), (self._highs, its.high)):
-            for ordered, value in zip(ends, values, strict=True):
-                insort(ordered, (value, name))
+        for axis, by_width in enumerate(self._lows):
+            insort(by_width.setdefault(_width(its, axis), []), (its.low[axis], name))
 
     def remove(self, name: str) -> None:
         its = self._by_name.pop(name)
-        for ends, values in ((self._lows, its.low), (self._highs, its.high)):
-            for ordered, value in zip(ends, values, strict=True):
-                del ordered[bisect_left(ordered, (value, name))]
+        for axis, by_width in enumerate(self._lows):
+            ordered = by_width[width := _width(its, axis)]
+            del ordered[bisect_left(ordered, (its.low[axis], name))]
+            if not ordered:
+                del by_width[width]
 
     def near(self, name: str) -> list[str]:
         """The others that it may meet, in order: whose sweep has a part in common with its own."""
         its = self._by_name[name]
-        counts = [
-            count
-            for axis in range(len(AXES))
-            for count in (
-                (bisect_left(self._lows[axis], (its.high[axis], "")), axis, True),
-                (len(self._highs[axis]) - bisect_left(self._highs[axis], (its.low[axis], "")), axis, False),
-            )
+        fewest = min((self._along(its, axis) for axis in range(len(AXES))), key=lambda found: sum(len(one) for one in found))
+        others = (other for ordered in fewest for other in ordered)
+        return sorted(other for other in others if other != name and _meet(its, self._by_name[other]))
+
+    def _along(self, its: Sweep, axis: int) -> list[list[str]]:
+        """Those that may meet it as far as one axis tells."""
+        low, high = its.low[axis], its.high[axis]
+        return [
+            [name for _, name in ordered[bisect_left(ordered, (low - width, "")) : bisect_left(ordered, (high, ""))]]
+            for width, ordered in self._lows[axis].items()
         ]
-        count, axis, is_low = min(counts)
-        ordered = self._lows[axis][:count] if is_low else self._highs[axis][len(self._highs[axis]) - count :]
-        return sorted(other for _, other in ordered if other != name and _meet(its, self._by_name[other]))
+
+
+def _width(its: Sweep, axis: int) -> float:
+    """The next power of two, which is not below it; or infinite."""
+    width = its.high[axis] - its.low[axis]
+    return width if width == inf else ldexp(1.0, frexp(width)[1])
 
 
 def _meet(one: Sweep, other: Sweep) -> bool:
