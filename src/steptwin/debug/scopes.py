@@ -147,7 +147,6 @@ def setting(world: Simulation, controller: str, name: str, value: float) -> Exte
     if kind.registers is not None and (point := kind.point(device, path)) is not None:
         if point.point.access is Access.READ:
             raise Misuse(READ_ONLY(name=name))
-        world.requests(target, ((path, value),))  # raises `Misuse`
         return Write(((target, path, value),))
     known = ", ".join(variables.values()) or "none"
     raise Misuse(CANNOT_BE_SET(name=name, known=known))

@@ -34,7 +34,7 @@ class ValueRange:
 
 
 def _plain(number: float) -> str:
-    return str(int(number)) if number == int(number) and abs(number) < 1e15 else f"{number:.4g}"
+    return str(int(number)) if number == int(number) and abs(number) < 1e15 else f"{number:.{12 if abs(number) < 1e15 else 4}g}"
 
 
 FINITE = ValueRange()

@@ -5,12 +5,14 @@ from __future__ import annotations
 import enum
 import re
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from math import isfinite
 from typing import NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.messages import Message, text_of
 from steptwin.mic488.encoding import dint_to_words, real_to_words, word_to_int, words_to_dint, words_to_real
+from steptwin.mic488.ranges import ValueRange
 from steptwin.mic488.registermap import DataType, Register, RegisterMap, Space, Type, WriteEffect
 from steptwin.mic488.registers import axes_of_mask
 from steptwin.mic488.status import ProgramState
@@ -91,6 +93,7 @@ CHOOSE_ONE = Message("mic488.choose-one", "{text!r}: choose one of {name}[0] to 
 UNKNOWN_FORMAT = Message("mic488.unknown-format", "{text!r}: permitted behind : are word, int, dint and real")
 
 
+@lru_cache(2048)
 def named(registers: RegisterMap, text: str) -> RegisterItem:
     """The value of that name: ``M1_POS_ACT``, ``OUT3``, ``USER_REGISTER[12]:real``. Raises `Misuse`."""
     match = _NAME.match(text.strip())
@@ -173,8 +176,11 @@ CAN_ONLY_BE_READ = Message("mic488.can-only-be-read", "{name} can only be read")
 WRONG_SWITCH_VALUE = Message("mic488.wrong-switch-value", "{name} = {value}: permitted are 0 (OFF) and 1 (ON)")
 
 
-def encoded(item: RegisterItem, value: RegisterValue, data_type: DataType, unit: str = "u") -> pdu.ModbusRequest:
-    """The request that writes ``value``, which is in units with DATA_TYPE REAL and in pulses with DINT.
+def encoded(
+    item: RegisterItem, value: RegisterValue, data_type: DataType, unit: str = "u", permitted: ValueRange | None = None
+) -> pdu.ModbusRequest:
+    """The request that writes ``value``, which is in units with DATA_TYPE REAL and in pulses with DINT. ``permitted``: what is
+    permitted where the gear of its axis is known.
 
     Raises `Misuse` when the register cannot be written or does not take the value.
     """
@@ -185,7 +191,7 @@ def encoded(item: RegisterItem, value: RegisterValue, data_type: DataType, unit:
         if value not in (0, 1):
             raise Misuse(WRONG_SWITCH_VALUE(name=register.name, value=value))
         return pdu.WriteCoilRequest(register.address, bool(value))
-    words = encoded_words(item, value, data_type, unit)
+    words = encoded_words(item, value, data_type, unit, permitted)
     if len(words) == 1:
         return pdu.WriteRegisterRequest(item.address, words[0])
     return pdu.WriteRegistersRequest(item.address, words)
@@ -195,22 +201,25 @@ WHOLE_NUMBER_IS_NEEDED = Message("mic488.whole-number-is-needed", "{what}: a who
 VALUE_NOT_PERMITTED = Message("mic488.value-not-permitted", "{what}: permitted {permitted}")
 
 
-def encoded_words(item: RegisterItem, value: RegisterValue, data_type: DataType, unit: str = "u") -> tuple[int, ...]:
+def encoded_words(
+    item: RegisterItem, value: RegisterValue, data_type: DataType, unit: str = "u", permitted: ValueRange | None = None
+) -> tuple[int, ...]:
     """The words of ``value`` in a holding register, as of `encoded`. Raises `Misuse` for a value that it does not take."""
     register = item.register
     kind = _kind(item, data_type)
     if kind is not Type.REAL and not (isfinite(value) and value == int(value)):
         raise Misuse(WHOLE_NUMBER_IS_NEEDED(what=_shown(item, value, data_type, unit)))
-    permitted = ""
+    expected = ""
+    permitted = permitted or register.permitted
     if register.type is Type.MEMORY:
         if item.view is UserFormat.INT and -0x8000 <= value <= 0x7FFF:
             return (int(value) & 0xFFFF,)
         if item.view in (UserFormat.INT, UserFormat.WORD) and (item.view is UserFormat.INT or not 0 <= value <= 0xFFFF):
-            permitted = item.view.range
-    elif value not in register.permitted:
-        permitted = f"{register.permitted} {register.unit(data_type, unit)}".rstrip()
-    if permitted:
-        raise Misuse(VALUE_NOT_PERMITTED(what=_shown(item, value, data_type, unit), permitted=permitted))
+            expected = item.view.range
+    elif value not in permitted or (kind is Type.REAL and words_to_real(*real_to_words(value)) not in permitted):
+        expected = f"{permitted} {register.unit(data_type, unit)}".rstrip()
+    if expected:
+        raise Misuse(VALUE_NOT_PERMITTED(what=_shown(item, value, data_type, unit), permitted=expected))
     if kind is Type.REAL:
         return real_to_words(value)
     return dint_to_words(int(value)) if kind is Type.DINT else (int(value),)

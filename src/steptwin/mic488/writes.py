@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
+from math import nextafter
 from typing import Protocol, TypeAlias
 
 from steptwin.controller import Nanos
 from steptwin.mic488.behaviour import BEHAVIOUR, AxisAction
 from steptwin.mic488.core import ControllerCore, RegisterAction
 from steptwin.mic488.encoding import DINT_MAX, DINT_MIN, swap_bytes
+from steptwin.mic488.ranges import ValueRange
 from steptwin.mic488.registermap import DataType, QuantityKind, Register, RegisterMap, Space, Type
 from steptwin.motion.planner import LEAST, MOST
 from steptwin.wire.pdu import (
@@ -156,9 +158,19 @@ def _check(register: Register, data_type: DataType) -> WriteCheck:
     held = _position_p if register.kind is QuantityKind.POSITION else _rate_p if register.permitted.above else _velocity_p
     if data_type is DataType.DINT:
         return lambda device, value: held(value) if value in permitted else None
-    if register.key in ("POSLIM_L", "POSLIM_R"):
+    if register.key in _LIMITS:
         held = _limit_of_real_p
     return lambda device, value: held(value * device.axes[number].gear) if value in permitted else None
+
+
+def permitted(register: Register, data_type: DataType, gear: float) -> ValueRange:
+    """The values that a register of an axis with ``gear`` pulses in a unit takes. A position is one whose pulses fit a DINT."""
+    if register.kind is not QuantityKind.POSITION or register.type is not Type.VALUE or data_type is DataType.DINT:
+        return register.permitted
+    if register.key in _LIMITS:
+        end = nextafter(2.0**31 * (1.0 + _REAL_STEP), 0.0)
+        return ValueRange(-end / gear, end / gear)
+    return ValueRange(DINT_MIN / gear, DINT_MAX / gear)
 
 
 def _position_p(pulses: float) -> int | None:
@@ -166,6 +178,7 @@ def _position_p(pulses: float) -> int | None:
     return round(pulses) if DINT_MIN - 0.5 < pulses < DINT_MAX + 0.5 else None
 
 
+_LIMITS = ("POSLIM_L", "POSLIM_R")
 _REAL_STEP = 2.0**-23
 """Distance of neighbouring REALs, as part of their size: nearer to the end of the range, a REAL means the end."""
 

@@ -151,9 +151,8 @@ class WorldSubject:
 
     def _write(self, step: steps.Write) -> None:
         self._apply_input(step)
-        world = self.world
-        for name, values in world.by_controller(step):
-            for pdu in world.requests(name, values):
+        for name, pdus in self.world.requests(step):
+            for pdu in pdus:
                 self._publish_stops(name, pdu)
 
     def _publish_stops(self, name: str, pdu: bytes) -> None:

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import struct
+
 import pytest
 
 from steptwin.controller import SECOND
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
+from steptwin.mic488.registermap import DataType
+from steptwin.mic488.values import encoded, named
 from steptwin.simulation.kinds.kind import MotionEnds
+from steptwin.simulation.kinds.mic488.kind import Mic488Registers
 from steptwin.simulation.kinds.registry import M1486, MIC488
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.control import ControllerCommand, ControlProgram, Enable, Halt, Home, Jog, Move, Seek, StopAxes
+from steptwin.simulation.world.references import check_step
+from steptwin.subject.world import WorldSubject
+from steptwin.wire.pdu import encode_request
 
 MOST = 2**31 - 1
 
@@ -27,8 +35,6 @@ def controller() -> World:
         (Move("a", 1, to=3.5), [("M1_POS_ABS", 3.5)]),
         (Move("a", 4, to=0.0), [("M4_POS_ABS", 0.0)]),
         (Move("a", 1, by=-2.5), [("M1_POS_REL", -2.5)]),
-        (Move("a", 1, to=2.0 * MOST), [("M1_POS_ABS", 2.0 * MOST)]),
-        (Move("a", 1, by=-2.0 * MOST - 2.0), [("M1_POS_REL", -2.0 * MOST - 2.0)]),
         (Move("a", 5, to=1e30), [("M5_POS_ABS", 1e30)]),  # the register is not there, and it is told so
         (Move("a", 0, to=1e30), [("M0_POS_ABS", 1e30)]),
         (Home("a", 3, -7.0), [("M3_HOME", -7.0)]),
@@ -42,13 +48,51 @@ def test_registers_that_are_written(command: ControllerCommand, values: list[tup
     assert found == do.Write(tuple(("a", name, value) for name, value in values))
 
 
-@pytest.mark.parametrize("command", [Move("a", 1, to=2.0 * MOST + 2.0), Move("a", 1, by=-2.0 * MOST - 4.0)])
-def test_positions_that_a_controller_ignores(command: Move) -> None:
-    device = controller().mic488["a"].device
-    with pytest.raises(Misuse) as error:
-        MIC488.step_of(device, None, command)
-    value = command.by if command.to is None else command.to
-    assert str(error.value) == f"move: {value:g} mm: permitted are -4294967296…4294967294 mm"
+@pytest.mark.parametrize("register", ["POS_ABS", "POS_REL", "POSLIM_L", "POSLIM_R"])
+@pytest.mark.parametrize("gear", [0.5, 1.0, 3.7, 640.0])
+def test_what_is_refused_before_it_is_sent_is_what_a_controller_refuses(register: str, gear: float) -> None:
+    """The nearest REALs on both sides of the ends of the range."""
+    device = World.from_toml(f'[[mic488]]\nname = "a"\n[mic488.M1]\nunit = "mm"\ngear = {gear}\n').mic488["a"].device
+    item = named(device.registers, f"M1_{register}")
+    refused = {False: 0, True: 0}
+    for end in (-(2.0**31) / gear, 2.0**31 / gear):
+        around = real(end)
+        for step in range(-4, 5):
+            value = real(around * (1 + step * 2.0**-23))
+            answer = device.execute(encode_request(encoded(item, value, DataType.REAL)), 0)
+            try:
+                Mic488Registers().requests(device, ((item.name, value),))
+                is_refused = False
+            except Misuse:
+                is_refused = True
+            assert is_refused is bool(answer[0] & 0x80), value
+            refused[is_refused] += 1
+    assert all(refused.values())
+
+
+def real(value: float) -> float:
+    """The nearest REAL."""
+    return float(struct.unpack("<f", struct.pack("<f", value))[0])
+
+
+@pytest.mark.parametrize("register", ["POS_ABS", "POS_REL"])
+def test_each_way_to_a_position_that_is_too_far_has_one_answer(register: str) -> None:
+    world = controller()
+    subject = WorldSubject(world)
+    values = (("a", f"M1_{register}", 2.0 * MOST + 2.0),)
+    expected = f"M1_{register} = 4.29497e+09 mm: permitted -4294967296…4294967294 mm"
+    move = Move("a", 1, to=values[0][2]) if register == "POS_ABS" else Move("a", 1, by=values[0][2])
+    ways = [
+        lambda: subject.do(move),
+        lambda: subject.do(do.Write(values)),
+        lambda: check_step(world, do.Write(values)),
+        lambda: check_step(world, do.Order(move)),
+        lambda: world.mic488["a"].write(values[0][1], values[0][2]),
+    ]
+    for way in ways:
+        with pytest.raises(Misuse) as error:
+            way()
+        assert str(error.value) == expected
 
 
 def test_when_a_motion_has_ended() -> None:

@@ -1,13 +1,18 @@
-"""The actions of steps and of external programs on a world, at the present moment."""
+"""The actions of steps and of external programs on a world.
+
+A step is prepared at the moment at which it is executed: its names are found, its values checked and encoded, and nothing has
+changed yet. What is prepared is then done. A check of a step is a preparation that nobody executes.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
-from typing import Any, get_args
+from typing import Any, TypeAlias, get_args
 
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
+from steptwin.messages import Message
 from steptwin.simulation.kinds.kind import ControllerKind
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.kinds.master import ANSWER_NS
@@ -28,19 +33,23 @@ from steptwin.simulation.world.inputs import (
     See,
     SetVariable,
 )
-from steptwin.simulation.world.model import Model
+from steptwin.simulation.world.model import WORLD, Model
 from steptwin.simulation.world.scripts import Scripts
 from steptwin.simulation.world.worldprograms import name_of_text
 from steptwin.tables import complete
 from steptwin.wire.rtu import encode_frame
 
+Action: TypeAlias = Callable[[Scripts], object]
+"""What was prepared; it is done at the moment of its preparation."""
 
-def act(model: Model, scripts: Scripts, what: ExternalInput) -> None:
-    """Execute an external input. Raises `Misuse` for unknown names, and for steps that only scripts can execute."""
-    action = ACTIONS.get(type(what))
-    if action is None:
+
+def prepare(model: Model, what: ExternalInput) -> Action:
+    """The action of a step now. Raises `Misuse` for unknown names, invalid values, and steps that only scripts can execute;
+    `Refusal` for what cannot be done now."""
+    found = ACTIONS.get(type(what))
+    if found is None:
         raise Misuse(f"{what}: only scripts can execute this step")
-    action(model, scripts, what)
+    return found(model, what)
 
 
 def _record(model: Model, controller: str, what: str, value: object) -> None:
@@ -56,23 +65,32 @@ def _now(model: Model, name: str) -> Generator[Scheduler]:
     scheduler.propagate()
 
 
-def _set(model: Model, scripts: Scripts, step: do.Set) -> None:
-    for name, pin, value in step.levels:
-        known = model.input_pin(name, pin, value)
-        scheduler = model.sync(name)  # as `_now`, but with hundreds of levels at a moment
-        scheduler.set_input(PinName(name, known), value)
-        scheduler.notify(name)
-        scheduler.propagate()
+def _set(model: Model, step: do.Set) -> Action:
+    levels = [(PinName(name, model.input_pin(name, pin, value)), value) for name, pin, value in step.levels]
+
+    def action(scripts: Scripts) -> None:
+        for pin, value in levels:
+            scheduler = model.sync(pin.controller)  # as `_now`, but with hundreds of levels at a moment
+            scheduler.set_input(pin, value)
+            scheduler.notify(pin.controller)
+            scheduler.propagate()
+
+    return action
 
 
-def _press(model: Model, scripts: Scripts, step: do.Press) -> None:
-    _move_button(model, scripts, step.button, pressed=True)
-    if step.duration is not None:
-        scripts.schedule(_releasing(step.button), (do.Wait(step.duration), do.Release(step.button)))
+def _press(model: Model, step: do.Press) -> Action:
+    press = _button(model, step.button, pressed=True)
+
+    def action(scripts: Scripts) -> None:
+        press(scripts)
+        if step.duration is not None:
+            scripts.schedule(_releasing(step.button), (do.Wait(step.duration), do.Release(step.button)))
+
+    return action
 
 
-def _release(model: Model, scripts: Scripts, step: do.Release) -> None:
-    _move_button(model, scripts, step.button, pressed=False)
+def _release(model: Model, step: do.Release) -> Action:
+    return _button(model, step.button, pressed=False)
 
 
 _RELEASE = "release "
@@ -92,146 +110,238 @@ def _is_release(script: str) -> bool:
     return script.startswith(_RELEASE)
 
 
-def _move_button(model: Model, scripts: Scripts, name: str, *, pressed: bool) -> None:
+def _button(model: Model, name: str, *, pressed: bool) -> Action:
     button, _ = model.button(name)
-    scripts.unschedule(_releasing(name))
-    with _now(model, button.controller):
-        _record(model, button.controller, name, "pressed" if pressed else "released")
-        button.press(pressed, model.now)
+
+    def action(scripts: Scripts) -> None:
+        scripts.unschedule(_releasing(name))
+        with _now(model, button.controller):
+            _record(model, button.controller, name, "pressed" if pressed else "released")
+            button.press(pressed, model.now)
+
+    return action
 
 
-def _write(model: Model, scripts: Scripts, step: do.Write) -> None:
-    parts, now = model.parts, model.now
-    for name, values in model.by_controller(step):
-        scheduler = model.sync(name)  # as `_now` does: every write of every script comes here
-        controller, on = parts.controllers[name], parts.line_of.get(name)
-        for pdu in model.requests(name, values):
+def _write(model: Model, step: do.Write) -> Action:
+    requests = model.requests(step)
+
+    def action(scripts: Scripts) -> None:
+        parts, now = model.parts, model.now
+        for name, pdus in requests:
+            scheduler, on = model.sync(name), parts.line_of.get(name)
             if on is not None:
                 line, unit = on
-                line.master.ask(encode_frame(unit, pdu), ANSWER_NS, now)
+                for pdu in pdus:
+                    line.master.ask(encode_frame(unit, pdu), ANSWER_NS, now)
             else:
-                _record(model, name, "request", pdu)
-                model.registers(name).execute(controller, pdu, now)
-        scheduler.notify(name if on is None else on[0].name)
-        scheduler.propagate()
+                for pdu in pdus:
+                    _record(model, name, "request", pdu)
+                    model.registers(name).execute(parts.controllers[name], pdu, now)
+            scheduler.notify(name if on is None else on[0].name)
+            scheduler.propagate()
+
+    return action
 
 
-def _halt(model: Model, scripts: Scripts, given: Halt) -> None:
-    with _now(model, given.controller):
-        on = model.parts.line_of.get(given.controller)
-        if on is not None:
-            line, unit = on
-            line.recall(unit, model.now)
-        _record(model, given.controller, "stop", given.scope)
-        scripts.unschedule(_downloading(given.controller))
-        model.kind(given.controller).halt(model.controller(given.controller), given, model.now)
+WRONG_HALT_OF_A_PROGRAM = Message("simulation.wrong-halt-of-a-program", "program = {program!r}: permitted are pause and stop")
+WRONG_AXIS_TO_HALT = Message(
+    "simulation.wrong-axis-to-halt", "axis = {axis}: {controller!r} is {title}, which has axes 1 to {most}"
+)
 
 
-def _end_scripts(model: Model, scripts: Scripts, given: EndScripts) -> None:
-    scripts.end_described(_is_release)
+def _halt(model: Model, given: Halt) -> Action:
+    kind, controller = model.kind(given.controller), model.controller(given.controller)
+    if given.program not in (None, "pause", "stop"):
+        raise Misuse(WRONG_HALT_OF_A_PROGRAM(program=given.program))
+    if given.axis is not None and not 1 <= given.axis <= len(controller.axes):
+        most = len(controller.axes)
+        raise Misuse(WRONG_AXIS_TO_HALT(axis=given.axis, controller=given.controller, title=kind.title, most=most))
+
+    def action(scripts: Scripts) -> None:
+        with _now(model, given.controller):
+            on = model.parts.line_of.get(given.controller)
+            if on is not None:
+                line, unit = on
+                line.recall(unit, model.now)
+            _record(model, given.controller, "stop", given.scope)
+            scripts.unschedule(_downloading(given.controller))
+            kind.halt(controller, given, model.now)
+
+    return action
 
 
-def _request(model: Model, scripts: Scripts, step: do.Request) -> None:
+def _end_scripts(model: Model, given: EndScripts) -> Action:
+    return lambda scripts: scripts.end_described(_is_release)
+
+
+def _request(model: Model, step: do.Request) -> Action:
+    master = model.line_called(step.line).master
+
+    def action(scripts: Scripts) -> None:
+        with _now(model, step.line):
+            master.ask(encode_frame(step.unit, step.pdu), step.within, model.now)
+
+    return action
+
+
+def _send(model: Model, step: do.Send) -> Action:
     line = model.line_called(step.line)
-    with _now(model, step.line):
-        line.master.ask(encode_frame(step.unit, step.pdu), step.within, model.now)
+
+    def action(scripts: Scripts) -> None:
+        with _now(model, step.line):
+            line.receive(SCRIPTS, step.data, model.now)
+
+    return action
 
 
-def _send(model: Model, scripts: Scripts, step: do.Send) -> None:
-    line = model.line_called(step.line)
-    with _now(model, step.line):
-        line.receive(SCRIPTS, step.data, model.now)
-
-
-def _bytes(model: Model, scripts: Scripts, given: Bytes) -> None:
+def _bytes(model: Model, given: Bytes) -> Action:
     line = model.line_called(given.line)
-    with _now(model, given.line):
-        line.connect(given.place, given.kind)
-        line.receive(given.place, given.data, model.now)
+
+    def action(scripts: Scripts) -> None:
+        with _now(model, given.line):
+            line.connect(given.place, given.kind)
+            line.receive(given.place, given.data, model.now)
+
+    return action
 
 
-def _see(model: Model, scripts: Scripts, given: See) -> None:
-    vision = model.vision(given.controller)
-    with _now(model, given.controller):
-        _record(model, given.controller, "vision", given[1:])
-        vision.see(model.controller(given.controller), given[1:], model.now)
+def _see(model: Model, given: See) -> Action:
+    vision, controller = model.vision(given.controller), model.controller(given.controller)
+
+    def action(scripts: Scripts) -> None:
+        with _now(model, given.controller):
+            _record(model, given.controller, "vision", given[1:])
+            vision.see(controller, given[1:], model.now)
+
+    return action
 
 
-def _download(model: Model, scripts: Scripts, given: Download) -> None:
+def _download(model: Model, given: Download) -> Action:
     kind = model.kind(given.controller)
     if not kind.offers(ControllerKind.download):
         raise kind.lacks(given.controller, "program memory")
-    with _now(model, given.controller):
-        on = model.parts.line_of.get(given.controller)
-        source = SourceText(name_of_text(model, given.controller, given.place), given.text)
-        to = Destination(given.controller, None if on is None else on[0].name, given.place)
-        found = kind.download(model.controller(given.controller), to, source)
-        found.put(model.now)
-        _record(model, given.controller, "download", given.place)
-        model.downloaded[given.controller, given.place] = source
-    if found.typed:
-        scripts.schedule(_downloading(given.controller), found.typed)
+    model.sync(given.controller)
+    on = model.parts.line_of.get(given.controller)
+    source = SourceText(name_of_text(model, given.controller, given.place), given.text)
+    to = Destination(given.controller, None if on is None else on[0].name, given.place)
+    found = kind.download(model.controller(given.controller), to, source)
+
+    def action(scripts: Scripts) -> None:
+        with _now(model, given.controller):
+            found.put(model.now)
+            _record(model, given.controller, "download", given.place)
+            model.downloaded[given.controller, given.place] = source
+        if found.typed:
+            scripts.schedule(_downloading(given.controller), found.typed)
+
+    return action
 
 
-def _set_variable(model: Model, scripts: Scripts, given: SetVariable) -> None:
-    with _now(model, given.controller):
-        model.programs_of(given.controller).set_variable(given.name, given.value, model.now)
+def _set_variable(model: Model, given: SetVariable) -> Action:
+    programs = model.programs_of(given.controller)
+
+    def action(scripts: Scripts) -> None:
+        with _now(model, given.controller):
+            programs.set_variable(given.name, given.value, model.now)
+
+    return action
 
 
-def _leave(model: Model, scripts: Scripts, given: Leave) -> None:
+def _leave(model: Model, given: Leave) -> Action:
     line = model.line_called(given.line)
-    model.sync(given.line)
-    line.leave(given.place)
+
+    def action(scripts: Scripts) -> None:
+        model.sync(given.line)
+        line.leave(given.place)
+
+    return action
 
 
-def _refused(model: Model, scripts: Scripts, given: Refused) -> None:
-    model.report_refused(given.text)
+def _refused(model: Model, given: Refused) -> Action:
+    return lambda scripts: model.report_refused(given.text)
 
 
-def _power_cycle(model: Model, scripts: Scripts, step: do.PowerCycle) -> None:
-    controller = model.controller(step.controller)
-    with _now(model, step.controller):
-        _record(model, step.controller, "power-cycle", "")
-        controller.power_cycle(model.now)
+IS_SWITCHED_BY_A_SUPPLY = Message(
+    "simulation.is-switched-by-a-supply",
+    "{controller!r} is switched by its supply {supply!r}: switch that, or let it have a brown-out",
+)
 
 
-def _turn(model: Model, scripts: Scripts, step: do.Turn) -> None:
-    encoders = model.encoders(step.controller)
-    with _now(model, step.controller):
-        _record(model, step.controller, f"M{step.axis} turned", step.counts)
-        encoders.reader(model.controller(step.controller)).turn_encoder(step.axis, step.counts, model.now)
+def _power_cycle(model: Model, step: do.PowerCycle) -> Action:
+    controller, supply = model.controller(step.controller), model.parts.supplied.get(step.controller)
+    if supply is not None:
+        raise Misuse(IS_SWITCHED_BY_A_SUPPLY(controller=step.controller, supply=supply))
+
+    def action(scripts: Scripts) -> None:
+        with _now(model, step.controller):
+            _record(model, step.controller, "power-cycle", "")
+            controller.power_cycle(model.now)
+
+    return action
 
 
-def _couple(model: Model, scripts: Scripts, step: do.Couple) -> None:
-    encoders = model.encoders(step.controller)
-    with _now(model, step.controller):
-        _record(model, step.controller, f"M{step.axis} coupled", step.coupling)
-        encoders.couple(model.controller(step.controller), step.axis, step.coupling, model.now)
+def _turn(model: Model, step: do.Turn) -> Action:
+    encoders, controller = model.encoders(step.controller), model.controller(step.controller)
+    encoders.check_turn(step.axis, step.counts)
+
+    def action(scripts: Scripts) -> None:
+        with _now(model, step.controller):
+            _record(model, step.controller, f"M{step.axis} turned", step.counts)
+            encoders.reader(controller).turn_encoder(step.axis, step.counts, model.now)
+
+    return action
 
 
-def _set_fault(model: Model, scripts: Scripts, step: do.SetFault) -> None:
-    model.put_fault(step.fault)
+ENCODER_OF_AN_AXIS = Message("simulation.encoder-of-an-axis", "{drive}: its encoder is part of the mechanics of axis {name!r}")
 
 
-def _clear_fault(model: Model, scripts: Scripts, step: do.ClearFault) -> None:
+def _couple(model: Model, step: do.Couple) -> Action:
+    encoders, controller = model.encoders(step.controller), model.controller(step.controller)
+    encoders.check_turn(step.axis, 0)
+    drive = step.controller, f"M{step.axis}"
+    for axis in model.axes.values():
+        if axis.spec.drive == drive:
+            raise Misuse(ENCODER_OF_AN_AXIS(drive=".".join(drive), name=axis.spec.name))
+
+    def action(scripts: Scripts) -> None:
+        with _now(model, step.controller):
+            _record(model, step.controller, f"M{step.axis} coupled", step.coupling)
+            encoders.couple(controller, step.axis, step.coupling, model.now)
+
+    return action
+
+
+def _set_fault(model: Model, step: do.SetFault) -> Action:
+    model.rigging.check(step.fault)
+    return lambda scripts: model.put_fault(step.fault)
+
+
+def _clear_fault(model: Model, step: do.ClearFault) -> Action:
     faults = model.parts.faults
-    if step.name in (active.name for active in faults.active):  # otherwise it was cleared already or is not set yet
+    faults.called(step.name)
+
+    def action(scripts: Scripts) -> None:
         model.sync_all()
         faults.remove(step.name, model.now)
 
-
-def _expect(model: Model, scripts: Scripts, step: do.Expect) -> None:
-    model.expect(step.condition)
+    return action
 
 
-def _note(model: Model, scripts: Scripts, step: do.Note) -> None:
-    if model.trace.watchers:
-        model.sync_all()  # earlier events are shown first
-
-    model.trace.add(TraceRecord(model.now, "world", "event", "note", step.text))
+def _expect(model: Model, step: do.Expect) -> Action:
+    model.condition(step.condition)
+    return lambda scripts: model.expect(step.condition)
 
 
-ACTIONS: Mapping[type, Callable[[Model, Scripts, Any], None]] = complete(
+def _note(model: Model, step: do.Note) -> Action:
+    def action(scripts: Scripts) -> None:
+        if model.trace.watchers:
+            model.sync_all()  # earlier events are shown first
+        model.trace.add(TraceRecord(model.now, WORLD, "event", "note", step.text))
+
+    return action
+
+
+ACTIONS: Mapping[type, Callable[[Model, Any], Action]] = complete(
     "step",
     [kind for kind in get_args(ExternalInput) if kind not in FOR_SCRIPTS],
     "action",

@@ -25,7 +25,7 @@ from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.build import Keep, build
 from steptwin.simulation.faults import Fault
 from steptwin.simulation.kinds.givenfiles import GivenFiles
-from steptwin.simulation.kinds.kind import AnyKind, EncoderInputs, NamedRegisters, NewValues, Vision
+from steptwin.simulation.kinds.kind import AnyKind, EncoderInputs, NamedRegisters, Vision
 from steptwin.simulation.kinds.lines import Line
 from steptwin.simulation.kinds.programs import Programs
 from steptwin.simulation.logic.condition import SignalCondition
@@ -198,23 +198,18 @@ class Model:
             raise kind.lacks(name, "vision registers")
         return kind.vision
 
-    @staticmethod
-    def by_controller(step: do.Write) -> list[tuple[str, NewValues]]:
-        """The values that a step writes, grouped by controller."""
-        groups: list[tuple[str, NewValues]] = []
+    def requests(self, step: do.Write) -> list[tuple[str, Sequence[bytes]]]:
+        """The PDUs of a write for one controller after the other. Raises `Misuse` for values that a register does not accept."""
+        found: list[tuple[str, Sequence[bytes]]] = []
         for name, group in groupby(step.values, key=itemgetter(0)):
-            groups.append((name, tuple(map(itemgetter(1, 2), group))))
-        return groups
-
-    def requests(self, name: str, values: NewValues) -> tuple[bytes, ...]:
-        """The PDUs that write ``values`` to `registers` of a controller. Raises `Misuse` for values that one does not accept."""
-        registers, controller = self.registers(name), self.parts.controllers[name]
-        key = (self.parts.kind_of[name].name, registers.dialect(controller), values)
-        found = self._encoded.get(key)
-        if found is None:
-            if len(self._encoded) >= MOST_REMEMBERED:
-                self._encoded.clear()
-            found = self._encoded[key] = registers.requests(controller, values)
+            registers, controller = self.registers(name), self.parts.controllers[name]
+            values = tuple(map(itemgetter(1, 2), group))
+            key = (name, registers.dialect(controller), values)
+            if key not in self._encoded:
+                if len(self._encoded) >= MOST_REMEMBERED:
+                    self._encoded.clear()
+                self._encoded[key] = registers.requests(controller, values)
+            found.append((name, self._encoded[key]))
         return found
 
     def programs_of(self, name: str) -> Programs:

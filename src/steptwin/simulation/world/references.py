@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any, get_args
+from typing import Any
 
 from steptwin.errors import Misuse, Refusal
-from steptwin.messages import Message
 from steptwin.simulation.describe.spec import ScriptSpec
 from steptwin.simulation.describe.steptable import STEPS
 from steptwin.simulation.faults import Fault
 from steptwin.simulation.script import steps as do
-from steptwin.simulation.script.control import Halt, Seek
+from steptwin.simulation.script.control import Seek
 from steptwin.simulation.toml.tomlplaces import Path
-from steptwin.simulation.world.inputs import Bytes, Download, EndScripts, ExternalInput, Leave, Refused, See, SetVariable
+from steptwin.simulation.world.actions import prepare
+from steptwin.simulation.world.inputs import FOR_SCRIPTS, ExternalInput
 from steptwin.simulation.world.model import Model
 from steptwin.simulation.world.motions import motion_ends, ordered
 from steptwin.tables import complete
@@ -95,14 +95,12 @@ def _may_be_called(fault: Fault, name: str) -> bool:
     return name == fault.name or (not fault.name and fault.kind.name in (name, kind if number.isdecimal() else name))
 
 
-def check_step(model: Model, step: object) -> None:
+def check_step(model: Model, step: ExternalInput) -> None:
     """Raises `Misuse` for a step with unknown names or invalid values."""
-    check = _CHECKS.get(type(step))
-    if check is not None:
-        check(model, step)
+    _CHECKS.get(type(step), prepare)(model, step)
 
 
-def _condition(model: Model, step: do.Until | do.Expect) -> None:
+def _condition(model: Model, step: do.Until) -> None:
     model.condition(step.condition)
 
 
@@ -119,116 +117,20 @@ def _motion(model: Model, step: do.UntilOver | do.ExpectReached) -> None:
     motion_ends(model, step.controller, step.axis)
 
 
-def _set(model: Model, step: do.Set) -> None:
-    for name, pin, level in step.levels:
-        model.input_pin(name, pin, level)
-
-
-def _button(model: Model, step: do.Press | do.Release) -> None:
-    model.button(step.button)
-
-
-def _write(model: Model, step: do.Write) -> None:
-    for name, values in model.by_controller(step):
-        model.requests(name, values)
-
-
-def _request(model: Model, step: do.Request) -> None:
-    _ = model.line_called(step.line).master
-
-
-def _send(model: Model, step: do.Send) -> None:
-    model.line_called(step.line)
-
-
-IS_SWITCHED_BY_A_SUPPLY = Message(
-    "simulation.is-switched-by-a-supply",
-    "{controller!r} is switched by its supply {supply!r}: switch that, or let it have a brown-out",
-)
-
-
-def _power_cycle(model: Model, step: do.PowerCycle) -> None:
-    model.controller(step.controller)
-    supply = model.parts.supplied.get(step.controller)
-    if supply is not None:
-        raise Misuse(IS_SWITCHED_BY_A_SUPPLY(controller=step.controller, supply=supply))
-
-
-WRONG_HALT_OF_A_PROGRAM = Message("simulation.wrong-halt-of-a-program", "program = {program!r}: permitted are pause and stop")
-WRONG_AXIS_TO_HALT = Message(
-    "simulation.wrong-axis-to-halt", "axis = {axis}: {controller!r} is {title}, which has axes 1 to {most}"
-)
-
-
-def _halt(model: Model, given: Halt) -> None:
-    kind = model.kind(given.controller)
-    axes = len(model.controller(given.controller).axes)
-    if given.program not in (None, "pause", "stop"):
-        raise Misuse(WRONG_HALT_OF_A_PROGRAM(program=given.program))
-    if given.axis is not None and not 1 <= given.axis <= axes:
-        raise Misuse(WRONG_AXIS_TO_HALT(axis=given.axis, controller=given.controller, title=kind.title, most=axes))
-
-
-def _turn(model: Model, step: do.Turn) -> None:
-    model.encoders(step.controller).check_turn(step.axis, step.counts)
-
-
-ENCODER_OF_AN_AXIS = Message("simulation.encoder-of-an-axis", "{drive}: its encoder is part of the mechanics of axis {name!r}")
-
-
-def _couple(model: Model, step: do.Couple) -> None:
-    model.encoders(step.controller).check_turn(step.axis, 0)
-    drive = step.controller, f"M{step.axis}"
-    for axis in model.axes.values():
-        if axis.spec.drive == drive:
-            raise Misuse(ENCODER_OF_AN_AXIS(drive=".".join(drive), name=axis.spec.name))
-
-
-def _see(model: Model, step: See) -> None:
-    model.vision(step.controller)
-
-
-def _set_variable(model: Model, step: SetVariable) -> None:
-    model.programs_of(step.controller)
-
-
-def _fault(model: Model, step: do.SetFault) -> None:
-    model.rigging.check(step.fault)
-
-
-def _clear_fault(model: Model, step: do.ClearFault) -> None:
-    model.parts.faults.called(step.name)
-
-
 def _nothing(model: Model, step: object) -> None:
     """No check: the step has no names, or is checked when it is executed."""
 
 
-_CHECKS: Mapping[type, Callable[[Model, Any], None]] = complete(
-    "step",
-    get_args(ExternalInput),
+_CHECKS: Mapping[type, Callable[[Model, Any], object]] = complete(
+    "step of scripts",
+    FOR_SCRIPTS,
     "check",
     {
         do.Until: _condition,
-        do.Expect: _condition,
         do.Order: _order,
         do.UntilOver: _motion,
         do.ExpectReached: _motion,
-        do.Set: _set,
-        do.Press: _button,
-        do.Release: _button,
-        do.Write: _write,
-        do.Request: _request,
-        do.Send: _send,
-        do.PowerCycle: _power_cycle,
-        do.Turn: _turn,
-        do.Couple: _couple,
-        Halt: _halt,
-        See: _see,
-        SetVariable: _set_variable,
-        do.SetFault: _fault,
-        do.ClearFault: _clear_fault,
-        **dict.fromkeys((do.Wait, do.At, do.Note, do.Stop, do.Read, do.Call, do.Repeat), _nothing),
-        **dict.fromkeys((Bytes, Download, Leave, Refused, EndScripts), _nothing),
+        **dict.fromkeys((do.Wait, do.At, do.Stop, do.Read, do.Call, do.Repeat), _nothing),
     },
 )
+"""The checks of steps that only scripts execute. What the others name is found where they are prepared."""

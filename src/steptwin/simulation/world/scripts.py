@@ -334,6 +334,12 @@ class Scripts:
         self._do(script, step)
         return ScriptWait(None, asked=(PendingRequests(step.line, number, number),), is_request=True), None
 
+    def _clear_fault(self, step: do.ClearFault, script: Script) -> StepResult:
+        """A script of a description may clear a fault that is not set yet, or was cleared already."""
+        if script.is_external or step.name in (active.name for active in self._model.parts.faults.active):
+            self._do(script, step)
+        return None, None
+
     def _write(self, step: do.Write, script: Script) -> StepResult:
         """Write as a Modbus master: wait for the answers before the next step."""
         model = self._model
@@ -372,7 +378,7 @@ class Scripts:
 
 _TAKING: Mapping[type, Callable[[Scripts, Any, Script], StepResult]] = complete(
     "step of scripts",
-    [*(FOR_SCRIPTS - {do.Repeat}), do.Request, do.Write],
+    [*(FOR_SCRIPTS - {do.Repeat}), do.Request, do.Write, do.ClearFault],
     "execution",
     {
         do.Wait: Scripts._pause,
@@ -383,9 +389,11 @@ _TAKING: Mapping[type, Callable[[Scripts, Any, Script], StepResult]] = complete(
         do.Call: Scripts._call,
         do.Request: Scripts._request,
         do.Write: Scripts._write,
+        do.ClearFault: Scripts._clear_fault,
         do.Order: Scripts._order,
         do.UntilOver: Scripts._wait_for_end,
         do.ExpectReached: Scripts._expect_reached,
     },
 )
-"""The execution of steps that wait or have a result (`steptwin.simulation.script.steps.Walk` resolves `Repeat`)."""
+"""The execution of steps that wait, have a result, or are done otherwise than from
+outside. `steptwin.simulation.script.steps.Walk` resolves `Repeat`."""

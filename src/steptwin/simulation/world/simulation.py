@@ -20,11 +20,11 @@ from steptwin.simulation.describe.spec import ScriptSpec
 from steptwin.simulation.scheduler.observing import WorldObserver
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.script import steps as do
-from steptwin.simulation.world.actions import act
+from steptwin.simulation.world.actions import prepare
 from steptwin.simulation.world.boundedlog import BoundedLog
 from steptwin.simulation.world.inputs import ExternalInput
 from steptwin.simulation.world.model import Model
-from steptwin.simulation.world.references import check_faults, check_scripts, check_step
+from steptwin.simulation.world.references import check_faults, check_scripts
 from steptwin.simulation.world.running import Script
 from steptwin.simulation.world.scripts import MOST_STEPS_PER_INSTANT, Scripts
 from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
@@ -107,7 +107,6 @@ class Simulation(Model):
 
     def apply_input(self, what: ExternalInput) -> None:
         """Apply an external input at the present moment and record it for replay. If it raises `Misuse`, nothing has changed."""
-        check_step(self, what)
         self.perform(what)
         self.record_input(what)
 
@@ -127,10 +126,11 @@ class Simulation(Model):
         self.is_settled = False
 
     def perform(self, what: ExternalInput, by: str = "") -> None:
-        """Execute an action at the present moment; ``by``: its script. Raises `Misuse` for names that do not exist."""
+        """Execute a step at the present moment; ``by``: its script. Raises as `prepare`; nothing has changed then."""
+        action = prepare(self, what)
         for watcher in self.act_watchers:
             watcher(by, what)
-        act(self, self._scripts, what)
+        action(self._scripts)
 
     # ------------------------------------------------------------------ time
 

@@ -8,16 +8,14 @@ from fractions import Fraction
 from steptwin.controller import ControllerEvent, Nanos
 from steptwin.datasheet import Datasheet, Pin
 from steptwin.diagnostics import SourceText
-from steptwin.errors import Misuse, Refusal
+from steptwin.errors import Refusal
 from steptwin.messages import Message
 from steptwin.mic488 import datasheet, points
-from steptwin.mic488.axis import Axis
 from steptwin.mic488.config import examine_config
 from steptwin.mic488.configtext import config_text
 from steptwin.mic488.core import ANALOG_PINS, ENABLE_PINS, INPUT_PINS, OUTPUT_PINS, check_pin, check_turn
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.encoder import Coupling
-from steptwin.mic488.encoding import DINT_MAX, DINT_MIN
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.inputs import index_input
 from steptwin.mic488.present import empty_banks, state_of, statement_of
@@ -64,9 +62,6 @@ from steptwin.wire.pdu import ModbusException, decode_request
 
 PROGRAM = {"stop": 0, "start": 1, "pause": 2}
 """PROGRAM_CTRL by action."""
-POSITION_IS_OUT_OF_RANGE = Message(
-    "simulation.mic488.position-is-out-of-range", "move: {value:g} {unit}: permitted are {low:.12g}…{high:.12g} {unit}"
-)
 PROGRAM_IS_IN_USE = Message(
     "simulation.mic488.program-is-in-use", "{place} is in use by the program that runs or is paused: stop it first"
 )
@@ -250,8 +245,6 @@ class Mic488Kind(ControllerKind[Mic488Spec, Mic488Device, Mic488View]):
         return _write(command, "EN", float(command.on))
 
     def move(self, device: Mic488Device, line: str | None, command: Move) -> do.Write:
-        if 1 <= command.axis <= AXES:
-            _check_position(device.axes[command.axis - 1], command.by or 0.0 if command.to is None else command.to)
         return _write(command, "POS_REL", command.by or 0.0) if command.to is None else _write(command, "POS_ABS", command.to)
 
     def home(self, device: Mic488Device, line: str | None, command: Home) -> do.Write:
@@ -326,14 +319,6 @@ class Mic488Kind(ControllerKind[Mic488Spec, Mic488Device, Mic488View]):
 def _write(command: Enable | Move | Home | Jog, register: str, value: float) -> do.Write:
     """A register of the axis of a command, by the rest of its name."""
     return do.Write(((command.controller, f"M{command.axis}_{register}", value),))
-
-
-def _check_position(axis: Axis, value: float) -> None:
-    """Raises `Misuse` for a position or distance that the controller ignores, because its pulses do not fit a DINT."""
-    if not DINT_MIN <= value * axis.gear <= DINT_MAX:
-        raise Misuse(
-            POSITION_IS_OUT_OF_RANGE(value=value, unit=axis.config.unit_name, low=DINT_MIN / axis.gear, high=DINT_MAX / axis.gear)
-        )
 
 
 MIC488 = Mic488Kind()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.registermap import DataType
 from steptwin.mic488.values import encoded, named
+from steptwin.mic488.writes import permitted
 from steptwin.simulation.kinds.kind import NewValues
 from steptwin.wire.pdu import MAX_WRITTEN_REGISTERS, ModbusRequest, WriteRegistersRequest, encode_request
 
@@ -12,11 +13,15 @@ from steptwin.wire.pdu import MAX_WRITTEN_REGISTERS, ModbusRequest, WriteRegiste
 def encode_write(device: Mic488Device, values: NewValues) -> tuple[bytes, ...]:
     """The requests that write registers by name; neighbours go together. Raises `Misuse` for what one does not take."""
     requests: list[ModbusRequest] = []
+    data_type = DataType(device.data_type)
     for register, value in values:
         item = named(device.registers, register)
-        axis = item.register.axis
-        unit = "u" if axis is None else device.config.axes[axis - 1].unit_name
-        request = encoded(item, value, DataType(device.data_type), unit)
+        if item.register.axis is None:
+            request = encoded(item, value, data_type)
+        else:
+            axis = device.axes[item.register.axis - 1]
+            permits = permitted(item.register, data_type, axis.gear)
+            request = encoded(item, value, data_type, axis.config.unit_name, permits)
         last = requests[-1] if requests else None
         if (
             isinstance(request, WriteRegistersRequest)
