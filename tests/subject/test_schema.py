@@ -8,12 +8,12 @@ from typing import Any
 
 import jsonschema_rs
 import pytest
+from steptwin.subject.shapes import shape
 
 from steptwin import World
 from steptwin.subject.following import filter_of
 from steptwin.subject.payloads import KINDS
 from steptwin.subject.schema import definitions
-from steptwin.subject.shapes import shape
 from steptwin.subject.world import WorldSubject
 
 WORLDS = sorted((Path(__file__).parents[2] / "examples/worlds").glob("*.toml"))

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Coroutine
-from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, cast
+from types import TracebackType
+from typing import Any, Concatenate, ParamSpec, Protocol, Self, TypeVar, cast
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -51,3 +52,25 @@ class Blocking:
 
     def __repr__(self) -> str:
         return repr(self._driver).replace("Async", "", 1)
+
+
+class BlockingLine(Blocking):
+    """Base of lines and devices: ``with`` opens and closes them."""
+
+    def __enter__(self) -> Self:
+        finish(self._driver.open())
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        finish(self._driver.close())
+
+
+class BlockingJog(Blocking):
+    """Base of jogs: ``with`` begins and ends them."""
+
+    def __enter__(self) -> Self:
+        finish(self._driver.__aenter__())
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        finish(self._driver.__aexit__(kind, error, trace))

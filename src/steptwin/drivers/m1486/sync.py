@@ -6,10 +6,8 @@ Calls may come from any thread. A stop precedes all waiting requests of other th
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from types import TracebackType
-from typing import Self
 
-from steptwin.drivers.blocking import Blocking, blocking, finish
+from steptwin.drivers.blocking import BlockingJog, BlockingLine, blocking, finish
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.m1486.download import DownloadProgress
 from steptwin.drivers.m1486.driver import TIMEOUT_S, AsyncM1486, ChipStatus
@@ -24,7 +22,7 @@ from steptwin.drivers.threads import ThreadLine
 from steptwin.m1486.variants import Variant
 
 
-class M1486Line(Blocking):
+class M1486Line(BlockingLine):
     """A line of chips that several drivers and threads share. ``with`` opens and closes it."""
 
     _driver: ThreadM1486Line
@@ -44,15 +42,8 @@ class M1486Line(Blocking):
     open = blocking(ThreadM1486Line.open)
     close = blocking(ThreadM1486Line.close)
 
-    def __enter__(self) -> Self:
-        self.open()
-        return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self.close()
-
-
-class M1486Jog(Blocking):
+class M1486Jog(BlockingJog):
     """A jog: ``with chip.jog(200.0) as jog: while pressed() and jog.hold(): pass``. See `AsyncM1486Jog`."""
 
     _driver: AsyncM1486Jog
@@ -69,20 +60,13 @@ class M1486Jog(Blocking):
 
     hold = blocking(AsyncM1486Jog.hold)
 
-    def __enter__(self) -> Self:
-        finish(self._driver.__aenter__())
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        finish(self._driver.__aexit__(kind, error, trace))
-
 
 class _ThreadM1486(AsyncM1486):
     def _own_line(self, address: str, baud: int, log: Callable[[str], object] | None) -> DriverLine[ChipRequest, bytes]:
         return ThreadM1486Line(address, baud=baud, log=log)
 
 
-class M1486(Blocking):
+class M1486(BlockingLine):
     """A chip for threads; arguments as of `AsyncM1486`. ``with`` opens and closes it."""
 
     _driver: AsyncM1486
@@ -139,10 +123,6 @@ class M1486(Blocking):
         """Known state of the chip, as `status` returns it. Nothing is sent."""
         return self._driver.known()
 
-    def download(self, text: str, *, progress: DownloadProgress | None = None, name: str = "program") -> bytes:
-        """Send a program to the chip; see `AsyncM1486.download`."""
-        return finish(self._driver.download(text, progress=progress, name=name))
-
     def jog(self, velocity: float) -> M1486Jog:
         """Run at a velocity (units/s) while it is held: a dead-man's switch. See `AsyncM1486Jog`."""
         return M1486Jog(self._driver.jog(velocity))
@@ -152,6 +132,7 @@ class M1486(Blocking):
         most once per ``period_s``."""
         return DeviceSubject(AsyncDeviceSubject(name, M1486Part(self._driver), period_s))
 
+    download = blocking(AsyncM1486.download)
     open = blocking(AsyncM1486.open)
     open_line = blocking(AsyncM1486.open_line)
     close = blocking(AsyncM1486.close)
@@ -185,13 +166,6 @@ class M1486(Blocking):
     command = blocking(AsyncM1486.command)
     run_block = blocking(AsyncM1486.run_block)
     uploaded = blocking(AsyncM1486.uploaded)
-
-    def __enter__(self) -> Self:
-        self.open()
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self.close()
 
 
 def download_to(

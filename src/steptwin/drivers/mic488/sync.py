@@ -7,10 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Generic, Self
+from typing import Generic
 
-from steptwin.drivers.blocking import Blocking, blocking, finish
+from steptwin.drivers.blocking import Blocking, BlockingJog, BlockingLine, blocking, finish
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.mic488.axis import AsyncMic488Axis
 from steptwin.drivers.mic488.driver import TIMEOUT_S, AsyncMic488
@@ -26,7 +25,7 @@ from steptwin.drivers.threads import ThreadLine
 from steptwin.mic488.config import ControllerConfig
 
 
-class ModbusLine(Blocking):
+class ModbusLine(BlockingLine):
     """A Modbus line that several drivers and threads share. ``with`` opens and closes it."""
 
     _driver: ThreadModbusLine
@@ -53,15 +52,8 @@ class ModbusLine(Blocking):
     open = blocking(ThreadModbusLine.open)
     close = blocking(ThreadModbusLine.close)
 
-    def __enter__(self) -> Self:
-        self.open()
-        return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self.close()
-
-
-class Mic488Jog(Blocking):
+class Mic488Jog(BlockingJog):
     """A jog of one axis: ``with axis.jog(5.0) as jog: while pressed() and jog.hold(): pass``. See `AsyncMic488Jog`."""
 
     _driver: AsyncMic488Jog
@@ -78,13 +70,6 @@ class Mic488Jog(Blocking):
 
     hold = blocking(AsyncMic488Jog.hold)
     release = blocking(AsyncMic488Jog.release)
-
-    def __enter__(self) -> Self:
-        finish(self._driver.__aenter__())
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        finish(self._driver.__aexit__(kind, error, trace))
 
 
 class Mic488Axis(Blocking):
@@ -182,7 +167,7 @@ class _ThreadMic488(AsyncMic488):
         return ThreadModbusLine(address, baud=baud, log=log)
 
 
-class Mic488(Blocking):
+class Mic488(BlockingLine):
     """A MIC488 for threads; arguments as of `AsyncMic488`. ``with`` opens and closes it."""
 
     _driver: AsyncMic488
@@ -258,10 +243,3 @@ class Mic488(Blocking):
     request = blocking(AsyncMic488.request)
     take_snapshot = blocking(AsyncMic488.take_snapshot)
     restore_snapshot = blocking(AsyncMic488.restore_snapshot)
-
-    def __enter__(self) -> Self:
-        self.open()
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self.close()
