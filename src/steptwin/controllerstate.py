@@ -1,6 +1,6 @@
 """The present state of one controller: one shape for all kinds. What is not known is None.
 
-`ControllerState.plain` makes JSON of it, `read_state` reads that. The data sheet has what does not change: title, units, pins,
+`steptwin.jsonvalues` makes JSON of it, and reads that. The data sheet has what does not change: title, units, pins,
 and what each of the ``details`` means.
 """
 
@@ -10,11 +10,12 @@ import enum
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, TypeAlias, TypeVar, cast
+from typing import Generic, TypeAlias, TypeVar, cast
 
 from steptwin.controller import SECOND, Nanos
-from steptwin.datasheet import AxisDescription, Datasheet, Detail, plain
+from steptwin.datasheet import AxisDescription, Datasheet, Detail
 from steptwin.errors import Misuse
+from steptwin.jsonvalues import plain
 from steptwin.messages import Message
 from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss
@@ -49,9 +50,6 @@ class StateStatus:
     text: str
     level: StatusLevel = StatusLevel.OK
 
-    def plain(self) -> dict[str, object]:
-        return {"code": self.code, "text": self.text, "level": self.level.value}
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StateProgram:
@@ -67,16 +65,6 @@ class StateProgram:
     statement: str | None = None
     """The one that is executed or comes next."""
     variables: Mapping[str, float]
-
-    def plain(self) -> dict[str, object]:
-        return {
-            "state": None if self.state is None else self.state.value,
-            "text": self.text,
-            "file": self.file,
-            "line": self.line,
-            "statement": self.statement,
-            "variables": dict(self.variables),
-        }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,19 +85,6 @@ class StateAxis:
     """Counts; None without an encoder."""
     status: StateStatus
 
-    def plain(self) -> dict[str, object]:
-        return {
-            "number": self.number,
-            "name": self.name,
-            "unit": self.unit,
-            "position": self.position,
-            "velocity": self.velocity,
-            "moving": self.moving,
-            "enabled": self.enabled,
-            "encoder": self.encoder,
-            "status": self.status.plain(),
-        }
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControllerState:
@@ -125,19 +100,6 @@ class ControllerState:
     """Levels: 0, 1, volts."""
     details: Mapping[str, DetailValue]
     """Details that only this kind has, by the names of ``details`` in its data sheet."""
-
-    def plain(self) -> dict[str, object]:
-        """As JSON has values. It is made for every sample of a gateway, so nothing is looked for in it."""
-        return {
-            "kind": self.kind,
-            "variant": self.variant,
-            "time_s": self.time_s,
-            "status": self.status.plain(),
-            "program": self.program.plain(),
-            "axes": [axis.plain() for axis in self.axes],
-            "pins": dict(self.pins),
-            "details": plain(self.details),
-        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,10 +153,10 @@ class StateReader(ABC, Generic[M]):
         sheet = self.datasheet(controller)
         found: dict[str, object] = {}
         if "status" in wanted:
-            found["status"] = self.status(controller, now).plain()
+            found["status"] = plain(self.status(controller, now))
         if "program" in wanted:
-            found["program"] = self.program(controller, now).plain()
-        found["axes"] = [self.axis(controller, axis, now).plain() for axis in sheet.axes if axis.name in wanted]
+            found["program"] = plain(self.program(controller, now))
+        found["axes"] = [plain(self.axis(controller, axis, now)) for axis in sheet.axes if axis.name in wanted]
         if "pins" in wanted:
             found["pins"] = dict(self.pins(controller, now))
         if "details" in wanted:
@@ -222,9 +184,9 @@ def check_parts(sheet: Datasheet, wanted: Collection[str]) -> None:
 def parts_of(state: ControllerState, sheet: Datasheet, wanted: Collection[str]) -> dict[str, object]:
     """As `StateReader.parts`, of a state that has been read."""
     check_parts(sheet, wanted)
-    whole = state.plain()
+    whole = plain(state)
     found = {name: whole[name] for name in PARTS if name in wanted}
-    return {**found, "axes": [axis.plain() for axis in state.axes if axis.name in wanted]}
+    return {**found, "axes": [plain(axis) for axis in state.axes if axis.name in wanted]}
 
 
 def details_of(rows: Iterable[DetailRow[M]], controller: M, now: Nanos) -> dict[str, DetailValue]:
@@ -243,28 +205,3 @@ def detail_text(value: DetailValue) -> str:
         case str() | int() | float():
             return str(value)
     return ", ".join(f"{name} = {number}" for name, number in value.items()) or "none"
-
-
-def read_state(data: Mapping[str, Any]) -> ControllerState:
-    """The state in JSON. Raises `TypeError`, `ValueError` or `LookupError` for what is none."""
-    lists: dict[str, Any] = {
-        "status": _read_status(data["status"]),
-        "program": _read_program(data["program"]),
-        "axes": tuple(map(_read_axis, data["axes"])),
-        "details": {name: tuple(value) if isinstance(value, list) else value for name, value in data["details"].items()},
-    }
-    return ControllerState(**{**data, **lists})
-
-
-def _read_status(data: Mapping[str, Any]) -> StateStatus:
-    return StateStatus(code=data["code"], text=data["text"], level=StatusLevel(data["level"]))
-
-
-def _read_program(data: Mapping[str, Any]) -> StateProgram:
-    read: dict[str, Any] = {"state": None if data["state"] is None else ProgramActivity(data["state"])}
-    return StateProgram(**{**data, **read})
-
-
-def _read_axis(data: Mapping[str, Any]) -> StateAxis:
-    read: dict[str, Any] = {"status": _read_status(data["status"])}
-    return StateAxis(**{**data, **read})

@@ -1,15 +1,13 @@
 """The static description of one controller: what there is to read, write, connect and expect, and in which units.
 
-A data sheet is made from the controller's own tables and never changes. `plain` makes JSON of it, `read_datasheet` reads that.
+A data sheet is made from the controller's own tables and never changes. `steptwin.jsonvalues` makes JSON of it, and reads that.
 """
 
 from __future__ import annotations
 
 import enum
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, is_dataclass
-from functools import cache
-from typing import Any
+from dataclasses import dataclass, field
 
 
 class PointEffect(enum.Enum):
@@ -233,93 +231,3 @@ class Datasheet:
             if found.path.upper() == path.upper():
                 return found
         raise KeyError(path)
-
-
-_LEAVES = frozenset({str, int, float, bool, type(None)})
-
-
-@cache
-def _names(kind: type) -> tuple[str, ...] | None:
-    """The fields of a dataclass; None of another type."""
-    return tuple(one.name for one in fields(kind)) if is_dataclass(kind) else None
-
-
-def plain(value: Any) -> Any:
-    """A data sheet, or a part of it, as JSON has values."""
-    kind = type(value)
-    if kind in _LEAVES:
-        return value
-    names = _names(kind)
-    if names is not None:
-        return {name: plain(getattr(value, name)) for name in names}
-    if isinstance(value, enum.Enum):
-        return value.value
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    return [plain(item) for item in value] if isinstance(value, tuple) else value
-
-
-def read_datasheet(data: Mapping[str, Any]) -> Datasheet:
-    """The data sheet in JSON. Raises `TypeError`, `ValueError` or `LookupError` for what `plain` does not give."""
-    lists: dict[str, Any] = {
-        "axes": tuple(map(_read_axis, data["axes"])),
-        "pins": tuple(map(_read_pin, data["pins"])),
-        "points": tuple(map(_read_point, data["points"])),
-        "commands": tuple(map(_read_command, data["commands"])),
-        "events": tuple(map(_read_event, data["events"])),
-        "program_actions": tuple(data["program_actions"]),
-        "details": tuple(map(_read_detail, data["details"])),
-        "also_change": None if data["also_change"] is None else {name: tuple(of) for name, of in data["also_change"].items()},
-    }
-    return Datasheet(**{**data, **lists})
-
-
-def _read_axis(data: Mapping[str, Any]) -> AxisDescription:
-    read: dict[str, Any] = {name: _read_limits(data[name]) for name in ("positions", "distances", "velocities")}
-    read["ramp_points"] = tuple(data["ramp_points"])
-    read["limit_codes"] = None if data["limit_codes"] is None else tuple(data["limit_codes"])
-    return AxisDescription(**{**data, **read})
-
-
-def _read_pin(data: Mapping[str, Any]) -> Pin:
-    read: dict[str, Any] = {"direction": PinDirection(data["direction"]), "limits": Limits(**data["limits"])}
-    return Pin(**{**data, **read})
-
-
-def _read_point(data: Mapping[str, Any]) -> Point:
-    read: dict[str, Any] = {
-        "limits": _read_limits(data["limits"]),
-        "values": {int(number): text for number, text in data["values"].items()},
-        "conditions": {int(number): Condition(text) for number, text in data["conditions"].items()},
-        "access": Access(data["access"]),
-        "effect": PointEffect(data["effect"]),
-        "addresses": tuple(PointAddress(**address) for address in data["addresses"]),
-    }
-    return Point(**{**data, **read})
-
-
-def _read_command(data: Mapping[str, Any]) -> CommandDescription:
-    read: dict[str, Any] = {"arguments": tuple(map(read_argument, data["arguments"])), "effect": PointEffect(data["effect"])}
-    return CommandDescription(**{**data, **read})
-
-
-def read_argument(data: Mapping[str, Any]) -> Argument:
-    read: dict[str, Any] = {"limits": _read_limits(data["limits"]), "values": tuple(data["values"])}
-    return Argument(**{**data, **read})
-
-
-def _read_event(data: Mapping[str, Any]) -> EventDescription:
-    facts = tuple(
-        FactDescription(name=one["name"], type=FactType(one["type"]), unit=one["unit"], is_optional=one["is_optional"])
-        for one in data["facts"]
-    )
-    read: dict[str, Any] = {"facts": facts, "severity": EventSeverity(data["severity"])}
-    return EventDescription(**{**data, **read})
-
-
-def _read_detail(data: Mapping[str, Any]) -> Detail:
-    return Detail(data["name"], data["meaning"], FactType(data["type"]), data["unit"], data["is_brief"])
-
-
-def _read_limits(data: Mapping[str, Any] | None) -> Limits | None:
-    return None if data is None else Limits(**data)

@@ -21,6 +21,7 @@ from typing import Annotated, Any, TypeAlias, get_args, get_origin, get_type_hin
 
 from steptwin.durations import LONGEST_NS
 from steptwin.errors import Misuse
+from steptwin.jsonvalues import Schema
 from steptwin.messages import NONE, Message, text_of
 from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
@@ -34,8 +35,6 @@ FASTEST, SLOWEST = 1000.0, 0.001
 
 MISSING: Any = dataclasses.MISSING
 """The default of a field that has to be given."""
-
-Schema = Mapping[str, object]
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,8 @@ from toy.kind import registered
 from typer.testing import CliRunner
 
 from steptwin.cli import app
-from steptwin.datasheet import read_datasheet
+from steptwin.datasheet import Datasheet
+from steptwin.jsonvalues import read
 from steptwin.mic488.datasheet import datasheet_of
 
 
@@ -29,7 +30,7 @@ def test_of_a_firmware_and_of_a_type() -> None:
 
 
 def test_its_json_is_read_back() -> None:
-    assert read_datasheet(json.loads(printed("mic488", "--json"))) == datasheet_of("1.70")
+    assert read(Datasheet, json.loads(printed("mic488", "--json"))) == datasheet_of("1.70")
 
 
 def test_a_kind_of_ones_own_has_one() -> None:

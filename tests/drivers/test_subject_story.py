@@ -15,9 +15,10 @@ from device_rig import CELL, Rig
 from tests.conftest import STEPTWIN, until
 
 from steptwin.controller import SECOND
-from steptwin.controllerstate import read_state
+from steptwin.controllerstate import ControllerState
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
+from steptwin.jsonvalues import read
 from steptwin.live.remote import RemoteSubject
 from steptwin.simulation.script import steps as do
 from steptwin.subject import commands as command
@@ -188,6 +189,6 @@ def test_a_device_answers_the_same_but_for_what_it_cannot_know_or_refuses(told: 
     assert shown["program"] == present["program"]
     assert shown["pins"] == {pin: None if pin in UNKNOWN_PINS else level for pin, level in present["pins"].items()}
     assert shown["details"] == {**present["details"], "user_registers": None}
-    assert read_state(shown).time_s is None
+    assert read(ControllerState, shown).time_s is None
     for key in ("kind", "variant", "status"):
         assert shown[key] == present[key]

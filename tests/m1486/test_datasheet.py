@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from sheets import line, missing, sheet_lines
 
-from steptwin.datasheet import plain
+from steptwin.jsonvalues import plain
 from steptwin.m1486 import findings, functions, lines, registers, variants
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.datasheet import datasheet, datasheet_of

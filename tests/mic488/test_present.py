@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import pytest
 from mic488_rig import EN, MM, Rig, controller, loaded, programmed, started
 
-from steptwin.controllerstate import ControllerState, ProgramActivity, StateProgram, StatusLevel, read_state
-from steptwin.datasheet import plain
+from steptwin.controllerstate import ControllerState, ProgramActivity, StateProgram, StatusLevel
+from steptwin.jsonvalues import plain, read
 from steptwin.mic488.config import AxisConfig, ProgramConfig
 from steptwin.mic488.present import axis_status, controller_status, empty_banks, place_of, state_of, statement_of
 
@@ -169,9 +171,8 @@ def test_json_has_every_member() -> None:
     rig = Rig(controller(MM))
     rig.enable(1)
     found = state(rig)
-    assert found.plain() == plain(found)
-    assert list(found.plain()) == list(plain(found))
-    assert read_state(found.plain()) == found
+    assert list(plain(found)) == [one.name for one in fields(found)]
+    assert read(ControllerState, plain(found)) == found
 
 
 @pytest.mark.parametrize("used", [(), (0,), (1999,), (5, 249, 250, 251, 1000)])

@@ -13,11 +13,11 @@ from toy.kind import TOY, registered
 from typer.testing import CliRunner
 
 from steptwin.cli import app
-from steptwin.datasheet import plain
 from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.files.export import axis_views, read_trace, write_trace
 from steptwin.files.recording import load, recording_of, save
 from steptwin.files.world import World
+from steptwin.jsonvalues import plain
 from steptwin.live import twins
 from steptwin.live.clock import Clock
 from steptwin.live.options import LiveOptions, UpOptions

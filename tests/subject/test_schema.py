@@ -8,9 +8,9 @@ from typing import Any
 
 import jsonschema_rs
 import pytest
-from steptwin.subject.shapes import shape
 
 from steptwin import World
+from steptwin.jsonvalues import shape
 from steptwin.subject.following import filter_of
 from steptwin.subject.payloads import KINDS
 from steptwin.subject.schema import definitions

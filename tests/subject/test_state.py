@@ -11,8 +11,9 @@ import jsonschema_rs
 import pytest
 
 from steptwin import World
-from steptwin.controllerstate import ProgramActivity, StatusLevel, read_state
-from steptwin.datasheet import FactType, plain
+from steptwin.controllerstate import ControllerState, ProgramActivity, StatusLevel
+from steptwin.datasheet import FactType
+from steptwin.jsonvalues import plain, read
 from steptwin.simulation.script.steps import Send, Set
 from steptwin.subject.commands import Advance, Enable, Move, ReadPins, ReadState
 from steptwin.subject.schema import definitions
@@ -58,7 +59,7 @@ def test_states_of_a_running_world_are_as_schema_and_data_sheet_say(path: Path) 
             for part in subject.description.controllers:
                 found, sheet = state(subject, part.name), part.datasheet
                 assert list(schema.iter_errors(found)) == []
-                assert json.loads(json.dumps(plain(read_state(found)))) == found
+                assert json.loads(json.dumps(plain(read(ControllerState, found)))) == found
                 assert (found["kind"], found["variant"]) == (sheet.kind, sheet.variant)
                 assert found["time_s"] == world.now / 1e9
                 assert [(axis["name"], axis["unit"]) for axis in found["axes"]] == [(axis.name, axis.unit) for axis in sheet.axes]
@@ -103,7 +104,7 @@ def test_what_the_program_of_a_chip_does(typed: str, activity: ProgramActivity, 
     subject = WorldSubject(world)
     subject.do(Send("chips", typed.encode()))
     world.run(for_=0.5)
-    found = read_state(state(subject, "k"))
+    found = read(ControllerState, state(subject, "k"))
     assert (found.program.state, found.program.text, found.status.level) == (activity, words, level)
     assert (found.status.text == "ok") is (level is StatusLevel.OK)
 
@@ -115,7 +116,7 @@ def test_a_chip_that_is_shut_down_and_an_axis_at_a_limit_are_warnings() -> None:
     subject.do(Move("m", 1, to=20.0))
     subject.do(Set((("m", "IN1", 1.0), ("k", "SD", 0.0))))
     world.run(for_=0.5)
-    chip, axis = read_state(state(subject, "k")), read_state(state(subject, "m")).axes[0]
+    chip, axis = read(ControllerState, state(subject, "k")), read(ControllerState, state(subject, "m")).axes[0]
     assert (chip.status.level, chip.status.text) == (StatusLevel.WARNING, "shut down")
     assert (axis.status.level, axis.status.text) == (StatusLevel.WARNING, "stopped at limit R")
 

@@ -6,7 +6,8 @@ import json
 from dataclasses import fields
 from typing import Any
 
-from steptwin.datasheet import Datasheet, plain
+from steptwin.datasheet import Datasheet
+from steptwin.jsonvalues import plain
 
 
 def line(item: Any) -> str:

@@ -29,7 +29,7 @@ def command(
     if json:
         from json import dumps
 
-        from steptwin.datasheet import plain
+        from steptwin.jsonvalues import plain
 
         typer.echo(dumps(plain(found), ensure_ascii=False, indent=2))  # ranges are exact, not REAL
     else:

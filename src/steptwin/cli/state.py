@@ -28,9 +28,10 @@ def command(twin: Twin = None, json: Json = False) -> None:
     if json:
         print_data(found)
         return
-    from steptwin.controllerstate import read_state
+    from steptwin.controllerstate import ControllerState
+    from steptwin.jsonvalues import read
 
-    typer.echo("\n".join(_lines(read_state(found), there.sheet(name))))
+    typer.echo("\n".join(_lines(read(ControllerState, found), there.sheet(name))))
 
 
 def _lines(state: ControllerState, sheet: Datasheet) -> Iterator[str]:

@@ -24,6 +24,7 @@ from steptwin.drivers.blocking import Blocking, blocking, finish
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.lineframes import FRAMES, LineFrames, SeenFrame
 from steptwin.errors import Misuse, Refusal
+from steptwin.jsonvalues import plain
 from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.script import steps
@@ -338,7 +339,7 @@ class AsyncDeviceSubject:
 
     async def _state(self, wanted: command.ReadState) -> object:
         found = await self._device.state()
-        return found.plain() if wanted.parts is None else parts_of(found, self._device.datasheet, wanted.parts)
+        return plain(found) if wanted.parts is None else parts_of(found, self._device.datasheet, wanted.parts)
 
     async def _time(self, _: command.Time) -> object:
         now = self.now()

@@ -20,6 +20,7 @@ from steptwin.files.programbanks import Findings, read_banks
 from steptwin.files.programfiles import CompanionFiles
 from steptwin.files.world import World
 from steptwin.inputfiles import read_bytes
+from steptwin.jsonvalues import plain
 from steptwin.languages.descriptions import Named, print_world
 from steptwin.languages.program_run import (
     NOTE,
@@ -312,7 +313,7 @@ def _data(ran: WbcRunResult, *, wrong: bool) -> dict[str, object]:
         "ratio": outcome.ratio,
         "assumed": list(ran.given.placed.assumed),
         "missing_switches": ran.missing,
-        "state": state_of(watch.device, outcome.ending.at).plain(),
+        "state": plain(state_of(watch.device, outcome.ending.at)),
         "events": [_event_data(watch, happening) for happening in watch.happened],
     }
 

@@ -25,6 +25,7 @@ from steptwin.files.export.progress import TimeProgress
 from steptwin.files.timedinputs import TimedInput
 from steptwin.files.world import LONGEST_RUN_NS, World
 from steptwin.files.worldoptions import ShownOptions, WorldRunOptions
+from steptwin.jsonvalues import plain
 from steptwin.languages.program_run import report_causes
 from steptwin.live.interrupts import FirstInterrupt
 from steptwin.simulation.kinds.kind import ProgramAct, ProgramReport
@@ -351,7 +352,7 @@ def _json(world: World, outcome: WorldRunResult, out: Print) -> None:
             name: {"position": axis.position, "unit": axis.unit, "lost_pulses": axis.lost, "stalled": axis.stalled}
             for name, axis in world.axis.items()
         },
-        "controllers": {name: state.plain() for name, state in _states(world).items()},
+        "controllers": {name: plain(state) for name, state in _states(world).items()},
         "files": [str(path) for path in outcome.written],
         "digest": outcome.digest,
     }

@@ -26,10 +26,10 @@ from steptwin.simulation.logic.condition import SignalCondition
 from steptwin.simulation.world.model import WORLD
 from steptwin.simulation.world.snapshot import SimulationSnapshot
 from steptwin.subject import commands as command
-from steptwin.subject import events
 from steptwin.subject.dispatch import Action
 from steptwin.subject.events import line_of
 from steptwin.subject.following import Following
+from steptwin.subject.payloads import PacePayload
 from steptwin.subject.time import MOST_SHOWN, end_of, happened, shown_of
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def read_speed(text: str, least: float = SLOWEST) -> float:
     return speed
 
 
-_STANDS = events.PacePayload(paused=True, speed=None)
+_STANDS = PacePayload(paused=True, speed=None)
 SPEED_MAX_WITH_CLIENTS = Message(
     "live.speed-max-with-clients", "--speed max: this world has lines with external clients, which need real time"
 )
@@ -139,10 +139,10 @@ class Pace:
             self.is_paused = False
             self._go()
 
-    def _goes(self) -> events.PacePayload:
-        return events.PacePayload(paused=False, speed=None if self.speed == inf else self.speed)
+    def _goes(self) -> PacePayload:
+        return PacePayload(paused=False, speed=None if self.speed == inf else self.speed)
 
-    def _say(self, pace: events.PacePayload) -> None:
+    def _say(self, pace: PacePayload) -> None:
         """Notify users and followers."""
         self._show(line_of(self._live.now, WORLD, pace.text))
         self._live.subject.paced(pace)

@@ -9,8 +9,8 @@ from typing import Annotated, Protocol, TypeAlias
 from steptwin.access.roles import KEEP, LOOK
 from steptwin.controller import Nanos
 from steptwin.fields import TIME, Meaning, Schema, whole
+from steptwin.jsonvalues import MOMENT, TEXT, WHOLE, list_of, members
 from steptwin.studio.requesttype import request
-from steptwin.subject.shapes import MOMENT, TEXT, WHOLE, list_of, members
 
 
 class Branches(Protocol):

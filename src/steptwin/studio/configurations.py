@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 
 from steptwin.configuration import ConfigurationFormat, ConfigurationKey, Form, Section
-from steptwin.datasheet import Datasheet, plain
+from steptwin.datasheet import Datasheet
 from steptwin.diagnostics import SourceText, to_json
 from steptwin.errors import Refusal
+from steptwin.jsonvalues import plain
 from steptwin.messages import Message
 from steptwin.simulation.kinds.registry import KINDS
 from steptwin.simulation.world.worldprograms import FINDING

@@ -8,8 +8,8 @@ from typing import Annotated, TypeAlias
 from steptwin.access.roles import KEEP, LOOK
 from steptwin.controller import Nanos
 from steptwin.fields import TIME, Meaning, Schema
+from steptwin.jsonvalues import MOMENT, NUMBER, TEXT, WHOLE, list_of, members, or_null
 from steptwin.studio.requesttype import request
-from steptwin.subject.shapes import MOMENT, NUMBER, TEXT, WHOLE, list_of, members, or_null
 
 _DIFFERENCE = members(
     {

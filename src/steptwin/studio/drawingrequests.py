@@ -8,9 +8,9 @@ from typing import Annotated, Any, Protocol, TypeAlias
 
 from steptwin.access.roles import LOOK, SERVICE
 from steptwin.fields import LONGEST_TEXT, Meaning, Schema, ValueType, check_text, whole, wrong
+from steptwin.jsonvalues import TEXT, members, or_null
 from steptwin.simulation.describe.arrangement import MOST_PLACED, MOST_PX, DrawnPlace
 from steptwin.studio.requesttype import request
-from steptwin.subject.shapes import TEXT, members, or_null
 
 
 class Arrangement(Protocol):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from steptwin.access.roles import ROLES
 from steptwin.fields import Schema
-from steptwin.subject.shapes import FLAG, MOMENT, NUMBER, TEXT, WHOLE, list_of, members, or_null
+from steptwin.jsonvalues import FLAG, MOMENT, NUMBER, TEXT, WHOLE, list_of, members, or_null
 
 VERSION = 1
 """Version of the messages; in the message hello."""

@@ -8,8 +8,8 @@ from typing import Annotated, Protocol, TypeAlias
 
 from steptwin.access.roles import KEEP, LOOK
 from steptwin.fields import Meaning
+from steptwin.jsonvalues import FLAG, MOMENT, TEXT, WHOLE, list_of, members, or_null
 from steptwin.studio.requesttype import request
-from steptwin.subject.shapes import FLAG, MOMENT, TEXT, WHOLE, list_of, members, or_null
 
 
 class Recordings(Protocol):

@@ -15,6 +15,7 @@ from steptwin.access.roles import ACT, LOOK, ROLES, SERVICE, TAKE, Permit
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.fields import PROGRAM, TIME, Meaning, RequestType, Schema, choices, number, whole
+from steptwin.jsonvalues import FLAG, MOMENT, TEXT, WHOLE, list_of, members, or_null
 from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.plaintypes import shown
@@ -30,7 +31,6 @@ from steptwin.studio.toolrequests import FINDING, ToolRequest
 from steptwin.studio.workrequests import WorkRequest
 from steptwin.subject.commands import COMMANDS
 from steptwin.subject.payloads import KINDS
-from steptwin.subject.shapes import FLAG, MOMENT, TEXT, WHOLE, list_of, members, or_null
 
 FASTEST_RATE = 30.0
 """Updates in a second of the wall clock."""

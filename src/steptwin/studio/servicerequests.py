@@ -10,8 +10,8 @@ from steptwin.access.roles import LOOK
 from steptwin.controller import SECOND
 from steptwin.durations import LONGEST_NS
 from steptwin.fields import Meaning, Schema, number, whole
+from steptwin.jsonvalues import FLAG, NUMBER, TEXT, WHOLE, list_of, members, or_null
 from steptwin.studio.requesttype import request
-from steptwin.subject.shapes import FLAG, NUMBER, TEXT, WHOLE, list_of, members, or_null
 
 
 class WorldServices(Protocol):

@@ -26,9 +26,9 @@ from steptwin.fields import (
     read_fields,
     wrong,
 )
+from steptwin.jsonvalues import FLAG, NUMBER, TEXT, WHOLE, list_of, members, or_null, with_sentences
 from steptwin.messages import Message
 from steptwin.studio.requesttype import request
-from steptwin.subject.shapes import FLAG, NUMBER, TEXT, WHOLE, list_of, members, or_null, with_sentences
 from steptwin.wire.pcapng import CapturedFrame
 
 LONGEST_FILE = 48_000

@@ -7,8 +7,8 @@ from typing import Annotated, TypeAlias
 
 from steptwin.access.roles import LOOK, SERVICE
 from steptwin.fields import Meaning, number
+from steptwin.jsonvalues import FLAG, TEXT, WHOLE, list_of, members, or_null
 from steptwin.studio.requesttype import request
-from steptwin.subject.shapes import FLAG, TEXT, WHOLE, list_of, members, or_null
 
 _FOUND = members({"device": {**TEXT, "description": "As connect takes it."}, "what": TEXT})
 _PROBE = members({"what": TEXT, "expected": TEXT, "came": TEXT, "holds": FLAG})

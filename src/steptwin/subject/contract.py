@@ -8,11 +8,12 @@ device behind a driver (`steptwin.drivers.subject`). Unknown values have the qua
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol
 
 from steptwin.controller import Nanos
-from steptwin.datasheet import Datasheet, plain, read_argument, read_datasheet
+from steptwin.datasheet import Datasheet
+from steptwin.jsonvalues import plain, read
 from steptwin.messages import read_message_text, with_messages
 from steptwin.subject.commands import VERSION, Command
 from steptwin.subject.controls import ControlDescription
@@ -200,7 +201,7 @@ class Description:
                     "line": part.line,
                     "unit": part.unit,
                     "controls": part.controls,
-                    "takes": plain(part.takes),
+                    "takes": [plain(taken) for taken in part.takes],
                     "real": part.is_real,
                     "moved": part.is_moved,
                     "no_twin": part.no_twin,
@@ -208,73 +209,27 @@ class Description:
             )
             for part in self.controllers
         ]
-        return {
-            **{field.name: getattr(self, field.name) for field in fields(self)},
-            "controllers": controllers,
-            "axes": [asdict(part) for part in self.axes],
-            "elements": [asdict(part) for part in self.elements],
-            "connections": [asdict(part) for part in self.connections],
-            "lines": [asdict(part) for part in self.lines],
-            "datasheets": [plain(sheet) for sheet in sheets.values()],
-        }
+        sheets_of_all = [plain(sheet) for sheet in sheets.values()]
+        return {**plain(replace(self, controllers=())), "controllers": controllers, "datasheets": sheets_of_all}
 
 
 def read_description(data: Mapping[str, Any]) -> Description:
     """The description in JSON. Raises `TypeError`, `ValueError` or `LookupError`."""
-    sheets = [read_datasheet(sheet) for sheet in data["datasheets"]]
-    controllers = tuple(
+    sheets = [read(Datasheet, sheet) for sheet in data["datasheets"]]
+    controllers = [
         ControllerPart(
             one["name"],
             sheets[one["datasheet"]],
             one["line"],
             one["unit"],
-            tuple(map(_read_control, one["takes"])),
+            tuple([read(ControlDescription, taken) for taken in one["takes"]]),
             is_real=one["real"],
             is_moved=one["moved"],
             no_twin=read_message_text(one, "no_twin"),
         )
         for one in data["controllers"]
-    )
-    axes = tuple(
-        MechanicsPart(
-            one["name"],
-            one["controller"],
-            one["axis"],
-            one["unit"],
-            tuple(one["points"]),
-            one["kind"],
-            None if one["travel"] is None else (one["travel"][0], one["travel"][1]),
-            tuple(SwitchPart(**switch) for switch in one["switches"]),
-            one["pulses_per_unit"],
-        )
-        for one in data["axes"]
-    )
-    elements = tuple(
-        ElementPart(
-            one["name"],
-            one["kind"],
-            tuple(one["inputs"]),
-            tuple(one["outputs"]),
-            tuple(SignalPart(**signal) for signal in one["signals"]),
-            None if one["drawing"] is None else _read_drawing(one["drawing"]),
-            one.get("function"),
-        )
-        for one in data["elements"]
-    )
-    connections = tuple(ConnectionPart(**one) for one in data["connections"])
-    lines = tuple(LinePart(**one) for one in data["lines"])
-    buttons, commands = tuple(data["buttons"]), tuple(data["commands"])
-    return Description(data["name"], controllers, axes, buttons, elements, connections, lines, commands, version=data["version"])
-
-
-def _read_drawing(data: Mapping[str, Any]) -> DrawingPart:
-    switches = tuple(SwitchPart(**switch) for switch in data["switches"])
-    more = (data.get(name, 0.0) for name in ("low", "across", "across_low"))
-    return DrawingPart(data["shape"], data["length"], tuple(data["places"]), data["size"], switches, *more)
-
-
-def _read_control(data: Mapping[str, Any]) -> ControlDescription:
-    return ControlDescription(data["command"], data["axis"], tuple(map(read_argument, data["arguments"])))
+    ]
+    return replace(read(Description, {**data, "controllers": ()}), controllers=tuple(controllers))
 
 
 class Subject(Protocol):

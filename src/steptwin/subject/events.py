@@ -12,14 +12,12 @@ from itertools import count
 from typing import Any
 
 from steptwin.controller import SECOND, Nanos
-from steptwin.messages import read_message_text, with_messages
-from steptwin.motion.plain import read_plan
+from steptwin.messages import with_messages
 from steptwin.simulation.scheduler.trace import KINDS as RECORDS
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.world.records import owner_of
 from steptwin.subject.payloads import (
-    KINDS,
-    BreakpointsPayload,
+    PAYLOADS,
     ButtonPayload,
     CoordinatePayload,
     EdgePayload,
@@ -28,18 +26,12 @@ from steptwin.subject.payloads import (
     FreePayload,
     InputPayload,
     LoadPayload,
-    LogPayload,
     NotePayload,
-    PacePayload,
     Payload,
     PlanPayload,
     ReportPayload,
-    RestoredPayload,
-    SamplePayload,
     StatementPayload,
     StatusPayload,
-    StoppedPayload,
-    WritePayload,
     is_shown,
 )
 from steptwin.tables import complete
@@ -152,62 +144,10 @@ def _owner(controller: str, payload: Payload) -> str:
     return owner_of(controller, payload.facts) if isinstance(payload, StatusPayload) else controller
 
 
-# ---------------------------------------------------------------------- from JSON
-
-
-def _read_input(data: Mapping[str, Any]) -> InputPayload:
-    value = data["value"]
-    if isinstance(value, dict):
-        return InputPayload(data["what"], bytes.fromhex(value["hex"]))
-    return InputPayload(data["what"], tuple(value) if isinstance(value, list) else value)
-
-
-def _read_load(data: Mapping[str, Any]) -> LoadPayload:
-    pieces = ((int(piece["time_ns"]), piece["follows"], piece["pulses"]) for piece in data["pieces"])
-    return LoadPayload(data["axis"], tuple(pieces))
-
-
-def _read_pace(data: Mapping[str, Any]) -> PacePayload:
-    return PacePayload(data["paused"], None if data["speed"] in ("max", None) else data["speed"])
-
-
-def _read_stopped(data: Mapping[str, Any]) -> StoppedPayload:
-    hit = tuple(data["breakpoints"])
-    return StoppedPayload(data["reason"], data["what"], hit, data["program"], data["line"], data["past"])
-
-
-_READ: Mapping[str, Callable[[Mapping[str, Any]], Payload]] = complete(
-    "kind of event",
-    KINDS,
-    "reading",
-    {
-        "plan": lambda data: PlanPayload(data["axis"], read_plan(data["plan"]), data["origin"]),
-        "coordinate": lambda data: CoordinatePayload(data["axis"], data["origin"]),
-        "sample": lambda data: SamplePayload(data["axis"], data["position"], data["unit"], data["velocity"]),
-        "load": _read_load,
-        "free": lambda data: FreePayload(data["axis"], read_plan(data["plan"])),
-        "edge": lambda data: EdgePayload(data["pin"], data["level"]),
-        "frame": lambda data: FramePayload(data["client"], data["direction"], bytes.fromhex(data["data"]), data["words"]),
-        "write": lambda data: WritePayload(data["client"], data["source"], data["words"], data["outcome"]),
-        "statement": lambda data: StatementPayload(data["program"], data["line"]),
-        "status": lambda data: StatusPayload(data["code"], read_message_text(data, "text"), tuple(data["facts"].items())),
-        "note": lambda data: NotePayload(data["note"]),
-        "report": lambda data: ReportPayload(data["code"], read_message_text(data, "what")),
-        "button": lambda data: ButtonPayload(data["button"], data["pressed"]),
-        "input": _read_input,
-        "fault": lambda data: FaultPayload(data["fault"], read_message_text(data, "words")),
-        "pace": _read_pace,
-        "restored": lambda data: RestoredPayload(data["snapshot"]),
-        "stopped": _read_stopped,
-        "log": lambda data: LogPayload(data["words"], data["program"], data["line"]),
-        "breakpoints": lambda data: BreakpointsPayload(tuple(data["breakpoints"]), tuple(data["stop_on"])),
-    },
-)
-
-
 def read_event(data: Mapping[str, Any]) -> Event:
     """The event in JSON. Raises `TypeError`, `ValueError` or `LookupError` for what `Event.plain` does not give."""
-    return Event(data["number"], int(data["time_ns"]), data["controller"], _READ[data["kind"]](data), data["cause"])
+    payload: Any = PAYLOADS[data["kind"]].read(data)
+    return Event(data["number"], int(data["time_ns"]), data["controller"], payload, data["cause"])
 
 
 _CAUSES = (StatementPayload, ButtonPayload, InputPayload, FaultPayload)

@@ -4,22 +4,64 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, TypeAlias, get_args
+from typing import Annotated, Any, ClassVar, Self, TypeAlias, get_args
 
 from steptwin.controller import Fact, Nanos
-from steptwin.messages import Message, text_of
+from steptwin.jsonvalues import FLAG, MOMENT, NUMBER, TEXT, WHOLE, Hexadecimal, JsonForm, list_of, members, or_null, plain, read
+from steptwin.messages import Message, read_message_text, text_of
 from steptwin.motion.divisions import Plan as MotionPlan
 from steptwin.motion.divisions import profile_of
-from steptwin.motion.plain import plain_plan
+from steptwin.motion.plain import plain_plan, read_plan
+
+_NUMBERS = list_of({"type": ["number", "null"]})
+_ARC = members(
+    {
+        "end_s": {"type": ["number", "null"]},
+        "direction": WHOLE,
+        "way": _NUMBERS,
+        "course": _NUMBERS,
+        "half": WHOLE,
+        "end_p": NUMBER,
+    }
+)
+_PLAN = {
+    "type": "object",
+    "description": "Numbers for the position at any moment; docs/control.md has the formulas.",
+    "properties": {
+        "start_ns": MOMENT,
+        "base": WHOLE,
+        "final": NUMBER,
+        "segments": list_of({"anyOf": [_NUMBERS, _ARC]}),
+        "microstepping": _NUMBERS,
+        "divisions": list_of(list_of(WHOLE)),
+    },
+    "required": ["start_ns", "base", "final", "segments"],
+    "additionalProperties": False,
+}
+_JsonPlan: TypeAlias = Annotated[MotionPlan, JsonForm(_PLAN, read_plan, plain_plan)]
+
+
+class JsonPayload:
+    """What a payload is in JSON, by the annotations of its class (`steptwin.jsonvalues`)."""
+
+    __slots__ = ()
+
+    def plain(self) -> dict[str, object]:
+        return plain(self)
+
+    @classmethod
+    def read(cls, data: Mapping[str, Any]) -> Self:
+        """The payload of an event in JSON. Raises `TypeError`, `ValueError` or `LookupError`."""
+        return read(cls, data)
 
 
 @dataclass(frozen=True, slots=True)
-class PlanPayload:
+class PlanPayload(JsonPayload):
     """A new plan of an axis, which holds from the event's moment. Position shown = (position of the plan + origin) / scale."""
 
     kind: ClassVar[str] = "plan"
     axis: str
-    plan: MotionPlan
+    plan: _JsonPlan
     origin: int | None = None
     """Pulses by which the position shown is above that of the plan; None where it is as before."""
 
@@ -27,12 +69,9 @@ class PlanPayload:
     def text(self) -> str:
         return f"axis {self.axis} {'moves' if profile_of(self.plan).segments else 'stands'}"
 
-    def plain(self) -> dict[str, object]:
-        return {"axis": self.axis, "plan": plain_plan(self.plan), "origin": self.origin}
-
 
 @dataclass(frozen=True, slots=True)
-class CoordinatePayload:
+class CoordinatePayload(JsonPayload):
     """From now on the position shown is ``origin`` pulses above that of the plan."""
 
     kind: ClassVar[str] = "coordinate"
@@ -43,12 +82,9 @@ class CoordinatePayload:
     def text(self) -> str:
         return f"axis {self.axis}: zero moved, {self.origin:+d} pulses from power-on"
 
-    def plain(self) -> dict[str, object]:
-        return {"axis": self.axis, "origin": self.origin}
-
 
 @dataclass(frozen=True, slots=True)
-class SamplePayload:
+class SamplePayload(JsonPayload):
     """Where an axis of a device was at the event's moment, in its unit: a device gives samples where a twin gives plans.
 
     Position and velocity (units/s) are None where they are not known.
@@ -66,45 +102,42 @@ class SamplePayload:
             return f"axis {self.axis}: the position is not known"
         return f"axis {self.axis} at {self.position:g} {self.unit}".rstrip()
 
-    def plain(self) -> dict[str, object]:
-        return {"axis": self.axis, "position": self.position, "unit": self.unit, "velocity": self.velocity}
-
 
 @dataclass(frozen=True, slots=True)
-class LoadPayload:
+class LoadPayload(JsonPayload):
     """Where the load of an axis is from now on: (moment, whether it goes with the pulses, how many from them or at which)."""
 
     kind: ClassVar[str] = "load"
     axis: str
-    pieces: tuple[tuple[Nanos, bool, int], ...]
+    pieces: Annotated[
+        tuple[tuple[Nanos, bool, int], ...],
+        JsonForm(
+            list_of(members({"time_ns": MOMENT, "follows": FLAG, "pulses": WHOLE})),
+            lambda pieces: tuple([(int(one["time_ns"]), one["follows"], one["pulses"]) for one in pieces]),
+            lambda pieces: [{"time_ns": str(time), "follows": follows, "pulses": pulses} for time, follows, pulses in pieces],
+        ),
+    ]
 
     @property
     def text(self) -> str:
         return f"axis {self.axis}: load {'follows' if self.pieces and self.pieces[-1][1] else 'is held'}"
 
-    def plain(self) -> dict[str, object]:
-        pieces = [{"time_ns": str(time), "follows": follows, "pulses": pulses} for time, follows, pulses in self.pieces]
-        return {"axis": self.axis, "pieces": pieces}
-
 
 @dataclass(frozen=True, slots=True)
-class FreePayload:
+class FreePayload(JsonPayload):
     """The motion of the load of an axis without current, until the next ``load`` or ``free`` of the axis."""
 
     kind: ClassVar[str] = "free"
     axis: str
-    plan: MotionPlan
+    plan: _JsonPlan
 
     @property
     def text(self) -> str:
         return f"axis {self.axis}: load moves without current"
 
-    def plain(self) -> dict[str, object]:
-        return {"axis": self.axis, "plan": plain_plan(self.plan)}
-
 
 @dataclass(frozen=True, slots=True)
-class EdgePayload:
+class EdgePayload(JsonPayload):
     """A pin has a new level: 0, 1, volts."""
 
     kind: ClassVar[str] = "edge"
@@ -116,12 +149,9 @@ class EdgePayload:
     def text(self) -> str:
         return f"{self.pin}: {self.level:g}"
 
-    def plain(self) -> dict[str, object]:
-        return {"pin": self.pin, "level": self.level}
-
 
 @dataclass(frozen=True, slots=True)
-class FramePayload:
+class FramePayload(JsonPayload):
     """A frame, or characters, on a line, from (``in``) or to (``out``) a client. ``words`` have its meaning, in a running world.
 
     Bytes that belong to no frame have words alone.
@@ -130,20 +160,17 @@ class FramePayload:
     kind: ClassVar[str] = "frame"
     axis: ClassVar[None] = None
     client: str
-    direction: str
-    data: bytes
-    words: str = ""
+    direction: Annotated[str, JsonForm({"enum": ["in", "out"]})]
+    data: Annotated[Hexadecimal, "Hexadecimal; empty for bytes that belong to no frame."]
+    words: Annotated[str, "Its meaning."] = ""
 
     @property
     def text(self) -> str:
         return f"{self.client} {self.direction}: {self.words or self.data.hex(' ')}"
 
-    def plain(self) -> dict[str, object]:
-        return {"client": self.client, "direction": self.direction, "data": self.data.hex(), "words": self.words}
-
 
 @dataclass(frozen=True, slots=True)
-class WritePayload:
+class WritePayload(JsonPayload):
     """A request of a program on a line that is no read, or a line of characters that a host has sent to M1486 chips.
 
     ``client``: its place on the line; ``source``: who is there: an address, the owner of a certificate; ``script`` for scripts
@@ -152,21 +179,18 @@ class WritePayload:
 
     kind: ClassVar[str] = "write"
     axis: ClassVar[None] = None
-    client: str
-    source: str
-    words: str
-    outcome: str
+    client: Annotated[str, "Its place on the line."]
+    source: Annotated[str, "Who is there: an address, the owner of a certificate, a path, or script."]
+    words: Annotated[str, "What was written."]
+    outcome: Annotated[str, JsonForm({"enum": ["done", "refusal", ""]}), "Empty where there is no answer."]
 
     @property
     def text(self) -> str:
         return f"{self.source}: {self.words}{' (refused)' if self.outcome == 'refusal' else ''}"
 
-    def plain(self) -> dict[str, object]:
-        return {"client": self.client, "source": self.source, "words": self.words, "outcome": self.outcome}
-
 
 @dataclass(frozen=True, slots=True)
-class StatementPayload:
+class StatementPayload(JsonPayload):
     """A program executes the statement in a line of its source."""
 
     kind: ClassVar[str] = "statement"
@@ -178,16 +202,13 @@ class StatementPayload:
     def text(self) -> str:
         return f"{self.program}: line {self.line}"
 
-    def plain(self) -> dict[str, object]:
-        return {"program": self.program, "line": self.line}
-
 
 NOT_ENABLED = "drive-off"
 """The code of the event of a controller that ignores a motion (`steptwin.datasheet.Datasheet.events`)."""
 
 
 @dataclass(frozen=True, slots=True)
-class StatusPayload:
+class StatusPayload(JsonPayload):
     """Something happened in a controller or to its mechanics. ``code`` is stable; ``facts`` have the content of its text."""
 
     kind: ClassVar[str] = "status"
@@ -205,14 +226,19 @@ class StatusPayload:
         return self.words
 
     def plain(self) -> dict[str, object]:
+        """Its text is that of the event, and its axis one of the facts."""
         return {"code": self.code, "axis": self.axis, "facts": dict(self.facts)}
+
+    @classmethod
+    def read(cls, data: Mapping[str, Any]) -> StatusPayload:
+        return cls(data["code"], read_message_text(data, "text"), tuple(data["facts"].items()))
 
 
 NOTE = Message("subject.note", "note: {note}")
 
 
 @dataclass(frozen=True, slots=True)
-class NotePayload:
+class NotePayload(JsonPayload):
     """A text of a script or an operator."""
 
     kind: ClassVar[str] = "note"
@@ -223,9 +249,6 @@ class NotePayload:
     def text(self) -> str:
         return NOTE(note=self.note)
 
-    def plain(self) -> dict[str, object]:
-        return {"note": self.note}
-
 
 EXPECTATION = Message("subject.expectation", "expectation: {what}")
 OVERDUE = Message("subject.overdue", "overdue: {what}")
@@ -234,7 +257,7 @@ REPORTS = {"expectation": EXPECTATION, "overdue": OVERDUE}
 
 
 @dataclass(frozen=True, slots=True)
-class ReportPayload:
+class ReportPayload(JsonPayload):
     """An expectation that does not hold, or what was waited for in vain (``code`` expectation or overdue)."""
 
     kind: ClassVar[str] = "report"
@@ -246,16 +269,13 @@ class ReportPayload:
     def text(self) -> str:
         return REPORTS[self.code](what=text_of(self.what))
 
-    def plain(self) -> dict[str, object]:
-        return {"code": self.code, "what": self.what}
-
 
 PRESSED = Message("subject.button-pressed", "{button}: pressed")
 RELEASED = Message("subject.button-released", "{button}: released")
 
 
 @dataclass(frozen=True, slots=True)
-class ButtonPayload:
+class ButtonPayload(JsonPayload):
     """A button is pressed or released."""
 
     kind: ClassVar[str] = "button"
@@ -267,9 +287,6 @@ class ButtonPayload:
     def text(self) -> str:
         return (PRESSED if self.pressed else RELEASED)(button=self.button)
 
-    def plain(self) -> dict[str, object]:
-        return {"button": self.button, "pressed": self.pressed}
-
 
 INPUT = Message("subject.input", "{what}: {value}")
 TURNED = Message("subject.turned", "{shaft} turned: {counts}")
@@ -277,14 +294,27 @@ POWER_CYCLE = Message("subject.power-cycle", "power-cycle:")
 POWER_CYCLE_OF = Message("subject.power-cycle-of", "power-cycle: {what}")
 
 
+def _read_value(value: Any) -> object:
+    if isinstance(value, dict):
+        return bytes.fromhex(value["hex"])
+    return tuple(value) if isinstance(value, list) else value
+
+
 @dataclass(frozen=True, slots=True)
-class InputPayload:
+class InputPayload(JsonPayload):
     """Something else from outside: ``power-cycle``, ``request``, ``vision``, a turned shaft."""
 
     kind: ClassVar[str] = "input"
     axis: ClassVar[None] = None
     what: str
-    value: object
+    value: Annotated[
+        object,
+        JsonForm(
+            {},
+            _read_value,
+            lambda value: {"hex": value.hex()} if isinstance(value, bytes) else value,
+        ),
+    ]
 
     @property
     def text(self) -> str:
@@ -295,15 +325,12 @@ class InputPayload:
             return TURNED(shaft=self.what.removesuffix(" turned"), counts=value)
         return INPUT(what=self.what, value=value) if value else f"{self.what}:"
 
-    def plain(self) -> dict[str, object]:
-        return {"what": self.what, "value": {"hex": self.value.hex()} if isinstance(self.value, bytes) else self.value}
-
 
 FAULT = Message("subject.fault", "{fault}: {effect}")
 
 
 @dataclass(frozen=True, slots=True)
-class FaultPayload:
+class FaultPayload(JsonPayload):
     """A fault has struck, or does so no more."""
 
     kind: ClassVar[str] = "fault"
@@ -315,9 +342,6 @@ class FaultPayload:
     def text(self) -> str:
         return FAULT(fault=self.fault, effect=text_of(self.words))
 
-    def plain(self) -> dict[str, object]:
-        return {"fault": self.fault, "words": self.words}
-
 
 PAUSED = Message("subject.paused", "paused")
 RUNNING = Message("subject.running", "running")
@@ -326,13 +350,20 @@ RUNNING_AT = Message("subject.running-at", "running, {speed:g} virtual seconds p
 
 
 @dataclass(frozen=True, slots=True)
-class PacePayload:
+class PacePayload(JsonPayload):
     """From the event's moment time stands, or goes at a speed: virtual seconds in a second, None as many as there can be."""
 
     kind: ClassVar[str] = "pace"
     axis: ClassVar[None] = None
     paused: bool
-    speed: float | None
+    speed: Annotated[
+        float | None,
+        JsonForm(
+            {"anyOf": [NUMBER, {"const": "max"}, {"type": "null"}]},
+            lambda speed: None if speed == "max" else speed,
+            lambda speed: "max" if speed is None else speed,
+        ),
+    ]
 
     @property
     def text(self) -> str:
@@ -342,34 +373,28 @@ class PacePayload:
             return RUNNING_FAST()
         return RUNNING() if self.speed == 1.0 else RUNNING_AT(speed=self.speed)
 
-    def plain(self) -> dict[str, object]:
-        return {"paused": self.paused, "speed": "max" if self.speed is None else self.speed}
-
 
 BACK_IN_TIME = Message("subject.back-in-time", "time went back to here")
 BACK_AT_SNAPSHOT = Message("subject.back-at-snapshot", "back at snapshot {name}")
 
 
 @dataclass(frozen=True, slots=True)
-class RestoredPayload:
+class RestoredPayload(JsonPayload):
     """The world is as it was at the event's moment, which may be before those of earlier events: all values may be others. The
     plans of all axes follow."""
 
     kind: ClassVar[str] = "restored"
     axis: ClassVar[None] = None
-    snapshot: str | None
-    """Its name; None for a moment that was looked at."""
+    snapshot: Annotated[str | None, "Its name; null without one."]
+    """None for a moment that was looked at."""
 
     @property
     def text(self) -> str:
         return BACK_IN_TIME() if self.snapshot is None else BACK_AT_SNAPSHOT(name=self.snapshot)
 
-    def plain(self) -> dict[str, object]:
-        return {"snapshot": self.snapshot}
-
 
 @dataclass(frozen=True, slots=True)
-class StoppedPayload:
+class StoppedPayload(JsonPayload):
     """A debugger stands at the event's moment, which may be in the past while time stands at the present.
 
     ``reason``: ``entry``, ``step``, ``breakpoint``, ``function breakpoint`` (a label), ``data breakpoint``, ``exception`` (an
@@ -391,19 +416,9 @@ class StoppedPayload:
         where = "" if self.line is None else f" in line {self.line} of {self.program}"
         return f"stopped: {self.reason}{where}{', ' if self.what else ''}{self.what}"
 
-    def plain(self) -> dict[str, object]:
-        return {
-            "reason": self.reason,
-            "what": self.what,
-            "breakpoints": list(self.breakpoints),
-            "program": self.program,
-            "line": self.line,
-            "past": self.past,
-        }
-
 
 @dataclass(frozen=True, slots=True)
-class LogPayload:
+class LogPayload(JsonPayload):
     """The text of a breakpoint that logs, when it was passed."""
 
     kind: ClassVar[str] = "log"
@@ -416,25 +431,35 @@ class LogPayload:
     def text(self) -> str:
         return f"{self.program}, line {self.line}: {self.words}"
 
-    def plain(self) -> dict[str, object]:
-        return {"words": self.words, "program": self.program, "line": self.line}
-
 
 @dataclass(frozen=True, slots=True)
-class BreakpointsPayload:
+class BreakpointsPayload(JsonPayload):
     """Time stops at these breakpoints and events from now on. ``breakpoints`` are as the command ``breakpoints`` gives them."""
 
     kind: ClassVar[str] = "breakpoints"
     axis: ClassVar[None] = None
-    breakpoints: tuple[Mapping[str, object], ...]
+    breakpoints: Annotated[
+        tuple[Mapping[str, object], ...],
+        JsonForm(
+            list_of(
+                members(
+                    {
+                        "number": WHOLE,
+                        **dict.fromkeys(("controller", "program"), or_null(TEXT)),
+                        "line": or_null(WHOLE),
+                        **dict.fromkeys(("label", "value", "condition", "hits", "log", "problem"), or_null(TEXT)),
+                    }
+                )
+            ),
+            tuple,
+            lambda breakpoints: list(map(dict, breakpoints)),
+        ),
+    ]
     stop_on: tuple[str, ...]
 
     @property
     def text(self) -> str:
         return f"{len(self.breakpoints)} breakpoints; stops on {', '.join(self.stop_on) or 'no events'}"
-
-    def plain(self) -> dict[str, object]:
-        return {"breakpoints": [dict(one) for one in self.breakpoints], "stop_on": list(self.stop_on)}
 
 
 Payload: TypeAlias = (
@@ -459,7 +484,8 @@ Payload: TypeAlias = (
     | LogPayload
     | BreakpointsPayload
 )
-KINDS: tuple[str, ...] = tuple(payload.kind for payload in get_args(Payload))
+PAYLOADS: Mapping[str, type[JsonPayload]] = {payload.kind: payload for payload in get_args(Payload)}
+KINDS: tuple[str, ...] = tuple(PAYLOADS)
 SHOWN_KINDS = frozenset({"status", "note", "report", "button", "input", "fault", "pace", "restored"})
 """Kinds that are shown to a user; the others are as frequent as requests."""
 STEP_KINDS = SHOWN_KINDS | {"edge", "plan"}

@@ -10,106 +10,18 @@ from typing import Any, get_type_hints
 from steptwin.controllerstate import ControllerState
 from steptwin.datasheet import Datasheet
 from steptwin.fields import LONGEST_ID, Field
+from steptwin.jsonvalues import MOMENT, TEXT, members, or_null, shape, with_sentences
 from steptwin.simulation.script.command import CommandType
 from steptwin.subject.commands import COMMANDS, VERSION
 from steptwin.subject.contract import Description
 from steptwin.subject.controls import ControlDescription
-from steptwin.subject.payloads import KINDS
-from steptwin.subject.shapes import FLAG, MOMENT, NUMBER, TEXT, WHOLE, members, or_null, shape, with_sentences
-from steptwin.tables import complete
+from steptwin.subject.payloads import PAYLOADS
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 _ID = {"type": ["string", "integer", "null"], "maxLength": LONGEST_ID, "description": "Comes back with the answer."}
 _NUMBER = {"type": "integer", "minimum": 1, "description": "Commands and events are numbered together."}
 _NUMBER_OF_EVENT = {**_NUMBER, "minimum": 0, "description": "Commands and events are numbered together; 0: a plan from before."}
 _TEXT_OR_NULL = {"type": ["string", "null"]}
-_REAL_OR_NULL = {"type": ["number", "null"]}
-_NUMBERS = {"type": "array", "items": {"type": ["number", "null"]}}
-_ARC = members(
-    {
-        "end_s": {"type": ["number", "null"]},
-        "direction": WHOLE,
-        "way": _NUMBERS,
-        "course": _NUMBERS,
-        "half": WHOLE,
-        "end_p": NUMBER,
-    }
-)
-_PLAN = {
-    "type": "object",
-    "description": "Numbers for the position at any moment; docs/control.md has the formulas.",
-    "properties": {
-        "start_ns": MOMENT,
-        "base": WHOLE,
-        "final": NUMBER,
-        "segments": {"type": "array", "items": {"anyOf": [_NUMBERS, _ARC]}},
-        "microstepping": _NUMBERS,
-        "divisions": {"type": "array", "items": {"type": "array", "items": WHOLE}},
-    },
-    "required": ["start_ns", "base", "final", "segments"],
-    "additionalProperties": False,
-}
-_PAYLOADS: Mapping[str, Mapping[str, object]] = complete(
-    "kind of event",
-    KINDS,
-    "schema",
-    {
-        "plan": {"axis": TEXT, "plan": _PLAN, "origin": {"type": ["integer", "null"]}},
-        "coordinate": {"axis": TEXT, "origin": WHOLE},
-        "sample": {"axis": TEXT, "position": _REAL_OR_NULL, "unit": TEXT, "velocity": _REAL_OR_NULL},
-        "load": {
-            "axis": TEXT,
-            "pieces": {"type": "array", "items": members({"time_ns": MOMENT, "follows": FLAG, "pulses": WHOLE})},
-        },
-        "free": {"axis": TEXT, "plan": _PLAN},
-        "edge": {"pin": TEXT, "level": NUMBER},
-        "frame": {
-            "client": TEXT,
-            "direction": {"enum": ["in", "out"]},
-            "data": {**TEXT, "description": "Hexadecimal; empty for bytes that belong to no frame."},
-            "words": {**TEXT, "description": "Its meaning."},
-        },
-        "write": {
-            "client": {**TEXT, "description": "Its place on the line."},
-            "source": {**TEXT, "description": "Who is there: an address, the owner of a certificate, a path, or script."},
-            "words": {**TEXT, "description": "What was written."},
-            "outcome": {"enum": ["done", "refusal", ""], "description": "Empty where there is no answer."},
-        },
-        "statement": {"program": TEXT, "line": WHOLE},
-        "status": {"code": TEXT, "axis": _TEXT_OR_NULL, "facts": {"type": "object"}},
-        "note": {"note": TEXT},
-        "report": {"code": TEXT, "what": TEXT},
-        "button": {"button": TEXT, "pressed": FLAG},
-        "input": {"what": TEXT, "value": {}},
-        "fault": {"fault": TEXT, "words": TEXT},
-        "restored": {"snapshot": {"anyOf": [TEXT, {"type": "null"}], "description": "Its name; null without one."}},
-        "stopped": {
-            "reason": TEXT,
-            "what": TEXT,
-            "breakpoints": {"type": "array", "items": WHOLE},
-            "program": _TEXT_OR_NULL,
-            "line": {"type": ["integer", "null"]},
-            "past": FLAG,
-        },
-        "log": {"words": TEXT, "program": TEXT, "line": WHOLE},
-        "breakpoints": {
-            "breakpoints": {
-                "type": "array",
-                "items": members(
-                    {
-                        "number": WHOLE,
-                        "controller": _TEXT_OR_NULL,
-                        "program": _TEXT_OR_NULL,
-                        "line": {"type": ["integer", "null"]},
-                        **dict.fromkeys(("label", "value", "condition", "hits", "log", "problem"), _TEXT_OR_NULL),
-                    }
-                ),
-            },
-            "stop_on": {"type": "array", "items": TEXT},
-        },
-        "pace": {"paused": FLAG, "speed": {"anyOf": [NUMBER, {"const": "max"}, {"type": "null"}]}},
-    },
-)
 
 
 def schema() -> dict[str, object]:
@@ -178,7 +90,9 @@ def _answer() -> dict[str, object]:
 
 
 def _event() -> dict[str, object]:
-    return {"oneOf": [_event_of(kind, given) for kind, given in _PAYLOADS.items()]}
+    status = {"code": TEXT, "axis": _TEXT_OR_NULL, "facts": {"type": "object"}}
+    own: Mapping[str, Any] = {kind: shape(payload)["properties"] for kind, payload in PAYLOADS.items() if kind != "status"}
+    return {"oneOf": [_event_of(kind, own.get(kind, status)) for kind in PAYLOADS]}
 
 
 def _event_of(kind: str, given: Mapping[str, object]) -> dict[str, object]:

@@ -9,6 +9,7 @@ from typing import Any, get_args
 
 from steptwin.controller import Nanos
 from steptwin.errors import Refusal
+from steptwin.jsonvalues import plain
 from steptwin.messages import Message
 from steptwin.simulation.components.registry import failing
 from steptwin.simulation.faults.kinds import rows
@@ -248,7 +249,7 @@ class WorldSubject:
         reader = self.world.kind(wanted.controller).state
         if wanted.parts is not None:
             return reader.parts(controller, self.world.now, wanted.parts)
-        return reader(controller, self.world.now).plain()
+        return plain(reader(controller, self.world.now))
 
     def _encoders(self, wanted: command.Encoders) -> object:
         encoders = self.world.encoders(wanted.controller)

@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn, TypeAlias, TypeVar
 import pytest
 
 from steptwin.controller import SECOND, Nanos, Port
-from steptwin.controllerstate import ControllerState, read_state
+from steptwin.controllerstate import ControllerState
 from steptwin.errors import Misuse
 from steptwin.files.world import World
+from steptwin.jsonvalues import read
 from steptwin.live.world import LiveWorld, PlacePort
 from steptwin.live.world_frames import follow_frames
 from steptwin.simulation.describe.generated import LINE
@@ -250,7 +251,7 @@ class LineRig(Rig):
     def state(self) -> ControllerState:
         """Its status, program, axes, pins and details at present. The twin's."""
         __tracebackhide__ = True
-        return read_state(self._do("state", command.ReadState(self._controller)))
+        return read(ControllerState, self._do("state", command.ReadState(self._controller)))
 
     @property
     def pins(self) -> Mapping[str, float]:

@@ -11,12 +11,13 @@ from chip_rig import ChipWire, chip_task_line
 from device_rig import Rig
 from line_rig import run_virtual
 
-from steptwin.controllerstate import ProgramActivity, read_state
+from steptwin.controllerstate import ControllerState, ProgramActivity
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.m1486 import M1486, AsyncM1486, Busy
 from steptwin.drivers.m1486.subject import M1486Part
 from steptwin.drivers.subject import DeviceSubject, RawEffect
 from steptwin.errors import Misuse, Refusal, SteptwinError
+from steptwin.jsonvalues import read
 from steptwin.simulation.script import steps as do
 from steptwin.subject import commands as command
 from steptwin.subject.contract import UNKNOWN
@@ -55,24 +56,24 @@ def test_the_state_of_an_m1486_is_known_at_rest(drum: DeviceSubject, rig: Rig) -
     twin = WorldSubject(rig.world)
     drum.do(do.Send("chips", b"t41\r"))
     drum.read("drum.counter", "drum.variable", *(f"drum.U{number}" for number in (14, 17, 18, 19)))
-    found, there = (read_state(subject.do(command.ReadState("drum")).value) for subject in (drum, twin))
+    found, there = (read(ControllerState, subject.do(command.ReadState("drum")).value) for subject in (drum, twin))
     known = ("counter", "counter_valid", "variable", "flags_on", "functions_on")
     assert {name: value for name, value in found.details.items() if value is not None} == {n: there.details[n] for n in known}
     assert found.details.keys() == there.details.keys()
     assert (found.kind, found.variant, found.program.state) == (there.kind, there.variant, ProgramActivity.STOPPED)
     assert found.pins == dict.fromkeys(there.pins)
     drum.do(command.Move("drum", 1, by=5000.0))
-    found = read_state(drum.do(command.ReadState("drum")).value)
+    found = read(ControllerState, drum.do(command.ReadState("drum")).value)
     assert (found.program.state, found.axes[0].position, found.axes[0].moving) == (None, None, None)
     assert {found.status.text, found.axes[0].status.text, found.program.text} == {"moves, waits or runs its program"}
     rig.time.sleep(60.0)
-    found = read_state(drum.do(command.ReadState("drum")).value)
+    found = read(ControllerState, drum.do(command.ReadState("drum")).value)
     assert {found.status.text, found.axes[0].status.text, found.program.text} == {"is at rest"}
     rig.time.sleep(60.0)
-    found = read_state(drum.do(command.ReadState("drum")).value)
+    found = read(ControllerState, drum.do(command.ReadState("drum")).value)
     assert (found.axes[0].position, found.axes[0].velocity, found.axes[0].moving) == (None, 0.0, False), "not read yet"
     drum.read("drum.counter")
-    assert read_state(drum.do(command.ReadState("drum")).value).axes[0].position == 5000.0
+    assert read(ControllerState, drum.do(command.ReadState("drum")).value).axes[0].position == 5000.0
 
 
 def test_an_m1486_jogs_and_stops(drum: DeviceSubject, rig: Rig) -> None:

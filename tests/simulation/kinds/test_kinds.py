@@ -14,9 +14,10 @@ from facts import check_facts
 
 import steptwin.mic488
 from steptwin import m1486
-from steptwin.datasheet import Access, Limits, PointAddress, PointEffect, plain
+from steptwin.datasheet import Access, Limits, PointAddress, PointEffect
 from steptwin.errors import Misuse
 from steptwin.files.world import World
+from steptwin.jsonvalues import plain
 from steptwin.m1486.events import M1486Event
 from steptwin.m1486.variants import VARIANTS
 from steptwin.mic488.events import EVENTS
