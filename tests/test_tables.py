@@ -83,8 +83,8 @@ def test_a_complete_table_is_read_only() -> None:
         ),
         (
             "import steptwin.simulation.world.inputs as t; t.ExternalInput |= int",
-            "steptwin.simulation.world.references",
-            "step int lacks its check",
+            "steptwin.simulation.world.actions",
+            "step int lacks its action",
         ),
         *(
             (f"import steptwin.wbc.statements as t; {change}", "steptwin.mic488.program_motion", message)
