@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Awaitable, Callable, Coroutine, Mapping
+from functools import cache
 from pathlib import PurePath
 from typing import Any, NamedTuple, TypeAlias
 
@@ -294,11 +295,17 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
 }
 
 
+@cache
+def _members_of_answers() -> Mapping[str, object]:
+    """Schemas of what an answer has besides its result."""
+    answer: Any = definitions()["(answer)"]
+    return {name: one for name, one in answer["properties"].items() if name not in ("id", "error")}
+
+
 def _done(ok: object) -> dict[str, Any]:
     """The response to a request whose answer has the schema ``ok``."""
-    answer: Any = definitions()["(answer)"]
-    properties = {name: one for name, one in answer["properties"].items() if name not in ("id", "error")}
-    schema = {"type": "object", "properties": {**properties, "ok": _local(ok)}, "required": ["ok", "number", "time_ns"]}
+    properties = {**_members_of_answers(), "ok": _local(ok)}
+    schema = {"type": "object", "properties": properties, "required": ["ok", "number", "time_ns"]}
     return {"description": STATUS_TEXTS[DONE], "content": {"application/json": {"schema": schema}}}
 
 
