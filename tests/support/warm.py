@@ -8,6 +8,7 @@ are those of any process. The command as a shell starts it is what `test_docs_ru
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import ctypes
 import gc
@@ -17,6 +18,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -119,4 +121,13 @@ if __name__ == "__main__":
             sys.exit()
     from steptwin.cli import main
 
-    sys.exit(main())
+    try:
+        code: object = main()
+    except SystemExit as ended:
+        code = ended.code
+    if isinstance(code, str) or any(not one.daemon for one in {*threading.enumerate()} - {threading.main_thread()}):
+        sys.exit(code)  # type: ignore[arg-type]
+    # To take all modules down again would take half a second.
+    atexit._run_exitfuncs()
+    sys.stdout.flush()
+    os._exit(code if isinstance(code, int) else 0)
