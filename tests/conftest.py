@@ -45,9 +45,9 @@ T = TypeVar("T")
 pytest_plugins = ["pytester"]
 
 # A deadline on the wall clock would make a test depend on what else the machine is doing.
-settings.register_profile("steptwin", deadline=None)
+settings.register_profile("steptwin", deadline=None, max_examples=40)
 # A change is judged by the same examples every time; `make test` on a developer's machine draws new ones.
-settings.register_profile("same", deadline=None, derandomize=True)
+settings.register_profile("same", deadline=None, max_examples=40, derandomize=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "steptwin"))
 
 # Commands that tests start inherit ignored signals: SIGINT from a shell without job control (`make test &`), SIGHUP from nohup.

@@ -63,14 +63,14 @@ programs = st.tuples(bodies, bodies, bodies, bodies, bodies).map(
 levels = st.lists(st.tuples(st.integers(0, 300), st.integers(1, 2), st.integers(0, 1)), max_size=10).map(sorted)
 
 
-@settings(max_examples=100)
+@settings(max_examples=60)
 @given(programs, levels)
 def test_what_is_never_reached_is_never_executed(text: str, happens: list[tuple[int, int, int]]) -> None:
     found = explained(text)
     assert {number for _, number in executed(text, happens)}.isdisjoint(found.unreachable)
 
 
-@settings(max_examples=100)
+@settings(max_examples=60)
 @given(programs, levels)
 def test_a_loop_that_is_never_left_is_never_left(text: str, happens: list[tuple[int, int, int]]) -> None:
     found = explained(text)
@@ -84,7 +84,7 @@ def test_a_loop_that_is_never_left_is_never_left(text: str, happens: list[tuple[
 settled = st.sampled_from(("S100", "S300", "V800", "V1500", "A2000", "F640", "B6400", "F64000", "D", "W25", "T3", "R", "R", "+1"))
 
 
-@settings(max_examples=100)
+@settings(max_examples=60)
 @given(st.lists(settled, min_size=1, max_size=12), st.sampled_from(("B", "B2x")))
 def test_measured_durations_are_the_explained_ones(commands: list[str], kind: str) -> None:
     text = "\n".join(["[", *commands, "T1", "]"]) + "\n"

@@ -91,7 +91,7 @@ def executed(device: Mic488Device, happens: list[tuple[int, int, bool]] = []) ->
     return found
 
 
-@settings(max_examples=100, suppress_health_check=[HealthCheck.filter_too_much])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.filter_too_much])
 @given(wandering(), inputs)
 def test_what_is_never_reached_is_never_executed(text: str, happens: list[tuple[int, int, bool]]) -> None:
     if check(text).executable is None:
@@ -103,7 +103,7 @@ def test_what_is_never_reached_is_never_executed(text: str, happens: list[tuple[
     assert seen <= {*in_blocks, len(found.statements)}
 
 
-@settings(max_examples=100, suppress_health_check=[HealthCheck.filter_too_much])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.filter_too_much])
 @given(wandering(), inputs)
 def test_a_loop_that_is_never_left_is_never_left(text: str, happens: list[tuple[int, int, bool]]) -> None:
     if check(text).executable is None:
@@ -163,7 +163,7 @@ MOVES = (
 )
 
 
-@settings(max_examples=100)
+@settings(max_examples=60)
 @given(st.lists(st.sampled_from(MOVES), min_size=1, max_size=14))
 def test_measured_durations_are_the_explained_ones(moves: list[str]) -> None:
     text = "\n".join(["M1 = ON", "PABS M1 7", "WAITPOS", "x = 0", *moves, "$I0 = x", "END"]) + "\n"

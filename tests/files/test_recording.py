@@ -359,7 +359,7 @@ def test_digests_are_the_same_everywhere(name: str) -> None:
     assert world.trace.digest() == GOLDEN[name]
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(way=WAYS, value=VALUES)
 def test_a_session_of_other_values_is_refused_or_replayed(way: list[int], value: Any, tmp_path: Path) -> None:
     world = World.from_toml('[[mic488]]\nname = "a"\nline = "l"\n[[line]]\nname = "l"\n')

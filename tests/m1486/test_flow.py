@@ -78,7 +78,7 @@ def walk(stream: CommandStream, chance: random.Random) -> Iterator[tuple[int, Se
         at = target
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(PIECES, PIECES, PIECES, PIECES, st.integers(0, 2**32))
 # The internal variable is 2^24 - 1: with M64 a right multiple, but no distance.
 @example([], [], [], [":1", "-2", "L2", "M64", "E", "F"], 0)

@@ -201,7 +201,7 @@ class Played:
         return self.look(), dict(device.pins()), list(device.events), device.deadline(), device.copy_state()
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(script=SCRIPTS, looks=st.lists(st.integers(0, 10**6), max_size=30))
 def test_advancing_in_steps_and_looking_change_nothing(script: list[tuple[Action, Nanos]], looks: list[int]) -> None:
     one, other = Played(), Played()
@@ -220,7 +220,7 @@ def test_advancing_in_steps_and_looking_change_nothing(script: list[tuple[Action
     assert one.device.take_edges() == other.device.take_edges()
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(script=SCRIPTS)
 def test_from_event_to_event_the_deadline_is_always_later_and_the_end_is_the_same(script: list[tuple[Action, Nanos]]) -> None:
     one, other = Played(), Played()
@@ -261,7 +261,7 @@ def test_edges_lead_from_the_first_pins_to_the_last(script: list[tuple[Action, N
 # ---------------------------------------------------------------------- snapshots
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(script=SCRIPTS, cut=st.integers(0, 14))
 def test_a_snapshot_put_back_changes_nothing_and_goes_on_alike(script: list[tuple[Action, Nanos]], cut: int) -> None:
     one, other = Played(), Played(BUSY)

@@ -366,7 +366,7 @@ VALUE_PDU = st.builds(
 )
 
 
-@settings(max_examples=150)
+@settings(max_examples=60)
 @given(
     pdus=st.lists(st.tuples(ANY_PDU | VALUE_PDU, st.integers(0, 10**10)), max_size=25),
     lenient=st.booleans(),

@@ -74,7 +74,7 @@ def check_train(train: StepTrain, pulses: list[tuple[int, int]], begin: int, unt
 
 
 @given(curve=curves, micro=microsteppings, direction=directions, begin=begins, way=st.integers(1, 4000))
-@settings(max_examples=200)
+@settings(max_examples=80)
 def test_m_26_a_move_changes_its_division_in_flight(
     curve: SpeedCurve, micro: Microstepping, direction: int, begin: int, way: int
 ) -> None:
@@ -97,7 +97,7 @@ def test_m_26_a_move_changes_its_division_in_flight(
     share=st.floats(0.0, 1.0),
     landing=st.sampled_from([None, 64]),
 )
-@settings(max_examples=200)
+@settings(max_examples=80)
 def test_m_26_a_forced_stop_changes_back_in_flight(
     *, curve: SpeedCurve, micro: Microstepping, direction: int, begin: int, share: float, landing: int | None
 ) -> None:
@@ -126,7 +126,7 @@ def test_m_26_a_forced_stop_changes_back_in_flight(
 
 
 @given(curve=curves, micro=microsteppings, direction=directions, looks=st.lists(st.floats(0.0, 1.0), min_size=3, max_size=5))
-@settings(max_examples=100)
+@settings(max_examples=60)
 def test_windows_of_a_train_concatenate(curve: SpeedCurve, micro: Microstepping, direction: int, looks: list[float]) -> None:
     profile = plan_distance(0, 0, direction * micro.fine * 3000, curve)
     train = step_train(profile, 0, micro)

@@ -134,7 +134,7 @@ def exactly(move: Move) -> Exact:
 
 
 @every_move
-@settings(max_examples=300)
+@settings(max_examples=100)
 def test_a_position_move_is_the_exact_solution(move: Move) -> None:
     assume(abs(move.brake_p - abs(move.distance - move.phase)) > 1e-5)
     profile = move.plan()
@@ -158,7 +158,7 @@ def test_a_position_move_is_the_exact_solution(move: Move) -> None:
 
 
 @every_move
-@settings(max_examples=200)
+@settings(max_examples=80)
 def test_a_position_move_ends_at_rest_on_its_target(move: Move) -> None:
     profile = move.plan()
     assert profile.end is not None
@@ -198,7 +198,7 @@ def check_limits(profile: Profile, seconds: float, move: Move) -> None:
 
 
 @every_move
-@settings(max_examples=150)
+@settings(max_examples=60)
 def test_limits_are_kept_and_the_position_is_the_integral_of_the_velocity(move: Move) -> None:
     profile = move._replace(base=0).plan()
     assert profile.end is not None
@@ -207,7 +207,7 @@ def test_limits_are_kept_and_the_position_is_the_integral_of_the_velocity(move: 
 
 
 @given(phase=phases, v=velocities, to=velocities, acc=rates, dec=rates)
-@settings(max_examples=150)
+@settings(max_examples=60)
 def test_a_velocity_is_reached_by_the_shortest_ramps(phase: float, v: float, to: float, acc: float, dec: float) -> None:
     profile = plan_velocity(MotionState(0, 0, phase, v), to, acc, dec)
     if v * to < 0.0:
@@ -238,7 +238,7 @@ def test_a_stop_takes_speed_over_deceleration_and_half_that_way(phase: float, v:
 
 
 @given(move=moves, share=st.floats(0.0, 1.0))
-@settings(max_examples=200)
+@settings(max_examples=80)
 def test_the_same_command_again_changes_nothing(move: Move, share: float) -> None:
     """Above all within the last ramp, where a rounding error must not look like a brake too late."""
     move = move._replace(phase=0.0, v=0.0, start=0, distance=move.distance % 10**6 - 500_000)
@@ -311,7 +311,7 @@ extremes = st.sampled_from([1e-60, 1e-45, 1.4e-20, 1.0, 3.4e38, 1e60])
     dec=extremes,
     vmax=extremes,
 )
-@settings(max_examples=300)
+@settings(max_examples=100)
 def test_no_permitted_parameter_overflows(*, v: float, to: float, distance: int, acc: float, dec: float, vmax: float) -> None:
     state = MotionState(0, 0, 0.5, v)
     move = plan_position(state, distance, acc, dec, vmax)

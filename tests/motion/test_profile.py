@@ -94,7 +94,7 @@ def moment_of(wish: int | str, profile: Profile, now: int) -> int:
 
 
 @given(start=st.integers(0, 10**15), plan=st.lists(st.tuples(commands, moments), min_size=1, max_size=4))
-@settings(max_examples=100)
+@settings(max_examples=60)
 def test_looks_agree_with_stepping_through_every_nanosecond(start: int, plan: list[tuple[Command, int | str]]) -> None:
     profile = at_rest(start, 0)
     stepper = Stepper(0)
@@ -148,7 +148,7 @@ replacements = st.builds(
 
 
 @given(replacement=replacements, steps=st.lists(st.integers(1, 3000), min_size=1, max_size=8))
-@settings(max_examples=300)
+@settings(max_examples=100)
 def test_the_count_jumps_exactly_at_the_pulse_times(replacement: Replacement, steps: list[int]) -> None:
     """Also after a replacement in flight, at any distance from it, on the way out and back."""
     profile = replacement.plan()
@@ -284,7 +284,7 @@ def exact_root(segment: Segment, position: float) -> Fraction:
     direction=st.sampled_from([1, -1]),
     rising=st.booleans(),
 )
-@settings(max_examples=150)
+@settings(max_examples=60)
 def test_cubic_segments_are_solved_to_the_last_digits(
     slow: float, ratio: float, part: float, direction: int, rising: bool
 ) -> None:

@@ -106,7 +106,7 @@ def moments_within(profile: Profile, pulses: int, shares: list[float]) -> list[i
 
 
 @given(profile=any_motion, shares=st.lists(st.floats(0.0, 1.0), min_size=2, max_size=6), nudge=st.integers(-1, 1))
-@settings(max_examples=200)
+@settings(max_examples=80)
 def test_windows_concatenate_and_sum_to_the_count(profile: Profile, shares: list[float], nudge: int) -> None:
     """Whatever the moments of the looks: also exactly at a pulse, and one nanosecond from it."""
     looks = moments_within(profile, 6000, shares)
@@ -126,7 +126,7 @@ def test_windows_concatenate_and_sum_to_the_count(profile: Profile, shares: list
 
 
 @given(profile=any_motion, shares=st.lists(st.floats(0.0, 1.0), min_size=2, max_size=2))
-@settings(max_examples=200)
+@settings(max_examples=80)
 def test_arrays_and_single_looks_agree_exactly(profile: Profile, shares: list[float]) -> None:
     after, until = moments_within(profile, 3000, shares)
     count, previous = profile.count(max(after, profile.start)), after

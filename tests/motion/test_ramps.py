@@ -122,7 +122,7 @@ def agree(profile: Profile, now: int, way: Decimal, speed: Decimal, direction: i
 
 
 @with_curves(direction=directions, share=shares)
-@settings(max_examples=150)
+@settings(max_examples=60)
 def test_m_6_m_8_an_endless_motion_follows_the_integrated_curve(curve: SpeedCurve, direction: int, share: float) -> None:
     rise = Rise(curve)
     profile = plan_endless(7, -300, direction, curve)
@@ -136,7 +136,7 @@ def test_m_6_m_8_an_endless_motion_follows_the_integrated_curve(curve: SpeedCurv
 
 
 @with_curves(direction=directions, share=shares, ways=((0.01, 1.0), st.tuples(st.floats(0.0, 1.0), st.floats(0.5, 3.0))))
-@settings(max_examples=200)
+@settings(max_examples=80)
 def test_m_7_a_move_is_its_rise_and_the_mirror_image(
     curve: SpeedCurve, direction: int, share: float, ways: tuple[float, float]
 ) -> None:
@@ -161,7 +161,7 @@ def test_m_7_a_move_is_its_rise_and_the_mirror_image(
 
 
 @with_curves(direction=directions, share=shares, way=(777, st.integers(1, 10**6)))
-@settings(max_examples=200)
+@settings(max_examples=80)
 def test_a_move_ends_on_its_target_with_every_pulse(curve: SpeedCurve, direction: int, share: float, way: int) -> None:
     begin = int(share * 2**24)
     target = begin + direction * way
@@ -178,7 +178,7 @@ def test_a_move_ends_on_its_target_with_every_pulse(curve: SpeedCurve, direction
 
 
 @with_curves(k=(100_000, st.integers(1, 10**6)))
-@settings(max_examples=150)
+@settings(max_examples=60)
 def test_pulses_are_the_first_nanosecond_after_the_integrated_position(curve: SpeedCurve, k: int) -> None:
     rise = Rise(curve)
     profile = plan_endless(0, 0, 1, curve)
@@ -195,7 +195,7 @@ landings = (16, st.sampled_from([1, 2, 16, 64, 256]))
 @with_curves(
     direction=directions, share=shares, landing=landings, way=(40_000, st.integers(1, 10**5)), begin=(7, st.integers(-300, 300))
 )
-@settings(max_examples=300)
+@settings(max_examples=100)
 def test_a_forced_stop_is_the_mirror_image_of_the_rise_to_its_speed(
     *, curve: SpeedCurve, direction: int, share: float, landing: int, way: int, begin: int
 ) -> None:
@@ -232,7 +232,7 @@ def test_a_forced_stop_is_the_mirror_image_of_the_rise_to_its_speed(
 
 
 @with_curves(direction=directions, share=shares, way=(4000, st.integers(1, 10**4)))
-@settings(max_examples=200)
+@settings(max_examples=80)
 def test_a_stop_forced_in_the_last_ramp_ends_where_the_move_would_have_ended(
     curve: SpeedCurve, direction: int, share: float, way: int
 ) -> None:

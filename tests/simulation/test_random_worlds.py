@@ -10,16 +10,15 @@ from steptwin.simulation.describe.steptable import ACTIONS
 from steptwin.simulation.faults.kinds import KINDS
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("name", SCENES)
 def test_a_world_goes_on_alike(name: str, seed: int) -> None:
     check_it_goes_on_alike(name, seed)
 
 
-@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("name", SCENES)
-def test_a_description_without_an_error_can_be_built_and_no_other(name: str, seed: int) -> None:
-    check_mistakes_are_found(name, seed)
+def test_a_description_without_an_error_can_be_built_and_no_other(name: str) -> None:
+    check_mistakes_are_found(name, seed=1)
 
 
 def test_everything_is_in_one_of_them() -> None:

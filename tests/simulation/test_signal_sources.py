@@ -228,7 +228,7 @@ def history(text: str) -> list[object]:
     return found
 
 
-@settings(deadline=None, max_examples=40, suppress_health_check=list(HealthCheck))
+@settings(deadline=None, max_examples=12, suppress_health_check=list(HealthCheck))
 @given(st.randoms(use_true_random=False))
 def test_to_evaluate_everything_at_every_event_changes_nothing(random: Random) -> None:
     layout = Layout(random)

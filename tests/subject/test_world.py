@@ -214,7 +214,7 @@ def messages(draw: st.DrawFn) -> dict[str, Any]:
     return {"do": row.name, "id": draw(LEAVES), **fields, **draw(st.dictionaries(st.text(max_size=3), LEAVES, max_size=1))}
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(given=st.lists(messages(), max_size=8))
 def test_no_exception_escapes_the_dispatcher(given: list[dict[str, Any]]) -> None:
     subject = of(feeder())
@@ -224,7 +224,7 @@ def test_no_exception_escapes_the_dispatcher(given: list[dict[str, Any]]) -> Non
         assert answer.get("error", {}).get("code") in (None, "misuse", "refusal")
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(line=st.binary(max_size=80) | st.text(max_size=40).map(str.encode))
 def test_every_line_has_an_answer(line: bytes) -> None:
     subject = of(small())

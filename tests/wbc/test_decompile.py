@@ -277,7 +277,7 @@ def images(draw: DrawFn) -> bytes:
     return image_of([record.ljust(16, b"\0") for record in records], draw(st.lists(row, max_size=4)))
 
 
-@settings(max_examples=200)
+@settings(max_examples=80)
 @given(images())
 def test_round_trip(data: bytes) -> None:
     assert again(decompile(data)) == data

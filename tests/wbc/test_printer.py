@@ -194,7 +194,7 @@ def said(text: str) -> list[SourceLine]:
     return lines
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(
     st.one_of(
         st.text(max_size=200),
@@ -208,7 +208,7 @@ def test_any_text_keeps_its_meaning(text: str) -> None:
     assert format_text(printed) == printed
 
 
-@settings(max_examples=100)
+@settings(max_examples=60)
 @given(data=st.data())
 def test_valid_programs_check_clean_before_and_after(programs: SearchStrategy, data: DataObject) -> None:
     program = data.draw(programs)

@@ -142,7 +142,7 @@ def signals_of(formula: PropertyFormula, a: Values, b: Values) -> dict[Any, Valu
 BOTH = st.integers(1, 12).flatmap(lambda n: st.tuples(*[st.lists(VALUES, min_size=n, max_size=n)] * 2))
 
 
-@settings(max_examples=400)
+@settings(max_examples=100)
 @given(formulas(windows=True), BOTH)
 @example("always (within 3 ns a.x > 0)", ([Fraction(-1)] * 5, [Fraction(1)] * 5))
 @example("eventually ((a.x > 0) for 3 ns)", ([Fraction(-1), Fraction(1)], [Fraction(1)] * 2))
@@ -154,7 +154,7 @@ def test_the_sign_of_a_value_is_the_truth_at_every_moment(text: str, both: tuple
         assert (value_at(found, t) > 0) is truth(formula, signals, t, open_is=True), t
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(formulas(windows=False), BOTH)
 def test_without_windows_the_value_is_that_of_signal_temporal_logic(text: str, both: tuple[Values, Values]) -> None:
     formula = parse_property(text)
@@ -185,7 +185,7 @@ def line_of(knots: list[tuple[int, Fraction]]) -> tuple[list[Slope], Values]:
 KNOTS = st.lists(VALUES, min_size=3, max_size=3).map(lambda some: [(7, one) for one in some])
 
 
-@settings(max_examples=200)
+@settings(max_examples=80)
 @given(formulas(windows=True), KNOTS, KNOTS)
 def test_straight_intervals_are_true_and_false_where_their_moments_are(text: str, a: Any, b: Any) -> None:
     formula = parse_property(text)
@@ -204,7 +204,7 @@ def meeting_at_a_moment(*eighths: int) -> list[tuple[int, Fraction]]:
     return [(7, Fraction(one, 8)) for one in eighths]
 
 
-@settings(max_examples=200)
+@settings(max_examples=80)
 @given(formulas(windows=False), KNOTS, KNOTS)
 @example("(a.x > 0) implies (b.x > 0)", meeting_at_a_moment(3, 1, 1), meeting_at_a_moment(-7, 2, 1))
 def test_straight_intervals_have_the_distances_of_their_moments(text: str, a: Any, b: Any) -> None:
@@ -296,7 +296,7 @@ def counted() -> st.SearchStrategy[str]:
     )
 
 
-@settings(max_examples=300)
+@settings(max_examples=100)
 @given(counted(), BOTH, st.randoms(use_true_random=False))
 @example("count(a.x > 0) >= 2", ([Fraction(-1)] * 2, [Fraction(1)] * 2), random.Random(1))
 @example("count(a.x > 0) < 0", ([Fraction(-1)] * 2, [Fraction(1)] * 2), random.Random(1))

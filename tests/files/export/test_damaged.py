@@ -61,7 +61,7 @@ def test_a_head_with_another_value_is_refused_or_exported(way: list[int], value:
     check_that_it_is_refused_or_exported(path)
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(number=st.integers(0, 10**6), way=WAYS, value=VALUES)
 def test_a_record_with_another_value_and_the_right_digest_is_refused_or_exported(
     number: int, way: list[int], value: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -228,7 +228,7 @@ def test_at_standstill_the_first_torque_holds() -> None:
 # ---------------------------------------------------------------------- when a quadratic goes below 0
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(
     q2=st.floats(-50.0, 50.0).filter(lambda q: abs(q) > 1e-3),
     middle=st.floats(-2.0, 2.0),
@@ -259,7 +259,7 @@ def test_the_first_moment_below_0_is_that_of_a_dense_scan(q2: float, middle: flo
     assert all(value(u) > -1e-9 for u in moments if u < found)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(
     parabolas=st.lists(st.tuples(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(-5.0, 5.0)), min_size=1, max_size=2),
     begin=st.floats(-1.0, 0.9),

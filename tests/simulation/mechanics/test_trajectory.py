@@ -55,7 +55,7 @@ def pressed(build: Build, profile: Profile, until: Nanos) -> list[tuple[Nanos, i
     return list(way.values())
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     first=st.integers(-120, 120),
     second=st.integers(-120, 120),

@@ -125,7 +125,7 @@ def graphs(draw: st.DrawFn) -> list[set[int]]:
     return [draw(st.sets(st.integers(0, count - 1), max_size=3)) - {number} for number in range(count)]
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(graphs(), st.sets(st.integers(0, 8), max_size=2))
 @example([{2}, {3, 6}, {4, 6}, {0, 4}, {0, 1, 2, 3, 6}, {0, 7}, {3, 4}, {1, 5}], {3, 4})
 def test_only_within_a_loop_does_a_part_come_before_what_drives_it(after: list[set[int]], late: set[int]) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 from tests.support.toy.controller import Bare
@@ -78,6 +78,7 @@ class Book(RuleBasedStateMachine):
 TestBook = Book.TestCase
 
 
+@settings(max_examples=20)
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 1000)), min_size=300, max_size=400))
 def test_outdated_entries_are_cleared_away(moments: list[tuple[int, int]]) -> None:
     agenda: Any = Agenda()
