@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import socket
 import subprocess
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -117,12 +116,6 @@ def test_a_jog_that_is_killed_ends_by_itself_and_the_position_is_right(serve_m14
     assert state["details"]["counter"] == state["axes"][0]["position"]
 
 
-def test_an_e_type_is_not_jogged(serve_m1486: Callable[..., Any]) -> None:
-    twin = serve_m1486("--variant", "E1")
-    refused = twin.command("jog", "1=100", "--seconds", "1", "--device", "m1486")
-    assert (refused.returncode, refused.stderr.count("writes every command into its EEPROM")) == (1, 1), refused.stderr
-
-
 def test_seek_is_no_command_of_a_mic488(serve: Callable[..., Any]) -> None:
     refused = serve("--demo").command("seek", "1=-B3")
     assert (refused.returncode, refused.stderr) == (2, "steptwin: a MIC488 has no seek\n")
@@ -173,46 +166,6 @@ def test_scanning(serve_m1486: Callable[..., Any], serve: Callable[..., Any]) ->
     alone = scan(str(controller.pty), "--kind", "m1486")
     assert (alone.returncode, alone.stderr) == (1, f"no device responded on {controller.pty}\n")
     assert scan(places[2], "--kind", "mic488", "--units", "1").returncode == 0
-
-
-def position_of(twin: Any, place: str, chip: int) -> float:
-    found = json.loads(twin.command("get", "POSITION", "-d", f"{place},chip={chip}", "--json").stdout)
-    return float(found["POSITION"]["value"] if isinstance(found["POSITION"], dict) else found["POSITION"])
-
-
-def test_a_terminal_moves_the_chip_it_was_told_whatever_stands_in_the_input_buffers(serve_m1486: Callable[..., Any]) -> None:
-    """The bytes of a Modbus master, the beginning of a command and another selection are in front of the first command."""
-    twin = serve_m1486("--variant", "B", "--chain", "0,7")
-    place = f"tcp://127.0.0.1:{twin.tcp_port}"
-    device = f"{place},chip=7"
-
-    def terminal(script: str) -> tuple[int, str, str]:
-        done = twin.command("terminal", "-d", device, script=script)
-        return done.returncode, done.stdout, done.stderr
-
-    for noise in (b"", bytes.fromhex("01 03 27 74 00 02 8e 67"), b"f999", b"r"):
-        with socket.create_connection(("127.0.0.1", twin.tcp_port)) as line:
-            line.sendall(b"xg\rxg\rt41\rx0\r")
-            time.sleep(0.2)
-            line.sendall(noise)
-            time.sleep(0.2)
-        before = position_of(twin, place, 0)
-        stood = position_of(twin, place, 7)
-        with socket.create_connection(("127.0.0.1", twin.tcp_port)) as line:
-            line.sendall(b"x0\r" + noise)
-            time.sleep(0.2)
-        assert terminal("f640\nr\nwait\n") == (0, "42H  U20 type letter in ASCII: M1486B\n", "")
-        assert position_of(twin, place, 7) == stood + 10.0, noise
-        assert position_of(twin, place, 0) == before, noise
-
-
-def test_a_terminal_to_a_chip_that_is_not_there_types_only_k(serve_m1486: Callable[..., Any]) -> None:
-    twin = serve_m1486("--variant", "B", "--chain", "0,7")
-    place = f"tcp://127.0.0.1:{twin.tcp_port}"
-    for script, code in (("f640\nr\n", 1), ("k\n", 0)):
-        run = twin.command("terminal", "-d", f"{place},chip=5", script=script)
-        assert (run.returncode, run.stdout) == (code, "")
-    assert position_of(twin, place, 0) == position_of(twin, place, 7) == 0.0
 
 
 def test_info_without_a_kind_leaves_nothing_in_front_of_the_next_command(serve_m1486: Callable[..., Any]) -> None:
