@@ -145,14 +145,15 @@ class Reader:
         else:
             if program == "steptwin" and words[1] in ("replay", "run", "export"):
                 self._end("up")  # what it has recorded is written at its end
-            return self._check(["bash", "-c", line])
+            is_alone = program == "steptwin" and not {*"|<>&;$*?"}.intersection(line)
+            return self._check([str(BIN / "steptwin"), *words[1:]] if is_alone else ["bash", "-c", line])
         return ""
 
     def _check(self, command: list[str]) -> str:
         ended = subprocess.run(
             command, cwd=self._cwd, env=self._environment, capture_output=True, text=True, timeout=LIMIT_S, check=False
         )
-        output = f"{command[-1]}\nexit code {ended.returncode}\n{ended.stdout[-2000:]}{ended.stderr[-2000:]}"
+        output = f"{shlex.join(command)}\nexit code {ended.returncode}\n{ended.stdout[-2000:]}{ended.stderr[-2000:]}"
         assert ended.returncode == 0, output
         assert "Traceback" not in ended.stderr, output
         return ended.stdout
@@ -172,7 +173,7 @@ class Reader:
         if "[[mic488]]" not in text:
             text = (self._cwd / "examples/worlds/feeder.toml").read_text() + text
         (self._cwd / "machine.toml").write_text(text)
-        self._check(["bash", "-c", "steptwin run machine.toml --for 100ms"])
+        self._check([str(BIN / "steptwin"), "run", "machine.toml", "--for", "100ms"])
 
     def _start(self, words: list[str]) -> None:
         name = words[2] if words[1] == "serve" else "up"

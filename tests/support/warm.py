@@ -1,7 +1,7 @@
 """The command `steptwin` in processes that begin warm: forked from one that has imported what most of its work needs.
 
 Those imports take a second of a processor, and hundreds of tests start the command. Sockets, signals, descriptors and the end
-are those of any process. The command as a shell starts it is what `test_docs_run.py` runs.
+are those of any process. `cli/test_main.py` and `test_wheel.py` start it as users do.
 
 `python warm.py FD` waits at this end of a pair of sockets for requests: JSON, with the descriptors 0, 1 and 2 of the process.
 """
