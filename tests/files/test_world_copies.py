@@ -77,7 +77,7 @@ def in_another_process(*what: object) -> Any:
     return pickle.loads(found.stdout)
 
 
-@pytest.mark.parametrize("name", ["feeder.toml", "pick_and_place/pick_and_place.toml", "hoist/hoist.toml", "winder/winder.toml"])
+@pytest.mark.parametrize("name", ["feeder.toml", "pick_and_place/pick_and_place.toml", "press/press.toml"])
 def test_worlds_and_snapshots_go_between_processes(name: str) -> None:
     """There and back: both go on from where they are."""
     world = World.load(EXAMPLES / name, seed=4)

@@ -5,9 +5,18 @@ The shortcuts that this concerns are listed in the architecture page.
 
 from __future__ import annotations
 
-from compositions import as_it_is, composed, copies, generally, looked_on
+import re
+
+from compositions import BASE, PARTS, as_it_is, composed, copies, generally, looked_on
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from steptwin.simulation.components.registry import ELEMENTS
+
+
+def test_every_element_can_be_in_one() -> None:
+    there = {table for text in (BASE, *PARTS) for table in re.findall(r"^\[\[([a-z]+)\]\]", text, re.MULTILINE)}
+    assert set(ELEMENTS) <= there
 
 
 @settings(max_examples=6, deadline=None)
