@@ -22,9 +22,9 @@ from steptwin.simulation.space.pieces import (
     Piece,
     geared,
     pieces_of_cam,
-    pieces_of_course,
     pieces_of_profile,
     pieces_of_response,
+    pieces_of_trajectory,
     pieces_of_travel,
     span,
     standing,
@@ -41,8 +41,8 @@ CUBIC = Profile(0, 0, (Segment(0.4, 0.0, 0.0, 10.0, 500.0, -300.0, 1),), 64.8)
 WAY = Profile(0, 0, (ramp(0.0, 0.0, 0.0, 50.0, 200.0), cruise(0.25, 1.0, 6.25, 50.0)), 43.75)
 ARC = Circular(0.0, 1000.0, 0.3, 0.1).profile(WAY, 890, None)
 END: Nanos = SECOND + 200 * MILLISECOND
-COURSE = Trajectory(Build(high=300, play=7, period_p=16, zero=4), THERE, 0, MechanicalState(4, 4))
-RESPONSE = Response(Spring(17.0, 0.08), load_intervals(COURSE, 0), 0.0, 0.0)
+TRAJECTORY = Trajectory(Build(high=300, play=7, period_p=16, zero=4), THERE, 0, MechanicalState(4, 4))
+RESPONSE = Response(Spring(17.0, 0.08), load_intervals(TRAJECTORY, 0), 0.0, 0.0)
 CAM = Cam([(Fraction(0), Fraction(0)), (Fraction(50), Fraction(9)), (Fraction(120), Fraction(3))], Fraction(160))
 
 
@@ -61,7 +61,7 @@ MOTIONS: dict[str, tuple[Callable[[Nanos], Iterator[Piece]], Callable[[Nanos], f
     "profile": (lambda now: pieces_of_profile(THERE, now), THERE.position, 1e-9),
     "cubic": (lambda now: pieces_of_profile(CUBIC, now), CUBIC.position, 1e-9),
     "arc": (lambda now: pieces_of_profile(ARC, now), ARC.position, 1e-9),
-    "trajectory": (lambda now: pieces_of_course(COURSE, now), COURSE.position, 1e-9),
+    "trajectory": (lambda now: pieces_of_trajectory(TRAJECTORY, now), TRAJECTORY.position, 1e-9),
     "response": (lambda now: pieces_of_response(RESPONSE, now), lambda now: RESPONSE.at(now)[0], 1e-9),
     "travel": (lambda now: pieces_of_travel(TRAVEL, now), lambda now: float(TRAVEL.place(now)), 0.0),
     "cam": (

@@ -118,10 +118,10 @@ class ArcPiece(Piece):
 
     def _turning(self, begin: Nanos, end: Nanos) -> tuple[float, float]:
         """Bounds of the angular speed and its rate, rad."""
-        way, per_way = self.segment.travel, abs(self.segment.curve.turn_q) * QUARTER
+        travel, per_travel = self.segment.travel, abs(self.segment.curve.turn_q) * QUARTER
         times = [(t - self.start) / SECOND for t in (begin, end)]
-        rate = max(abs(2.0 * way.c2 + 6.0 * way.c3 * (t - way.anchor_s)) for t in times)
-        return per_way * max(abs(way.velocity(t)) for t in times), per_way * rate
+        rate = max(abs(2.0 * travel.c2 + 6.0 * travel.c3 * (t - travel.anchor_s)) for t in times)
+        return per_travel * max(abs(travel.velocity(t)) for t in times), per_travel * rate
 
     def speed(self, begin: Nanos, end: Nanos) -> float:
         return self.segment.curve.radius_p * self._turning(begin, end)[0]
@@ -210,7 +210,7 @@ def standing(position: float) -> Motion:
 # ---------------------------------------------------------------------- what moves in a controller
 
 
-def pieces_of_course(trajectory: Trajectory, now: Nanos) -> Iterator[Piece]:
+def pieces_of_trajectory(trajectory: Trajectory, now: Nanos) -> Iterator[Piece]:
     """The load of an axis between its whole pulses, in pulses."""
     profile = profile_of(trajectory.plan) if trajectory.coasting is None else trajectory.coasting
     sign, zero = trajectory.build.sign, trajectory.build.zero
