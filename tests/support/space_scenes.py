@@ -279,10 +279,10 @@ def grown(scene: Scene, more: int) -> Scene:
 
 def grazing(scene: Scene) -> tuple[Scene, Scene] | None:
     """Two scenes, a nm apart in size: in the first the bodies pass each other, in the second they touch. None where they touch
-    already."""
-    if Model(scene).deepest()[1] > 0.5:
-        return None
+    already, or are far from it."""
     low, high = 0, 1 << 27
+    if Model(scene).deepest()[1] > 0.5 or Model(grown(scene, high)).deepest()[1] <= 0.5:
+        return None
     while high - low > 1:
         middle = (low + high) // 2
         low, high = (low, middle) if Model(grown(scene, middle)).deepest()[1] > 0.5 else (middle, high)

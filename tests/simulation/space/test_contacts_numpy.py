@@ -53,7 +53,9 @@ def test_contacts_are_those_of_the_model(block: int) -> None:
         model, pair = Model(scene), Pair(*bodies_of(scene))
         touch = model.at(0) > 0.5
         assert pair.overlap(0) is touch, seed
-        ours = contacts([float(moment) for moment in found_by_search(pair)], touch=touch)
+        changes = found_by_search(pair)
+        assert all(pair.overlap(moment) is not pair.overlap(moment - 1) for moment in changes), seed
+        ours = contacts([float(moment) for moment in changes], touch=touch)
         theirs = contacts(model.changes(), touch=touch)
         assert len(long_ones(ours)) == len(long_ones(theirs)), seed
         for one, other in zip(long_ones(ours), long_ones(theirs), strict=True):

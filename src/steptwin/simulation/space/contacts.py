@@ -114,7 +114,7 @@ class _Bounds(NamedTuple):
 class _Stretch:
     """A time in which each joint between the bodies of a pair goes through one piece: from ``begin`` to ``end``, with both."""
 
-    __slots__ = ("_begin", "_end", "_pieces", "_positions", "_slides", "_turns", "_ways", "looks", "pair")
+    __slots__ = ("_begin", "_common", "_end", "_pieces", "_positions", "_slides", "_turns", "_ways", "looks", "pair")
 
     def __init__(self, pair: Pair, pieces: Sequence[Piece], begin: Nanos, end: Nanos) -> None:
         self.pair = pair
@@ -129,9 +129,12 @@ class _Stretch:
         """Of all joints; those that move are replaced."""
         turning = [n for n in self._pieces if pair.steps[n].turns]
         self._turns = bool(turning)
-        views = [sum(step.is_back for step in pair.steps), *turning, *(n + 1 for n in turning)]
-        self._ways = min(map(self._ways_from, views), key=self._bend_of) if turning else self._ways_from(views[0])
-        """To both bodies from the frame between them from which they are seen: that from which their ways are straightest."""
+        self._common = self._ways_from(sum(step.is_back for step in pair.steps))
+        """To both bodies from the last frame that both are on: where rounding errors would decide whether they overlap, they are
+        those from there, whenever and from wherever a search began."""
+        views = (self._ways_from(split) for n in turning for split in (n, n + 1))
+        self._ways = min(self._common, *views, key=self._bend_of) if turning else self._common
+        """From the frame between them from which they are seen: that from which their ways are straightest."""
         self._slides = [*self._find_slides()]
 
     # ------------------------------------------------------------------ search
@@ -237,8 +240,14 @@ class _Stretch:
         positions = self._positions.copy()
         for n, piece in self._pieces.items():
             positions[n] = piece.at(now)
-        placed = self._placed(0, self._ways[0], positions), self._placed(1, self._ways[1], positions)
-        return _Spot(now, placed, *gap(*placed))
+        placed = self._both(self._ways, positions)
+        apart, way = gap(*placed)
+        if abs(apart - OVERLAP_NM) < NOISE_NM:
+            apart = gap(*self._both(self._common, positions)).apart
+        return _Spot(now, placed, apart, way)
+
+    def _both(self, ways: tuple[_Way, _Way], positions: Sequence[float]) -> tuple[Placed, Placed]:
+        return self._placed(0, ways[0], positions), self._placed(1, ways[1], positions)
 
     def _placed(self, body: int, way: _Way, positions: Sequence[float]) -> Placed:
         at = along([step for _, step in way], [positions[n] for n, _ in way], self.pair.axis)[-1]
