@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from steptwin.diagnostics import MOST_SHOWN, Diagnostic, Fix, Severity, SourceText, Span, in_order, render, to_json
+from steptwin.diagnostics import MOST_SHOWN, Diagnostic, Fix, Severity, SourceText, Span, diagnostics_to_json, in_order, render
 
 
 def found(start: int, end: int, code: str = "W101", hint: str | None = None, fix: Fix | None = None) -> Diagnostic:
@@ -106,9 +106,11 @@ def test_render_joins_several_and_of_none_is_empty() -> None:
     ]
 
 
-def test_to_json_is_plain_data_with_places_from_one() -> None:
+def test_diagnostics_to_json_has_places_from_one() -> None:
     source = SourceText("feed.prg", "GO\nEND\n")
-    rows = to_json(source, [found(3, 6, fix=Fix(Span(2, 6), "")), Diagnostic("W300", Severity.NOTE, Span(0, 2), "m", "h")])
+    rows = diagnostics_to_json(
+        source, [found(3, 6, fix=Fix(Span(2, 6), "")), Diagnostic("W300", Severity.NOTE, Span(0, 2), "m", "h")]
+    )
     assert json.loads(json.dumps(rows)) == [
         {
             "file": "feed.prg",
@@ -168,4 +170,4 @@ def test_long_words_and_many_findings_are_cut() -> None:
     shown = render(SourceText("x", "ab"), [Diagnostic("W1", Severity.ERROR, Span(0, 1), "odd")] * 20_000)
     assert shown.count("odd") == MOST_SHOWN
     assert shown.endswith("\nx: 19900 more are not shown")
-    assert len(to_json(SourceText("x", "ab"), many)) == 20_000
+    assert len(diagnostics_to_json(SourceText("x", "ab"), many)) == 20_000

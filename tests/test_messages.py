@@ -264,11 +264,11 @@ def test_an_error_is_the_same_after_pickling_copying_and_json(wide: Message, kin
     for other in (pickle.loads(pickle.dumps(error)), copy.deepcopy(error)):
         assert type(other) is kind
         assert vars(other).keys() == vars(error).keys()
-        assert (str(other), text_of(other).plain()) == (str(error), text_of(error).plain())
+        assert (str(other), text_of(other).to_json()) == (str(error), text_of(error).to_json())
     by_json = raised(json.loads(json.dumps(failure(error)))["error"])
     assert type(by_json) in (Misuse, Refusal, LineFailure)
     assert isinstance(error, type(by_json)) or code_of(error) == "failure"
-    assert (str(by_json), text_of(by_json).plain()) == (str(error), text_of(error).plain())
+    assert (str(by_json), text_of(by_json).to_json()) == (str(error), text_of(error).to_json())
 
 
 def test_what_json_has_no_number_for_is_a_text(wide: Message) -> None:

@@ -193,7 +193,7 @@ def product_classes() -> Iterator[type[Stateful]]:
 def test_everything_that_has_state_is_in_these_tests() -> None:
     world = everything()
     world.run(for_=0.1)
-    plan: Any = world.parts
+    plan: Any = world.objects
     seen: dict[int, Stateful] = {}
     parts([Ports(), plan.faults, plan.lines], seen)
     for scheduler in plan.schedulers:

@@ -17,7 +17,7 @@ from register_bank import RegisterBank
 
 from steptwin.baseprotocol import message_bytes, read_body
 from steptwin.controller import MILLISECOND, SECOND
-from steptwin.drivers.mic488.frames import FrameWords
+from steptwin.drivers.mic488.frames import FrameLog
 from steptwin.drivers.mic488.listening import RtuListener, TcpListener
 from steptwin.drivers.modbus import ModbusQuery, RtuMaster, TcpMaster
 from steptwin.errors import Misuse
@@ -73,7 +73,7 @@ def timed(bank: RegisterBank, *, strict: bool = False) -> TimedUnits:
 
 
 def heard(pieces: list[bytes]) -> list[Any]:
-    words = FrameWords()
+    words = FrameLog()
     frames: list[Any] = []
     words.sinks.append(frames.append)
     ear, now = RtuListener(words), 0
@@ -88,7 +88,7 @@ def heard(pieces: list[bytes]) -> list[Any]:
 
 
 def heard_over_tcp(pieces: list[bytes]) -> list[Any]:
-    words = FrameWords(tcp=True)
+    words = FrameLog(tcp=True)
     frames: list[Any] = []
     words.sinks.append(frames.append)
     ear = TcpListener(words)

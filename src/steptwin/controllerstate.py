@@ -15,7 +15,7 @@ from typing import Generic, TypeAlias, TypeVar, cast
 from steptwin.controller import SECOND, Nanos
 from steptwin.datasheet import AxisDescription, Datasheet, Detail
 from steptwin.errors import Misuse
-from steptwin.jsonvalues import plain
+from steptwin.jsonvalues import to_json
 from steptwin.messages import Message
 from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss
@@ -153,14 +153,14 @@ class StateReader(ABC, Generic[M]):
         sheet = self.datasheet(controller)
         found: dict[str, object] = {}
         if "status" in wanted:
-            found["status"] = plain(self.status(controller, now))
+            found["status"] = to_json(self.status(controller, now))
         if "program" in wanted:
-            found["program"] = plain(self.program(controller, now))
-        found["axes"] = [plain(self.axis(controller, axis, now)) for axis in sheet.axes if axis.name in wanted]
+            found["program"] = to_json(self.program(controller, now))
+        found["axes"] = [to_json(self.axis(controller, axis, now)) for axis in sheet.axes if axis.name in wanted]
         if "pins" in wanted:
             found["pins"] = dict(self.pins(controller, now))
         if "details" in wanted:
-            found["details"] = plain(details_of(self.details, controller, now))
+            found["details"] = to_json(details_of(self.details, controller, now))
         if len(found) - 1 + len(cast("list[object]", found["axes"])) != len(wanted):
             check_parts(sheet, wanted)
         return found
@@ -184,9 +184,9 @@ def check_parts(sheet: Datasheet, wanted: Collection[str]) -> None:
 def parts_of(state: ControllerState, sheet: Datasheet, wanted: Collection[str]) -> dict[str, object]:
     """As `StateReader.parts`, of a state that has been read."""
     check_parts(sheet, wanted)
-    whole = plain(state)
+    whole = to_json(state)
     found = {name: whole[name] for name in PARTS if name in wanted}
-    return {**found, "axes": [plain(axis) for axis in state.axes if axis.name in wanted]}
+    return {**found, "axes": [to_json(axis) for axis in state.axes if axis.name in wanted]}
 
 
 def details_of(rows: Iterable[DetailRow[M]], controller: M, now: Nanos) -> dict[str, DetailValue]:

@@ -162,7 +162,7 @@ def _blank_fix(text: str) -> MessageText:
     return START_A_NEW_LINE() if "\n" in text else A_BLANK()
 
 
-def to_json(source: SourceText, diagnostics: Sequence[Diagnostic]) -> list[dict[str, object]]:
+def diagnostics_to_json(source: SourceText, diagnostics: Sequence[Diagnostic]) -> list[dict[str, object]]:
     """The diagnostics as plain data: file, line, column, end_line, end_column, severity, code, message, hint, fix."""
     rows: list[dict[str, object]] = []
     for d in diagnostics:

@@ -19,12 +19,12 @@ from operator import attrgetter
 from types import NoneType
 from typing import Annotated, Any, TypeAlias, get_args, get_origin, get_type_hints
 
+from steptwin.datatypes import format_short
 from steptwin.durations import LONGEST_NS
 from steptwin.errors import Misuse
 from steptwin.jsonvalues import Schema
 from steptwin.messages import NONE, Message, text_of
 from steptwin.nearmiss import NearMiss
-from steptwin.plaintypes import shown
 
 LONGEST_TEXT = 4096
 """Characters of a text; the longest that are meant are paths."""
@@ -39,12 +39,12 @@ MISSING: Any = dataclasses.MISSING
 
 @dataclass(frozen=True, slots=True)
 class ValueType:
-    """A type of value. ``read`` raises `Misuse`; ``plain`` is its reverse; ``what`` is what is expected, in words."""
+    """A type of value. ``read`` raises `Misuse`; ``to_json`` is its reverse; ``what`` is what is expected, in words."""
 
     what: str
     schema: Schema
     read: Callable[[Any], Any]
-    plain: Callable[[Any], Any] = lambda value: value
+    to_json: Callable[[Any], Any] = lambda value: value
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +142,7 @@ def read_fields(place: str, fields: tuple[Field, ...], given: Mapping[str, objec
     for name in given:
         if name not in known:
             hint = NearMiss().hint(name, known)
-            raise Misuse(UNKNOWN_FIELD(place=place, name=shown(name), hint=hint, names=known or NONE()))
+            raise Misuse(UNKNOWN_FIELD(place=place, name=format_short(name), hint=hint, names=known or NONE()))
     values: dict[str, Any] = {}
     for field in fields:
         value = given.get(field.name)
@@ -161,7 +161,7 @@ WRONG_VALUE = Message("fields.wrong-value", "{value}: expected {expected}")
 
 
 def wrong(value: object, form: str) -> Misuse:
-    return Misuse(WRONG_VALUE(value=shown(value), expected=form))
+    return Misuse(WRONG_VALUE(value=format_short(value), expected=form))
 
 
 # ---------------------------------------------------------------------- forms
@@ -177,7 +177,7 @@ def check_text(value: str) -> str:
     if len(value) > LONGEST_TEXT:
         raise Misuse(TEXT_TOO_LONG(count=len(value), most=LONGEST_TEXT))
     if _NUL_OR_SURROGATE.search(value):
-        raise Misuse(TEXT_HAS_NUL_OR_SURROGATES(value=shown(value)))
+        raise Misuse(TEXT_HAS_NUL_OR_SURROGATES(value=format_short(value)))
     return value
 
 
@@ -301,7 +301,9 @@ def choices(words: Iterable[str], what: str) -> ValueType:
     def read(value: Any) -> tuple[str, ...]:
         for name in _names(value):
             if name not in known:
-                raise Misuse(UNKNOWN_NAME(what=what, name=shown(name), hint=NearMiss().hint(name, known), names=list(known)))
+                raise Misuse(
+                    UNKNOWN_NAME(what=what, name=format_short(name), hint=NearMiss().hint(name, known), names=list(known))
+                )
         return tuple(value)
 
     return ValueType(A_LIST_OF(what=what, names=list(known)), {"type": "array", "items": {"enum": list(known)}}, read, list)

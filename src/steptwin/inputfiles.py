@@ -72,9 +72,9 @@ def open_regular(path: Path, most: int | None = None) -> IO[bytes]:
         # Opening a pipe would wait for a program that writes into it.
         handle = os.open(path, READ_FLAGS)
     except OSError as error:
-        raise Misuse(CANNOT_READ(path=shown(path), why=reason(error))) from error
+        raise Misuse(CANNOT_READ(path=format_path(path), why=reason(error))) from error
     except ValueError as error:
-        raise Misuse(CANNOT_READ(path=shown(path), why=error)) from None
+        raise Misuse(CANNOT_READ(path=format_path(path), why=error)) from None
     found = os.fstat(handle)
     if stat.S_ISREG(found.st_mode) and (most is None or found.st_size <= most):
         return os.fdopen(handle, "rb")
@@ -89,7 +89,7 @@ def _too_large(path: Path, size: int, most: int) -> Misuse:
     return Misuse(f"cannot read {path}: it has {size} bytes; permitted are at most {most}")
 
 
-def shown(path: Path) -> str:
+def format_path(path: Path) -> str:
     """A path for a message: printable, and no longer than a line."""
     text = str(path).encode("utf-8", "backslashreplace").decode().replace("\0", "\\0")
     return text if len(text) <= 200 else f"{text[:100]}…{text[-60:]}"

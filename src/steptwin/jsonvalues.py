@@ -22,27 +22,27 @@ _Change: TypeAlias = "Callable[[Any], Any] | None"
 
 @dataclass(frozen=True, slots=True)
 class JsonForm:
-    """``schema`` of the values; ``plain`` writes one, ``read`` is its reverse. None: it is the same in JSON."""
+    """``schema`` of the values; ``to_json`` writes one, ``read`` is its reverse. None: it is the same in JSON."""
 
     schema: Schema
     read: _Change = None
-    plain: _Change = None
+    to_json: _Change = None
 
 
-def plain(value: Any) -> Any:
+def to_json(value: Any) -> Any:
     """A value of a dataclass as JSON has values, or of another type whose form its value shows."""
     kind = type(value)
     if is_dataclass(kind):
-        return _form_of_class(kind).plain(value)  # pyrefly: ignore[not-callable]
+        return _form_of_class(kind).to_json(value)  # pyrefly: ignore[not-callable]
     if isinstance(value, enum.Enum):
         return value.value
     if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    return [plain(item) for item in value] if isinstance(value, tuple) else value
+        return {str(key): to_json(item) for key, item in value.items()}
+    return [to_json(item) for item in value] if isinstance(value, tuple) else value
 
 
 def read(kind: type[T], data: Any) -> T:
-    """The value of a dataclass in JSON. Raises `TypeError`, `ValueError` or `LookupError` for what `plain` does not give."""
+    """The value of a dataclass in JSON. Raises `TypeError`, `ValueError` or `LookupError` for what `to_json` does not give."""
     return _form_of_class(kind).read(data)  # pyrefly: ignore[not-callable]
 
 
@@ -132,10 +132,10 @@ def _either(forms: list[JsonForm], *, is_optional: bool) -> JsonForm:
     schema = {"anyOf": [one.schema for one in forms]}
     if is_optional:
         some = next(one for one in forms if one is not _PLAIN[NoneType])
-        return JsonForm(schema, _unless_none(some.read), _unless_none(some.plain))
-    if all(one.plain is None for one in forms):
+        return JsonForm(schema, _unless_none(some.read), _unless_none(some.to_json))
+    if all(one.to_json is None for one in forms):
         return JsonForm(schema)
-    return JsonForm(schema, lambda value: tuple(value) if isinstance(value, list) else value, plain)
+    return JsonForm(schema, lambda value: tuple(value) if isinstance(value, list) else value, to_json)
 
 
 def _unless_none(change: _Change) -> _Change:
@@ -143,7 +143,7 @@ def _unless_none(change: _Change) -> _Change:
 
 
 def _list(item: JsonForm) -> JsonForm:
-    one, write = item.read, item.plain
+    one, write = item.read, item.to_json
     return JsonForm(
         list_of(item.schema),
         tuple if one is None else lambda values: tuple(map(one, values)),
@@ -152,9 +152,9 @@ def _list(item: JsonForm) -> JsonForm:
 
 
 def _table(key: Any, item: JsonForm) -> JsonForm:
-    one, write = item.read or _same, item.plain or _same
+    one, write = item.read or _same, item.to_json or _same
     schema = {"type": "object", "additionalProperties": item.schema}
-    if key is str and item.read is item.plain is None:
+    if key is str and item.read is item.to_json is None:
         return JsonForm(schema, dict, dict)
     return JsonForm(
         schema,
@@ -172,7 +172,7 @@ def _form_of_class(kind: Any) -> JsonForm:
     hints = get_type_hints(kind, include_extras=True)
     forms = {one.name: form_of(hints[one.name]) for one in fields(kind)}
     reads = [(name, form.read) for name, form in forms.items()]
-    writes = [(name, form.plain) for name, form in forms.items()]
+    writes = [(name, form.to_json) for name, form in forms.items()]
 
     def write(value: Any) -> dict[str, Any]:
         return {name: getattr(value, name) if to is None else to(getattr(value, name)) for name, to in writes}

@@ -41,7 +41,7 @@ class MessageText(str):
     def __reduce__(self) -> tuple[object, ...]:
         return MessageText, (str(self), self.id, self.values)
 
-    def plain(self) -> dict[str, JsonValue]:
+    def to_json(self) -> dict[str, JsonValue]:
         """The message as JSON."""
         return {"text": str(self)} if self.id is None else {"text": str(self), "id": self.id, "values": self.values}
 
@@ -84,7 +84,7 @@ class _List(tuple[Any, ...]):
 
 def _json_value(value: Any) -> JsonValue:
     if isinstance(value, MessageText):
-        return value.plain()
+        return value.to_json()
     if type(value) in (list, tuple):
         return [_json_value(one) for one in value]
     if isinstance(value, float) and not isfinite(value):
@@ -102,20 +102,20 @@ def text_of(said: BaseException | str) -> MessageText:
     return first if isinstance(first, MessageText) else MessageText(str(said))
 
 
-def with_messages(plain: dict[str, Any]) -> dict[str, Any]:
+def with_messages(data: dict[str, Any]) -> dict[str, Any]:
     """A JSON object whose members may be texts of messages or lists of them, with a member ``messages`` where any is.
 
     ``messages`` has ``id`` and ``values`` by the name of the member; of a list, those of each text.
     """
-    found = {name: message for name, value in plain.items() if (message := _reference(value)) is not None}
-    texts = {name: _as_text(value) for name, value in plain.items()}
+    found = {name: message for name, value in data.items() if (message := _reference(value)) is not None}
+    texts = {name: _as_text(value) for name, value in data.items()}
     return {**texts, "messages": found} if found else texts
 
 
-def read_message_text(plain: Mapping[str, Any], name: str) -> MessageText:
+def read_message_text(data: Mapping[str, Any], name: str) -> MessageText:
     """The member ``name`` of an object that `with_messages` has made. Raises `LookupError` for another one."""
-    reference = plain.get("messages", {}).get(name, {})
-    return MessageText(plain[name], reference.get("id"), reference.get("values"))
+    reference = data.get("messages", {}).get(name, {})
+    return MessageText(data[name], reference.get("id"), reference.get("values"))
 
 
 def _as_text(value: Any) -> Any:

@@ -10,9 +10,9 @@ import re
 import unicodedata
 from math import isfinite
 
+from steptwin.datatypes import format_short
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.plaintypes import shown
 
 _NUMBER = re.compile(r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+", re.ASCII)
@@ -40,14 +40,14 @@ def read_number(text: str, *, or_hexadecimal: bool = False) -> float:
     if _GROUPED.fullmatch(text):
         whole = text.replace(",", "")
         if text.count(",") > 1:
-            raise Misuse(COMMAS_OF_THOUSANDS(text=shown(text), whole=whole))
-        raise Misuse(COMMA_OF_THOUSANDS(text=shown(text), whole=whole, fraction=str(float(text.replace(",", ".")))))
+            raise Misuse(COMMAS_OF_THOUSANDS(text=format_short(text), whole=whole))
+        raise Misuse(COMMA_OF_THOUSANDS(text=format_short(text), whole=whole, fraction=str(float(text.replace(",", ".")))))
     if not _NUMBER.fullmatch(text):
         meant = _meant(text)
-        raise Misuse(NO_NUMBER(text=shown(text)) if meant is None else OTHER_FORM(text=shown(text), meant=meant))
+        raise Misuse(NO_NUMBER(text=format_short(text)) if meant is None else OTHER_FORM(text=format_short(text), meant=meant))
     value = float(text.replace(",", "."))
     if not isfinite(value):
-        raise Misuse(TOO_LARGE(text=shown(text)))
+        raise Misuse(TOO_LARGE(text=format_short(text)))
     return value
 
 
@@ -58,7 +58,7 @@ def read_integer(text: str) -> int:
     """A whole number with its sign, or a word as ``0x1F``, exactly. Raises `Misuse`."""
     value = read_number(text, or_hexadecimal=True)
     if not value.is_integer():
-        raise Misuse(NO_WHOLE_NUMBER(text=shown(text.strip())))
+        raise Misuse(NO_WHOLE_NUMBER(text=format_short(text.strip())))
     return int(text) if len(text) <= 4000 and text.strip().lstrip("+-").isdecimal() else int(value)
 
 

@@ -100,7 +100,7 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     """A process of xdist gives its coverage to the one that reports."""
     config = session.config
     if _coverage in config.stash and hasattr(config, "workeroutput"):
-        config.workeroutput[WORKER_COVERAGE] = config.stash[_coverage].coverage.plain()
+        config.workeroutput[WORKER_COVERAGE] = config.stash[_coverage].coverage.to_json()
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -110,7 +110,7 @@ def pytest_testnodedown(node: Any) -> None:
     if given is not None:
         from steptwin.coverage.counts import Coverage
 
-        for text in Coverage.of_plain(given):
+        for text in Coverage.from_json(given):
             node.config.stash[_coverage].coverage.add(text)
 
 

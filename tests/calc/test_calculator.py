@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from steptwin.calc import Calculator, Mic488Model, calculator_of, curve, plain
+from steptwin.calc import Calculator, Mic488Model, calculator_of, curve, to_json
 from steptwin.errors import Misuse
 from steptwin.m1486.datasheet import datasheet_of as chip_sheet
 from steptwin.m1486.variants import variant
@@ -25,7 +25,7 @@ def test_the_curve_ends_where_the_move_does() -> None:
 
 
 def test_as_json() -> None:
-    data = json.loads(json.dumps(plain(RESULT)))
+    data = json.loads(json.dumps(to_json(RESULT)))
     assert data["times"]["time"] == pytest.approx(2.7)
     assert data["parts"][0]["name"] == "acceleration"
     assert data["settings"][0] == {"name": "velocity", "code": "M1_VMAX", "detail": "", "value": 60, "unit": "mm/s"}

@@ -47,7 +47,7 @@ def test_half_of_the_runs_fail(doors: Campaign) -> None:
 def test_results_are_the_same_with_any_workers(doors: Campaign, jobs: int, dask: str | None) -> None:
     if dask is not None:
         pytest.importorskip("distributed")
-    assert doors.run(jobs=jobs, dask=dask).plain() == doors.run(jobs=1).plain()
+    assert doors.run(jobs=jobs, dask=dask).to_json() == doors.run(jobs=1).to_json()
 
 
 class _Shuffled(Executor):
@@ -151,7 +151,7 @@ def test_a_process_of_the_pool_that_is_killed_loses_nothing(tmp_path: Path) -> N
 
     summary = campaign.run(jobs=2, progress=kill)
     assert killed
-    assert summary.plain() == campaign.run().plain()
+    assert summary.to_json() == campaign.run().to_json()
     assert summary.errors == 0
 
 
@@ -176,7 +176,7 @@ def test_a_worker_of_dask_that_is_killed_loses_nothing(tmp_path: Path) -> None:
 
         summary = campaign.run(dask=cluster.scheduler_address, progress=kill)
     assert killed
-    assert summary.plain() == campaign.run().plain()
+    assert summary.to_json() == campaign.run().to_json()
 
 
 def test_a_cluster_that_is_not_there(doors: Campaign) -> None:
@@ -194,8 +194,8 @@ def test_what_is_done_is_not_done_again(doors: Campaign, tmp_path: Path) -> None
     summary = doors.run(tmp_path / "out", progress=lambda progress: done.append(progress.done))
     assert first.runs == 25
     assert done[0] == 26  # the first further one
-    assert summary.plain() == doors.run().plain()
-    assert json.loads((tmp_path / "out" / SUMMARY).read_text()) == json.loads(json.dumps(summary.plain()))
+    assert summary.to_json() == doors.run().to_json()
+    assert json.loads((tmp_path / "out" / SUMMARY).read_text()) == json.loads(json.dumps(summary.to_json()))
 
 
 def test_a_campaign_that_was_killed_goes_on(tmp_path: Path) -> None:
@@ -213,7 +213,7 @@ def test_a_campaign_that_was_killed_goes_on(tmp_path: Path) -> None:
     assert known < 3000
     few = campaign.changed(runs=known + 20)
     summary = few.run(out)
-    assert summary.plain() == few.run().plain()
+    assert summary.to_json() == few.run().to_json()
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="processes are found in /proc")
@@ -267,7 +267,7 @@ def test_a_campaign_that_ended_by_failure_has_ended(doors: Campaign, tmp_path: P
     stopping = doors.changed(until_failure=True)
     one = stopping.run(tmp_path / "out")
     done: list[CampaignProgress] = []
-    assert stopping.run(tmp_path / "out", progress=done.append).plain() == one.plain()
+    assert stopping.run(tmp_path / "out", progress=done.append).to_json() == one.to_json()
     assert done == []
 
 
@@ -292,7 +292,7 @@ def test_coverage_is_added_up_and_survives(tmp_path: Path) -> None:
     whole = Campaign(campaign.description)
     whole.run(coverage=True, jobs=2)
     assert campaign.covered == whole.covered == 6
-    assert campaign.coverage.plain() == whole.coverage.plain()
+    assert campaign.coverage.to_json() == whole.coverage.to_json()
 
 
 @pytest.mark.parametrize(
@@ -344,7 +344,7 @@ def test_a_campaign_that_was_killed_before_its_first_failure_was_sure_fills_the_
     store.add([StoredCase(doors.cases[failing[1]], doors.run_case(failing[1]))])
     store.close()
     seen: list[CampaignProgress] = []
-    assert stopping.run(tmp_path / "out", progress=seen.append).plain() == stopping.run().plain()
+    assert stopping.run(tmp_path / "out", progress=seen.append).to_json() == stopping.run().to_json()
     assert seen[-1].failed == 2  # with the one that was known
 
 

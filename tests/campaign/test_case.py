@@ -15,13 +15,13 @@ RESULT = CaseResult(3, (Verdict("quiet", True, 0.5, None, ""), Verdict("safe", F
 
 
 def test_a_case_is_json_and_pickles() -> None:
-    assert Case.of_plain(json.loads(json.dumps(CASE.plain()))) == CASE
+    assert Case.from_json(json.loads(json.dumps(CASE.to_json()))) == CASE
     assert pickle.loads(pickle.dumps(CASE)) == CASE
 
 
 def test_all_that_a_case_and_a_result_have_is_in_their_plain_values() -> None:
     for one in (CASE, RESULT):
-        assert json.dumps(one.plain()) == json.dumps(asdict(one))
+        assert json.dumps(one.to_json()) == json.dumps(asdict(one))
 
 
 def test_equal_cases_have_equal_digests_whatever_their_number() -> None:
@@ -32,7 +32,7 @@ def test_equal_cases_have_equal_digests_whatever_their_number() -> None:
 
 
 def test_a_result_is_json_and_pickles() -> None:
-    assert CaseResult.of_plain(json.loads(json.dumps(RESULT.plain()))) == RESULT
+    assert CaseResult.from_json(json.loads(json.dumps(RESULT.to_json()))) == RESULT
     assert pickle.loads(pickle.dumps(RESULT)) == RESULT
 
 

@@ -108,7 +108,7 @@ def test_the_session_is_the_run_of_the_case(found: list[FoundFailure], campaign:
         assert recording.replay().trace.digest() == recording.digest
         assert one.files.timeline is not None
         assert "table" in one.files.timeline.read_text(encoding="utf-8")
-        assert one.plain(campaign.parent)["files"]["session"].startswith("out")
+        assert one.to_json(campaign.parent)["files"]["session"].startswith("out")
 
 
 def test_the_test_fails_until_the_program_is_mended(found: list[FoundFailure], campaign: Path) -> None:
@@ -138,13 +138,13 @@ eventually = "x.position > 39"
     runner, cases = CaseRunner(description), Cases(description)
     (found,) = find(runner, [runner.run(cases[3])], cases.__getitem__, campaign.parent / "out", campaign)
     assert found.result.end_ns < 500_000_000
-    assert found.plain(campaign.parent)["what"].startswith("not so far: x.position is 10 mm, not < 10 mm at 0.")
-    assert "arrives" not in found.plain(campaign.parent)["what"]
+    assert found.to_json(campaign.parent)["what"].startswith("not so far: x.position is 10 mm, not < 10 mm at 0.")
+    assert "arrives" not in found.to_json(campaign.parent)["what"]
     assert found.files is not None
     assert found.files.test is not None
     text = found.files.test.read_text(encoding="utf-8")
     assert "PROPERTIES = ['not so far']" in text
-    case = cases.made(1, 1, {"t": 0.25}, [], end_ns=found.result.end_ns).plain()
+    case = cases.made(1, 1, {"t": 0.25}, [], end_ns=found.result.end_ns).to_json()
     with pytest.raises(AssertionError, match=r"not so far: [^;]*$"):
         check_case(campaign, case, ["not so far"])
     with pytest.raises(AssertionError, match="arrives"):
@@ -155,8 +155,8 @@ eventually = "x.position > 39"
 def test_a_case_that_fails_is_an_assertion(campaign: Path) -> None:
     case = Cases(load_campaign(campaign)).made(1, 1, {"t": 0.25}, [0])
     with pytest.raises(AssertionError, match=r"x\.lost == 0"):
-        check_case(campaign, case.plain())
-    check_case(campaign, {**case.plain(), "faults": ()})
+        check_case(campaign, case.to_json())
+    check_case(campaign, {**case.to_json(), "faults": ()})
 
 
 @pytest.mark.parametrize(

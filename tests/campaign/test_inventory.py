@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from steptwin.campaign.inventory import FaultyPart, PossibleFault, occasions, possible_faults
+from steptwin.campaign.inventory import FaultCategory, PossibleFault, occasions, possible_faults
 from steptwin.controller import SECOND
 from steptwin.files.world import World
 from steptwin.simulation.faults import read
@@ -38,9 +38,9 @@ def test_sensors_actuators_logic_and_power_of_the_press() -> None:
     assert {"jam element=ram", "no-air element=ram", "open-coil element=safety", "supply-drop machine=cell"} <= texts
     assert {"stuck machine=cell pin=IN4 value=0", "stuck machine=cell pin=IN4 value=1"} <= texts
     assert "stuck-output element=ram output=extended level=1" in texts
-    assert {one.part for one in found if one.place == "ram"} == {FaultyPart.ACTUATOR}
-    assert {one.part for one in found if one.place == "ram.extended"} == {FaultyPart.SENSOR}
-    assert {one.part for one in found if one.place == "valve.out"} == {FaultyPart.LOGIC}
+    assert {one.part for one in found if one.place == "ram"} == {FaultCategory.ACTUATOR}
+    assert {one.part for one in found if one.place == "ram.extended"} == {FaultCategory.SENSOR}
+    assert {one.part for one in found if one.place == "valve.out"} == {FaultCategory.LOGIC}
     assert {one.place for one in found if one.mode == "stuck-input level=1"} == {
         *("safety.coil", "left_hand.in1", "right_hand.in1")  # what wires drive is stuck at the output
     }

@@ -12,7 +12,7 @@ from steptwin.campaign.reading import TABLES, load_campaign, read_campaign
 from steptwin.campaign.variation import Between, Choice, Normal
 from steptwin.controller import SECOND
 from steptwin.errors import Misuse
-from steptwin.simulation.describe.pieces import no_files
+from steptwin.simulation.describe.includes import no_files
 from steptwin.simulation.toml.reader import WorldError
 from steptwin.simulation.world.check import diagnose
 

@@ -76,7 +76,7 @@ def test_coverage_is_kept_with_the_cases_that_it_counts(url: str) -> None:
     store.add([stored(0)])
     store.add([stored(1), stored(2)], Coverage())
     coverage, count = store.coverage()
-    assert (coverage.plain(), count) == ([], 2)
+    assert (coverage.to_json(), count) == ([], 2)
     store.close()
 
 

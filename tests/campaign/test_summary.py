@@ -35,7 +35,7 @@ def test_properties_failures_and_errors_are_counted() -> None:
     assert (found.runs, found.failed, found.errors, found.passed) == (3, 2, 1, 1)
     assert (found.properties["p"].failed, found.properties["p"].robustness, found.properties["p"].case) == (1, -1.0, 1)
     assert [(one.number, one.why) for one in found.failures] == [(1, "p: why not"), (2, "refused")]
-    plain = found.plain()
+    plain = found.to_json()
     assert (plain["pass_rate"], plain["confidence"]) == (pytest.approx(1 / 3), 0.95)
     assert plain["failures"][0]["case"]["values"] == {"a": 0.5}
 

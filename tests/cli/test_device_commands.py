@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from shell import Shell
 from tests.conftest import STEPTWIN
 
-from steptwin.cli.device import SuspensionDetector, print_started, shown, table
+from steptwin.cli.device import SuspensionDetector, format_value, print_started, table
 from steptwin.drivers import Mic488
 from steptwin.errors import Refusal
 from steptwin.live.ports import FoundPort
@@ -30,12 +30,12 @@ from steptwin.mic488.registers import register_map
 @example(0.1)
 def test_a_real_is_shown_with_the_digits_it_has(value: float) -> None:
     real = struct.unpack("<f", struct.pack("<f", value))[0]
-    assert struct.pack("<f", float(shown(real))) == struct.pack("<f", real) or abs(real) < 1e-37
+    assert struct.pack("<f", float(format_value(real))) == struct.pack("<f", real) or abs(real) < 1e-37
 
 
 def test_a_real_is_shown_as_people_write_it() -> None:
     reals = [struct.unpack("<f", struct.pack("<f", value))[0] for value in (10.13, 0.1, -9.999999, 100.0, 123456.79)]
-    assert [shown(real) for real in reals] == ["10.13", "0.1", "-9.999999", "100", "123456.79"]
+    assert [format_value(real) for real in reals] == ["10.13", "0.1", "-9.999999", "100", "123456.79"]
 
 
 def test_somebody_at_a_terminal_is_told_that_it_moves(

@@ -139,7 +139,7 @@ def test_a_saved_description_has_the_files_it_names_beside_it(tmp_path: Path, ca
     assert capsys.readouterr().out == f"wrote {tmp_path / 'there' / 'controller.cfg'}\nwrote {target}\n"
     with World.load(target) as world:
         assert world.mic488["mic488"].device.axes[0].config.gear == 50.0
-        assert world.parts.line_of["mic488"][1] == 9  # the address of the configuration
+        assert world.objects.line_of["mic488"][1] == 9  # the address of the configuration
     (tmp_path / "there" / "machine.cfg").write_text("[Axis0]\nGear=3\n")
     with pytest.raises(Misuse, match="is another file than"):
         serve_mic488(served, Mic488Options(config=config))

@@ -166,7 +166,7 @@ def test_a_page_in_which_every_way_was_taken_has_no_partly_executed_line() -> No
 
 def test_plain_values_are_the_same_coverage_for_another_process() -> None:
     before = Coverage([text("a.prg"), text("b.prg")])
-    after = Coverage.of_plain(json.loads(json.dumps(before.plain())))
+    after = Coverage.from_json(json.loads(json.dumps(before.to_json())))
     assert [(one.path, one.summary, one.hits, one.taken) for one in after] == [
         (one.path, one.summary, one.hits, one.taken) for one in before
     ]

@@ -86,7 +86,7 @@ def test_what_has_no_value_has_a_reason(text: str, problem: str) -> None:
 
 def test_logs() -> None:
     calculate = partial(ResolvedExpression, WORLD, "m")
-    assert LogText("n is {n}, then {n + 0.5}", calculate).shown(WORLD.now) == "n is 7, then 7.5"
+    assert LogText("n is {n}, then {n + 0.5}", calculate).formatted(WORLD.now) == "n is 7, then 7.5"
     with pytest.raises(Misuse, match="only names of the program can be in it"):
         LogText("x is {x-slide.position}", calculate)
 

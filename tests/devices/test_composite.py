@@ -13,7 +13,7 @@ from steptwin.errors import Misuse
 from steptwin.m1486.datasheet import datasheet_of
 from steptwin.m1486.variants import DEFAULT
 from steptwin.simulation.script import steps
-from steptwin.subject.contract import ControllerPart, Description, LinePart
+from steptwin.subject.contract import ControllerDescription, Description, LineDescription
 from steptwin.subject.events import Numbering
 from steptwin.subject.following import Followers
 
@@ -25,8 +25,8 @@ class Chip:
 
     def __init__(self, unit: int) -> None:
         name = f"chip{unit}"
-        controller = ControllerPart(name, datasheet_of(DEFAULT), PLACE, unit, (), is_real=True)
-        self.description = Description(name, (controller,), lines=(LinePart(PLACE, "m1486", None),), commands=("send",))
+        controller = ControllerDescription(name, datasheet_of(DEFAULT), PLACE, unit, (), is_real=True)
+        self.description = Description(name, (controller,), lines=(LineDescription(PLACE, "m1486", None),), commands=("send",))
         self.followers = Followers()
         self.sent: list[bytes] = []
 

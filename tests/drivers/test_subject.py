@@ -70,7 +70,7 @@ def test_the_description_of_a_device(table: DeviceSubject, rig: Rig) -> None:
     (controller,) = found.controllers
     assert (controller.name, controller.unit, controller.datasheet) == (twin.name, twin.unit, twin.datasheet)
     assert (controller.is_real, twin.is_real) == (True, False)
-    assert read_description(json.loads(json.dumps(found.plain()))) == found
+    assert read_description(json.loads(json.dumps(found.to_json()))) == found
     assert found.lines[0].baud is None
 
 
@@ -196,7 +196,7 @@ def test_frames_are_observed_only_while_they_are_followed(table: DeviceSubject, 
 
 def test_events_of_a_device_come_from_polling(table: DeviceSubject, rig: Rig) -> None:
     following = table.follow(filter_of(), 99)
-    assert [(event.kind, event.payload.plain()["position"]) for event in following.take().events] == [("sample", 0.0)] * 4
+    assert [(event.kind, event.payload.to_json()["position"]) for event in following.take().events] == [("sample", 0.0)] * 4
     table.do(command.Enable("table", 1))
     table.do(command.Move("table", 1, to=10.0))
     rig.world.apply_input(do.Set((("table", "IN7", 1.0),)))
@@ -211,7 +211,7 @@ def test_events_of_a_device_come_from_polling(table: DeviceSubject, rig: Rig) ->
     assert sample.velocity is not None
     assert 0.0 < sample.velocity <= 40.0
     assert sample.unit == "mm"
-    assert [read_event(json.loads(json.dumps(event.plain()))) for event in events] == events
+    assert [read_event(json.loads(json.dumps(event.to_json()))) for event in events] == events
     assert following.take().events == []  # not before the next period
     following.close()
 
@@ -228,8 +228,8 @@ def test_what_the_controller_and_its_program_do_is_told_in_words(table: DeviceSu
         ("controller: Modbus master communication error", None),
         ("controller: ok", None),
     ]
-    assert told[0].payload.plain()["code"] == "controller-status"
-    assert told[0].payload.plain()["facts"] == {"status": ControllerStatus.MASTER_ERROR}
+    assert told[0].payload.to_json()["code"] == "controller-status"
+    assert told[0].payload.to_json()["facts"] == {"status": ControllerStatus.MASTER_ERROR}
 
 
 def test_a_device_that_nobody_follows_is_not_polled(table: DeviceSubject, rig: Rig) -> None:
@@ -316,14 +316,14 @@ def test_a_device_that_was_lost_is_unknown_until_it_is_asked_again(table: Device
         assert len(following.take().events) == axes
         finish(subject.poll())
         assert following.take().events == []
-        newest = [event.payload.plain() for event in subject.samples()]
+        newest = [event.payload.to_json() for event in subject.samples()]
         assert len(newest) == axes
         subject.forget()
-        unknown = [event.payload.plain() for event in following.take().events]
-        assert [event.payload.plain() for event in subject.samples()] == unknown
+        unknown = [event.payload.to_json() for event in following.take().events]
+        assert [event.payload.to_json() for event in subject.samples()] == unknown
         assert unknown == [{"axis": one["axis"], "position": None, "unit": one["unit"], "velocity": None} for one in newest]
         finish(subject.poll())
-        assert [event.payload.plain() for event in following.take().events] == newest
+        assert [event.payload.to_json() for event in following.take().events] == newest
 
 
 def test_after_a_loss_the_same_device_is_there(rig: Rig) -> None:
@@ -381,7 +381,7 @@ def test_settings_are_kept_as_json(rig: Rig) -> None:
 
 
 def test_the_description_and_the_time_as_commands(table: DeviceSubject, rig: Rig) -> None:
-    assert table.do(command.Describe()).value == table.description.plain()
+    assert table.do(command.Describe()).value == table.description.to_json()
     rig.time.sleep(2.5)
     time = table.do(command.Time()).value
     assert isinstance(time, dict)
@@ -400,7 +400,7 @@ def test_what_a_program_does_is_an_event(table: DeviceSubject, rig: Rig) -> None
     table.do(command.ControlProgram("table", "start"))
     rig.time.sleep(1.0)
     (event,) = following.take().events
-    assert (event.text, event.payload.plain()["facts"]) == ("program: running", {"state": 1})
+    assert (event.text, event.payload.to_json()["facts"]) == ("program: running", {"state": 1})
     table.do(command.ControlProgram("table", "pause"))
     rig.time.sleep(1.0)
     assert [event.text for event in following.take().events] == ["program: paused"]

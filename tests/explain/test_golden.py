@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from steptwin.cli.explain import explanations
+from steptwin.explain.jsondata import to_json
 from steptwin.explain.picture import picture
-from steptwin.explain.plain import plain
 from steptwin.explain.text import text
 
 REPOSITORY = Path(__file__).parents[2]
@@ -38,7 +38,7 @@ def made(name: str) -> str:
     path = CASES[name]
     found = explanations(path, {})
     if name.endswith(".json"):
-        written = json.dumps([plain(one) for one in found], ensure_ascii=False, indent=1) + "\n"
+        written = json.dumps([to_json(one) for one in found], ensure_ascii=False, indent=1) + "\n"
         return INNERMOST.sub(lambda match: " ".join(match[0].split()), written)
     return "\n".join(text(one) for one in found).replace(str(path), path.name)
 

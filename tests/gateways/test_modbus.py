@@ -19,7 +19,7 @@ from steptwin.gateways.modbus.gateway import MOST_READS, MasterGateway
 from steptwin.gateways.modbus.options import ModbusSpec
 from steptwin.live.devicefile import read_device_file
 from steptwin.simulation.script.steps import Request
-from steptwin.subject.contract import Description, LinePart, Result
+from steptwin.subject.contract import Description, LineDescription, Result
 
 HALL = '[[mic488]]\nname = "one"\n[[mic488]]\nname = "two"\nunit = 2\n'
 CELL = '[[device]]\nname = "one"\naddress = "/dev/ttyUSB0"\n[gateway.modbus]\nlisten = "127.0.0.1:0"\n'
@@ -35,7 +35,7 @@ class Devices(GatewayWorld):
             replace(part, is_real=True, line=f"tcp://{part.name}:502", unit=unit)
             for part, unit in zip(inner.controllers, units, strict=False)
         ]
-        lines = tuple(LinePart(part.line or "", "modbus", None) for part in controllers)
+        lines = tuple(LineDescription(part.line or "", "modbus", None) for part in controllers)
         self._description = replace(inner, controllers=tuple(controllers), lines=lines)
         self.asked: list[Request] = []
         self.let = asyncio.Event()

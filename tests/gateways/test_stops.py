@@ -54,7 +54,7 @@ from steptwin.studio.rest import Rest
 from steptwin.studio.surroundings import PresentMoment, Surroundings
 from steptwin.studio.viewersession import ViewerSession
 from steptwin.subject import commands as command
-from steptwin.subject.commands import Command, plain_command
+from steptwin.subject.commands import Command, command_to_json
 from steptwin.subject.contract import Result
 from steptwin.subject.dispatch import respond
 from steptwin.wire import pdu
@@ -131,7 +131,7 @@ class Endpoint:
         async def answered(one: Command, _: object) -> Result:
             return await self._rig.control.answer(one)
 
-        answer: Any = await respond(answered, json.dumps(plain_command(wanted)).encode(), _raise)
+        answer: Any = await respond(answered, json.dumps(command_to_json(wanted)).encode(), _raise)
         if "error" in answer:
             raise Refused(answer["error"])
 
@@ -163,7 +163,7 @@ class Viewers:
         return answer["ok"]
 
     async def ask(self, what: str) -> None:
-        found = await self._do(self._one, plain_command(command_for(what, self._rig.numbers)))
+        found = await self._do(self._one, command_to_json(command_for(what, self._rig.numbers)))
         if what == "jog":
             self._renewing = asyncio.create_task(self._renew(found["lease"]))
 
@@ -175,7 +175,7 @@ class Viewers:
 
     async def stop(self, what: str) -> None:
         """By anybody, that of a program and by registers by who has control."""
-        await self._do(self._one if what in ("program", "registers") else self._other, plain_command(STOPS[what]))
+        await self._do(self._one if what in ("program", "registers") else self._other, command_to_json(STOPS[what]))
 
     async def close(self) -> None:
         if self._renewing is not None:
@@ -348,10 +348,10 @@ class Topics:
 
     async def ask(self, what: str) -> None:
         lease = {"lease_s": LEASE_S} if what == "jog" else {}
-        await self._do({**plain_command(command_for(what, self._numbers)), **lease})
+        await self._do({**command_to_json(command_for(what, self._numbers)), **lease})
 
     async def stop(self, what: str) -> None:
-        await self._do(plain_command(STOPS[what]))
+        await self._do(command_to_json(STOPS[what]))
 
     async def leave(self) -> None:
         """The broker is lost."""

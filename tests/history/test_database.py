@@ -11,7 +11,7 @@ from alembic.runtime.migration import MigrationContext
 from sqlalchemy import Engine, select, text
 
 from steptwin.errors import Misuse
-from steptwin.history.database import check_version, engine_of, insert_all, read_url, shown, upgrade
+from steptwin.history.database import check_version, engine_of, format_url, insert_all, read_url, upgrade
 from steptwin.history.reading import HistoryDatabase
 from steptwin.history.schema import METADATA, RUN, SAMPLE, TEXT
 
@@ -30,7 +30,7 @@ RELEASED = sorted((Path(__file__).parent / "schemas").glob("*.sql"))
     ],
 )
 def test_addresses(given: str, found: str) -> None:
-    assert shown(read_url(given, Path("/plant"))) == found
+    assert format_url(read_url(given, Path("/plant"))) == found
 
 
 @pytest.mark.parametrize("given", ["h.db", "", "mysql://db/plant", "sqlite://", "sqlite:///:memory:", "sqlite+pysqlite:///x"])

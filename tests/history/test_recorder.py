@@ -11,7 +11,7 @@ from steptwin.access.audit import Audit
 from steptwin.access.roles import Role
 from steptwin.controller import SECOND
 from steptwin.gateways.clients import GatewayClient
-from steptwin.motion.plain import read_plan
+from steptwin.motion.planjson import read_plan
 from steptwin.simulation.script.steps import Note, Set, Turn, Write
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Enable, Move

@@ -436,7 +436,7 @@ def test_followers_are_told_what_time_stops_at_where_that_changes(run: Run) -> N
             rig.line(line=99)
         for _ in range(2):
             rig.do("clear_breakpoint", breakpoint=number)
-        seen: list[Any] = [event.payload.plain() for event in told.take().events]
+        seen: list[Any] = [event.payload.to_json() for event in told.take().events]
         assert [([one["line"] for one in state["breakpoints"]], state["stop_on"]) for state in seen] == [
             ([10], []),
             ([10], ["limit"]),

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from sheets import line, missing, sheet_lines
 
-from steptwin.jsonvalues import plain
+from steptwin.jsonvalues import to_json
 from steptwin.m1486 import findings, functions, lines, registers, variants
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.datasheet import datasheet, datasheet_of
@@ -22,7 +22,7 @@ OTHERS = [v for v in VARIANTS if v is not DEFAULT]
 
 def shown(row: functions.AuxiliaryFunction | registers.ChipRegister) -> str:
     """Without what commands do to the chip, which `test_commanduse` compares with it."""
-    return line({name: value for name, value in plain(row).items() if name not in ("acts_on", "state")})
+    return line({name: value for name, value in to_json(row).items() if name not in ("acts_on", "state")})
 
 
 def everything() -> dict[str, list[str]]:

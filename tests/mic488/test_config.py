@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from vendor_config import VENDOR
 
-from steptwin.diagnostics import Severity, to_json
+from steptwin.diagnostics import Severity, diagnostics_to_json
 from steptwin.errors import Misuse
 from steptwin.mic488.config import (
     AxisConfig,
@@ -243,7 +243,7 @@ def test_all_errors_at_once_with_file_line_and_key() -> None:
         "    |       ^\n"
         "    = permitted: 0 = active high, 1 = active low"
     )
-    rows = to_json(caught.value.source, caught.value.findings)
+    rows = diagnostics_to_json(caught.value.source, caught.value.findings)
     assert [(row["line"], row["code"]) for row in rows] == [(2, "C008"), (3, "C006"), (6, "C008")]
 
 
@@ -280,7 +280,7 @@ def test_a_misspelt_section_comes_with_the_repair_where_it_is_the_only_one() -> 
 def test_every_unknown_name_is_told_with_its_line() -> None:
     file = IniFile.parse(VENDOR, "m.cfg")
     found = examine_config(file)[1]
-    told = [(row["line"], row["code"], row["message"]) for row in to_json(file.source, found)]
+    told = [(row["line"], row["code"], row["message"]) for row in diagnostics_to_json(file.source, found)]
     assert told == [
         (18, "C005", "[Axis0] MotCurrent is not known and has no effect"),
         (39, "C005", "the section [Vision] is not known and has no effect"),

@@ -8,7 +8,7 @@ import pytest
 from mic488_rig import EN, MM, Rig, controller, loaded, programmed, started
 
 from steptwin.controllerstate import ControllerState, ProgramActivity, StateProgram, StatusLevel
-from steptwin.jsonvalues import plain, read
+from steptwin.jsonvalues import read, to_json
 from steptwin.mic488.config import AxisConfig, ProgramConfig
 from steptwin.mic488.present import axis_status, controller_status, empty_banks, place_of, state_of, statement_of
 
@@ -171,8 +171,8 @@ def test_json_has_every_member() -> None:
     rig = Rig(controller(MM))
     rig.enable(1)
     found = state(rig)
-    assert list(plain(found)) == [one.name for one in fields(found)]
-    assert read(ControllerState, plain(found)) == found
+    assert list(to_json(found)) == [one.name for one in fields(found)]
+    assert read(ControllerState, to_json(found)) == found
 
 
 @pytest.mark.parametrize("used", [(), (0,), (1999,), (5, 249, 250, 251, 1000)])

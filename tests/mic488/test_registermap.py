@@ -17,7 +17,7 @@ from steptwin.mic488.registermap import (
     Register,
     RegisterMap,
     RegisterMapError,
-    RequestPart,
+    RegisterSlice,
     Space,
     Type,
     UnknownRegister,
@@ -81,16 +81,16 @@ def test_unknown_keys_raise() -> None:
 
 def test_pieces_cut_a_request_at_register_borders() -> None:
     chart = register_map()
-    assert list(chart.pieces(Space.HOLDING, 10017, 4)) == [
-        RequestPart(chart.named("JOG_SPEED"), 10017, 2),
-        RequestPart(None, 10019, 1),
-        RequestPart(chart.named("M1_POS_ACT"), 10020, 1),
+    assert list(chart.slices(Space.HOLDING, 10017, 4)) == [
+        RegisterSlice(chart.named("JOG_SPEED"), 10017, 2),
+        RegisterSlice(None, 10019, 1),
+        RegisterSlice(chart.named("M1_POS_ACT"), 10020, 1),
     ]
-    assert list(chart.pieces(Space.HOLDING, 1990, 20)) == [
-        RequestPart(chart.named("USER_REGISTER"), 1990, 10),
-        RequestPart(None, 2000, 10),
+    assert list(chart.slices(Space.HOLDING, 1990, 20)) == [
+        RegisterSlice(chart.named("USER_REGISTER"), 1990, 10),
+        RegisterSlice(None, 2000, 10),
     ]
-    assert list(chart.pieces(Space.COIL, 6007, 9)) == [RequestPart(chart.named("OUT8"), 6007, 1), RequestPart(None, 6008, 8)]
+    assert list(chart.slices(Space.COIL, 6007, 9)) == [RegisterSlice(chart.named("OUT8"), 6007, 1), RegisterSlice(None, 6008, 8)]
 
 
 def test_unknown_firmware() -> None:

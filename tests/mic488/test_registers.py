@@ -175,12 +175,12 @@ def test_mic_5_only_whole_values_of_32_bit_control_registers() -> None:
     chart = register_map()
     wide = [r for r in chart if r.type.size == 2 and r.writes and r.name != "JOG_SPEED"]
     assert {r.accepts for r in wide} == {(16,)}
-    whole, half = chart.pieces(Space.HOLDING, 10020, 3)
+    whole, half = chart.slices(Space.HOLDING, 10020, 3)
     assert (whole.whole, whole.register) == (True, chart.named("M1_POS_ACT"))
     assert (half.whole, half.register, half.address, half.size) == (False, chart.named("M2_POS_ACT"), 10022, 1)
-    (odd,) = chart.pieces(Space.HOLDING, 10021, 1)
+    (odd,) = chart.slices(Space.HOLDING, 10021, 1)
     assert not odd.whole
-    (memory,) = chart.pieces(Space.HOLDING, 1, 1)
+    (memory,) = chart.slices(Space.HOLDING, 1, 1)
     assert memory.whole
 
 

@@ -53,7 +53,7 @@ def test_every_value_is_in_one_block_and_no_block_touches_what_may_not_be_read(i
         space = {1: Space.COIL, 2: Space.INPUT, 3: Space.HOLDING}[block.request.function]
         most = pdu.MAX_REGISTERS if space is Space.HOLDING else pdu.MAX_BITS
         assert 0 < block.request.count <= most
-        pieces = MAP.pieces(space, block.request.address, block.request.count)
+        pieces = MAP.slices(space, block.request.address, block.request.count)
         assert all(piece.whole and piece.register is not None and piece.register.reads for piece in pieces)
         for item, place in block.items:
             assert item.address == block.request.address + place

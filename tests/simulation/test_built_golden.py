@@ -114,7 +114,7 @@ to = "a.IN6"
 
 def described(world: World) -> Iterator[str]:
     yield f"schedulers: {'; '.join(' '.join(names) for names in world.blueprint.connected or ())}"
-    for name, axis in world.parts.built(AXIS).items():
+    for name, axis in world.objects.built(AXIS).items():
         yield f"axis {name}: {axis.mechanism.build}, {float(axis.scale.pulses_per_unit):.12g} imp/{axis.scale.unit}"
     yield from (f"view {'.'.join(name)}: {view}" for name, view in axis_views(world).items())
     for element in ELEMENTS.values():
@@ -123,7 +123,7 @@ def described(world: World) -> Iterator[str]:
                 f"{one.one}–{one.other} {'.'.join(map(str, one.path))}" for one in element.refers(spec, world.spec.elements)
             )
             yield f"{'.'.join(map(str, spec.path))}: {', '.join(refers)}"
-        for name, built in world.parts.built(element).items():
+        for name, built in world.objects.built(element).items():
             if element.drawing is not None:
                 yield f"  {name} is drawn: {element.drawing(built)}"
             for signal, of in ({} if element.signals is None else element.signals(built)).items():

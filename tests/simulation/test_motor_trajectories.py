@@ -14,7 +14,7 @@ from steptwin.controller import SECOND
 from steptwin.motion import MotionState, Profile, Segment, plan_position, plan_velocity
 from steptwin.motion.paths import Circular
 from steptwin.simulation.mechanics.motor import StepperMotor, _first_below_0
-from steptwin.simulation.mechanics.resonance import MotionPart, Resonance
+from steptwin.simulation.mechanics.resonance import MotionPhase, Resonance
 from steptwin.simulation.mechanics.trajectory import Build, MechanicalState, Trajectory
 
 # ---------------------------------------------------------------------- along an arc
@@ -116,7 +116,7 @@ def test_a_rotor_that_would_be_caught_and_lost_at_once_stays_lost() -> None:
     for moment in (SECOND, 2 * SECOND, 3 * SECOND, 9 * SECOND):
         assert trajectory.at(moment).stalled, moment
         assert trajectory.at(moment).rotor == 0
-    assert [piece.begin for piece in trajectory.pieces] == sorted({piece.begin for piece in trajectory.pieces})
+    assert [section.begin for section in trajectory.sections] == sorted({section.begin for section in trajectory.sections})
 
 
 @pytest.mark.parametrize(
@@ -145,10 +145,10 @@ def test_what_falls_from_0_at_the_beginning_is_below_0_there(
 BAND = Resonance(4000.0, 9000.0, 10.0, 10.0, 0.05)
 
 
-def parts_of(drive: StepperMotor, plan: Profile, number: int, sign: int = 1) -> list[MotionPart]:
+def parts_of(drive: StepperMotor, plan: Profile, number: int, sign: int = 1) -> list[MotionPhase]:
     begin = plan.segments[number - 1].end_s if number else 0.0
     s = plan.segments[number]
-    return list(drive.parts(s, begin, s.end_s, sign))
+    return list(drive.phases(s, begin, s.end_s, sign))
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -157,7 +157,7 @@ def test_parts_of_a_ramp_end_where_the_speed_passes_the_band_and_corners(sign: i
     curve = ((0.0, 1.0), (6000.0, 0.7), (32_000.0, 0.2))
     drive = replace(motor(curve, friction=0.1, load=0.05), resonance=BAND)
     (ramp, *_) = plan_position(MotionState(0, 0, 0.0, 0.0), sign * 10**6, 1000.0, 1000.0, 10_000.0).segments
-    parts = list(drive.parts(ramp, 0.0, ramp.end_s, 1))
+    parts = list(drive.phases(ramp, 0.0, ramp.end_s, 1))
     assert [part.begin_s for part in parts] == pytest.approx([0.0, 4.0, 6.0, 9.0])
     assert [part.end_s for part in parts] == pytest.approx([4.0, 6.0, 9.0, 10.0])
     assert [part.speed for part in parts] == pytest.approx([2000.0, 5000.0, 7500.0, 9500.0])
@@ -171,7 +171,7 @@ def test_where_the_acceleration_falls_that_of_the_middle_counts() -> None:
     """From 3000 to 1000 pulses/s² in 2 s, and below the band: one part, in whose middle it is 2000."""
     drive = replace(motor(((0.0, 1.0), (32_000.0, 1.0)), friction=0.1), resonance=Resonance(9000.0, 9500.0, 10.0, 10.0, 0.05))
     segment = Segment(2.0, 0.0, 0.0, 1000.0, 1500.0, -1000.0 / 6.0, 1)
-    (part,) = drive.parts(segment, 0.0, 2.0, 1)
+    (part,) = drive.phases(segment, 0.0, 2.0, 1)
     assert part.speed == pytest.approx(1000.0 + 3000.0 - 500.0)
     assert part.use == pytest.approx(INERTIA * 2000.0 + 0.1)
 
@@ -197,7 +197,7 @@ def test_along_an_arc_there_is_a_part_for_each_millisecond() -> None:
     arc = Circular(-8000, 8000, 0.0, 4.0 / 50_265).profile(travel, 0, 0).segments[0]
     drive = replace(motor(friction=0.1), resonance=BAND)
     begin, end = 0.1, 0.1045
-    parts = list(drive.parts(arc, begin, end, 1))
+    parts = list(drive.phases(arc, begin, end, 1))
     assert [part.begin_s for part in parts] == pytest.approx([0.1, 0.101, 0.102, 0.103, 0.104])
     assert [part.end_s for part in parts] == pytest.approx([0.101, 0.102, 0.103, 0.104, 0.1045])
     assert [part.speed for part in parts] == [pytest.approx(abs(arc.velocity(part.begin_s))) for part in parts]

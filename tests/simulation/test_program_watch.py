@@ -24,7 +24,7 @@ WORLD = """
 def reports(program: str, seconds: float) -> list[tuple[int, str, str, str]]:
     """Microseconds, kind, text and statement of what happened in the first ``seconds``."""
     world = World.from_toml(dedent(WORLD), {"first.prg": dedent(program).encode()}, name="w.toml")
-    watch = ProgramWatch(world.mic488["t"].device, world.parts.scheduler_of["t"], "t")
+    watch = ProgramWatch(world.mic488["t"].device, world.objects.scheduler_of["t"], "t")
     world.run(for_=seconds)
     return [(event.time // 1000, event.code, event.text, event.place.strip()) for event in watch.happened]
 
@@ -58,7 +58,7 @@ def test_delays_registers_outputs_and_the_end() -> None:
 def test_what_a_statement_waits_for() -> None:
     """Axes that are named, the input, and of WAITPOS those that move. That something looks on is no part of a state."""
     world = World.from_toml(dedent(WORLD), {"first.prg": b"WAIT PosM2 = 9\n"}, name="w.toml")
-    watch = ProgramWatch(world.mic488["t"].device, world.parts.scheduler_of["t"], "t")
+    watch = ProgramWatch(world.mic488["t"].device, world.objects.scheduler_of["t"], "t")
     assert watch.copy_state() == ()
     taken = world.snapshot()
     world.run(for_=0.1)
@@ -125,7 +125,7 @@ def test_an_axis_that_follows_its_encoder_is_told_once() -> None:
     """
     )
     world = World.from_toml(dedent(text), {"first.prg": b"M2 = ON\nDELAY 2\nM2 = OFF\n"}, name="w.toml")
-    watch = ProgramWatch(world.mic488["t"].device, world.parts.scheduler_of["t"], "t")
+    watch = ProgramWatch(world.mic488["t"].device, world.objects.scheduler_of["t"], "t")
     for _ in range(10):
         world.run(for_=0.1)
         world.apply_input(Turn("t", 2, 4))

@@ -150,7 +150,7 @@ class Layout:
     def signals(self) -> list[str]:
         """What conditions can use; terminals, pins and what moves more often than other points."""
         world = World.from_toml(self.text, {"p.prg": PROGRAM})
-        parts = world.parts
+        parts = world.objects
         found = ["idle"]
         for name, controller in parts.controllers.items():
             points = [f"{name}.{point.path}" for point in parts.kind_of[name].datasheet(controller).points]

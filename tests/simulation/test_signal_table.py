@@ -37,7 +37,7 @@ def present(signal: SignalOf, now: Nanos) -> str:
 
 
 def signals(world: World) -> dict[str, SignalOf]:
-    found = {name: world.parts.element_signals(name) or {} for name in world.parts.element_names}
+    found = {name: world.objects.element_signals(name) or {} for name in world.objects.element_names}
     return {f"{name}.{signal}": of for name, every in found.items() for signal, of in every.items()}
 
 
@@ -67,7 +67,7 @@ def test_the_documentation_lists_them() -> None:
         world = everything()
         for kind in listed:
             for spec in ELEMENTS[kind].named(world.spec.elements[kind]):
-                names = world.parts.element_signals(spec.name) or {}
+                names = world.objects.element_signals(spec.name) or {}
                 known.setdefault(kind, set()).update(re.sub(r"\d+$", "1", name) for name in names)
         named = {kind for kind, element in ELEMENTS.items() if element.is_named}
     assert set(listed) == named - {"lamp"}

@@ -13,7 +13,7 @@ from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.errors import Misuse, TimeReversal
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
-from steptwin.simulation.faults import Faults, read, rig
+from steptwin.simulation.faults import Faults, prepare_for_faults, read
 from steptwin.simulation.mechanics.mechanics import Mechanism
 from steptwin.simulation.mechanics.trajectory import Build
 from steptwin.simulation.scheduler.scheduler import Scheduler
@@ -122,7 +122,7 @@ def faulty(*faults: str) -> tuple[Scheduler, Toy, Mechanism, Faults]:
     scheduler.add("toy", toy)
     mechanism = Mechanism(scheduler, "toy", 1, Build())
     scheduler.add_part(mechanism)
-    rig(scheduler, "toy", there, ToyBody([mechanism]))
+    prepare_for_faults(scheduler, "toy", there, ToyBody([mechanism]))
     for fault in faults:
         there.add(read(fault))
     return scheduler, toy, mechanism, there
@@ -200,7 +200,7 @@ def test_a_snapshot_from_before_it_could_fail_is_restored() -> None:
     scheduler, toy = Scheduler(), Toy()
     scheduler.add("toy", toy)
     before = scheduler.snapshot()
-    rig(scheduler, "toy", there := Faults(), ToyBody())
+    prepare_for_faults(scheduler, "toy", there := Faults(), ToyBody())
     there.add(read("stuck pin=STOP value=1"))
     scheduler.advance(SECOND)
     there.clear(SECOND)

@@ -17,7 +17,7 @@ from steptwin.errors import LineFailure, Misuse, Refusal
 from steptwin.files.export import axis_views, read_trace, write_trace
 from steptwin.files.recording import load, recording_of, save
 from steptwin.files.world import World
-from steptwin.jsonvalues import plain
+from steptwin.jsonvalues import to_json
 from steptwin.live import twins
 from steptwin.live.clock import Clock
 from steptwin.live.options import LiveOptions, UpOptions
@@ -159,7 +159,7 @@ def test_a_subject_reads_and_commands_it() -> None:
 
 def test_its_data_sheet_is_json() -> None:
     world = World.from_toml(TEXT)
-    sheet = plain(world.kind("t").datasheet(world.controllers["t"]))
+    sheet = to_json(world.kind("t").datasheet(world.controllers["t"]))
     assert json.loads(json.dumps(sheet))["points"][0]["path"] == "position"
 
 

@@ -18,7 +18,7 @@ from steptwin.simulation.world.actions import ACTIONS
 from steptwin.simulation.world.inputs import Bytes, Download, EndScripts, Leave, Refused, See, SetVariable
 from steptwin.subject import commands as command
 from steptwin.subject import debugcommands as debug
-from steptwin.subject.commands import COMMANDS, plain_command, read_command
+from steptwin.subject.commands import COMMANDS, command_to_json, read_command
 from steptwin.subject.schema import schema
 
 EXAMPLES: list[tuple[dict[str, Any], command.Command]] = [
@@ -116,7 +116,7 @@ EXAMPLES: list[tuple[dict[str, Any], command.Command]] = [
 def test_from_json_and_back(plain: dict[str, Any], value: command.Command) -> None:
     name, fields = plain["do"], {key: one for key, one in plain.items() if key != "do"}
     assert read_command(name, fields) == value
-    assert json.loads(json.dumps(plain_command(value))) == plain
+    assert json.loads(json.dumps(command_to_json(value))) == plain
 
 
 def test_every_command_is_among_the_examples() -> None:
@@ -193,7 +193,7 @@ def test_whatever_is_read_is_a_command_or_misuse(name: str, data: st.DataObject)
         found = read_command(name, fields)
     except Misuse:
         return
-    again = plain_command(found)
+    again = command_to_json(found)
     assert again.pop("do") == name
     assert read_command(name, json.loads(json.dumps(again))) == found
 

@@ -20,11 +20,11 @@ def test_only_what_is_looked_at_comes_to_the_present() -> None:
     world = subject.world
     world.now = SECOND
     subject.do(command.ReadState("t1"))
-    assert [world.parts.scheduler_of[name].now for name in ("t0", "t1", "t2")] == [0, SECOND, 0]
+    assert [world.objects.scheduler_of[name].now for name in ("t0", "t1", "t2")] == [0, SECOND, 0]
     subject.do(command.ReadPoints(("t2.M1.position",)))
-    assert [world.parts.scheduler_of[name].now for name in ("t0", "t1", "t2")] == [0, SECOND, SECOND]
+    assert [world.objects.scheduler_of[name].now for name in ("t0", "t1", "t2")] == [0, SECOND, SECOND]
     subject.do(command.Time())
-    assert world.parts.scheduler_of["t0"].now == SECOND
+    assert world.objects.scheduler_of["t0"].now == SECOND
 
 
 def test_a_look_has_a_number_and_is_no_cause() -> None:

@@ -30,7 +30,7 @@ def test_they_are_those_of_the_world(controller: str, axis: str) -> None:
     for _ in range(300):
         world.run(for_=0.05)
         for event in following.take().events:
-            motions.take(read_event(json.loads(json.dumps(event.plain()))))
+            motions.take(read_event(json.loads(json.dumps(event.to_json()))))
         assert motions.position("1", world.now) == pytest.approx(world.read(f"{controller}.{axis}position"), abs=1e-9)
         assert motions.velocity("1", world.now) == pytest.approx(world.read(f"{controller}.{axis}velocity"), abs=1e-9)
         moved += motions.is_moving(world.now)

@@ -29,7 +29,7 @@ def test_what_worlds_give_is_as_the_schema_says(path: Path) -> None:
     event = validator("(event)")
     with World.load(path) as world:
         subject = WorldSubject(world)
-        plain = json.loads(json.dumps(subject.description.plain()))
+        plain = json.loads(json.dumps(subject.description.to_json()))
         assert list(validator("(description)").iter_errors(plain)) == []
         following = subject.follow(filter_of(KINDS), 100_000)
         plans = subject.plans(filter_of())
@@ -37,7 +37,7 @@ def test_what_worlds_give_is_as_the_schema_says(path: Path) -> None:
         events = [*plans, *following.take().events]
     assert {"plan", "edge"} <= {one.kind for one in events}
     for one in events[:5000]:
-        assert list(event.iter_errors(json.loads(json.dumps(one.plain())))) == [], one
+        assert list(event.iter_errors(json.loads(json.dumps(one.to_json())))) == [], one
 
 
 def test_a_member_too_many_is_noticed() -> None:

@@ -13,7 +13,7 @@ import pytest
 from steptwin import World
 from steptwin.controllerstate import ControllerState, ProgramActivity, StatusLevel
 from steptwin.datasheet import FactType
-from steptwin.jsonvalues import plain, read
+from steptwin.jsonvalues import read, to_json
 from steptwin.simulation.script.steps import Send, Set
 from steptwin.subject.commands import Advance, Enable, Move, ReadPins, ReadState
 from steptwin.subject.schema import definitions
@@ -59,7 +59,7 @@ def test_states_of_a_running_world_are_as_schema_and_data_sheet_say(path: Path) 
             for part in subject.description.controllers:
                 found, sheet = state(subject, part.name), part.datasheet
                 assert list(schema.iter_errors(found)) == []
-                assert json.loads(json.dumps(plain(read(ControllerState, found)))) == found
+                assert json.loads(json.dumps(to_json(read(ControllerState, found)))) == found
                 assert (found["kind"], found["variant"]) == (sheet.kind, sheet.variant)
                 assert found["time_s"] == world.now / 1e9
                 assert [(axis["name"], axis["unit"]) for axis in found["axes"]] == [(axis.name, axis.unit) for axis in sheet.axes]

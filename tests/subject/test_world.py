@@ -23,7 +23,14 @@ from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.inputs import Bytes, Download
 from steptwin.subject import commands as command
 from steptwin.subject.commands import COMMANDS
-from steptwin.subject.contract import ConnectionPart, DrawingPart, ElementPart, SignalPart, SwitchPart, read_description
+from steptwin.subject.contract import (
+    ConnectionDescription,
+    DrawingDescription,
+    ElementDescription,
+    SignalDescription,
+    SwitchDescription,
+    read_description,
+)
 from steptwin.subject.describe import describe
 from steptwin.subject.dispatch import respond
 from steptwin.subject.events import Event
@@ -94,7 +101,7 @@ def test_what_each_command_of_a_controller_writes() -> None:
 def test_a_description_survives_json_and_names_points_that_can_be_read() -> None:
     subject = of(feeder())
     description = subject.description
-    assert read_description(json.loads(json.dumps(description.plain()))) == description
+    assert read_description(json.loads(json.dumps(description.to_json()))) == description
     assert {part.name: part.controls for part in description.controllers} == {
         "table": ("enable", "move", "home", "jog", "stop", "program"),
         "drum": ("move", "jog", "stop", "program"),
@@ -186,7 +193,7 @@ def test_an_answer_that_comes_at_once_is_in_the_result_of_a_request() -> None:
     following = later.follow(filter_of(["frame"]), 9)
     assert later.do(do.Request("bus", 1, READ_POSITION[1:-2], SECOND)).value == {"pdu": None}
     later.do(command.Advance(duration=SECOND))
-    frames = [event.payload.plain() for event in following.take().events]
+    frames = [event.payload.to_json() for event in following.take().events]
     assert frames[:2] == [
         {"client": "script", "direction": "in", "data": READ_POSITION.hex(), "words": "read M1_POS_ACT"},
         {
@@ -414,16 +421,16 @@ def test_elements_are_described_with_terminals_and_signals() -> None:
     )
     description = describe(world)
     assert description.elements == (
-        ElementPart("both", "gate", ("in1", "in2"), ("out",), (), function="and"),
-        ElementPart(
-            "clamp", "cylinder", ("extend",), ("extended", "retracted"), (SignalPart("position", "mm", 0.0, 40.0),),
-            DrawingPart("rod", 40.0, ("position",), 0.0, (SwitchPart("a.IN3", 19.0, 21.0),)),
+        ElementDescription("both", "gate", ("in1", "in2"), ("out",), (), function="and"),
+        ElementDescription(
+            "clamp", "cylinder", ("extend",), ("extended", "retracted"), (SignalDescription("position", "mm", 0.0, 40.0),),
+            DrawingDescription("rod", 40.0, ("position",), 0.0, (SwitchDescription("a.IN3", 19.0, 21.0),)),
         ),
     )  # fmt: skip
     assert set(description.connections) == {
-        ConnectionPart("clamp.extended", "both.in1", inverted=False, delay_ns=0, join=None),
-        ConnectionPart("a.OUT1", "clamp.extend", inverted=False, delay_ns=0, join=None),
-        ConnectionPart("clamp.switch1", "a.IN3", inverted=False, delay_ns=0, join=None),
-        ConnectionPart("b", "both.in2", inverted=False, delay_ns=0, join=None),
+        ConnectionDescription("clamp.extended", "both.in1", inverted=False, delay_ns=0, join=None),
+        ConnectionDescription("a.OUT1", "clamp.extend", inverted=False, delay_ns=0, join=None),
+        ConnectionDescription("clamp.switch1", "a.IN3", inverted=False, delay_ns=0, join=None),
+        ConnectionDescription("b", "both.in2", inverted=False, delay_ns=0, join=None),
     }
-    assert read_description(json.loads(json.dumps(description.plain()))) == description
+    assert read_description(json.loads(json.dumps(description.to_json()))) == description

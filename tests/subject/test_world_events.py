@@ -11,7 +11,7 @@ from world_rig import small
 from steptwin.controller import SECOND
 from steptwin.files.world import World
 from steptwin.motion.divisions import profile_of
-from steptwin.motion.plain import read_plan
+from steptwin.motion.planjson import read_plan
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.inputs import Bytes
 from steptwin.subject import commands as command
@@ -73,7 +73,7 @@ def test_frames_are_followed_on_connections_that_are_there_and_where_nothing_is_
     following = subject.follow(filter_of(["frame"], ["bus"]), 99)
     world.apply_input(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
     world.run(for_=0.5)
-    frames = [plain for event in following.take().events if (plain := event.payload.plain())["client"] == "tcp-1"]
+    frames = [plain for event in following.take().events if (plain := event.payload.to_json())["client"] == "tcp-1"]
     assert frames[0] == {"client": "tcp-1", "direction": "in", "data": READ_POSITION.hex(), "words": "read M1_POS_ACT"}
     assert [frame["direction"] for frame in frames] == ["in", "out"]
     following.close()
@@ -88,7 +88,7 @@ def test_bytes_that_belong_to_no_frame_are_counted_among_the_frames() -> None:
     world.run(for_=5)
     world.apply_input(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
     world.run(for_=0.5)
-    frames = [event.payload.plain() for event in following.take().events]
+    frames = [event.payload.to_json() for event in following.take().events]
     noise = [str(frame["words"]).split(maxsplit=1) for frame in frames if not frame["data"]]
     assert sum(int(count) for count, _ in noise) == 3
     assert {what for _, what in noise} <= {"byte that belongs to no frame", "bytes that belong to no frame"}
@@ -100,7 +100,7 @@ def test_frames_of_chips_are_lines_and_characters() -> None:
     following = of(world).follow(filter_of(["frame"]), 99)
     world.apply_input(Bytes("bus", "tcp-1", "raw", b"X7\rU3\r"))
     world.run(for_=1)
-    assert [event.payload.plain() for event in following.take().events] == [
+    assert [event.payload.to_json() for event in following.take().events] == [
         {"client": "tcp-1", "direction": "in", "data": b"X7\r".hex(), "words": "X7  indeX 7"},
         {"client": "tcp-1", "direction": "in", "data": b"U3\r".hex(), "words": "U3  Upload 3"},
         {"client": "line", "direction": "out", "data": "00", "words": "U3 position, high byte = 0"},
@@ -119,7 +119,7 @@ def test_the_plans_of_a_run_give_every_position_the_controller_shows() -> None:
     for _ in range(200):
         world.run(for_=0.05)
         for event in following.take().events:
-            plain = json.loads(json.dumps(event.plain()))
+            plain = json.loads(json.dumps(event.to_json()))
             key = event.controller, event.axis
             origins[key] = plain["origin"]
             if event.kind == "plan":
@@ -128,7 +128,7 @@ def test_the_plans_of_a_run_give_every_position_the_controller_shows() -> None:
             if controller != "table":
                 continue
             assert isinstance(event.payload, PlanPayload)
-            plan = profile_of(read_plan(json.loads(json.dumps(event.plain()))["plan"]))
+            plan = profile_of(read_plan(json.loads(json.dumps(event.to_json()))["plan"]))
             origin = origins.get((controller, axis), event.payload.origin or 0)
             shown = (plan.count(world.now) + origin) / scales[controller, str(axis)]
             assert shown == pytest.approx(world.read(f"{controller}.M{axis}.position"), abs=1e-9)
@@ -141,4 +141,4 @@ def test_words_of_a_note_are_a_value_of_its_message() -> None:
     following = subject.follow(filter_of(["note"]), 99)
     subject.do(command.Advance(duration=SECOND))
     (note,) = following.take().events
-    assert note.plain()["messages"] == {"text": {"id": "subject.note", "values": {"note": words}}}
+    assert note.to_json()["messages"] == {"text": {"id": "subject.note", "values": {"note": words}}}

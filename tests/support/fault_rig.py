@@ -5,7 +5,7 @@ from __future__ import annotations
 from steptwin.controller import MILLISECOND, SECOND
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
-from steptwin.simulation.faults import ActiveFault, Faults, FaultyController, FaultyPort, LineProtocol, read, rig
+from steptwin.simulation.faults import ActiveFault, Faults, FaultyController, FaultyPort, LineProtocol, prepare_for_faults, read
 from steptwin.simulation.kinds.mic488.faults import Mic488Body
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import TraceRecord
@@ -62,7 +62,7 @@ class FaultRig:
         for unit, device in self.devices.items():
             device.execute(bytes.fromhex("06 00 64 12 34"), 0)
             self.scheduler.add(str(unit), device)
-            self.controllers[unit] = rig(self.scheduler, str(unit), self.faults, Mic488Body(device, unit))
+            self.controllers[unit] = prepare_for_faults(self.scheduler, str(unit), self.faults, Mic488Body(device, unit))
         self.records: list[TraceRecord] = []
         self.faults.sinks.append(self.records.append)
         if line is LineProtocol.TCP and is_timed:

@@ -14,7 +14,7 @@ from line_rig import LATENCY, MemoryChannel, MemoryEndpoint, MemoryTransport, Vi
 from steptwin.controller import MILLISECOND
 from steptwin.drivers import AsyncMic488, Mic488
 from steptwin.drivers.exchange import Exchanger
-from steptwin.drivers.mic488.frames import FrameWords
+from steptwin.drivers.mic488.frames import FrameLog
 from steptwin.drivers.modbus import ModbusQuery, RtuMaster, TcpMaster
 from steptwin.drivers.tasks import TaskLine
 from steptwin.drivers.threads import ThreadLine
@@ -198,7 +198,7 @@ def _exchanger(wire: Wire, interval: int, log: list[str] | None) -> tuple[Exchan
     shared: dict[str, object] = {"tcp": wire.tcp}
     observer = None
     if log is not None:
-        frames = FrameWords(tcp=wire.tcp)
+        frames = FrameLog(tcp=wire.tcp)
         frames.sinks.append(lambda frame: log.append(f"{frame.direction.value if frame.direction else '?'} {frame.meaning}"))
         shared["frames"] = frames
         observer = frames.observe

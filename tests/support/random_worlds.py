@@ -23,7 +23,7 @@ from steptwin.diagnostics import Severity
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.recording import recording_of
 from steptwin.files.world import World
-from steptwin.simulation.describe.pieces import given_files
+from steptwin.simulation.describe.includes import given_files
 from steptwin.simulation.describe.steptable import read_steps
 from steptwin.simulation.faults import read as read_fault
 from steptwin.simulation.logic.signal import SignalOf
@@ -171,8 +171,8 @@ def shown(world: Simulation) -> list[str]:
 def seen_of_controllers(world: Simulation) -> list[str]:
     """Signals of elements, controllers and axes."""
     found = [f"{world.now}"]
-    for name in world.parts.element_names:
-        signals = world.parts.element_signals(name) or {}
+    for name in world.objects.element_names:
+        signals = world.objects.element_signals(name) or {}
         found += [told_of(f"{name}.{signal}", of, world.now) for signal, of in signals.items()]
     for name, fitted in world.axes.items():
         axis = MechanicsView(world, fitted)

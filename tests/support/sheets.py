@@ -7,12 +7,12 @@ from dataclasses import fields
 from typing import Any
 
 from steptwin.datasheet import Datasheet
-from steptwin.jsonvalues import plain
+from steptwin.jsonvalues import to_json
 
 
 def line(item: Any) -> str:
     """Every field of a row that is not empty, in the order of its definition."""
-    return json.dumps(_filled(plain(item)), ensure_ascii=False, default=str)
+    return json.dumps(_filled(to_json(item)), ensure_ascii=False, default=str)
 
 
 def _filled(value: Any) -> Any:
@@ -42,5 +42,5 @@ def missing(sheet: Datasheet, other: Datasheet) -> list[str]:
 
 
 def _name(row: Any) -> str:
-    given = plain(row)
+    given = to_json(row)
     return given if isinstance(given, str) else str(given.get("path") or given.get("name") or given["code"])

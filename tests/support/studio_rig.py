@@ -16,7 +16,7 @@ from steptwin.access.roles import Role
 from steptwin.access.tokens import AccessGate, Token
 from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.devices.composite import CompositeSubject
-from steptwin.devices.worldpart import WorldPart
+from steptwin.devices.worldmember import WorldMember
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
 from steptwin.simulation.world.worldprograms import WorldPrograms, configuration_text
@@ -87,7 +87,7 @@ class NoWork:
     def verify(self, address: str, *, write: bool) -> None:
         raise Misuse("there are no lines here")
 
-    def plain(self) -> None:
+    def to_json(self) -> None:
         return None
 
     def cancel(self) -> None:
@@ -151,7 +151,7 @@ class Studio:
             work=NoWork(),
             on_internal=self.errors.append,
         )
-        world = WorldPart(self.subject, self.subject.followers, self.jogs)
+        world = WorldMember(self.subject, self.subject.followers, self.jogs)
         shown = CompositeSubject(world, lambda: self.world.now, self.subject.numbering)
         self.hub = Hub(shown, shown, around)
         self.now: Nanos = 5 * SECOND

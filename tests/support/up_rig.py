@@ -7,7 +7,7 @@ from typing import Any
 
 from steptwin.controller import Nanos
 from steptwin.devices.composite import CompositeSubject
-from steptwin.devices.worldpart import WorldPart
+from steptwin.devices.worldmember import WorldMember
 from steptwin.files.world import World
 from steptwin.live.gateways import LiveWorldSubject
 from steptwin.live.pace import Pace
@@ -68,7 +68,7 @@ class UpRig:
         self.subject = LiveWorldSubject(self.control, self.live)
         jogs = WorldJogs(self.live.subject, self.control.at_present)
         self.live.external_actor = jogs
-        world = WorldPart(self.control, self.live.subject.followers, jogs)
+        world = WorldMember(self.control, self.live.subject.followers, jogs)
         self.composite = CompositeSubject(world, lambda: self.live.now, self.live.subject.numbering)
 
     async def open(self) -> None:

@@ -458,7 +458,7 @@ def test_levels_in_volts() -> None:
 
 
 def test_plain_answers() -> None:
-    answer = waits().why("guard.no").plain()
+    answer = waits().why("guard.no").to_json()
     assert answer["since_ns"] == "1021000000"
     assert answer["complete"] is True
     message = {"id": "why.became", "values": {"signal": "guard.no", "value": 1, "how": ""}}

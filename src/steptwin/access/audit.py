@@ -49,7 +49,7 @@ class Entry:
             f"{self.viewer}: {' '.join([self.do, *(f'{name}={value}' for name, value in self.fields.items())])}: {self.outcome}"
         )
 
-    def plain(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, object]:
         head = {"at": self.at, "time_ns": str(self.time), "viewer": self.viewer, "role": self.role}
         return {**head, "do": self.do, "fields": dict(self.fields), "outcome": self.outcome}
 

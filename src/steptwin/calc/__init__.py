@@ -11,7 +11,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from steptwin.calc.calculator import TIMES, Calculator, range_text
-from steptwin.calc.contract import Calculation, CurvePoint, Formula, Model, MovePart, MoveQuantity, RequiredSetting, curve, plain
+from steptwin.calc.contract import (
+    Calculation,
+    CurvePoint,
+    Formula,
+    Model,
+    MovePhase,
+    MoveQuantity,
+    RequiredSetting,
+    curve,
+    to_json,
+)
 from steptwin.calc.m1486 import M1486Model
 from steptwin.calc.mic488 import Mic488Model
 from steptwin.calc.units import Dimension, DriveMechanics, UnitScale, read_lead, read_quantity, unit_of
@@ -29,16 +39,16 @@ __all__ = [
     "M1486Model",
     "Mic488Model",
     "Model",
-    "MovePart",
+    "MovePhase",
     "MoveQuantity",
     "RequiredSetting",
     "UnitScale",
     "calculator_of",
     "curve",
-    "plain",
     "range_text",
     "read_lead",
     "read_quantity",
+    "to_json",
     "unit_of",
 ]
 

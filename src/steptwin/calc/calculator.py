@@ -21,7 +21,7 @@ from steptwin.calc.contract import (
     VELOCITY,
     Calculation,
     Model,
-    MovePart,
+    MovePhase,
     MoveQuantity,
     RequiredSetting,
 )
@@ -236,8 +236,8 @@ class Calculator:
             speed_pulses=speed_pulses,
         )
 
-    def _parts(self, profile: Profile) -> list[MovePart]:
-        parts: list[MovePart] = []
+    def _parts(self, profile: Profile) -> list[MovePhase]:
+        parts: list[MovePhase] = []
         begin, at_p = 0.0, 0.0
         speed, pulses = self.quantities[VELOCITY].pulses, self.quantities[DISTANCE].pulses
         names = {"rises": ACCELERATION, "stays": "constant velocity", "falls": DECELERATION}
@@ -245,7 +245,7 @@ class Calculator:
             shape = f"parabolic {names[phase]}" if segment.c3 else names[phase]
             end_p = segment.position(segment.end_s)
             first, last = abs(segment.velocity(begin)) / speed, abs(segment.velocity(segment.end_s)) / speed
-            parts.append(MovePart(shape, begin, segment.end_s - begin, first, last, (end_p - at_p) / pulses))
+            parts.append(MovePhase(shape, begin, segment.end_s - begin, first, last, (end_p - at_p) / pulses))
             begin, at_p = segment.end_s, end_p
         return parts
 

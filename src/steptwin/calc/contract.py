@@ -82,7 +82,7 @@ class Model(Protocol):
     def formulas(self, values: Mapping[str, float], profile: Profile) -> list[Formula]: ...
 
 
-class MovePart(NamedTuple):
+class MovePhase(NamedTuple):
     """A part of a move. Velocities and distance in the units of the quantities."""
 
     name: str
@@ -120,7 +120,7 @@ class Calculation:
     """Highest velocity that is reached."""
     reaches: bool
     """Whether that is the velocity that was asked for."""
-    parts: tuple[MovePart, ...]
+    parts: tuple[MovePhase, ...]
     formulas: tuple[Formula, ...]
     notes: tuple[str, ...]
     settings: tuple[RequiredSetting, ...]
@@ -132,7 +132,7 @@ class Calculation:
     """Pulses/s in the unit of velocity."""
 
 
-def plain(result: Calculation) -> dict[str, object]:
+def to_json(result: Calculation) -> dict[str, object]:
     """As JSON has values; ``curve`` has points of the profile (`curve`)."""
     found = {
         "title": result.title,

@@ -157,7 +157,7 @@ class Campaign:
             if coverage:
                 self.coverage, self.covered = store.coverage()
         if out is not None:
-            write_bytes(Path(out) / SUMMARY, (json.dumps(summary.plain(), ensure_ascii=False, indent=1) + "\n").encode())
+            write_bytes(Path(out) / SUMMARY, (json.dumps(summary.to_json(), ensure_ascii=False, indent=1) + "\n").encode())
         return summary
 
     @contextmanager
@@ -222,7 +222,7 @@ class Campaign:
             batches = iter(CaseExecution(description, there, cases, is_over, counts=coverage))
         for batch in batches:
             if counted is not None:
-                for text in Coverage.of_plain(batch.coverage or ()):
+                for text in Coverage.from_json(batch.coverage or ()):
                     counted.add(text)
             store.add([StoredCase(*both) for both in zip(batch.cases, batch.results, strict=True)], counted)
             wrong = [one.number for one in batch.results if one.failed]

@@ -61,7 +61,7 @@ class StepAt:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A run by its values. It is JSON (`plain`) and can be pickled.
+    """A run by its values. It is JSON (`to_json`) and can be pickled.
 
     ``values`` are those of what varies, by its path or name; times in seconds. ``seed`` is that of all chance in the world.
     """
@@ -76,7 +76,7 @@ class Case:
     def __reduce__(self) -> PickledCase:
         return Case, (self.number, self.values, self.faults, self.steps, self.seed, self.end_ns)
 
-    def plain(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         faults = [{"at_ns": one.at_ns, "fault": one.fault, "table": one.table} for one in self.faults]
         steps = [{"at_ns": one.at_ns, "step": one.step, "table": one.table} for one in self.steps]
         return {
@@ -89,16 +89,16 @@ class Case:
         }
 
     @classmethod
-    def of_plain(cls, plain: Mapping[str, Any]) -> Case:
-        """Read the result of `plain`, also after JSON."""
-        faults = tuple(FaultAt(**one) for one in plain["faults"])
-        steps = tuple(StepAt(**one) for one in plain["steps"])
-        return cls(plain["number"], dict(plain["values"]), faults, steps, plain["seed"], plain["end_ns"])
+    def from_json(cls, data: Mapping[str, Any]) -> Case:
+        """Read the result of `to_json`, also after JSON."""
+        faults = tuple(FaultAt(**one) for one in data["faults"])
+        steps = tuple(StepAt(**one) for one in data["steps"])
+        return cls(data["number"], dict(data["values"]), faults, steps, data["seed"], data["end_ns"])
 
     @property
     def digest(self) -> str:
         """Equal for equal cases, whatever their number."""
-        return digest_of({**self.plain(), "number": None})
+        return digest_of({**self.to_json(), "number": None})
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +125,7 @@ class CaseResult:
         """The least of all properties; None without any."""
         return min((verdict.robustness for verdict in self.verdicts), default=None)
 
-    def plain(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         verdicts = [
             {"name": one.name, "holds": one.holds, "robustness": one.robustness, "at_ns": one.at_ns, "why": one.why}
             for one in self.verdicts
@@ -140,13 +140,13 @@ class CaseResult:
         }
 
     @classmethod
-    def of_plain(cls, plain: Mapping[str, Any]) -> CaseResult:
-        """Read the result of `plain`, also after JSON."""
-        verdicts = tuple(Verdict(**one) for one in plain["verdicts"])
-        return cls(plain["number"], verdicts, plain["digest"], plain["end_ns"], dict(plain["measures"]), plain["error"])
+    def from_json(cls, data: Mapping[str, Any]) -> CaseResult:
+        """Read the result of `to_json`, also after JSON."""
+        verdicts = tuple(Verdict(**one) for one in data["verdicts"])
+        return cls(data["number"], verdicts, data["digest"], data["end_ns"], dict(data["measures"]), data["error"])
 
 
-def digest_of(plain: Any) -> str:
+def digest_of(data: Any) -> str:
     """Digest of values that JSON has: 32 hexadecimal digits, equal for equal values in whatever order of their keys."""
-    text = json.dumps(plain, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    text = json.dumps(data, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     return blake2b(text.encode(), digest_size=DIGEST_BYTES).hexdigest()

@@ -131,7 +131,7 @@ class Cases:
 
 def filled(text: str, values: Mapping[str, VariedValue]) -> str:
     """With values in the place of ``{name}``."""
-    return _NAME.sub(lambda found: _plain(values[found[1]]) if found[1] in values else found[0], text)
+    return _NAME.sub(lambda found: _format(values[found[1]]) if found[1] in values else found[0], text)
 
 
 def filled_step(step: str, values: Mapping[str, VariedValue]) -> str:
@@ -153,5 +153,5 @@ def names_in(text: str) -> list[str]:
     return _NAME.findall(text)
 
 
-def _plain(value: VariedValue) -> str:
+def _format(value: VariedValue) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)

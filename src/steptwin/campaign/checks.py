@@ -17,8 +17,8 @@ from steptwin.durations import LONGEST_NS, duration
 from steptwin.errors import Misuse
 from steptwin.files.world import World, read_beside
 from steptwin.simulation.describe.description import describe
+from steptwin.simulation.describe.includes import FILE_KEYS, USE, given_files
 from steptwin.simulation.describe.overrides import override, place_of
-from steptwin.simulation.describe.pieces import FILE_KEYS, USE, given_files
 from steptwin.simulation.faults import read as read_fault
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.toml.reader import TomlText

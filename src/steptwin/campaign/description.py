@@ -259,9 +259,9 @@ class CampaignDescription(CampaignTable):
 
     def _decisive(self) -> Mapping[str, Any]:
         left = {"runs", "time_ns", "until_failure", "database", "files", "name", "matrix", "world", "path"}
-        plain: dict[str, Any] = {"version": __version__} | {
+        data: dict[str, Any] = {"version": __version__} | {
             one.name: repr(getattr(self, one.name)) for one in fields(self) if one.name not in left
         }
         if self.design == "latin-hypercube":  # its points depend on how many there are
-            plain["runs"] = self.runs
-        return plain | {"files": {name: content.hex() for name, content in self.files.items()}}
+            data["runs"] = self.runs
+        return data | {"files": {name: content.hex() for name, content in self.files.items()}}

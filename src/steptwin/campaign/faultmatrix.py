@@ -69,13 +69,13 @@ class FaultMatrix:
         found = Counter(cell.judgement.effect for row in self.rows for cell in row.cells)
         return {effect: found[effect] for effect in FaultEffect}
 
-    def plain(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """As JSON."""
         return {
             "name": self.name,
             "end_s": self.nominal.result.end_ns / SECOND,
             "ended": self.nominal.ended,
-            "phases": [phase.plain() for phase in self.phases],
+            "phases": [phase.to_json() for phase in self.phases],
             "counts": {effect.value: count for effect, count in self.counts.items()},
             "coverage": list(self.coverage.summary),
             "left_out": [one.text for one in self.left_out],
@@ -144,7 +144,7 @@ def fault_matrix(
     rows: list[MatrixRow] = []
     for results, covered in _results(description, rules, tasks, folder, jobs):
         possible_fault, row = tried[len(rows)], tasks[len(rows)]
-        for text in Coverage.of_plain(covered):
+        for text in Coverage.from_json(covered):
             coverage.add(text)
         cells = [
             MatrixCell(
@@ -192,7 +192,7 @@ def _run_row(
             name = f"{CELLS}/{task.name}.json"
             recordings.save(recordings.recording_of(world), folder / name)
         found.append(_CellResult(facts, name))
-    return found, coverage.plain()
+    return found, coverage.to_json()
 
 
 def _results(
@@ -213,7 +213,7 @@ def function_of(world: World, possible: PossibleFault) -> str:
     """The function that fails: the faulty thing, and what drives the input."""
     place = possible.place
     name, _, pin = place.partition(".")
-    path = next((path for one, path in world.parts.driven.items() if one.controller == name and one.pin == pin), None)
+    path = next((path for one, path in world.objects.driven.items() if one.controller == name and one.pin == pin), None)
     if path is None or possible.fault.kind.parameter("pin") is None:
         return place
     table: Any = world.spec.text.data

@@ -31,7 +31,7 @@ class FoundFailure:
     files: Reproduction | None
     where: str | None = None
 
-    def plain(self, folder: Path) -> dict[str, Any]:
+    def to_json(self, folder: Path) -> dict[str, Any]:
         """As JSON; paths are relative to ``folder``."""
         shrunk = self.shrunk
         return {
@@ -40,11 +40,11 @@ class FoundFailure:
             "what": summary(self.result),
             "count": len(self.numbers),
             "cases": list(self.numbers[:100]),
-            "simplest": None if shrunk is None else shrunk.case.plain(),
+            "simplest": None if shrunk is None else shrunk.case.to_json(),
             "where": self.where,
             "repeats": None if shrunk is None else shrunk.repeats,
             "shrinking_runs": 0 if shrunk is None else shrunk.runs,
-            "files": {} if self.files is None else self.files.plain(folder),
+            "files": {} if self.files is None else self.files.to_json(folder),
         }
 
 

@@ -27,7 +27,7 @@ TRIED: dict[str, tuple[dict[str, FaultValue], ...]] = {
 """Parameters with which a kind of fault is tried, where it is not tried with their defaults alone."""
 
 
-class FaultyPart(enum.StrEnum):
+class FaultCategory(enum.StrEnum):
     """Kind of part that has a fault."""
 
     SENSOR = "sensor"
@@ -39,19 +39,19 @@ class FaultyPart(enum.StrEnum):
 
 
 _OF_KIND = {
-    "stuck": FaultyPart.SENSOR,
-    STUCK_INPUT: FaultyPart.SENSOR,
-    "bounce": FaultyPart.SENSOR,
-    "slip": FaultyPart.SENSOR,
-    "broken-wire": FaultyPart.SENSOR,
-    "drift": FaultyPart.SENSOR,
-    "master-error": FaultyPart.LINE,
-    "supply-drop": FaultyPart.POWER,
-    "power-cut": FaultyPart.POWER,
-    "brown-out": FaultyPart.POWER,
-    "wear": FaultyPart.MEMORY,
-    "welded-contact": FaultyPart.LOGIC,
-    "open-coil": FaultyPart.LOGIC,
+    "stuck": FaultCategory.SENSOR,
+    STUCK_INPUT: FaultCategory.SENSOR,
+    "bounce": FaultCategory.SENSOR,
+    "slip": FaultCategory.SENSOR,
+    "broken-wire": FaultCategory.SENSOR,
+    "drift": FaultCategory.SENSOR,
+    "master-error": FaultCategory.LINE,
+    "supply-drop": FaultCategory.POWER,
+    "power-cut": FaultCategory.POWER,
+    "brown-out": FaultCategory.POWER,
+    "wear": FaultCategory.MEMORY,
+    "welded-contact": FaultCategory.LOGIC,
+    "open-coil": FaultCategory.LOGIC,
 }
 """The parts of kinds of faults; those of lines are faults of lines, all others of actuators."""
 _LOGIC = frozenset({"gate", "latch", "timer", "relay", "counter"})
@@ -62,7 +62,7 @@ _LOGIC = frozenset({"gate", "latch", "timer", "relay", "counter"})
 class PossibleFault:
     """A fault, without its moment: set, it begins at once. ``place`` names what is faulty, ``mode`` how."""
 
-    part: FaultyPart
+    part: FaultCategory
     place: str
     mode: str
     fault: Fault
@@ -95,7 +95,7 @@ def _of_kind(world: Simulation, kind: FaultKind) -> Iterator[PossibleFault]:
             given: dict[str, object] = {**where, **more}
             try:
                 fault = parse({"kind": kind.name, **given})
-                world.rigging.check(fault)
+                world.fault_setup.check(fault)
             except Misuse:
                 continue  # impossible at this place
             yield PossibleFault(_part(world, kind, where), place, _mode(kind, more, where), fault)
@@ -108,14 +108,14 @@ def _mode(kind: FaultKind, more: dict[str, FaultValue], where: dict[str, FaultVa
     )
 
 
-def _part(world: Simulation, kind: FaultKind, where: dict[str, FaultValue]) -> FaultyPart:
+def _part(world: Simulation, kind: FaultKind, where: dict[str, FaultValue]) -> FaultCategory:
     if kind.layer not in (Layer.PHYSICS, Layer.ELEMENT):
-        return FaultyPart.LINE
+        return FaultCategory.LINE
     if kind.name == STUCK_OUTPUT:
         name = where["element"]
-        of = next((of for of, built in world.parts.elements.items() if name in built), "")
-        return FaultyPart.LOGIC if of in _LOGIC else FaultyPart.SENSOR
-    return _OF_KIND.get(kind.name, FaultyPart.ACTUATOR)
+        of = next((of for of, built in world.objects.elements.items() if name in built), "")
+        return FaultCategory.LOGIC if of in _LOGIC else FaultCategory.SENSOR
+    return _OF_KIND.get(kind.name, FaultCategory.ACTUATOR)
 
 
 def _places(world: Simulation, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue], str]]:
@@ -130,7 +130,7 @@ def _places(world: Simulation, kind: FaultKind) -> Iterator[tuple[dict[str, Faul
 
 def _elements(world: Simulation, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue], str]]:
     key, used = {STUCK_OUTPUT: ("output", _sources(world)), STUCK_INPUT: ("input", _contacted(world))}.get(kind.name, ("", []))
-    for name in world.parts.faults.elements:
+    for name in world.objects.faults.elements:
         if not key:
             yield {"element": name}, name
             continue
@@ -141,13 +141,13 @@ def _elements(world: Simulation, kind: FaultKind) -> Iterator[tuple[dict[str, Fa
 def _sources(world: Simulation) -> list[tuple[str, str]]:
     """The outputs that a wire leads away from, in the order of terminals: what is stuck elsewhere has no effect."""
     led = {tuple(wire.source) for scheduler in world.schedulers for wire in scheduler.wires}
-    outputs = ((name, pin) for name, its in world.parts.terminals.items() for pin in its.outputs)
+    outputs = ((name, pin) for name, its in world.objects.terminals.items() for pin in its.outputs)
     return [one for one in outputs if one in led]
 
 
 def _contacted(world: Simulation) -> list[tuple[str, str]]:
     """The inputs of elements with contacts: one that a wire drives is stuck where the output is."""
-    return [tuple(pin) for pin in world.parts.circuits if pin.controller in world.parts.terminals]
+    return [tuple(pin) for pin in world.objects.circuits if pin.controller in world.objects.terminals]
 
 
 def _controllers(world: Simulation, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue], str]]:
@@ -166,12 +166,12 @@ def _controllers(world: Simulation, kind: FaultKind) -> Iterator[tuple[dict[str,
 def _axes(world: Simulation, controller: str, count: int) -> list[int]:
     """The axes that move something; all where the world has no elements."""
     moving = {axis.mechanism.number for axis in world.axes.values() if axis.spec.drive[0] == controller}
-    return sorted(moving) if any(world.parts.elements.values()) else list(range(1, count + 1))
+    return sorted(moving) if any(world.objects.elements.values()) else list(range(1, count + 1))
 
 
 def _inputs(world: Simulation, controller: str) -> list[str]:
     """The inputs that a wire, a switch or a script changes, in the order of the pins."""
-    led = {pin.pin for pin in (*world.parts.driven, *world.parts.circuits) if pin.controller == controller}
+    led = {pin.pin for pin in (*world.objects.driven, *world.objects.circuits) if pin.controller == controller}
     led |= {pin.upper() for script in world.spec.scripts for name, pin in _set_by(script.steps) if name == controller}
     return [pin for pin in world.controllers[controller].pins() if pin in led]
 
@@ -192,8 +192,8 @@ def _lines(world: Simulation, kind: FaultKind) -> Iterator[tuple[dict[str, Fault
             where["link"] = SCRIPTS
         for direction in directions:
             yield where | ({"direction": direction} if direction else {}), spec.name
-    for name, controller_kind in world.parts.kind_of.items():
-        if controller_kind.registers is not None and name not in world.parts.line_of and kind.layer is not Layer.BYTES:
+    for name, controller_kind in world.objects.kind_of.items():
+        if controller_kind.registers is not None and name not in world.objects.line_of and kind.layer is not Layer.BYTES:
             yield {}, name
             return  # requests to controllers without a line do not say to which
 
@@ -209,6 +209,6 @@ def occasions(world: Simulation, possible: Iterable[PossibleFault], end_ns: int,
         if one.is_counted:
             never = replace(one.fault, given={**one.fault.given, "probability": 0.0})
             world.put_fault(never)
-            counted.append((one.text, world.parts.faults.active[-1].name))
+            counted.append((one.text, world.objects.faults.active[-1].name))
     world.run_to(end_ns, until)
-    return {text: world.parts.faults.called(name).seen for text, name in counted}
+    return {text: world.objects.faults.called(name).seen for text, name in counted}

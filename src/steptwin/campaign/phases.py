@@ -35,7 +35,7 @@ class CyclePhase:
     def middle(self) -> Nanos:
         return (self.begin + self.end) // 2
 
-    def plain(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, object]:
         """As JSON."""
         return {
             "number": self.number,
@@ -67,11 +67,11 @@ def cycle_phases(world: Simulation, begin: Nanos = 0, most: int = MOST_PHASES) -
 
 def _acting(world: Simulation) -> frozenset[str]:
     """The outputs that tell phases apart, as records call them; inputs follow from them."""
-    found = {f"{name}.{output.lower()}" for name, one in world.parts.terminals.items() for output in one.outputs}
+    found = {f"{name}.{output.lower()}" for name, one in world.objects.terminals.items() for output in one.outputs}
     for name, controller in world.controllers.items():
         sheet = world.kind(name).datasheet(controller)
         found |= {f"{name}.{pin.name}" for pin in sheet.pins if pin.direction is not PinDirection.INPUT}
-    return frozenset(found | set(world.parts.built(BUTTON)))
+    return frozenset(found | set(world.objects.built(BUTTON)))
 
 
 def _changes(trace: Iterable[TraceRecord], acting: Collection[str], end: Nanos) -> list[tuple[Nanos, str, bool]]:

@@ -36,7 +36,7 @@ class Reproduction:
     timeline: Path | None
     test: Path | None
 
-    def plain(self, folder: Path) -> dict[str, str]:
+    def to_json(self, folder: Path) -> dict[str, str]:
         """Their paths, relative to a folder."""
         found = {"session": self.session, "timeline": self.timeline, "test": self.test}
         return {name: os.path.relpath(path, folder) for name, path in found.items() if path is not None}
@@ -80,7 +80,7 @@ def text_of_test(case: Case, result: CaseResult, name: str, campaign: str, at: s
     return (
         f'"""{title}"""\n\nfrom pathlib import Path\n\nfrom steptwin.campaign.reproduce import check_case\n\n'
         f"CAMPAIGN = Path(__file__).parent / {Path(campaign).as_posix()!r}\n"
-        f"CASE = {pformat(case.plain(), width=WIDTH, sort_dicts=False)}\n"
+        f"CASE = {pformat(case.to_json(), width=WIDTH, sort_dicts=False)}\n"
         f"PROPERTIES = {pformat([one.name for one in result.verdicts if not one.holds], width=WIDTH)}\n\n\n"
         f"def test_{identifier(name)}() -> None:\n    check_case(CAMPAIGN, CASE, PROPERTIES)\n"
     )
@@ -111,7 +111,7 @@ def check_case(campaign: Path | str, case: Mapping[str, Any], properties: Collec
 
     ``properties``: only these; others may need more time than a case has that was made as short as it fails.
     """
-    result = CaseRunner(load_campaign(campaign)).run(Case.of_plain(case))
+    result = CaseRunner(load_campaign(campaign)).run(Case.from_json(case))
     if properties is not None:
         result = replace(result, verdicts=tuple(one for one in result.verdicts if one.name in properties))
     if result.failed:

@@ -21,8 +21,8 @@ from steptwin.files.world import World
 from steptwin.simulation.describe import steptable
 from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.description import read_world
+from steptwin.simulation.describe.includes import given_files
 from steptwin.simulation.describe.overrides import Overrides
-from steptwin.simulation.describe.pieces import given_files
 from steptwin.simulation.faults import read as read_fault
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.toml.reader import TomlText
@@ -61,7 +61,7 @@ class CaseRunner:
             if ended is not None:
                 start = description.start_ns / SECOND
                 raise Misuse(f"start = {start:g} s: the world ends its run at {world.now / SECOND:g} s: {ended}")
-            self._coverage = coverage.plain()
+            self._coverage = coverage.to_json()
             self._seen = [one.state() for one in watches]
             for one in watches:
                 one.close()
@@ -143,7 +143,7 @@ class CaseRunner:
         """Run the world of a case, as `begin` made it, to its end. Raises `SteptwinError` where it does not get there."""
         watch = None
         if coverage is not None:
-            for text in Coverage.of_plain(self._coverage):
+            for text in Coverage.from_json(self._coverage):
                 coverage.add(text)
             watch = WorldCoverage(world, coverage)
         measures = _Measures(world, self.description.measures)

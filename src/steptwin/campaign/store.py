@@ -33,7 +33,7 @@ from sqlalchemy.exc import DBAPIError
 from steptwin.campaign.case import Case, CaseResult
 from steptwin.coverage.counts import Coverage
 from steptwin.errors import Misuse
-from steptwin.history.database import POSTGRESQL, SQLITE, engine_of, failure, shown
+from steptwin.history.database import POSTGRESQL, SQLITE, engine_of, failure, format_url
 
 FORMAT = 1
 """Version of the tables; another one is refused."""
@@ -93,10 +93,10 @@ class CampaignStore:
     def _find(self, connection: Connection, digest: str, name: str, seed: int, *, is_own: bool) -> int:
         rows = connection.execute(select(CAMPAIGN.c.id, CAMPAIGN.c.digest, CAMPAIGN.c.format)).all()
         if any(row.format != FORMAT for row in rows):
-            raise Misuse(f"{shown(self._url)} was written by another version of steptwin")
+            raise Misuse(f"{format_url(self._url)} was written by another version of steptwin")
         if is_own and any(row.digest != digest for row in rows):
             raise Misuse(
-                f"{shown(self._url)} has the results of another campaign, or of this one before a change: give another --out"
+                f"{format_url(self._url)} has the results of another campaign, or of this one before a change: give another --out"
             )
         found = next((row.id for row in rows if row.digest == digest), None)
         if found is None:
@@ -126,8 +126,8 @@ class CampaignStore:
                 "number": case.number,
                 "failed": result.failed,
                 "robustness": result.robustness,
-                "given": _json(case.plain()),
-                "result": _json(result.plain()),
+                "given": _json(case.to_json()),
+                "result": _json(result.to_json()),
             }
             for case, result in found
         ]
@@ -136,7 +136,7 @@ class CampaignStore:
                 connection.execute(self._insert(CASE).on_conflict_do_nothing(), rows)
             if coverage is not None:
                 counted = CAMPAIGN.c.covered + len(rows)
-                values = {"coverage": _json(coverage.plain()), "covered": counted}
+                values = {"coverage": _json(coverage.to_json()), "covered": counted}
                 connection.execute(update(CAMPAIGN).where(CAMPAIGN.c.id == self._id).values(values))
 
     # ------------------------------------------------------------------ reading
@@ -156,7 +156,7 @@ class CampaignStore:
             wanted = wanted.where(CASE.c.failed == failed)
         with self._begin() as connection:
             for given, result in connection.execute(wanted, execution_options={"yield_per": _STREAMED}):
-                yield StoredCase(Case.of_plain(json.loads(given)), CaseResult.of_plain(json.loads(result)))
+                yield StoredCase(Case.from_json(json.loads(given)), CaseResult.from_json(json.loads(result)))
 
     def failed(self) -> int:
         """How many of the cases failed."""
@@ -174,7 +174,7 @@ class CampaignStore:
         """Counts, and the number of their cases."""
         with self._begin() as connection:
             row = connection.execute(select(CAMPAIGN.c.coverage, CAMPAIGN.c.covered).where(CAMPAIGN.c.id == self._id)).one()
-            return Coverage.of_plain(json.loads(row.coverage or "[]")), int(row.covered)
+            return Coverage.from_json(json.loads(row.coverage or "[]")), int(row.covered)
 
 
 def counted(path: Path) -> tuple[int, int]:

@@ -75,7 +75,7 @@ class CampaignSummary:
         for case, result in results:
             if before is not None and case.number >= before:
                 break
-            whole.update(_digested(result.plain()).encode())
+            whole.update(_digested(result.to_json()).encode())
             found._add(case, result)
         found.digest = whole.hexdigest()
         return found
@@ -105,7 +105,7 @@ class CampaignSummary:
     def interval(self) -> PassInterval:
         return wilson(self.passed, self.runs)
 
-    def plain(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """For JSON."""
         return {
             "campaign": self.campaign,
@@ -122,7 +122,7 @@ class CampaignSummary:
                 name: {"failed": one.failed, "robustness": _finite(one.robustness), "case": one.case}
                 for name, one in self.properties.items()
             },
-            "failures": [{"number": one.number, "why": one.why, "case": one.case.plain()} for one in self.failures],
+            "failures": [{"number": one.number, "why": one.why, "case": one.case.to_json()} for one in self.failures],
         }
 
 

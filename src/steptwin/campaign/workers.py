@@ -53,7 +53,7 @@ def run_batch(description: CampaignDescription, cases: Sequence[Case], *, counts
     began = time.perf_counter()
     coverage = Coverage() if counts else None
     results = tuple(known[1].run(case, coverage) for case in cases)
-    return BatchResult(results, time.perf_counter() - began, None if coverage is None else coverage.plain())
+    return BatchResult(results, time.perf_counter() - began, None if coverage is None else coverage.to_json())
 
 
 @dataclass(frozen=True, slots=True)

@@ -192,9 +192,9 @@ def _values(calculator: Calculator, scale: UnitScale, given: Mapping[str, object
 def _print_json(result: Calculation, scale: UnitScale) -> None:
     from json import dumps
 
-    from steptwin.calc import plain
+    from steptwin.calc import to_json
 
-    typer.echo(dumps({**plain(result), "pulses_per_unit": dict(scale.pulses)}, ensure_ascii=False, indent=2))
+    typer.echo(dumps({**to_json(result), "pulses_per_unit": dict(scale.pulses)}, ensure_ascii=False, indent=2))
 
 
 def _print_scale(scale: UnitScale, *, json: bool) -> None:

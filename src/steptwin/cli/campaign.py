@@ -173,9 +173,9 @@ def _run(options: CampaignOptions, out: Print) -> bool:
         summary = campaign.run(folder, jobs=options.jobs, dask=options.dask, coverage=bool(options.coverage), progress=progress)
     report = write_report(campaign, summary, folder, options.file)
     if options.as_json:
-        out(_json(summary.plain()))
+        out(_json(summary.to_json()))
     else:
-        _print(summary.plain(), out, [f"cause, {len(one.numbers)} runs: {cause_text(one)}" for one in report.found])
+        _print(summary.to_json(), out, [f"cause, {len(one.numbers)} runs: {cause_text(one)}" for one in report.found])
         out(f"{time.monotonic() - began:.1f} s; results in {folder}, report.html shows them")
     reports.add(campaign.coverage, options.file.parent)
     tables: list[str] = []
@@ -201,15 +201,15 @@ def _show(folder: Path, out: Print, *, as_json: bool) -> bool:
             + ("its campaign has not ended, run it again to go on" if (folder / RESULTS).exists() else "it has no results")
         )
     try:
-        plain = json.loads(read_recorded(path))
-        text = _json(plain)
+        data = json.loads(read_recorded(path))
+        text = _json(data)
         lines: list[str] = []
-        _print(plain, lines.append)
+        _print(data, lines.append)
     except (LookupError, TypeError, ValueError, AttributeError) as error:
         raise error if isinstance(error, Misuse) else Misuse(f"{path} is no summary of a campaign") from None
     for line in [text] if as_json else lines:
         out(line)
-    return not plain["failed"]
+    return not data["failed"]
 
 
 def _compare(before: Path, after: Path, out: Print, *, as_json: bool) -> bool:
@@ -222,31 +222,31 @@ def _compare(before: Path, after: Path, out: Print, *, as_json: bool) -> bool:
     return found["verdict"] != "worse"
 
 
-def _json(plain: Any) -> str:
-    return json.dumps(plain, ensure_ascii=False, indent=2)
+def _json(data: Any) -> str:
+    return json.dumps(data, ensure_ascii=False, indent=2)
 
 
-def _print(plain: Any, out: Print, causes: Sequence[str] = ()) -> None:
+def _print(data: Any, out: Print, causes: Sequence[str] = ()) -> None:
     from steptwin.campaign.campaign import SUMMARY
     from steptwin.campaign.summary import percent
 
-    runs, failed = plain["runs"], plain["failed"]
-    low, high = plain["interval"]
+    runs, failed = data["runs"], data["failed"]
+    low, high = data["interval"]
     if not runs:
-        out(f"{plain['name']}: no runs")
+        out(f"{data['name']}: no runs")
         return
-    out(f"{plain['name']}: {runs} runs, {failed} failed: {percent(plain['pass_rate'])} pass (95 %: {low:.2%} to {high:.2%})")
-    for name, one in plain["properties"].items():
+    out(f"{data['name']}: {runs} runs, {failed} failed: {percent(data['pass_rate'])} pass (95 %: {low:.2%} to {high:.2%})")
+    for name, one in data["properties"].items():
         worst = "" if one["robustness"] is None else f"; least robustness {one['robustness']:.4g} in case {one['case']}"
         held = f"violated in {one['failed']}" if one["failed"] else "holds"
         out(f"  {name}: {held}{worst}")
-    for one in plain["failures"][:MOST_LINES]:
+    for one in data["failures"][:MOST_LINES]:
         out(f"case {one['number']}: {_given(one['case'])}: {one['why']}")
     if failed > MOST_LINES:
         out(f"... and {failed - MOST_LINES} more: {SUMMARY} has the first 1000, the database all")
     for cause in causes:
         out(cause)
-    out(f"seed {plain['seed']}, digest {plain['digest']}")
+    out(f"seed {data['seed']}, digest {data['digest']}")
 
 
 def _given(case: Any) -> str:
@@ -335,7 +335,7 @@ def _faults(file: Path, out: Path | None, write: Print, *, jobs: int | None, pha
     matrix = fault_matrix(description, folder, jobs=jobs, progress=_print_progress)
     written = write_matrix(matrix, folder)
     if as_json:
-        write(json.dumps(matrix.plain(), ensure_ascii=False, indent=2))
+        write(json.dumps(matrix.to_json(), ensure_ascii=False, indent=2))
     else:
         _print_matrix(matrix, write)
         write(f"{time.monotonic() - began:.1f} s; {', '.join(str(path) for path in written)}")

@@ -37,7 +37,7 @@ def command(
 ) -> None:
     """Check a file and report everything wrong or doubtful in it: WBC programs (.prg), position tables (.csv), configurations
     (.cfg), worlds (.toml); all others are M1486 programs."""
-    from steptwin.diagnostics import Severity, render, to_json
+    from steptwin.diagnostics import Severity, diagnostics_to_json, render
     from steptwin.files.textfiles import read_text
     from steptwin.languages import language_for
     from steptwin.languages.contract import FileLanguage, count
@@ -60,7 +60,7 @@ def command(
             "language": language.name,
             "errors": errors,
             "warnings": warnings,
-            "diagnostics": [row for where, found in findings for row in to_json(where, found)],
+            "diagnostics": [row for where, found in findings for row in diagnostics_to_json(where, found)],
             **report.data,
         }
         typer.echo(json.dumps(data, ensure_ascii=False, indent=2))

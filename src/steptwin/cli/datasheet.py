@@ -29,9 +29,9 @@ def command(
     if json:
         from json import dumps
 
-        from steptwin.jsonvalues import plain
+        from steptwin.jsonvalues import to_json
 
-        typer.echo(dumps(plain(found), ensure_ascii=False, indent=2))  # ranges are exact, not REAL
+        typer.echo(dumps(to_json(found), ensure_ascii=False, indent=2))  # ranges are exact, not REAL
     else:
         typer.echo("\n\n".join(_sections(found)))
 

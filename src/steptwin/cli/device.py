@@ -130,15 +130,15 @@ def print_started(names: Sequence[str]) -> None:
         typer.echo(f"{', '.join(names)} under way; Ctrl-C stops", err=True)
 
 
-def shown(value: object) -> str:
+def format_value(value: object) -> str:
     from steptwin.drivers import typed
 
-    return typed.shown(value)
+    return typed.format_value(value)
 
 
 def values_table(values: ReadValues) -> str:
     """Names, values, and their units or meanings."""
-    return table([(name, shown(one.value), one.unit or one.meaning) for name, one in values.items()])
+    return table([(name, format_value(one.value), one.unit or one.meaning) for name, one in values.items()])
 
 
 def values_data(values: ReadValues) -> dict[str, Any]:

@@ -66,8 +66,8 @@ def _show(
     as_json: bool = False,
 ) -> None:
     """Print the explanation, or write the picture of the control flow to ``output``. Raises `Misuse`."""
+    from steptwin.explain.jsondata import to_json
     from steptwin.explain.picture import picture
-    from steptwin.explain.plain import plain
     from steptwin.explain.text import text
     from steptwin.files.textfiles import write_bytes
     from steptwin.files.writing import is_written_directly
@@ -78,7 +78,7 @@ def _show(
     if output is not None:
         write_bytes(output, picture(found).encode())
     if as_json:
-        data = {"version": JSON_VERSION, "file": str(path), "programs": [plain(one) for one in found]}
+        data = {"version": JSON_VERSION, "file": str(path), "programs": [to_json(one) for one in found]}
         out(json.dumps(data, ensure_ascii=False, indent=2))
     elif output is None:
         out("\n".join(text(one) for one in found).rstrip("\n"))

@@ -133,7 +133,7 @@ class _Shown:
     def show(self) -> bool:
         options = self._options
         if self._interval is None:
-            self._out(f"{self._past.shown}: nothing has been kept yet")
+            self._out(f"{self._past.address}: nothing has been kept yet")
             return True
         if options.events or options.writes:
             from steptwin.history.reading import WRITTEN
@@ -192,7 +192,7 @@ class _Shown:
             names = [point._asdict() for point in points]
             self._out(json.dumps({"runs": listed, "points": names, "rows": self._past.counts()}, ensure_ascii=False, indent=2))
             return
-        self._out(self._past.shown)
+        self._out(self._past.address)
         for run in runs:
             length = (run.ended_ns - run.began_ns) / SECOND
             state = "" if run.is_over else "  goes on, or was cut off"
@@ -210,8 +210,8 @@ class _Shown:
         assert interval is not None  # noqa: S101
         found = self._past.events(interval.begin, interval.end, run=interval.number, kinds=kinds, most=MOST_LINES)
         if self._options.as_json:
-            plain = [{**event._asdict(), "at": event.at.isoformat(), "time": str(event.time)} for event in found]
-            self._out(json.dumps(plain, ensure_ascii=False, indent=2))
+            data = [{**event._asdict(), "at": event.at.isoformat(), "time": str(event.time)} for event in found]
+            self._out(json.dumps(data, ensure_ascii=False, indent=2))
             return
         for event in found:
             self._out(f"{_local(event.at)}  {event.time / SECOND:12.6f} s  {event.machine:<10} {event.text}".rstrip())
@@ -219,7 +219,7 @@ class _Shown:
     def _values(self, found: Sequence[Any]) -> None:
         rows = sorted(_rows(found), key=lambda row: (row[1], row[0]))
         if self._options.as_json:
-            self._out(json.dumps([dict(zip(HEAD, _plain(row), strict=True)) for row in rows], ensure_ascii=False, indent=2))
+            self._out(json.dumps([dict(zip(HEAD, _to_json(row), strict=True)) for row in rows], ensure_ascii=False, indent=2))
             return
         for run, at, seconds, point, value, unit in rows[:MOST_LINES]:
             self._out(f"{_local(at)}  run {run}  {seconds:12.6f} s  {point}  {_text(value, unit)}")
@@ -238,8 +238,8 @@ class _Shown:
             self._export_pairs(options.output, points, interval, other)
         found = compare(self._past, points, interval, other, self._every)
         if options.as_json:
-            plain = [{**one._asdict(), "most": _finite(one.most), "values": list(map(_finite, one.values))} for one in found]
-            self._out(json.dumps(plain, ensure_ascii=False, indent=2))
+            data = [{**one._asdict(), "most": _finite(one.most), "values": list(map(_finite, one.values))} for one in found]
+            self._out(json.dumps(data, ensure_ascii=False, indent=2))
         for one in () if options.as_json else found:
             apart = "differs" if one.most == float("inf") else f"{one.most:g} {one.unit}".rstrip() + " apart"
             values = " and ".join(map(_text, one.values))
@@ -259,7 +259,7 @@ class _Shown:
                 with as_text(file) as text:
                     writer = csv.writer(text, lineterminator="\n")
                     writer.writerow(HEAD)
-                    writer.writerows(_plain(row) for row in _rows(found))
+                    writer.writerows(_to_json(row) for row in _rows(found))
             elif path.suffix == ".parquet":
                 from steptwin.history.parquet import write_parquet
 
@@ -302,7 +302,7 @@ def _rows(found: Iterable[Any]) -> Iterable[tuple[Any, ...]]:
             yield int(run), at, float(seconds), series.point, value, series.unit
 
 
-def _plain(row: tuple[Any, ...]) -> tuple[Any, ...]:
+def _to_json(row: tuple[Any, ...]) -> tuple[Any, ...]:
     run, at, seconds, point, value, unit = row
     return run, f"{at}Z", seconds, point, _finite(value), unit
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import typer
 
-from steptwin.cli.device import Device, Json, LogFrames, find, kind_of, opened, print_json, shown, table
+from steptwin.cli.device import Device, Json, LogFrames, find, format_value, kind_of, opened, print_json, table
 
 
 def command(device: Device = None, json: Json = False, log_frames: LogFrames = False) -> None:
@@ -18,5 +18,5 @@ def command(device: Device = None, json: Json = False, log_frames: LogFrames = F
     if json:
         print_json(found.data)
         return
-    rows = table([[shown(cell) for cell in row] for row in found.rows])
+    rows = table([[format_value(cell) for cell in row] for row in found.rows])
     typer.echo("\n".join([*found.head, *([rows] if rows else []), *found.tail]))

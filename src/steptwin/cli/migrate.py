@@ -39,7 +39,7 @@ def _migrate(
 ) -> tuple[bool, dict[str, Any]]:
     """Print what has to change, write the changed program to ``output``. Returns whether it fits then, and the report as data.
     Raises `Misuse` for what is no program."""
-    from steptwin.diagnostics import SourceText, render, to_json
+    from steptwin.diagnostics import SourceText, diagnostics_to_json, render
     from steptwin.files.textfiles import read_text, write_bytes
     from steptwin.languages import language_for
     from steptwin.languages.contract import FileLanguage, count
@@ -64,7 +64,7 @@ def _migrate(
         "file": str(path),
         "title": found.title,
         "differences": found.differences,
-        "diagnostics": to_json(file.source, found.findings),
-        "errors_left": to_json(changed, found.left),
+        "diagnostics": diagnostics_to_json(file.source, found.findings),
+        "errors_left": diagnostics_to_json(changed, found.left),
         "text": found.text,
     }

@@ -154,7 +154,7 @@ def _check_targets(trace: Path | None, recording: Path | None) -> None:
 
         check_target(trace)
     if recording is not None:
-        from steptwin.files.beginning import check_recording_target
+        from steptwin.files.loader import check_recording_target
 
         check_recording_target(recording)
 

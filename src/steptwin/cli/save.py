@@ -24,8 +24,8 @@ def command(
     json: Json = False,
 ) -> None:
     """Save the recording of a running world, to replay it or to continue from it with 'run' and 'up'."""
-    from steptwin.files.beginning import check_recording_target, is_recording
     from steptwin.files.export import FORMATS
+    from steptwin.files.loader import check_recording_target, is_recording
 
     if file.suffix[1:].lower() not in FORMATS:
         check_recording_target(file)

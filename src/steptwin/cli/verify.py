@@ -58,7 +58,7 @@ def command(
             is_cancelled=lambda: interrupt.came,
         )
     if json is not None:
-        write_bytes(json, report.to_json().encode())
+        write_bytes(json, report.json_text().encode())
     typer.echo(report.to_text())
     if report.of(CheckOutcome.REFUTED) or not report.is_complete:
         raise typer.Exit(1)

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 import typer
 
 from steptwin.cli import completion
-from steptwin.cli.device import Device, LogFrames, as_json, find, kind_of, opened, shown, table
+from steptwin.cli.device import Device, LogFrames, as_json, find, format_value, kind_of, opened, table
 from steptwin.errors import Misuse
 
 Look = Callable[[], dict[str, tuple[Any, str]]]
@@ -105,7 +105,7 @@ def _print_lines(looks: Iterator[tuple[float, dict[str, tuple[Any, str]]]]) -> N
 
 
 def _text(value: Any) -> str:
-    return "unknown" if value is None else shown(value)
+    return "unknown" if value is None else format_value(value)
 
 
 def _line(cells: Sequence[str], widths: Sequence[int]) -> str:

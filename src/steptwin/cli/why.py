@@ -57,7 +57,7 @@ def _of_recording(path: Path, question: str, at: str | None) -> Mapping[str, Any
     from steptwin.files import recording as recordings
     from steptwin.files.why import why_of_recording
 
-    return why_of_recording(recordings.load(path)).ask(question, None if at is None else duration(at)).plain()
+    return why_of_recording(recordings.load(path)).ask(question, None if at is None else duration(at)).to_json()
 
 
 def _of_twin(text: str, question: str, at: str | None) -> Mapping[str, Any]:

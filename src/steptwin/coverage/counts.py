@@ -115,8 +115,8 @@ class Coverage:
 
     # ------------------------------------------------------------------ as plain values
 
-    def plain(self) -> list[Any]:
-        """For another process, which continues with `of_plain`."""
+    def to_json(self) -> list[Any]:
+        """For another process, which continues with `from_json`."""
         return [
             {
                 "path": text.path,
@@ -131,7 +131,7 @@ class Coverage:
         ]
 
     @classmethod
-    def of_plain(cls, plain: Iterable[Any]) -> Coverage:
+    def from_json(cls, data: Iterable[Any]) -> Coverage:
         return cls(
             TextCoverage(
                 one["path"],
@@ -141,5 +141,5 @@ class Coverage:
                 Counter(dict(one["hits"])),
                 Counter({Way(origin, target): count for origin, target, count in one["taken"]}),
             )
-            for one in plain
+            for one in data
         )

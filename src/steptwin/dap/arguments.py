@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from steptwin.dap.sources import Text
+from steptwin.datatypes import format_short
 from steptwin.debug.values import DataPoint, LabelPoint, LinePoint
 from steptwin.errors import Misuse
-from steptwin.plaintypes import shown
 
 _OF_LINES = {"condition": "condition", "hits": "hitCondition", "log": "logMessage"}
 _OF_LABELS = {"condition": "condition", "hits": "hitCondition"}
@@ -41,5 +41,5 @@ def _texts_in(given: Mapping[str, Any], names: Mapping[str, str]) -> dict[str, s
 def _text(given: Mapping[str, Any], name: str) -> str:
     value = given[name]
     if not isinstance(value, str):
-        raise Misuse(f"{name} = {shown(value)}: expected a text")
+        raise Misuse(f"{name} = {format_short(value)}: expected a text")
     return value

@@ -12,12 +12,12 @@ from steptwin.debug.debugger import DebugTravel
 from steptwin.debug.values import (
     DataPoint,
     Events,
+    FormattedValue,
     LabelPoint,
     LinePoint,
     Location,
     Scope,
     SetPoint,
-    ShownValue,
     StackFrame,
     Stopped,
     StopReason,
@@ -144,10 +144,10 @@ class AttachedTwin:
     def scope(self, controller: str, name: str) -> Scope:
         return Scope(name, [_value(one) for one in self._ask(command.Values(controller, name))])
 
-    def evaluate(self, controller: str, text: str) -> ShownValue:
+    def evaluate(self, controller: str, text: str) -> FormattedValue:
         return _value(self._ask(command.Evaluate(controller, text)))
 
-    def set_value(self, controller: str, name: str, text: str) -> ShownValue:
+    def set_value(self, controller: str, name: str, text: str) -> FormattedValue:
         return _value(self._ask(command.SetValue(controller, name, text)))
 
     def why(self, question: str) -> Answer:
@@ -272,8 +272,8 @@ class AttachedTwin:
         return Stopped(StopReason(stopped.reason), event.time, controller, stopped.what, stopped.breakpoints)
 
 
-def _value(found: Mapping[str, Any]) -> ShownValue:
-    return ShownValue(found["name"], found["value"], found["number"], found["settable"], found.get("expression", ""))
+def _value(found: Mapping[str, Any]) -> FormattedValue:
+    return FormattedValue(found["name"], found["value"], found["number"], found["settable"], found.get("expression", ""))
 
 
 def _wanted(point: AnyPoint) -> command.SetBreakpoint:

@@ -67,7 +67,7 @@ class Debugged:
         """A location as the protocol has it."""
         line, column = self.first_line - 1, self.first_column - 1
         return {
-            "source": self.sources.plain(location.controller, location.text),
+            "source": self.sources.to_json(location.controller, location.text),
             "line": location.line + line,
             "column": location.column + column,
             "endLine": location.end_line + line,

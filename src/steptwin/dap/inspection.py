@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from steptwin.dap.debugged import FRAMES, Arguments, Debugged, ResponseBody
-from steptwin.debug.values import ShownValue
+from steptwin.debug.values import FormattedValue
 from steptwin.errors import Misuse
 from steptwin.subject.debugcommands import SCOPES
 
@@ -68,7 +68,7 @@ class Inspection:
         return {"variables": [_variable(value) for value in found[first : first + count]]}
 
 
-def _variable(value: ShownValue) -> ResponseBody:
+def _variable(value: FormattedValue) -> ResponseBody:
     hint = {} if value.is_settable else {"presentationHint": {"attributes": ["readOnly"]}}
     evaluated = {"evaluateName": value.expression} if value.expression else {}
     return {"name": value.name, "value": value.text, "variablesReference": 0, **evaluated, **hint}

@@ -59,7 +59,7 @@ class Sources:
             raise Misuse(f"sourceReference = {reference!r}: permitted are 1 to {len(self._texts)}")
         return self._texts[reference - 1]
 
-    def plain(self, controller: str, text: str) -> Mapping[str, object]:
+    def to_json(self, controller: str, text: str) -> Mapping[str, object]:
         """A source as the protocol has it."""
         number, found = next((i, t) for i, t in enumerate(self._texts, start=1) if (t.controller, t.text) == (controller, text))
         if found.path.is_file():
@@ -67,5 +67,5 @@ class Sources:
         return {"name": f"{controller}, {found.path.name}", "sourceReference": number}
 
     def all(self) -> Sequence[Mapping[str, object]]:
-        found = {text.path: self.plain(text.controller, text.text) for text in self._texts}
+        found = {text.path: self.to_json(text.controller, text.text) for text in self._texts}
         return list(found.values())

@@ -46,7 +46,7 @@ class ResolvedExpression:
             return signals[name].unit if name in signals else ""
 
         self._value = value_of(node.in_unit(unit_of_all(node, unit_of), unit_of), reads, _checked)
-        self._own = world.parts.scheduler_of[controller]
+        self._own = world.objects.scheduler_of[controller]
         schedulers = {source.scheduler: None for signal in signals.values() for source in signal.sync(world.now)}
         self._others = [scheduler for scheduler in schedulers if scheduler is not self._own]
 
@@ -89,7 +89,7 @@ def _signal(world: Simulation, controller: str, name: str) -> SignalOf | Idle | 
     owner, dot, _ = name.partition(".")
     if not dot:
         return world.signal(name) if name == "time" and name not in world.programs_of(controller).variables(world.now) else None
-    is_full = owner in world.controllers or owner in world.parts.element_names
+    is_full = owner in world.controllers or owner in world.objects.element_names
     found = world.signal(name) if is_full else _own_signal(world, controller, name)
     if not found.is_readable:
         raise Misuse(WRITE_ONLY(name=name))
@@ -156,7 +156,7 @@ class LogText:
             raise Misuse(NO_NAME_IN_LOG(text=text))
         return calculation
 
-    def shown(self, now: Nanos) -> str:
+    def formatted(self, now: Nanos) -> str:
         """As a statement at ``now`` finds it."""
         return "".join(part if isinstance(part, str) else number_text(part.value_at_statement(now)) for part in self._parts)
 

@@ -17,7 +17,7 @@ from steptwin.debug.breakpoints import AnyPoint
 from steptwin.debug.calculation import number_text
 from steptwin.debug.lookahead import Goal, LookAheadRun, Parts
 from steptwin.debug.observer import Logged
-from steptwin.debug.values import Events, Location, Scope, SetPoint, ShownValue, StackFrame, Stopped, StopReason
+from steptwin.debug.values import Events, FormattedValue, Location, Scope, SetPoint, StackFrame, Stopped, StopReason
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.messages import Message
@@ -176,11 +176,11 @@ class Debugger:
         """A group of values, one of `steptwin.debug.scopes.SCOPES`. Raises `Misuse`."""
         return scopes.scope(self.view, controller, name)
 
-    def evaluate(self, controller: str, text: str) -> ShownValue:
+    def evaluate(self, controller: str, text: str) -> FormattedValue:
         """An expression (`steptwin.debug.calculation`). Raises `Misuse`."""
         return scopes.evaluate(self.view, controller, text)
 
-    def set_value(self, controller: str, name: str, text: str) -> ShownValue:
+    def set_value(self, controller: str, name: str, text: str) -> FormattedValue:
         """Give a variable, an input or a register the value of an expression. Raises `Misuse`, in the past in any case."""
         if self._is_past:
             ago = (self.present - self.now) / SECOND
@@ -188,7 +188,7 @@ class Debugger:
         value = scopes.evaluate(self._world, controller, text).number or 0.0
         self._apply_input(scopes.setting(self._world, controller, name, value))
         self._lookahead.changed(self.now)
-        return ShownValue(name, number_text(value), value, is_settable=True)
+        return FormattedValue(name, number_text(value), value, is_settable=True)
 
     def branch(self) -> None:
         """Have the world go on from here: what came later has not happened."""

@@ -91,7 +91,7 @@ class Observer:
             if places != frozenset():
                 programs.hook(self._hooks[controller], places)
                 self._hooked[controller] = places
-        scheduler_of = self.world.parts.scheduler_of
+        scheduler_of = self.world.objects.scheduler_of
         self.world.synced_first = [scheduler_of[controller] for controller in self.points.reading_others()]
 
     def release(self) -> None:
@@ -129,7 +129,7 @@ class Observer:
         if point.log is None:
             return False
         try:
-            text = point.log.shown(now)
+            text = point.log.formatted(now)
         except Misuse as error:
             text = f"log: {error}"
         self.logged.append(Logged(now, controller, place, text))

@@ -8,7 +8,7 @@ from contextlib import suppress
 from steptwin.controllerstate import StateAxis, StateStatus, detail_text
 from steptwin.datasheet import Access
 from steptwin.debug.calculation import ResolvedExpression, number_text
-from steptwin.debug.values import Scope, ShownValue
+from steptwin.debug.values import FormattedValue, Scope
 from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.motioncontroller import MotionController
@@ -35,7 +35,7 @@ def scope(world: Simulation, controller: str, name: str) -> Scope:
     )
 
 
-def _expression(world: Simulation, controller: str, value: ShownValue) -> str:
+def _expression(world: Simulation, controller: str, value: FormattedValue) -> str:
     """Expression of a value: its name, or what follows the name of the axis where a controller has but one."""
     _, _, last = value.name.partition(".")
     for text in (value.name, last):
@@ -46,56 +46,60 @@ def _expression(world: Simulation, controller: str, value: ShownValue) -> str:
     return ""
 
 
-def _variables(world: Simulation, controller: str) -> Iterator[ShownValue]:
+def _variables(world: Simulation, controller: str) -> Iterator[FormattedValue]:
     for name, value in world.programs_of(controller).variables(world.now).items():
-        yield ShownValue(name, number_text(value), value, is_settable=True)
+        yield FormattedValue(name, number_text(value), value, is_settable=True)
 
 
-def _axes(world: Simulation, controller: str) -> Iterator[ShownValue]:
+def _axes(world: Simulation, controller: str) -> Iterator[FormattedValue]:
     for axis in world.kind(controller).state(world.controller(controller), world.now).axes:
         yield from _axis(axis)
 
 
-def _axis(axis: StateAxis) -> Iterator[ShownValue]:
+def _axis(axis: StateAxis) -> Iterator[FormattedValue]:
     yield _measured(f"{axis.name}.position", axis.position, axis.unit)
     yield _measured(f"{axis.name}.velocity", axis.velocity, f"{axis.unit}/s")
     moves = "" if axis.moving is None else "moves" if axis.moving else "at rest"
     yield _status(f"{axis.name}.status", axis.status, f", {moves}" if moves not in ("", axis.status.text) else "")
 
 
-def _status(name: str, status: StateStatus, more: str = "") -> ShownValue:
-    return ShownValue(name, f"{status.text}{more}", None if status.code is None else float(status.code))
+def _status(name: str, status: StateStatus, more: str = "") -> FormattedValue:
+    return FormattedValue(name, f"{status.text}{more}", None if status.code is None else float(status.code))
 
 
-def _measured(name: str, value: float | None, unit: str) -> ShownValue:
-    return ShownValue(name, "not known") if value is None else ShownValue(name, f"{number_text(value)} {unit}".rstrip(), value)
+def _measured(name: str, value: float | None, unit: str) -> FormattedValue:
+    return (
+        FormattedValue(name, "not known")
+        if value is None
+        else FormattedValue(name, f"{number_text(value)} {unit}".rstrip(), value)
+    )
 
 
-def _pins(world: Simulation, controller: str) -> Iterator[ShownValue]:
+def _pins(world: Simulation, controller: str) -> Iterator[FormattedValue]:
     kind, device = world.kind(controller), world.controller(controller)
     units = {name: pin.unit for name, pin in kind.pins(device).items()}
     inputs = {*kind.terminals.digital_inputs, *kind.terminals.analog_inputs}
     for name, level in kind.state.pins(device, world.now).items():
-        yield ShownValue(name, f"{number_text(level)} {units.get(name, '')}".rstrip(), level, is_settable=name in inputs)
+        yield FormattedValue(name, f"{number_text(level)} {units.get(name, '')}".rstrip(), level, is_settable=name in inputs)
 
 
-def _controller(world: Simulation, controller: str) -> Iterator[ShownValue]:
+def _controller(world: Simulation, controller: str) -> Iterator[FormattedValue]:
     state = world.kind(controller).state(world.controller(controller), world.now)
-    yield ShownValue("time", f"{world.now / 1e9:.9f} s", world.now / 1e9)
+    yield FormattedValue("time", f"{world.now / 1e9:.9f} s", world.now / 1e9)
     yield _status("status", state.status)
-    yield ShownValue("program", state.program.text)
+    yield FormattedValue("program", state.program.text)
     for name, detail in state.details.items():
-        yield ShownValue(name, detail_text(detail))
+        yield FormattedValue(name, detail_text(detail))
 
 
-def _registers(world: Simulation, controller: str) -> Iterator[ShownValue]:
+def _registers(world: Simulation, controller: str) -> Iterator[FormattedValue]:
     kind, device = world.kind(controller), world.controller(controller)
     for point in kind.datasheet(device).points:
         live = _live(kind, device, point.path)
         if live is not None and live.read is not None:
             value = float(live.read(world.now))
             settable = kind.registers is not None and point.access is not Access.READ
-            yield ShownValue(point.path, f"{number_text(value)} {point.unit}".rstrip(), value, is_settable=settable)
+            yield FormattedValue(point.path, f"{number_text(value)} {point.unit}".rstrip(), value, is_settable=settable)
 
 
 def _live(kind: AnyKind, device: MotionController, path: str) -> LivePoint | None:
@@ -106,7 +110,7 @@ def _live(kind: AnyKind, device: MotionController, path: str) -> LivePoint | Non
         return None
 
 
-def _parts(world: Simulation, controller: str) -> Iterator[ShownValue]:
+def _parts(world: Simulation, controller: str) -> Iterator[FormattedValue]:
     """Mechanics, by axis."""
     for axis in world.axes:
         name = f"{axis}.position"
@@ -118,12 +122,12 @@ _VALUES = {
 }  # fmt: skip
 
 
-def evaluate(world: Simulation, controller: str, text: str) -> ShownValue:
+def evaluate(world: Simulation, controller: str, text: str) -> FormattedValue:
     """The value of an expression. Raises `Misuse`."""
     world.sync(controller)
     name = text.strip()
     number = ResolvedExpression(world, controller, name).value(world.now)
-    return ShownValue(name, number_text(number), number, is_settable=False)
+    return FormattedValue(name, number_text(number), number, is_settable=False)
 
 
 READ_ONLY = Message("debug.read-only", "{name} cannot be set: it can only be read")

@@ -128,7 +128,7 @@ class StackFrame(NamedTuple):
     location: Location
 
 
-class ShownValue(NamedTuple):
+class FormattedValue(NamedTuple):
     """``text`` is for people, with the unit. ``number`` None: it is no number, or not known."""
 
     name: str
@@ -143,4 +143,4 @@ class Scope(NamedTuple):
     """A group of values of a controller."""
 
     name: str
-    values: Sequence[ShownValue]
+    values: Sequence[FormattedValue]

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any, Protocol
 
 from steptwin.controller import Nanos
-from steptwin.devices.worldpart import WorldPart
+from steptwin.devices.worldmember import WorldMember
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 from steptwin.later import start
 from steptwin.messages import Message
@@ -24,8 +24,8 @@ from steptwin.subject.jogs import ExtendableJog
 TIME = "time"
 
 
-class SubjectPart(Protocol):
-    """A world, or a device; a part of a `CompositeSubject`."""
+class MemberSubject(Protocol):
+    """A world, or a device; a member of a `CompositeSubject`."""
 
     @property
     def description(self) -> Description: ...
@@ -65,14 +65,14 @@ NEEDS_AN_ADDRESS = Message(
 class CompositeSubject:
     """Satisfies `steptwin.studio.surroundings.Served` and `steptwin.subject.jogs.Jogs`.
 
-    A command goes to the part whose controller or line it names; one that names none to ``world``, or to the only device.
+    A command goes to the member whose controller or line it names; one that names none to ``world``, or to the only device.
 
     ``clock`` and ``numbering`` are those of the world where there is one; all devices use them.
     """
 
-    def __init__(self, world: WorldPart | None, clock: Callable[[], Nanos], numbering: Numbering) -> None:
+    def __init__(self, world: WorldMember | None, clock: Callable[[], Nanos], numbering: Numbering) -> None:
         self._world = world
-        self._parts: list[SubjectPart] = [] if world is None else [world]
+        self._members: list[MemberSubject] = [] if world is None else [world]
         self.now = clock
         self.numbering = numbering
         self._followings: list[Following] = []
@@ -80,35 +80,37 @@ class CompositeSubject:
         """Controllers that were removed: values of them are unknown to viewers that still watch them."""
         self._describe()
 
-    # ------------------------------------------------------------------ parts
+    # ------------------------------------------------------------------ members
 
-    def add(self, part: SubjectPart) -> None:
-        self._parts.append(part)
+    def add(self, member: MemberSubject) -> None:
+        self._members.append(member)
         for following in self._followings:
-            part.followers.add(following)
+            member.followers.add(following)
         self._describe()
 
-    def remove(self, part: SubjectPart) -> None:
-        self._parts.remove(part)
+    def remove(self, member: MemberSubject) -> None:
+        self._members.remove(member)
         for following in self._followings:
-            part.followers.remove(following)
-        self._gone |= {controller.name for controller in part.description.controllers}
+            member.followers.remove(following)
+        self._gone |= {controller.name for controller in member.description.controllers}
         self._describe()
 
     @property
     def has_devices(self) -> bool:
-        return any(part is not self._world for part in self._parts)
+        return any(member is not self._world for member in self._members)
 
     def _describe(self) -> None:
-        all_of = [part.description for part in self._parts]
-        self._of_controller = {controller.name: part for part in self._parts for controller in part.description.controllers}
+        all_of = [member.description for member in self._members]
+        self._of_controller = {
+            controller.name: member for member in self._members for controller in member.description.controllers
+        }
         self._of_unit = {
-            (controller.line, controller.unit): part
-            for part in self._parts
-            for controller in part.description.controllers
+            (controller.line, controller.unit): member
+            for member in self._members
+            for controller in member.description.controllers
             if controller.is_real
         }
-        self._of_line = {line.name: part for part in reversed(self._parts) for line in part.description.lines}
+        self._of_line = {line.name: member for member in reversed(self._members) for line in member.description.lines}
         self._several = {name for name, count in Counter(line for line, _ in self._of_unit).items() if count > 1}
         """Lines with several devices."""
         can = {name for one in all_of for name in one.commands}
@@ -123,20 +125,20 @@ class CompositeSubject:
             commands=tuple(name for name in COMMANDS if name in can),
         )
 
-    def _part_called(self, controller: str) -> SubjectPart:
+    def _member_called(self, controller: str) -> MemberSubject:
         """Raises `Misuse`."""
-        part = self._of_controller.get(controller) or self._world
-        if part is None:
+        member = self._of_controller.get(controller) or self._world
+        if member is None:
             names = self._of_controller
             known = THERE_ARE(names=list(names)) if names else NONE_IS_CONNECTED()
             raise Misuse(UNKNOWN_CONTROLLER(controller=controller, hint=NearMiss().hint(controller, names), known=known))
-        return part
+        return member
 
-    def _part_of(self, wanted: Command) -> SubjectPart:
-        """Raises `Misuse`, and `Refusal` if no part can execute it."""
-        if self._world is not None and len(self._parts) == 1:
+    def _part_of(self, wanted: Command) -> MemberSubject:
+        """Raises `Misuse`, and `Refusal` if no member can execute it."""
+        if self._world is not None and len(self._members) == 1:
             return self._world  # there is nothing else that a command could be for
-        found: list[SubjectPart] = []
+        found: list[MemberSubject] = []
         if isinstance(wanted, steps.Request) and (there := self._of_unit.get((wanted.line, wanted.unit))) is not None:
             return there  # several devices share the line
         if isinstance(wanted, steps.Send) and wanted.line in self._several:
@@ -144,24 +146,24 @@ class CompositeSubject:
         for field in type_of(wanted).fields:
             value: Any = getattr(wanted, field.key)
             if field.name == "controller" and value is not None:
-                found.append(self._part_called(value))
+                found.append(self._member_called(value))
             elif field.name == "line" and value in self._of_line:
                 found.append(self._of_line[value])
             elif field.name == "values" and value is not None:
-                found += [self._part_called(controller) for controller, _, _ in value]
+                found += [self._member_called(controller) for controller, _, _ in value]
         if len(set(map(id, found))) > 1:
             raise Misuse(ONE_CONTROLLER_AT_A_TIME(command=type_of(wanted).name))
         if found:
             return found[0]
-        if self._world is None and not self._parts:
+        if self._world is None and not self._members:
             raise Refusal(NO_DEVICE_FOR(command=type_of(wanted).name))
-        if self._world is None and len(self._parts) > 1:
+        if self._world is None and len(self._members) > 1:
             can = self.description.commands
             name = type_of(wanted).name
             raise Refusal(NAME_THE_CONTROLLER(command=name) if name in can else NOT_POSSIBLE(command=name, names=list(can)))
-        return self._parts[0]
+        return self._members[0]
 
-    def _addressed(self, wanted: steps.Send) -> SubjectPart:
+    def _addressed(self, wanted: steps.Send) -> MemberSubject:
         """The device that characters on a line of several are for. Raises `Misuse` where they do not begin with its address."""
         address = self._of_line[wanted.line].selected(wanted.data)
         there = self._of_unit.get((wanted.line, address))
@@ -174,23 +176,23 @@ class CompositeSubject:
 
     @property
     def lost(self) -> str | None:
-        return "; ".join(part.lost for part in self._parts if part.lost is not None) or None
+        return "; ".join(member.lost for member in self._members if member.lost is not None) or None
 
     def read(self, *points: str) -> tuple[Reading, ...]:
-        if len(self._parts) == 1 and not self._gone:
-            return self._parts[0].read(*points)
-        groups = self._by_part(points)
-        found = {one.point: one for part, own in groups for one in part.read(*own)}
+        if len(self._members) == 1 and not self._gone:
+            return self._members[0].read(*points)
+        groups = self._by_member(points)
+        found = {one.point: one for member, own in groups for one in member.read(*own)}
         return self._in_order(points, found)
 
-    def _by_part(self, points: Iterable[str]) -> list[tuple[SubjectPart, list[str]]]:
+    def _by_member(self, points: Iterable[str]) -> list[tuple[MemberSubject, list[str]]]:
         """Raises `Misuse`. Points of controllers that are gone, and the time, are left out."""
-        groups: dict[int, tuple[SubjectPart, list[str]]] = {}
+        groups: dict[int, tuple[MemberSubject, list[str]]] = {}
         for point in points:
             owner = point.partition(".")[0]
             if point != TIME and (owner not in self._gone or owner in self._of_controller):
-                part = self._part_called(owner)
-                groups.setdefault(id(part), (part, []))[1].append(point)
+                member = self._member_called(owner)
+                groups.setdefault(id(member), (member, []))[1].append(point)
         return list(groups.values())
 
     def _in_order(self, points: Sequence[str], found: Mapping[str, Reading]) -> tuple[Reading, ...]:
@@ -201,39 +203,39 @@ class CompositeSubject:
         match wanted:
             case command.StopAll():
                 return self.result_of(await self._stop_all())
-            case command.Describe() if self._world is None or len(self._parts) > 1:
-                return self.result_of(self.description.plain())
+            case command.Describe() if self._world is None or len(self._members) > 1:
+                return self.result_of(self.description.to_json())
             case command.Time() if self._world is None:
                 now = self.now()
                 at = {"time_ns": str(now), "time_s": now / 1e9}
                 return self.result_of({"world": self.description.name, **at, "paused": False, "speed": 1.0, "stopped": None})
-            case command.ReadPoints() if self._world is None or len(self._parts) > 1:
-                read = [(await part.do(command.ReadPoints(tuple(own)))).value for part, own in self._by_part(wanted.points)]
+            case command.ReadPoints() if self._world is None or len(self._members) > 1:
+                read = [(await member.do(command.ReadPoints(tuple(own)))).value for member, own in self._by_member(wanted.points)]
                 found = {one["point"]: Reading(**one) for own in read for one in own}
                 return self.result_of([one._asdict() for one in self._in_order(wanted.points, found)])
-            case command.ReadPins() if wanted.controller is None and len(self._parts) > 1:
-                levels = [(await part.do(wanted)).value for part in self._parts]
+            case command.ReadPins() if wanted.controller is None and len(self._members) > 1:
+                levels = [(await member.do(wanted)).value for member in self._members]
                 return self.result_of({pin: level for own in levels for pin, level in own.items()})
             case _:
                 return await self._part_of(wanted).do(wanted)
 
     async def _stop_all(self) -> object:
-        """Stop all parts at the same time; a failure of one does not affect the others.
+        """Stop all members at the same time; a failure of one does not affect the others.
 
         Raises `LineFailure` with the controllers that could not be stopped.
         """
-        stopping = [(part, start(part.do(command.StopAll()))) for part in self._parts]
+        stopping = [(member, start(member.do(command.StopAll()))) for member in self._members]
         done: dict[str, list[str]] = {"controllers": [], "scripts": []}
         failed: list[str] = []
-        for part, later in stopping:
-            names = [controller.name for controller in part.description.controllers]
+        for member, later in stopping:
+            names = [controller.name for controller in member.description.controllers]
             try:
                 stopped: Any = (await later).value
             except SteptwinError as error:
                 failed.append(f"{', '.join(names)} ({error})")
             else:
                 done["controllers"] += names
-                done["scripts"] += stopped["scripts"] if part is self._world else []
+                done["scripts"] += stopped["scripts"] if member is self._world else []
         if failed:
             also = ALSO_STOPPED(names=done["controllers"]) if done["controllers"] else ""
             raise LineFailure(NOT_STOPPED(problems="; ".join(failed), also=also))
@@ -253,19 +255,19 @@ class CompositeSubject:
     def follow(self, what: Filter, bound: int) -> Following:
         following = Following(what, bound, self._unfollow)
         self._followings.append(following)
-        for part in self._parts:
-            part.followers.add(following)
+        for member in self._members:
+            member.followers.add(following)
         return following
 
     def _unfollow(self, following: Following) -> None:
         self._followings.remove(following)
-        for part in self._parts:
-            part.followers.remove(following)
+        for member in self._members:
+            member.followers.remove(following)
 
     def plans(self, what: Filter) -> list[Event]:
-        return [event for part in self._parts for event in part.plans(what)]
+        return [event for member in self._members for event in member.plans(what)]
 
     # ------------------------------------------------------------------ as `Jogs`
 
     async def begin_jog(self, wanted: command.Jog) -> ExtendableJog:
-        return await self._part_called(wanted.controller).begin_jog(wanted)
+        return await self._member_called(wanted.controller).begin_jog(wanted)

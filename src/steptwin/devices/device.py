@@ -1,4 +1,4 @@
-"""A device behind its driver as a part of a subject: polled for watched values, reconnected after its line was lost.
+"""A device behind its driver as a member of a composite subject: polled for watched values, reconnected after its line was lost.
 
 Nothing that moves is repeated or kept for later: while the line is lost, commands are refused. After a stop has been
 acknowledged, nothing begins that was asked for before: what waits when a stop arrives, and what arrives before its
@@ -76,7 +76,7 @@ SETTINGS_KEPT = Message("devices.settings-kept", "settings before the first writ
 
 
 class ConnectedDevice:
-    """Satisfies `steptwin.devices.composite.SubjectPart`. Its line is open."""
+    """Satisfies `steptwin.devices.composite.MemberSubject`. Its line is open."""
 
     def __init__(self, subject: AsyncDeviceSubject, device: DevicePart, around: DeviceSurroundings) -> None:
         self._subject = subject
@@ -337,7 +337,7 @@ class ConnectedDevice:
         self._shadow = None
 
     def shadow_state(self, after: Nanos) -> Mapping[str, object] | None:
-        return None if self._shadow is None else self._shadow.plain(after)
+        return None if self._shadow is None else self._shadow.to_json(after)
 
     async def _compare(self, shadow: DigitalShadow) -> None:
         """Not while a command is executed, of which the twin knows nothing yet."""

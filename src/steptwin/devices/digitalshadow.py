@@ -58,7 +58,7 @@ class Deviation(NamedTuple):
     device: float
     twin: float
 
-    def plain(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, object]:
         return {"at_ns": str(self.at), "what": self.what, "device": self.device, "twin": self.twin}
 
 
@@ -209,14 +209,14 @@ class DigitalShadow:
 
     # ------------------------------------------------------------------ as JSON
 
-    def plain(self, after: Nanos) -> dict[str, object]:
+    def to_json(self, after: Nanos) -> dict[str, object]:
         """With samples later than ``after``, from the beginning of the digital shadow."""
         return {
             "controller": self.name,
-            "axes": [_plain(axis, after) for axis in self._axes.values()],
-            "registers": [found.plain() for found in self._registers.values()],
+            "axes": [_to_json(axis, after) for axis in self._axes.values()],
+            "registers": [found.to_json() for found in self._registers.values()],
             "compared": len(self._twin.compared),
-            "first": None if self.first is None else self.first.plain(),
+            "first": None if self.first is None else self.first.to_json(),
             "problems": list(self.problems),
         }
 
@@ -227,12 +227,12 @@ def _stops(wanted: Command) -> bool:
     return isinstance(wanted, command.StopAxes | command.StopAll)
 
 
-def _plain(axis: _ComparedAxis, after: Nanos) -> dict[str, object]:
+def _to_json(axis: _ComparedAxis, after: Nanos) -> dict[str, object]:
     late: Sequence[tuple[Nanos, AxisSample]] = [one for one in axis.samples if one[0] > after]
     return {
         "axis": axis.sheet.number,
         "name": axis.sheet.name,
         "unit": axis.sheet.unit,
-        "first": None if axis.first is None else axis.first.plain(),
+        "first": None if axis.first is None else axis.first.to_json(),
         "samples": [[at / SECOND, *sample] for at, sample in late],
     }

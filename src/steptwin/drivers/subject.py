@@ -24,13 +24,13 @@ from steptwin.drivers.blocking import Blocking, blocking, finish
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.lineframes import FRAMES, LineFrames, SeenFrame
 from steptwin.errors import Misuse, Refusal
-from steptwin.jsonvalues import plain
+from steptwin.jsonvalues import to_json
 from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.script import steps
 from steptwin.subject import commands as command
 from steptwin.subject.commands import COMMANDS, Command, type_of
-from steptwin.subject.contract import GOOD, UNKNOWN, ControllerPart, Description, LinePart, Reading, Result
+from steptwin.subject.contract import GOOD, UNKNOWN, ControllerDescription, Description, LineDescription, Reading, Result
 from steptwin.subject.controls import controls_of
 from steptwin.subject.devicetwin import DeviceTwin
 from steptwin.subject.events import Event, Numbering
@@ -221,9 +221,11 @@ class AsyncDeviceSubject:
         place = self._line.place
         sheet = self._device.datasheet
         controls, no_twin = controls_of(sheet, self._actions), self._device.no_twin
-        controller = ControllerPart(self.name, sheet, place, self._device.address, controls, is_real=True, no_twin=no_twin)
+        controller = ControllerDescription(self.name, sheet, place, self._device.address, controls, is_real=True, no_twin=no_twin)
         names = tuple(row.name for row in COMMANDS.values() if row.kind in self._actions)
-        return Description(self.name, (controller,), lines=(LinePart(place, self._device.line_kind, None),), commands=names)
+        return Description(
+            self.name, (controller,), lines=(LineDescription(place, self._device.line_kind, None),), commands=names
+        )
 
     # ------------------------------------------------------------------ what a subject is
 
@@ -328,7 +330,7 @@ class AsyncDeviceSubject:
             raise Misuse(UNKNOWN_NAME(what=what, name=name, hint=NearMiss().hint(name, (there,)), there=there))
 
     async def _describe(self, _: command.Describe) -> object:
-        return self.description.plain()
+        return self.description.to_json()
 
     async def _read(self, wanted: command.ReadPoints) -> object:
         return [reading._asdict() for reading in await self.read(*wanted.points)]
@@ -339,7 +341,7 @@ class AsyncDeviceSubject:
 
     async def _state(self, wanted: command.ReadState) -> object:
         found = await self._device.state()
-        return plain(found) if wanted.parts is None else parts_of(found, self._device.datasheet, wanted.parts)
+        return to_json(found) if wanted.parts is None else parts_of(found, self._device.datasheet, wanted.parts)
 
     async def _time(self, _: command.Time) -> object:
         now = self.now()

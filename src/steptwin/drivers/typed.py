@@ -17,7 +17,7 @@ def number_of(value: str, whole: str) -> float:
         raise Misuse(f"{whole!r}: {error}") from None
 
 
-def shown(value: object) -> str:
+def format_value(value: object) -> str:
     """ON and OFF, and numbers with no more digits than a REAL has."""
     if isinstance(value, bool):
         return "ON" if value else "OFF"

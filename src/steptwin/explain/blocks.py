@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from steptwin.controlflow import ControlFlow
 from steptwin.controller import Nanos
-from steptwin.explain.model import FlowBlock, FlowWay, Piece
+from steptwin.explain.model import FlowBlock, FlowWay, StraightPiece
 
 
 class Timing(NamedTuple):
@@ -58,16 +58,16 @@ def _ways(flow: ControlFlow, last: int, index: Mapping[int, int], when: Callable
     return (*calls, *back)
 
 
-def _pieces(first: int, last: int, timing: Sequence[Timing]) -> list[Piece]:
-    found: list[Piece] = []
+def _pieces(first: int, last: int, timing: Sequence[Timing]) -> list[StraightPiece]:
+    found: list[StraightPiece] = []
     begin, total = first, 0
     for number in range(first, last + 1):
         duration, wait = timing[number]
         if duration is not None and not wait:
             total += duration
             continue
-        found.append(Piece(begin, number, total, wait or "not known before"))
+        found.append(StraightPiece(begin, number, total, wait or "not known before"))
         begin, total = number + 1, 0
     if begin <= last:
-        found.append(Piece(begin, last, total))
+        found.append(StraightPiece(begin, last, total))
     return found

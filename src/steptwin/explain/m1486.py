@@ -11,7 +11,7 @@ from steptwin.diagnostics import Severity, SourceText
 from steptwin.errors import Misuse
 from steptwin.explain.blocks import Timing, blocks_of
 from steptwin.explain.loops import TextLoop, executed, text_loops
-from steptwin.explain.model import EndlessLoop, ExplainedStatement, Explanation, LongWait, MemoryPart, MemorySection, Usage
+from steptwin.explain.model import EndlessLoop, ExplainedStatement, Explanation, LongWait, MemorySection, MemoryUse, Usage
 from steptwin.m1486.check import check
 from steptwin.m1486.commands import ArgType, When, when
 from steptwin.m1486.commands import rows as find_rows
@@ -166,18 +166,18 @@ class _Chip:
 
     # ------------------------------------------------------------------ memory and lines
 
-    def _memory(self) -> list[MemoryPart]:
+    def _memory(self) -> list[MemoryUse]:
         limit = self._variant.memory_bits
         store = "EEPROM" if self._variant.store is Store.EEPROM else "command memory"
         files = [
-            MemoryPart(
+            MemoryUse(
                 f"{store}, file {number}" if len(self._stream.files) > 1 else f"{store}, file in [ ]", file.bits, limit, "bits"
             )
             for number, file in enumerate(self._stream.files, 1)
         ]
-        everything = MemoryPart("all commands", self._stream.bits, None, "bits")
+        everything = MemoryUse("all commands", self._stream.bits, None, "bits")
         shared = self._variant.shared_bits
-        parts = [MemoryPart("of them shared with registers 1 to 8", shared, limit, "bits")] if shared else []
+        parts = [MemoryUse("of them shared with registers 1 to 8", shared, limit, "bits")] if shared else []
         return [*files, everything, *parts]
 
     def _sections(self, names: Mapping[int, Sequence[str]]) -> list[MemorySection]:

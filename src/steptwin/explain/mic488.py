@@ -13,7 +13,7 @@ from steptwin.explain import mic488_interrupts as interrupts
 from steptwin.explain import mic488_waits as waits
 from steptwin.explain.blocks import Timing, blocks_of
 from steptwin.explain.durations import Durations
-from steptwin.explain.model import EndlessLoop, ExplainedStatement, Explanation, MemoryPart, MemorySection, Usage
+from steptwin.explain.model import EndlessLoop, ExplainedStatement, Explanation, MemorySection, MemoryUse, Usage
 from steptwin.mic488.config import ControllerConfig
 from steptwin.wbc import steps as s
 from steptwin.wbc.check import CheckedProgram
@@ -111,24 +111,24 @@ def _names(executable: s.Executable) -> dict[int, list[str]]:
 # ---------------------------------------------------------------------- memory
 
 
-def memory_of(executable: s.Executable, positions: PositionTable | None, dialect: Dialect) -> list[MemoryPart]:
+def memory_of(executable: s.Executable, positions: PositionTable | None, dialect: Dialect) -> list[MemoryUse]:
     """Use of the memories of a controller by a program."""
     bank, image = position_memory(0 if positions is None else len(positions.rows), dialect)
     registers = {word for step in executable.steps for source in _operands(step) for word in _words(source)}
     return [
-        MemoryPart("program bank", len(executable.steps), dialect.max_steps, "statements"),
+        MemoryUse("program bank", len(executable.steps), dialect.max_steps, "statements"),
         bank,
-        MemoryPart("variables", len(executable.variables), dialect.max_variables, "variables"),
-        MemoryPart("user registers used", len(registers), dialect.user_registers, "registers"),
-        MemoryPart("statements in an image", STATEMENT_BYTES * len(executable.steps), None, "bytes"),
+        MemoryUse("variables", len(executable.variables), dialect.max_variables, "variables"),
+        MemoryUse("user registers used", len(registers), dialect.user_registers, "registers"),
+        MemoryUse("statements in an image", STATEMENT_BYTES * len(executable.steps), None, "bytes"),
         image,
     ]
 
 
-def position_memory(rows: int, dialect: Dialect) -> tuple[MemoryPart, MemoryPart]:
+def position_memory(rows: int, dialect: Dialect) -> tuple[MemoryUse, MemoryUse]:
     """Use of memory by a table of positions: of its bank, and in an image."""
-    bank = MemoryPart("position bank", rows, dialect.max_positions, "positions")
-    return bank, MemoryPart("positions in an image", POSITION_BYTES * rows, None, "bytes")
+    bank = MemoryUse("position bank", rows, dialect.max_positions, "positions")
+    return bank, MemoryUse("positions in an image", POSITION_BYTES * rows, None, "bytes")
 
 
 def _words(source: s.ValueSource) -> Iterable[int]:

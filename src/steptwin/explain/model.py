@@ -29,7 +29,7 @@ class FlowWay(NamedTuple):
     is_back: bool = False
 
 
-class Piece(NamedTuple):
+class StraightPiece(NamedTuple):
     """Statements without a branch or a wait between them. ``duration``: from the first to the statement after the last, or to the
     last if that waits: ``wait`` is for what."""
 
@@ -47,12 +47,12 @@ class FlowBlock:
     last: int
     names: tuple[str, ...]
     ways: tuple[FlowWay, ...]
-    pieces: tuple[Piece, ...]
+    pieces: tuple[StraightPiece, ...]
     is_entry: bool = False
     """The program or an interrupt begins here."""
 
 
-class MemoryPart(NamedTuple):
+class MemoryUse(NamedTuple):
     """Use of a memory; ``unit`` is that of ``used`` and ``most``."""
 
     what: str
@@ -117,7 +117,7 @@ class Explanation:
     statement_time: Nanos
     statements: Sequence[ExplainedStatement]
     blocks: Sequence[FlowBlock]
-    memory: Sequence[MemoryPart]
+    memory: Sequence[MemoryUse]
     sections: Sequence[MemorySection]
     section_unit: str
     usage: Mapping[str, Sequence[Usage]]

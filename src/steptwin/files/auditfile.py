@@ -58,7 +58,7 @@ class AuditFile:
     def add(self, entry: Entry) -> None:
         if self._file is None:
             return
-        self._file.write(json.dumps(entry.plain(), ensure_ascii=False) + "\n")
+        self._file.write(json.dumps(entry.to_json(), ensure_ascii=False) + "\n")
         self._file.flush()
         if self._most < inf and self._file.tell() > self._most:
             self._file.close()

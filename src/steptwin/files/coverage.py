@@ -36,12 +36,12 @@ class CoverageReports:
     def observe(self, world: Simulation, folder: Path) -> None:
         """Count from now on what a world executes, if that is to be reported. Its description lies in ``folder``."""
         if self._targets:
-            self._watches.append(WorldCoverage(world, self.coverage, lambda name: _shown(folder / name, self._here, name)))
+            self._watches.append(WorldCoverage(world, self.coverage, lambda name: _format_path(folder / name, self._here, name)))
 
     def add(self, coverage: Coverage, folder: Path) -> None:
         """Report also what was counted elsewhere, of a description that lies in ``folder``."""
         for text in coverage:
-            self.coverage.add(replace(text, path=_shown(folder / text.path, self._here, text.path)))
+            self.coverage.add(replace(text, path=_format_path(folder / text.path, self._here, text.path)))
 
     def close(self) -> None:
         """End all observation."""
@@ -72,7 +72,7 @@ def _check(target: str) -> None:
     check_writable(path)
 
 
-def _shown(path: Path, here: Path, name: str) -> str:
+def _format_path(path: Path, here: Path, name: str) -> str:
     """The path of a text: from ``here`` where it is below, else from the root; its name where it is no file."""
     with suppress(OSError, ValueError):
         if path.is_file():

@@ -133,7 +133,7 @@ class StateDirectory:
         magic = content[: len(_MAGIC)]
         if magic.startswith(_FAMILY) and len(magic) == len(_MAGIC) and magic != _MAGIC:
             raise StateFailure(
-                f"{path} has format {_shown(magic)}, this version of steptwin reads and writes {_shown(_MAGIC)}; it is left alone"
+                f"{path} has format {_text(magic)}, this version of steptwin reads and writes {_text(_MAGIC)}; it is left alone"
             )
 
 
@@ -141,5 +141,5 @@ def _header(data: bytes) -> bytes:
     return _HEADER.pack(_MAGIC, len(data), zlib.crc32(len(data).to_bytes(4, "little") + data))
 
 
-def _shown(magic: bytes) -> str:
+def _text(magic: bytes) -> str:
     return magic.decode("ascii", "backslashreplace")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from steptwin.errors import Misuse
-from steptwin.inputfiles import shown
+from steptwin.inputfiles import format_path
 from steptwin.messages import Message
 from steptwin.system import reason
 
@@ -24,9 +24,9 @@ def place_in(folder: Path, name: str) -> Path:
         is_within = path.parent.resolve().is_relative_to(folder.resolve())
         is_link = path.is_symlink() or (path.is_file() and path.stat().st_nlink > 1)
     except (OSError, RuntimeError) as error:  # RuntimeError: links in a circle
-        raise Misuse(NOT_IN_THE_FOLDER(path=shown(path), why=reason(error))) from None
+        raise Misuse(NOT_IN_THE_FOLDER(path=format_path(path), why=reason(error))) from None
     if not is_within or path.name in ("", ".."):
-        raise Misuse(ONLY_INTO_THE_FOLDER(path=shown(path), folder=folder))
+        raise Misuse(ONLY_INTO_THE_FOLDER(path=format_path(path), folder=folder))
     if is_link:
-        raise Misuse(NOT_THROUGH_A_LINK(path=shown(path)))
+        raise Misuse(NOT_THROUGH_A_LINK(path=format_path(path)))
     return path

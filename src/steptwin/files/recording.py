@@ -14,17 +14,17 @@ from typing import Any, get_type_hints
 
 from steptwin import __version__
 from steptwin.controller import SECOND, Nanos
+from steptwin.datatypes import fitting
 from steptwin.durations import LONGEST_NS
 from steptwin.errors import Misuse
 from steptwin.files.textfiles import write_bytes
 from steptwin.files.world import FailedSave, World
 from steptwin.inputfiles import read_recorded
 from steptwin.messages import Message
-from steptwin.plaintypes import fitting
 from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.description import read_world
+from steptwin.simulation.describe.includes import given_files
 from steptwin.simulation.describe.overrides import Overrides
-from steptwin.simulation.describe.pieces import given_files
 from steptwin.simulation.faults import Fault, parse
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.actions import ACTIONS
@@ -149,7 +149,7 @@ def save(recording: Recording, path: Path | str) -> None:
             {"time_ns": time, "machine": controller, "reason": text} for time, controller, text in recording.failed_saves
         ],
         "inputs": [
-            {"time_ns": time, "settled": settled, "do": type(what).__name__, **_plain(what)}
+            {"time_ns": time, "settled": settled, "do": type(what).__name__, **_to_json(what)}
             for time, what, settled in recording.inputs
         ],
     }
@@ -230,7 +230,7 @@ KEYS = {"controller": "machine"}
 ATTRIBUTES = {key: name for name, key in KEYS.items()}
 
 
-def _plain(what: ExternalInput) -> dict[str, Any]:
+def _to_json(what: ExternalInput) -> dict[str, Any]:
     if isinstance(what, tuple):
         return {KEYS.get(name, name): _value(value) for name, value in what._asdict().items()}
     named = fields(what) if is_dataclass(what) else ()

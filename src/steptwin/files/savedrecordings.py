@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.files.beginning import RECORDING_SUFFIX
+from steptwin.files.loader import RECORDING_SUFFIX
 from steptwin.messages import Message
 from steptwin.system import reason
 

@@ -11,7 +11,7 @@ from typing import IO
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.files.writing import check_content, new_content
-from steptwin.inputfiles import MOST_BYTES, read_bytes, shown
+from steptwin.inputfiles import MOST_BYTES, format_path, read_bytes
 from steptwin.messages import Message
 from steptwin.system import reason
 from steptwin.textcodec import Decoded, decode
@@ -37,7 +37,7 @@ def check_writable(path: Path) -> None:
     try:
         check_content(path)
     except (OSError, ValueError) as error:
-        raise Misuse(CANNOT_WRITE(path=shown(path), why=reason(error))) from None
+        raise Misuse(CANNOT_WRITE(path=format_path(path), why=reason(error))) from None
 
 
 NO_FOLDER = Message("files.no-folder", "cannot write {path}: there is no folder {folder}")
@@ -46,7 +46,7 @@ NO_FOLDER = Message("files.no-folder", "cannot write {path}: there is no folder 
 def check_folder(path: Path) -> None:
     """Check that the folder of a file exists. Raises `Misuse`."""
     if not path.parent.is_dir():
-        raise Misuse(NO_FOLDER(path=shown(path), folder=shown(path.parent)))
+        raise Misuse(NO_FOLDER(path=format_path(path), folder=format_path(path.parent)))
 
 
 @contextmanager
@@ -58,7 +58,7 @@ def new_file(path: Path) -> Generator[IO[bytes]]:
     except SteptwinError:  # a failed line or database is an `OSError`, too
         raise
     except OSError as error:
-        raise Misuse(CANNOT_WRITE(path=shown(path), why=reason(error))) from error
+        raise Misuse(CANNOT_WRITE(path=format_path(path), why=reason(error))) from error
 
 
 def write_bytes(path: Path, data: bytes) -> None:

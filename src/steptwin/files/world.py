@@ -17,15 +17,15 @@ from typing import Any, NamedTuple, Self, TypeAlias
 from steptwin.controller import SECOND, Nanos
 from steptwin.durations import duration
 from steptwin.errors import Misuse
+from steptwin.files.blueprintcache import DescriptionKey, keep_blueprint, known_blueprint
 from steptwin.files.export.progress import TimeProgress, silent
-from steptwin.files.loading import DescriptionKey, keep_blueprint, known_blueprint
 from steptwin.files.memory import StateDirectory, StateFailure
 from steptwin.files.textfiles import read_text
-from steptwin.inputfiles import MOST_DESCRIPTION_BYTES, read_bytes, shown
+from steptwin.inputfiles import MOST_DESCRIPTION_BYTES, format_path, read_bytes
 from steptwin.simulation.describe.blueprint import Blueprint, memory_file
 from steptwin.simulation.describe.description import describe, read_world
+from steptwin.simulation.describe.includes import given_files
 from steptwin.simulation.describe.overrides import NO_OVERRIDES, Overrides
-from steptwin.simulation.describe.pieces import given_files
 from steptwin.simulation.describe.servicetables import SERVICE_TABLES
 from steptwin.simulation.describe.spec import WorldSpec
 from steptwin.simulation.faults import Fault
@@ -312,7 +312,7 @@ class World(Simulation):
         Raises `Misuse` for one that cannot happen here.
         """
         self.apply_input(do.SetFault(read_fault(fault) if isinstance(fault, str) else fault))
-        return self.parts.faults.active[-1].name
+        return self.objects.faults.active[-1].name
 
     def clear_fault(self, name: str) -> None:
         """Remove a fault. Raises `Misuse` with the names there are."""
@@ -378,11 +378,11 @@ def _beside(folder: Path, name: str, *, allow_outside: bool) -> Path:
     path = folder / name
     try:
         if not allow_outside and not path.resolve().is_relative_to(folder.resolve()):
-            raise Misuse(f"{shown(Path(name))} is outside the folder of the description: --allow-outside permits it")
+            raise Misuse(f"{format_path(Path(name))} is outside the folder of the description: --allow-outside permits it")
     except (OSError, RuntimeError) as error:  # links in a circle
-        raise Misuse(f"{shown(Path(name))}: {error}") from None
+        raise Misuse(f"{format_path(Path(name))}: {error}") from None
     except ValueError as error:
-        raise error if isinstance(error, Misuse) else Misuse(f"{shown(Path(name))}: {error}") from None
+        raise error if isinstance(error, Misuse) else Misuse(f"{format_path(Path(name))}: {error}") from None
     return path
 
 

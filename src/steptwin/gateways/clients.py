@@ -14,8 +14,8 @@ from steptwin.datasheet import PointEffect
 from steptwin.errors import Refusal, SteptwinError
 from steptwin.gateways.contract import GatewaySubject
 from steptwin.simulation.script.steps import Request, Write
-from steptwin.subject.commands import Command, Home, Move, ReadState, StopAxes, plain_command, type_of
-from steptwin.subject.contract import ControllerPart, Result
+from steptwin.subject.commands import Command, Home, Move, ReadState, StopAxes, command_to_json, type_of
+from steptwin.subject.contract import ControllerDescription, Result
 from steptwin.subject.dispatch import code_of
 from steptwin.subject.events import Event
 from steptwin.subject.following import Filter, Following
@@ -89,7 +89,7 @@ class GatewayClient:
             raise
         finally:
             if subject.audit is not None and (isinstance(wanted, StopAxes) or PERMITS[type_of(wanted).name] != LOOK):
-                fields = plain_command(wanted)
+                fields = command_to_json(wanted)
                 subject.audit(self, str(fields.pop("do")), fields, outcome)
 
     def refused(self, subject: GatewaySubject, do: str, fields: Mapping[str, object], why: str = "misuse") -> None:
@@ -164,7 +164,7 @@ async def _is_under_way(subject: GatewaySubject, wanted: Write) -> bool:
     return False
 
 
-def _moved(part: ControllerPart, wanted: Write) -> set[int]:
+def _moved(part: ControllerDescription, wanted: Write) -> set[int]:
     """The axes of a controller to whose registers motions are written; a switch that is written 0 moves nothing."""
     found: set[int] = set()
     moving = {point.path: point for point in part.datasheet.points if point.effect is PointEffect.MOVES}

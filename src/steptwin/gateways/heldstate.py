@@ -13,7 +13,7 @@ from typing import Any
 from steptwin.controller import SECOND, Nanos
 from steptwin.controllerstate import PARTS
 from steptwin.gateways.points import State
-from steptwin.subject.contract import ControllerPart
+from steptwin.subject.contract import ControllerDescription
 from steptwin.subject.events import Event
 from steptwin.subject.payloads import (
     ButtonPayload,
@@ -43,7 +43,7 @@ class HeldState:
 
     __slots__ = ("_active", "_also", "_axes", "_levels", "_moved", "_others", "_stale", "_unsettled", "state")
 
-    def __init__(self, part: ControllerPart) -> None:
+    def __init__(self, part: ControllerDescription) -> None:
         axes = part.datasheet.axes
         names = [axis.name for axis in axes]
         self._axes = {str(axis.number): axis.name for axis in axes}

@@ -9,7 +9,7 @@ from steptwin.gateways.leases import LEASE_S
 from steptwin.gateways.points import PointType
 from steptwin.subject import commands as command
 from steptwin.subject.commands import Command
-from steptwin.subject.contract import ControllerPart
+from steptwin.subject.contract import ControllerDescription
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ METHODS: Mapping[str, tuple[MethodRow, ...]] = {
 """By the type of object that has them."""
 
 
-def methods_of(part: ControllerPart, rows: tuple[MethodRow, ...], axis: int | None) -> tuple[MethodRow, ...]:
+def methods_of(part: ControllerDescription, rows: tuple[MethodRow, ...], axis: int | None) -> tuple[MethodRow, ...]:
     """Those among ``rows`` that the controller takes, for its axis where one is named."""
     taken = {one.command for one in part.takes if one.axis == axis}
     return tuple(row for row in rows if row.command in taken)

@@ -18,7 +18,7 @@ from steptwin.errors import Misuse
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.script.steps import Set, Write
 from steptwin.subject.commands import Command
-from steptwin.subject.contract import ControllerPart, Description
+from steptwin.subject.contract import ControllerDescription, Description
 
 PointValue: TypeAlias = bool | int | float | str | None
 """None where it is not known."""
@@ -62,11 +62,11 @@ class GatewayPoint:
     def read(self, state: State) -> PointValue:
         return self.of(self.part(state))
 
-    def shown(self, state: State) -> PointValue:
+    def typed_value(self, state: State) -> PointValue:
         """Its value, of its type."""
-        return self.shown_in(self.part(state))
+        return self.typed_in(self.part(state))
 
-    def shown_in(self, part: Any) -> PointValue:
+    def typed_in(self, part: Any) -> PointValue:
         return self.typed(self.of(part))
 
     def typed(self, value: PointValue) -> PointValue:
@@ -88,12 +88,12 @@ def values_of(points: Sequence[GatewayPoint]) -> Callable[[Any], tuple[PointValu
     return lambda part: tuple([read(part) for read in reads])
 
 
-def points_of(part: ControllerPart, description: Description, registers: Iterable[str] = ()) -> tuple[GatewayPoint, ...]:
+def points_of(part: ControllerDescription, description: Description, registers: Iterable[str] = ()) -> tuple[GatewayPoint, ...]:
     """Those of a controller, in the order in which they are shown. ``registers``: the names of further points to show."""
     return tuple(_points(part, description, registers))
 
 
-def _points(part: ControllerPart, description: Description, registers: Iterable[str]) -> Iterator[GatewayPoint]:
+def _points(part: ControllerDescription, description: Description, registers: Iterable[str]) -> Iterator[GatewayPoint]:
     yield from _CONTROLLER
     yield from _PROGRAM
     for index, axis in enumerate(part.datasheet.axes):
@@ -264,7 +264,7 @@ CLOCK_POINTS = (
 # ---------------------------------------------------------------------- registers
 
 
-def _register(part: ControllerPart, name: str) -> GatewayPoint:
+def _register(part: ControllerDescription, name: str) -> GatewayPoint:
     """A point of the data sheet, or an element of one that is a list (``USER_REGISTER[5]``)."""
     point = part.datasheet.point(name.partition("[")[0])
     controller = part.name

@@ -43,7 +43,7 @@ def read_url(text: str, folder: Path) -> URL:
     return url.set(database=str(folder / url.database))
 
 
-def shown(url: URL) -> str:
+def format_url(url: URL) -> str:
     """Without its password."""
     return url.render_as_string(hide_password=True).replace("+psycopg", "")
 
@@ -55,7 +55,7 @@ def engine_of(url: URL) -> Engine:
             return create_engine(url, connect_args={"connect_timeout": CONNECT_S}, pool_pre_ping=True)
         engine = create_engine(url, connect_args={"timeout": BUSY_S})
     except (ImportError, NoSuchModuleError):
-        raise missing(shown(url), ["psycopg[binary]"]) from None
+        raise missing(format_url(url), ["psycopg[binary]"]) from None
     event.listen(engine, "connect", _set_up)
     return engine
 
@@ -98,7 +98,7 @@ _NO_SERVER = "see that the server runs and can be reached, and run it again: wha
 def failure(url: URL, error: DBAPIError) -> DatabaseFailure:
     """Which database it is, and what to do, in one line."""
     lines = str(error.orig).strip().splitlines()
-    text = f"{shown(url)}: {lines[0] if lines else type(error.orig).__name__}"
+    text = f"{format_url(url)}: {lines[0] if lines else type(error.orig).__name__}"
     remedy = _NO_SERVER if url.get_backend_name() == POSTGRESQL and isinstance(error, OperationalError) else None
     if isinstance(error.orig, sqlite3.Error) and error.orig.sqlite_errorcode is not None:
         remedy = _REMEDIES.get(error.orig.sqlite_errorcode & 0xFF)
@@ -120,7 +120,7 @@ def upgrade(connection: Connection, url: URL) -> None:
     try:
         command.upgrade(_config(connection), "head")
     except CommandError as error:
-        raise Misuse(f"{shown(url)} was written by a later steptwin: {error}") from None
+        raise Misuse(f"{format_url(url)} was written by a later steptwin: {error}") from None
 
 
 def check_version(connection: Connection, url: URL) -> None:
@@ -128,9 +128,11 @@ def check_version(connection: Connection, url: URL) -> None:
     found = MigrationContext.configure(connection).get_current_revision()
     wanted = ScriptDirectory.from_config(_config(connection)).get_current_head()
     if found is None:
-        raise Misuse(f"{shown(url)} has no history")
+        raise Misuse(f"{format_url(url)} has no history")
     if found != wanted:
-        raise Misuse(f"{shown(url)} has tables of version {found}, expected {wanted}: 'steptwin up' brings an older one to it")
+        raise Misuse(
+            f"{format_url(url)} has tables of version {found}, expected {wanted}: 'steptwin up' brings an older one to it"
+        )
 
 
 # ---------------------------------------------------------------------- many rows

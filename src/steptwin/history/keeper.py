@@ -14,7 +14,7 @@ from steptwin.errors import LineFailure, SteptwinError
 from steptwin.eventloop import endless
 from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.points import registers_by_controller
-from steptwin.history.database import read_url, shown
+from steptwin.history.database import format_url, read_url
 from steptwin.history.options import HistorySpec
 from steptwin.history.recorder import Recorder, WallAndSteady
 from steptwin.history.rows import RowBatch, RunHead
@@ -70,7 +70,7 @@ class HistoryKeeper:
         except OSError as error:
             raise LineFailure(CANNOT_BE_KEPT(folder=self._folder, why=reason(error))) from error
         self._task = endless(self._keep(self._recorder, self._spool), self._fail)
-        return {"url": shown(self._url)}
+        return {"url": format_url(self._url)}
 
     def _fail(self, text: str) -> None:
         self._failed = text

@@ -26,11 +26,11 @@ from sqlalchemy.exc import DBAPIError
 from steptwin.controller import MICROSECOND, SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.history.chores import MINUTE_US
-from steptwin.history.database import SQLITE, check_version, engine_of, failure, read_url, shown
+from steptwin.history.database import SQLITE, check_version, engine_of, failure, format_url, read_url
 from steptwin.history.motions import KeptMotion
 from steptwin.history.schema import EVENT, PLAN, POINT, RUN, SAMPLE, SUMMARY, TEXT
 from steptwin.messages import Message
-from steptwin.motion.plain import read_plan
+from steptwin.motion.planjson import read_plan
 from steptwin.nearmiss import NearMiss
 
 TEXTS = "text"
@@ -365,9 +365,9 @@ class HistoryDatabase:
         return dict(zip(tables, (self._rows(part)[0][0] for part in parts), strict=True))
 
     @property
-    def shown(self) -> str:
+    def address(self) -> str:
         """Its address, without its password."""
-        return shown(self._url)
+        return format_url(self._url)
 
 
 def _ordered(wanted: Query, table: Table, bounds: _Bounds) -> Query:

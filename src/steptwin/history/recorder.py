@@ -16,8 +16,8 @@ from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.points import CLOCK, CLOCK_POINTS, GatewayPoint, PointType, PointValue, points_of, whole_state
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.history.rows import EventRow, KeptValue, PlanRow, PointRow, RowBatch, RunHead, SampleRow
-from steptwin.motion.plain import plain_plan
-from steptwin.subject.contract import ControllerPart
+from steptwin.motion.planjson import plan_to_json
+from steptwin.subject.contract import ControllerDescription
 from steptwin.subject.events import Event
 from steptwin.subject.following import filter_of
 from steptwin.subject.payloads import SHOWN_KINDS, CoordinatePayload, EdgePayload, PlanPayload, RestoredPayload
@@ -116,7 +116,7 @@ class Recorder:
         """Rows that could not be kept, of which no batch tells yet."""
         self._note: _GapNote | None = None
 
-    def _add_controller(self, part: ControllerPart, registers: Iterable[str]) -> None:
+    def _add_controller(self, part: ControllerDescription, registers: Iterable[str]) -> None:
         points = [point for point in points_of(part, self._subject.description, registers) if point.name not in PASSING]
         if part.is_real:
             self._sampled[part.name] = self._add(part.name, points)
@@ -272,7 +272,7 @@ class Recorder:
 
     def log(self, entry: Entry) -> None:
         """Keep a command, with who gave it and what became of it."""
-        content = json.dumps(entry.plain(), ensure_ascii=False, separators=(",", ":"))
+        content = json.dumps(entry.to_json(), ensure_ascii=False, separators=(",", ":"))
         controller = str(entry.fields.get("controller") or "")
         self._batch.events.append(EventRow(entry.time, self._clock.wall_us(), 0, controller, COMMAND, None, str(entry), content))
 
@@ -325,7 +325,7 @@ class Recorder:
         match event.payload:
             case PlanPayload(axis, plan, origin):
                 known = self._plans.get((event.controller, axis), ("", 0))[1]
-                text = json.dumps(plain_plan(plan), separators=(",", ":"))
+                text = json.dumps(plan_to_json(plan), separators=(",", ":"))
                 self._keep_plan(event.controller, axis, time, at_us, text, known if origin is None else origin)
             case CoordinatePayload(axis, origin):
                 plan_text = self._plans.get((event.controller, axis), ("", 0))[0]
@@ -335,7 +335,7 @@ class Recorder:
                 if (event.controller, pin) in self._pins:
                     self._keep(self._pins[event.controller, pin], time, at_us, level, is_stepwise=True)
             case payload if event.is_shown or event.kind == "write":
-                content = json.dumps(payload.plain(), separators=(",", ":"))
+                content = json.dumps(payload.to_json(), separators=(",", ":"))
                 row = EventRow(time, at_us, event.number, event.controller, event.kind, event.cause, event.text, content)
                 self._batch.events.append(row)
 

@@ -89,7 +89,7 @@ PLAN = Table(
     Column("scale", Float(53), nullable=False),
     Column("round_p", BigInteger),
     Index("ix_plan_point_at", "point_id", "at_us"),
-    comment="A motion, from which positions follow (steptwin.motion.plain): (pulses + origin) / scale, between -round_p/2 and "
+    comment="A motion, from which positions follow (steptwin.motion.planjson): (pulses + origin) / scale, between -round_p/2 and "
     "round_p/2 pulses where there is a round_p. It holds as a sample does.",
 )
 

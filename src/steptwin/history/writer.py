@@ -12,7 +12,7 @@ from sqlalchemy.exc import DBAPIError, IntegrityError, InterfaceError, Operation
 
 from steptwin.errors import LineFailure, Misuse, SteptwinError
 from steptwin.history.chores import DAY_US, begin_anew, remove_old, summarise
-from steptwin.history.database import engine_of, failure, shown, upgrade
+from steptwin.history.database import engine_of, failure, format_url, upgrade
 from steptwin.history.spool import Spool, Taken
 from steptwin.history.writing import TableWriter
 from steptwin.system import reason
@@ -102,7 +102,7 @@ class HistoryWriter:
             else:
                 if self.lost is not None and self._is_ready:
                     self.lost = None
-                    self._notice(f"history: {shown(self._url)} answers again")
+                    self._notice(f"history: {format_url(self._url)} answers again")
                 pause = 0.0
                 continue
             pause = min(max(2 * pause, PAUSE_S[0]), PAUSE_S[1])

@@ -40,7 +40,7 @@ def language_for(path: Path, action: str, method: Callable[..., object]) -> File
         return language
     if language.not_text:
         raise Misuse(f"{path} {language.not_text}")
-    able = [one.shown for one in LANGUAGES.values() if one.offers(method)]
+    able = [one.description for one in LANGUAGES.values() if one.offers(method)]
     raise Misuse(f"cannot {action} {path}: permitted are {' and '.join(able)}")
 
 

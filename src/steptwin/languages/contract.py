@@ -102,7 +102,7 @@ class FileLanguage(OptionalMethods, ABC):
         raise NotImplementedError
 
     @property
-    def shown(self) -> str:
+    def description(self) -> str:
         """``WBC programs (.prg)``."""
         return f"{self.title} ({', '.join(self.suffixes)})"
 

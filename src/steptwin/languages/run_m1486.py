@@ -44,7 +44,7 @@ from steptwin.m1486.events import M1486Event
 from steptwin.m1486.lines import interface
 from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.pins import OPEN_ADDRESS, refuse_taken, settable_pin
-from steptwin.m1486.present import program_words, velocity
+from steptwin.m1486.present import describe_program, velocity
 from steptwin.m1486.unit import counter_text
 from steptwin.m1486.variants import DEFAULT, Store, Variant, variant
 from steptwin.simulation.describe.generated import InputChange, Whole
@@ -243,7 +243,7 @@ def _print_lines(chips: Chips, outcome: Outcome, out: Print) -> None:
     for name, chip in chips.chips.items():
         out(f"{f'chip {_address(name)}: ' if several else ''}{_position(chip, now)}")
         if outcome.ending.why != "ended":
-            out(f"  {program_words(chip, now)}")
+            out(f"  {describe_program(chip, now)}")
     if chips.sent:
         out(f"  sent {chips.sent.hex(' ').upper()}")
     if chips.unsent:
@@ -294,5 +294,5 @@ def _chip_data(name: str, chip: M1486Chip, now: Nanos) -> dict[str, object]:
         "position": drive.counter_u(now),
         "position_valid": drive.is_valid,
         "true_position": drive.true_u(now),
-        "program": program_words(chip, now),
+        "program": describe_program(chip, now),
     }

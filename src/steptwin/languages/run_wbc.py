@@ -20,7 +20,7 @@ from steptwin.files.programbanks import Findings, read_banks
 from steptwin.files.programfiles import CompanionFiles
 from steptwin.files.world import World
 from steptwin.inputfiles import read_bytes
-from steptwin.jsonvalues import plain
+from steptwin.jsonvalues import to_json
 from steptwin.languages.descriptions import Named, print_world
 from steptwin.languages.program_run import (
     NOTE,
@@ -190,7 +190,7 @@ class RunWatch(ProgramWatch):
 
     def __init__(self, world: World) -> None:
         device = world.mic488[NAME].device
-        super().__init__(device, world.parts.scheduler_of[NAME], NAME)
+        super().__init__(device, world.objects.scheduler_of[NAME], NAME)
         for event in device.events:  # those of power-on
             self._emit(event.time, event.code, event.text)
         world.trace.watchers.append(self._recorded)
@@ -313,7 +313,7 @@ def _data(ran: WbcRunResult, *, wrong: bool) -> dict[str, object]:
         "ratio": outcome.ratio,
         "assumed": list(ran.given.placed.assumed),
         "missing_switches": ran.missing,
-        "state": plain(state_of(watch.device, outcome.ending.at)),
+        "state": to_json(state_of(watch.device, outcome.ending.at)),
         "events": [_event_data(watch, happening) for happening in watch.happened],
     }
 

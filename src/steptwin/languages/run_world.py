@@ -18,14 +18,14 @@ from steptwin.controllerstate import ControllerState
 from steptwin.durations import duration
 from steptwin.errors import Misuse
 from steptwin.files import recording as recordings
-from steptwin.files.beginning import begin_world, set_faults
 from steptwin.files.coverage import CoverageReports
 from steptwin.files.export import axis_views, bar, write_trace
 from steptwin.files.export.progress import TimeProgress
+from steptwin.files.loader import load_world, set_faults
 from steptwin.files.timedinputs import TimedInput
 from steptwin.files.world import LONGEST_RUN_NS, World
 from steptwin.files.worldoptions import ShownOptions, WorldRunOptions
-from steptwin.jsonvalues import plain
+from steptwin.jsonvalues import to_json
 from steptwin.languages.program_run import report_causes
 from steptwin.live.interrupts import FirstInterrupt
 from steptwin.simulation.kinds.kind import ProgramAct, ProgramReport
@@ -78,7 +78,7 @@ def run(options: WorldRun, out: Print, warn: Print) -> bool:
     """
     reports = CoverageReports(options.coverage)
     keep_trace = options.trace is not None or not options.as_json
-    with begin_world(
+    with load_world(
         options.world,
         warn,
         moment=options.run.moment,
@@ -108,7 +108,7 @@ def _run_and_report(world: World, options: WorldRun, reports: CoverageReports, o
     known = Counter(record.controller for record in before)
     _arrange(world, options)
     properties = watch_together([read_property(text) for text in options.properties], world)
-    selection = read_selection(options.shown.of, options.shown.show, named_in(world.parts))
+    selection = read_selection(options.shown.of, options.shown.show, named_in(world.objects))
     usual = USUAL_LIMIT_NS if options.until is None else LONGEST_RUN_NS
     limit = options.limit if options.limit is not None else usual
     watches = {} if options.as_json else _watched(world)
@@ -145,7 +145,7 @@ def _run_and_report(world: World, options: WorldRun, reports: CoverageReports, o
 def _watched(world: World) -> dict[str, ProgramReport]:
     """Watches for the programs of all controllers that have any."""
     found = {
-        name: world.kind(name).watch_program(controller, world.parts.scheduler_of[name], name)
+        name: world.kind(name).watch_program(controller, world.objects.scheduler_of[name], name)
         for name, controller in world.controllers.items()
     }
     return {name: watch for name, watch in found.items() if watch is not None}
@@ -352,7 +352,7 @@ def _json(world: World, outcome: WorldRunResult, out: Print) -> None:
             name: {"position": axis.position, "unit": axis.unit, "lost_pulses": axis.lost, "stalled": axis.stalled}
             for name, axis in world.axis.items()
         },
-        "controllers": {name: plain(state) for name, state in _states(world).items()},
+        "controllers": {name: to_json(state) for name, state in _states(world).items()},
         "files": [str(path) for path in outcome.written],
         "digest": outcome.digest,
     }

@@ -294,7 +294,7 @@ class _Conversation(asyncio.Protocol):
         if len(self._following) >= MOST_FOLLOWED:
             raise Misuse(TOO_MANY_FOLLOWED(most=MOST_FOLLOWED))
         what = filter_of(wanted.kinds, wanted.controllers, wanted.axes)
-        plans = [plan.plain() for plan in self._subject.plans(what)]
+        plans = [plan.to_json() for plan in self._subject.plans(what)]
         following = self._following[identity] = self._subject.follow(what, wanted.bound)
         following.on_event = self._events_came
         return {"plans": plans}
@@ -325,7 +325,7 @@ class _Conversation(asyncio.Protocol):
             missed, events = following.take(EVENTS_AT_ONCE)
             for event in events:
                 lost: JsonObject = {"missed": missed} if missed else {}
-                self._write({"id": identity, "event": event.plain(), **lost})
+                self._write({"id": identity, "event": event.to_json(), **lost})
                 missed = 0
             if len(following):
                 self._events_came()

@@ -18,7 +18,7 @@ from steptwin.debug.breakpoints import AnyPoint
 from steptwin.debug.debugger import Debugger, DebugTravel
 from steptwin.debug.lookahead import Goal
 from steptwin.debug.observer import Logged
-from steptwin.debug.values import DataPoint, Events, LabelPoint, LinePoint, SetPoint, ShownValue, Stopped, StopReason
+from steptwin.debug.values import DataPoint, Events, FormattedValue, LabelPoint, LinePoint, SetPoint, Stopped, StopReason
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.live.pace import Pace
 from steptwin.live.realtimedriver import RealTimeDriver
@@ -106,7 +106,7 @@ class Debugging:
 
     def _tell(self) -> None:
         """Publish what time stops at, unless it is unchanged."""
-        said = BreakpointsPayload(tuple(self._plain(number) for number in self._breakpoints), self._events)
+        said = BreakpointsPayload(tuple(self._to_json(number) for number in self._breakpoints), self._events)
         if said != self._said:
             self._said = said
             self._live.subject.publish(self._live.now, WORLD, said)
@@ -119,7 +119,7 @@ class Debugging:
         if same is not None:
             found = self._breakpoints[same]
             self._breakpoints[same] = found._replace(times=found.times + 1)
-            return self._plain(same)
+            return self._to_json(same)
         number, self._next = self._next, self._next + 1
         self._breakpoints[number] = _Requested(wanted, _point(wanted))
         self._set_all()
@@ -127,7 +127,7 @@ class Debugging:
             self._remove(number)
             raise Misuse(WRONG_BREAKPOINT(problem=text_of(problem)))
         self._tell()
-        return self._plain(number)
+        return self._to_json(number)
 
     def _clear(self, wanted: command.ClearBreakpoint) -> None:
         if wanted.number not in self._breakpoints:
@@ -147,7 +147,7 @@ class Debugging:
         """Numbers of breakpoints, by those in the debugger."""
         return tuple(number for number, found in self._set.items() if found.number in points)
 
-    def _plain(self, number: int) -> dict[str, object]:
+    def _to_json(self, number: int) -> dict[str, object]:
         found = self._set.get(number)
         given = {name: value for name, value in asdict(self._breakpoints[number].wanted).items() if name != "line"}
         line = self._breakpoints[number].wanted.line if found is None or found.line is None else found.line
@@ -156,7 +156,7 @@ class Debugging:
 
     def _list(self) -> object:
         return {
-            "breakpoints": [self._plain(number) for number in self._breakpoints],
+            "breakpoints": [self._to_json(number) for number in self._breakpoints],
             "stop_on": list(self._events),
             "stop": None if self._open is None else self._open.stopped,
         }
@@ -181,7 +181,7 @@ class Debugging:
             command.Branch: lambda _: self._opened().branch(),
             command.Stack: lambda wanted: self._opened().stack(wanted.controller),
             command.Values: self._values,
-            command.Evaluate: lambda wanted: _plain_value(self._looked_at().evaluate(wanted.controller, wanted.expression)),
+            command.Evaluate: lambda wanted: _value_to_json(self._looked_at().evaluate(wanted.controller, wanted.expression)),
             command.SetValue: self._set_value,
             command.ProgramSource: self._source,
         }
@@ -190,10 +190,10 @@ class Debugging:
         return self._opened().looked_at
 
     def _values(self, wanted: command.Values) -> object:
-        return [_plain_value(value) for value in self._looked_at().scope(wanted.controller, wanted.scope).values]
+        return [_value_to_json(value) for value in self._looked_at().scope(wanted.controller, wanted.scope).values]
 
     def _set_value(self, wanted: command.SetValue) -> object:
-        return _plain_value(self._looked_at().set_value(wanted.controller, wanted.name, wanted.expression))
+        return _value_to_json(self._looked_at().set_value(wanted.controller, wanted.name, wanted.expression))
 
     def _source(self, wanted: command.ProgramSource) -> object:
         texts = self._opened().debugger.texts(wanted.controller)
@@ -461,7 +461,7 @@ class _OpenDebugger:
             debugger.is_past,
         )
         controller = stop.controller or WORLD
-        self.stopped = {"time_ns": str(debugger.now), "controller": controller, **said.plain()}
+        self.stopped = {"time_ns": str(debugger.now), "controller": controller, **said.to_json()}
         self._live.subject.publish(debugger.now, controller, said)
 
     def _log(self, logged: Logged) -> None:
@@ -480,7 +480,7 @@ def _point(wanted: command.SetBreakpoint) -> AnyPoint:
     return LinePoint(controller=controller, text=program, line=line, condition=condition, hits=hits, log=wanted.log)
 
 
-def _plain_value(value: ShownValue) -> dict[str, object]:
+def _value_to_json(value: FormattedValue) -> dict[str, object]:
     return {
         "name": value.name,
         "value": value.text,

@@ -91,7 +91,7 @@ def title_of(world: World) -> str:
 
 
 def _titled(world: World, name: str) -> str:
-    kind, on = world.kind(name), world.parts.line_of.get(name)
+    kind, on = world.kind(name), world.objects.line_of.get(name)
     where = {} if on is None else kind.announced(world.controllers[name], on[1])
     return ", ".join([kind.model, *(f"{key} {value}" for key, value in where.items() if key != "kind")])
 

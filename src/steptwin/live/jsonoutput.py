@@ -46,7 +46,7 @@ class JsonOutput(Output):
     def record(self, record: TraceRecord) -> None:
         payload = payload_of(record)
         self._log.info(
-            payload.text, kind=payload.kind, controller=record.controller, time_ns=str(record.time), data=payload.plain()
+            payload.text, kind=payload.kind, controller=record.controller, time_ns=str(record.time), data=payload.to_json()
         )
 
     def frame(self, frame: FrameLine) -> None:

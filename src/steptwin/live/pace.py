@@ -16,8 +16,8 @@ from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.fields import FASTEST, SLOWEST
 from steptwin.files import recording as recordings
-from steptwin.files.beginning import check_recording_target, is_recording
 from steptwin.files.export import axis_views, check_target, write_trace
+from steptwin.files.loader import check_recording_target, is_recording
 from steptwin.files.textfiles import check_folder
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.messages import Message, text_of

@@ -17,7 +17,7 @@ from steptwin.inputfiles import read_bytes
 from steptwin.live.control import ANNOUNCEMENT, HAS_LOCAL_SOCKETS, SOCKET, TIMEOUT_S
 from steptwin.live.directory import permissions, runtime_directory
 from steptwin.subject import commands as command
-from steptwin.subject.commands import plain_command
+from steptwin.subject.commands import command_to_json
 from steptwin.subject.contract import Description, Reading, Result, read_description
 from steptwin.subject.dispatch import raised
 from steptwin.subject.events import Event, read_event
@@ -166,7 +166,7 @@ class RemoteSubject:
     # ------------------------------------------------------------------ messages
 
     def _ask(self, wanted: command.Command, identity: int) -> Result:
-        self._send({**plain_command(wanted), "id": identity})
+        self._send({**command_to_json(wanted), "id": identity})
         for message in self._messages(self._timeout_s):
             if message.get("id") == identity and "event" not in message:
                 return _result(message)

@@ -18,10 +18,10 @@ from steptwin.controller import Nanos, SendingPort
 from steptwin.errors import Misuse
 from steptwin.files import recording as recordings
 from steptwin.files.auditfile import wall_clock
-from steptwin.files.beginning import begin_world, check_recording_target, is_recording, set_faults
 from steptwin.files.coverage import CoverageReports
 from steptwin.files.export import axis_views, check_target, growing_file, read_trace, write_trace
 from steptwin.files.export.tracefile import Kept, Ring, TraceFile, read_kept
+from steptwin.files.loader import check_recording_target, is_recording, load_world, set_faults
 from steptwin.files.world import World
 from steptwin.gateways.contract import OpenGateway
 from steptwin.live.clock import Clock
@@ -76,7 +76,7 @@ def up(options: UpOptions, addition: Addition | None = None) -> bool:
         raise Misuse("a world is missing: give its description (.toml) or a recording (.json)")
     check_name(options.live.name or options.world.stem)
     read_speed(options.live.speed, least=0)
-    with begin_world(
+    with load_world(
         options.world,
         lambda text: sys.stderr.write(f"{text}\n"),
         moment=options.run.moment,
@@ -168,7 +168,7 @@ async def _serve(
 
 
 def _display(live: LiveWorld, realtime: RealTimeDriver, output: Output, options: UpOptions) -> Display:
-    selection = read_selection(options.shown.of, options.shown.show, named_in(live.world.parts))
+    selection = read_selection(options.shown.of, options.shown.show, named_in(live.world.objects))
     if not shows_live_view(output, log_frames=options.live.log_frames):
         return Lines(live, output, frames=options.live.log_frames, selection=selection)
     from steptwin.live.view import LiveView

@@ -15,7 +15,7 @@ from steptwin.errors import Misuse
 from steptwin.live.remote import RemoteSubject
 from steptwin.simulation.world.model import WORLD
 from steptwin.subject import commands as command
-from steptwin.subject.contract import ControllerPart
+from steptwin.subject.contract import ControllerDescription
 from steptwin.subject.events import Event
 from steptwin.subject.following import USUAL, filter_of
 from steptwin.subject.motion import Motions
@@ -38,7 +38,7 @@ class TwinWatch:
             raise Misuse(f"{subject.name} has no controller {controller!r}")
         self._subject = subject
         self._wall_ns = wall_ns
-        self._part: ControllerPart = found
+        self._part: ControllerDescription = found
         points = {point.path.upper(): point for point in found.datasheet.points}
         self._points = {path: points.get(path.upper()) for path in paths}
         self._computed = {path: at for path, point in self._points.items() if (at := _computed(point, found)) is not None}
@@ -126,7 +126,7 @@ def _velocity(motions: Motions, axis: str, now: Nanos) -> float:
 _COMPUTED = {"POS_ACT": _position, "POSITION": _position, "VEL_ACT": _velocity, "VELOCITY": _velocity}
 
 
-def _computed(point: Point | None, part: ControllerPart) -> tuple[str, Callable[[Motions, str, Nanos], float]] | None:
+def _computed(point: Point | None, part: ControllerDescription) -> tuple[str, Callable[[Motions, str, Nanos], float]] | None:
     """The axis of a point that is computed from a plan, and the function."""
     if point is None:
         return None

@@ -56,7 +56,7 @@ class LiveWhy:
             while perf_counter() < until:
                 next(self._asking)
         except StopIteration as end:
-            self._end(partial(later.put, end.value.plain()))
+            self._end(partial(later.put, end.value.to_json()))
         except SteptwinError as error:
             self._end(partial(later.fail, error))
         else:

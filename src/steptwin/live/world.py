@@ -40,7 +40,7 @@ def announced(world: World) -> list[dict[str, object]]:
     """The announced controllers of a world: name, kind, line, present address, and the units of axes."""
     found: list[dict[str, object]] = []
     for name, controller in world.controllers.items():
-        kind, on = world.kind(name), world.parts.line_of.get(name)
+        kind, on = world.kind(name), world.objects.line_of.get(name)
         where = {"line": None} if on is None else {"line": on[0].name, **kind.announced(controller, on[1])}
         axes = [{"unit": axis.unit, "pulses_per_unit": axis.pulses_per_unit} for axis in kind.datasheet(controller).axes]
         found.append({"name": name, "kind": kind.name, **where, "axes": axes})
@@ -137,7 +137,7 @@ class LiveWorld:
     def share_reads(self, realtime: RealTimeDriver) -> None:
         """Let clients that ``realtime`` serves at one moment share their reads."""
         for line in self.world.lines.values():
-            names = {unit: name for name, (on, unit) in self.world.parts.line_of.items() if on is line}
+            names = {unit: name for name, (on, unit) in self.world.objects.line_of.items() if on is line}
 
             def served(devices: Mapping[int, SlaveDevice], names: Mapping[int, str] = names) -> Mapping[int, SlaveDevice]:
                 return share_reads(traced(devices, names) if is_traced() else devices, realtime)
@@ -355,7 +355,7 @@ class PlacePort:
         self._live = live
         self._world = world
         self._line = world.lines[line]
-        self._scheduler = world.parts.scheduler_of[line]
+        self._scheduler = world.objects.scheduler_of[line]
         self._places = self._line.places
         self._name = place
         self._kind = kind

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection
 from functools import partial
 
 from steptwin.live.world import LiveWorld
-from steptwin.simulation.kinds.lines import LineWords
+from steptwin.simulation.kinds.lines import TrafficLog
 from steptwin.simulation.kinds.registry import line_kinds
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.wire.frameline import FrameLine
@@ -20,12 +20,12 @@ def follow_frames(live: LiveWorld, sink: Callable[[FrameLine], None]) -> None:
     world = live.world
     for spec in world.spec.lines:
         line = world.lines[spec.name]
-        words = line_kinds()[spec.kind].words(line, "" if len(world.lines) == 1 else f"{line.name}/", sink)
-        line.follow_frames(words)
-        members = {name for name, (on, _) in world.parts.line_of.items() if on is line}
-        world.trace.watchers.append(partial(_recorded, words, members))
+        log = line_kinds()[spec.kind].traffic_log(line, "" if len(world.lines) == 1 else f"{line.name}/", sink)
+        line.follow_frames(log)
+        members = {name for name, (on, _) in world.objects.line_of.items() if on is line}
+        world.trace.watchers.append(partial(_recorded, log, members))
 
 
-def _recorded(words: LineWords, members: Collection[str], record: TraceRecord) -> None:
+def _recorded(log: TrafficLog, members: Collection[str], record: TraceRecord) -> None:
     if record.controller in members:
-        words.recorded(record)
+        log.recorded(record)

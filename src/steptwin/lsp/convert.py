@@ -80,7 +80,7 @@ class Converter:
         lines = [found.message] if found.hint is None else [found.message, found.hint]
         tags = [lsp.DiagnosticTag.Unnecessary] if found.code in _UNNECESSARY else None
         severity = _SEVERITIES[found.severity]
-        data = [text_of(line).plain() for line in lines]
+        data = [text_of(line).to_json() for line in lines]
         return lsp.Diagnostic(
             self.range(found.span), "\n".join(lines), severity=severity, code=found.code, source=SOURCE, tags=tags, data=data
         )
@@ -148,11 +148,11 @@ class Converter:
         return lsp.SemanticTokens(data)
 
 
-def changes_of(edits: a.Edits, converter: Callable[[str], Converter | None], shown: Callable[[str], str]) -> lsp.WorkspaceEdit:
+def changes_of(edits: a.Edits, converter: Callable[[str], Converter | None], spelled: Callable[[str], str]) -> lsp.WorkspaceEdit:
     """Edits by file; ``converter`` gives that of each text, ``shown`` its address for the client."""
     changes: dict[str, Sequence[lsp.TextEdit]] = {}
     for uri, found in edits.items():
         made = converter(uri)
         if made is not None:
-            changes[shown(uri)] = made.edits(found)
+            changes[spelled(uri)] = made.edits(found)
     return lsp.WorkspaceEdit(changes=changes)

@@ -131,7 +131,7 @@ class EditorServer(LanguageServer):
     def location(self, place: TextLocation) -> lsp.Location:
         converter = self.converter(place.uri)
         nowhere = lsp.Range(lsp.Position(0, 0), lsp.Position(0, 0))
-        return lsp.Location(self.session.shown(place.uri), nowhere if converter is None else converter.range(place.span))
+        return lsp.Location(self.session.spelled(place.uri), nowhere if converter is None else converter.range(place.span))
 
 
 def most_severe(diagnostics: Sequence[Diagnostic]) -> Sequence[Diagnostic]:

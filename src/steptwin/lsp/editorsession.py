@@ -88,7 +88,7 @@ class EditorSession:
     def document(self, uri: str) -> Document | None:
         return self._documents.get(normal(uri))
 
-    def shown(self, uri: str) -> str:
+    def spelled(self, uri: str) -> str:
         """An address as the client spells it."""
         document = self._documents.get(uri)
         return uri if document is None else document.uri

@@ -178,7 +178,7 @@ def _rename(server: EditorServer, params: lsp.RenameParams) -> lsp.WorkspaceEdit
         edits = navigation.rename(server.session, params.text_document.uri, place, params.new_name)
     except Misuse as error:
         raise _refused(error) from None
-    return changes_of(edits, server.converter, server.session.shown)
+    return changes_of(edits, server.converter, server.session.spelled)
 
 
 def _prepare_calls(server: EditorServer, params: lsp.CallHierarchyPrepareParams) -> list[lsp.CallHierarchyItem] | None:
@@ -193,7 +193,7 @@ def _call_item(server: EditorServer, converter: Converter, caller: navigation.Ca
     section = caller.section
     ranges = converter.range(section.span), converter.range(section.name_span)
     kind = SYMBOL_KINDS[section.kind]
-    return lsp.CallHierarchyItem(section.name, kind, server.session.shown(caller.uri), *ranges, detail=None, data=caller.key)
+    return lsp.CallHierarchyItem(section.name, kind, server.session.spelled(caller.uri), *ranges, detail=None, data=caller.key)
 
 
 def _calls(server: EditorServer, item: lsp.CallHierarchyItem, *, incoming: bool) -> list[tuple[Any, list[lsp.Range]]]:
@@ -249,7 +249,7 @@ def _inlay_hint(server: EditorServer, params: lsp.InlayHintParams) -> list[lsp.I
 
 
 def _document_link(server: EditorServer, params: lsp.DocumentLinkParams) -> list[lsp.DocumentLink] | None:
-    shown = server.session.shown
+    shown = server.session.spelled
     return _of(
         server,
         params.text_document.uri,
@@ -269,8 +269,8 @@ def _code_action(server: EditorServer, params: lsp.CodeActionParams) -> list[lsp
                 str(action.title),
                 kind=lsp.CodeActionKind.QuickFix,
                 diagnostics=[converter.diagnostic(action.mends)],
-                edit=changes_of(action.edits, server.converter, server.session.shown),
-                data=action.title.plain(),
+                edit=changes_of(action.edits, server.converter, server.session.spelled),
+                data=action.title.to_json(),
             )
             for action in found
         ]

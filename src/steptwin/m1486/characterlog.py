@@ -122,7 +122,7 @@ def _typed(raw: bytes, variant: Variant) -> MessageText:
         return WITHOUT_CR(count=len(raw))
     line, found = parse_line(text)
     if line.command is not None:
-        return COMMAND(command=line.command, text=in_words(line.command, variant))
+        return COMMAND(command=line.command, text=described(line.command, variant))
     if found:
         return COMMAND(command=text, text=found[0].message)
     return A_COMMENT() if line.comment is not None else AN_EMPTY_LINE()
@@ -134,7 +134,7 @@ def changes_nothing(raw: bytes) -> bool:
     return (line.command is None and not found) or (line.command is not None and line.command.key == UPLOAD)
 
 
-def in_words(command: ChipCommand, variant: Variant) -> MessageText:
+def described(command: ChipCommand, variant: Variant) -> MessageText:
     """``Forward 12 800 min. microsteps``."""
     argument = command.argument
     if isinstance(argument, JumpCondition):

@@ -23,7 +23,7 @@ from steptwin.m1486.program import WaitReason
 _MOTIONS = {MotionMode.MOVE: "move", MotionMode.ENDLESS: "endless move", MotionMode.SEEK: "seek"}
 
 
-def program_words(chip: M1486Chip, now: Nanos) -> str:
+def describe_program(chip: M1486Chip, now: Nanos) -> str:
     """The state of a chip's program as text."""
     program = chip.program
     if chip.is_shut_down:
@@ -67,14 +67,14 @@ class M1486State(StateReader[M1486Chip]):
 
     def status(self, chip: M1486Chip, now: Nanos) -> StateStatus:
         if chip.is_shut_down or chip.program.is_held:
-            return StateStatus(text=program_words(chip, now), level=StatusLevel.WARNING)
+            return StateStatus(text=describe_program(chip, now), level=StatusLevel.WARNING)
         return StateStatus(text="ok")
 
     def program(self, chip: M1486Chip, now: Nanos) -> StateProgram:
         following = next_command(chip)
         return StateProgram(
             state=_activity(chip, now),
-            text=program_words(chip, now),
+            text=describe_program(chip, now),
             statement=None if following is None else str(following),
             variables={},
         )

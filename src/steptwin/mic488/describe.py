@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from steptwin.messages import NONE, Message, MessageText, text_of
 from steptwin.mic488.encoding import word_to_int, words_to_dint, words_to_real
-from steptwin.mic488.registermap import DataType, QuantityKind, Register, RegisterMap, RequestPart, Space, Type, show_address
+from steptwin.mic488.registermap import DataType, QuantityKind, Register, RegisterMap, RegisterSlice, Space, Type, show_address
 from steptwin.mic488.registers import axes_of_mask
 from steptwin.wire import pdu as modbus
 
@@ -109,10 +109,10 @@ class Wording:
 
     # ------------------------------------------------------------------ parts of a request
 
-    def _groups(self, space: Space, address: int, count: int) -> Iterable[list[RequestPart]]:
-        """Pieces of a request, those of one row (all axes of a quantity) together; half a value is a piece of its own."""
-        pieces = self.register_map.pieces(space, address, count)
-        return (list(group) for _, group in groupby(pieces, _group_key))
+    def _groups(self, space: Space, address: int, count: int) -> Iterable[list[RegisterSlice]]:
+        """Slices of a request, those of one row (all axes of a quantity) together; half a value is a slice of its own."""
+        slices = self.register_map.slices(space, address, count)
+        return (list(group) for _, group in groupby(slices, _group_key))
 
     def _names(self, space: Space, address: int, count: int) -> list[str]:
         return [_name(group) for group in self._groups(space, address, count)]
@@ -150,7 +150,7 @@ class Wording:
         axis = register.axis
         return self.scales[axis - 1] if axis is not None and axis <= len(self.scales) else None
 
-    def _values(self, group: list[RequestPart], words: Sequence[int]) -> str | list[MessageText]:
+    def _values(self, group: list[RegisterSlice], words: Sequence[int]) -> str | list[MessageText]:
         registers = [p.register for p in group if p.register is not None]
         if not registers or not group[0].whole:
             return " ".join(f"{word:04X}" for word in words)
@@ -188,13 +188,13 @@ def _decoded(request: bytes | None) -> modbus.ModbusRequest | None:
         return None
 
 
-def _group_key(piece: RequestPart) -> tuple[str | None, int | None]:
-    if piece.register is None:
+def _group_key(one: RegisterSlice) -> tuple[str | None, int | None]:
+    if one.register is None:
         return None, None
-    return piece.register.key, None if piece.whole else piece.address
+    return one.register.key, None if one.whole else one.address
 
 
-def _name(group: list[RequestPart]) -> str:
+def _name(group: list[RegisterSlice]) -> str:
     first, last = group[0], group[-1]
     end = last.address + last.size - 1
     if first.register is None or last.register is None:
@@ -209,7 +209,7 @@ def _name(group: list[RequestPart]) -> str:
     return first.register.name if first is last else f"{first.register.name} … {last.register.name}"
 
 
-def _switches(group: list[RequestPart], states: Sequence[bool]) -> str:
+def _switches(group: list[RegisterSlice], states: Sequence[bool]) -> str:
     if len(states) == 1:
         return "ON" if states[0] else "OFF"
     if not any(states):

@@ -24,16 +24,16 @@ class ValueRange:
 
     def __str__(self) -> str:
         if self.low is not None and self.high is not None and not self.above:
-            return f"{_plain(self.low)}…{_plain(self.high)}"
+            return f"{_format(self.low)}…{_format(self.high)}"
         bounds = []
         if self.low is not None:
-            bounds.append(f"{'>' if self.above else '≥'} {_plain(self.low)}")
+            bounds.append(f"{'>' if self.above else '≥'} {_format(self.low)}")
         if self.high is not None:
-            bounds.append(f"≤ {_plain(self.high)}")
+            bounds.append(f"≤ {_format(self.high)}")
         return ", ".join(bounds) or "any finite number"
 
 
-def _plain(number: float) -> str:
+def _format(number: float) -> str:
     return str(int(number)) if number == int(number) and abs(number) < 1e15 else f"{number:.{12 if abs(number) < 1e15 else 4}g}"
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from steptwin.mic488.behaviour import BEHAVIOUR, Getter
 from steptwin.mic488.core import ControllerCore
 from steptwin.mic488.encoding import saturated_dint, saturated_real, swap_bytes
-from steptwin.mic488.registermap import FUNCTION_SPACES, LAST_ADDRESS, DataType, Register, RegisterMap, RequestPart, Space, Type
+from steptwin.mic488.registermap import FUNCTION_SPACES, LAST_ADDRESS, DataType, Register, RegisterMap, RegisterSlice, Space, Type
 from steptwin.mic488.registers import AXES
 from steptwin.wire.pdu import ILLEGAL_DATA_ADDRESS, ModbusException, ReadRequest, pack_bits
 
@@ -33,25 +33,25 @@ def compile_read(
 ) -> Callable[[ControllerCore], bytes]:
     """The plan for functions 01, 02, 03, or exception 02 (MIC-3). Registers may begin and end inside a value (MIC-5)."""
     space = FUNCTION_SPACES[request.function]
-    pieces = list(registers.pieces(space, request.address, request.count))
-    for piece in pieces:
-        register = piece.register
+    slices = list(registers.slices(space, request.address, request.count))
+    for one in slices:
+        register = one.register
         if register is not None and request.function in register.reads:
             continue
         if not lenient or request.address + request.count > LAST_ADDRESS + 1:
             raise ModbusException(request.function, ILLEGAL_DATA_ADDRESS)
     if space is Space.HOLDING:
-        return _registers_plan(request, pieces, data_type)
-    return _bits_plan(request, pieces)
+        return _registers_plan(request, slices, data_type)
+    return _bits_plan(request, slices)
 
 
 # ---------------------------------------------------------------------- bits
 
 
-def _bits_plan(request: ReadRequest, pieces: list[RequestPart]) -> Callable[[ControllerCore], bytes]:
+def _bits_plan(request: ReadRequest, slices: list[RegisterSlice]) -> Callable[[ControllerCore], bytes]:
     head = bytes((request.function, (request.count + 7) // 8))
     getters: list[Callable[[ControllerCore], bool]] = []
-    for register, _, size in pieces:
+    for register, _, size in slices:
         getters += [_off] * size if register is None else [_bit(register)]
     return lambda device: head + pack_bits([get(device) for get in getters])
 
@@ -70,13 +70,13 @@ def _bit(register: Register) -> Callable[[ControllerCore], bool]:
 # ---------------------------------------------------------------------- registers
 
 
-def _registers_plan(request: ReadRequest, pieces: list[RequestPart], data_type: DataType) -> Callable[[ControllerCore], bytes]:
+def _registers_plan(request: ReadRequest, slices: list[RegisterSlice], data_type: DataType) -> Callable[[ControllerCore], bytes]:
     head = bytes((request.function, 2 * request.count))
-    if len(pieces) == 1 and pieces[0].register is not None and pieces[0].register.type is Type.MEMORY:
+    if len(slices) == 1 and slices[0].register is not None and slices[0].register.type is Type.MEMORY:
         return _memory_plan(head, request.address, request.count)
     layout = "<"
     sources: list[RegisterSource] = []
-    for register, address, size in pieces:
+    for register, address, size in slices:
         if register is None:
             sources += [RegisterSource(DEVICE, lambda device, now: 0)] * size
             layout += "H" * size
@@ -86,8 +86,8 @@ def _registers_plan(request: ReadRequest, pieces: list[RequestPart], data_type: 
         else:
             sources.append(_source(register, data_type))
             layout += register.type.layout(data_type)
-    register = pieces[0].register
-    inside = 0 if register is None or register.type is Type.MEMORY else pieces[0].address - register.address
+    register = slices[0].register
+    inside = 0 if register is None or register.type is Type.MEMORY else slices[0].address - register.address
     return _packing_plan(head, struct.Struct(layout), sources, slice(2 * inside, 2 * (inside + request.count)))
 
 

@@ -240,7 +240,7 @@ class Register:
         return ("imp" if pulses else unit) + _UNIT_ENDS[self.kind]
 
 
-class RequestPart(NamedTuple):
+class RegisterSlice(NamedTuple):
     """The part of a request that falls on one register, or on a hole (register None)."""
 
     register: Register | None
@@ -367,8 +367,8 @@ class RegisterMap:
             NO_REGISTER_HERE(firmware=self.firmware.name, space=space.value, address=show_address(address), near=near)
         )
 
-    def pieces(self, space: Space, address: int, quantity: int) -> Iterator[RequestPart]:
-        """Cut the addresses of a request at register borders, in order; a hole is one piece."""
+    def slices(self, space: Space, address: int, quantity: int) -> Iterator[RegisterSlice]:
+        """Cut the addresses of a request at register borders, in order; a hole is one slice."""
         end = address + quantity
         while address < end:
             register = self.find(space, address)
@@ -378,7 +378,7 @@ class RegisterMap:
                 place = bisect_right(self._starts[space], address)
                 starts = self._starts[space]
                 stop = min(end, starts[place]) if place < len(starts) else end
-            yield RequestPart(register, address, stop - address)
+            yield RegisterSlice(register, address, stop - address)
             address = stop
 
 

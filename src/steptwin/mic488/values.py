@@ -208,7 +208,7 @@ def encoded_words(
     register = item.register
     kind = _kind(item, data_type)
     if kind is not Type.REAL and not (isfinite(value) and value == int(value)):
-        raise Misuse(WHOLE_NUMBER_IS_NEEDED(what=_shown(item, value, data_type, unit)))
+        raise Misuse(WHOLE_NUMBER_IS_NEEDED(what=_format(item, value, data_type, unit)))
     expected = ""
     permitted = permitted or register.permitted
     if register.type is Type.MEMORY:
@@ -219,13 +219,13 @@ def encoded_words(
     elif value not in permitted or (kind is Type.REAL and words_to_real(*real_to_words(value)) not in permitted):
         expected = f"{permitted} {register.unit(data_type, unit)}".rstrip()
     if expected:
-        raise Misuse(VALUE_NOT_PERMITTED(what=_shown(item, value, data_type, unit), permitted=expected))
+        raise Misuse(VALUE_NOT_PERMITTED(what=_format(item, value, data_type, unit), permitted=expected))
     if kind is Type.REAL:
         return real_to_words(value)
     return dint_to_words(int(value)) if kind is Type.DINT else (int(value),)
 
 
-def _shown(item: RegisterItem, value: RegisterValue, data_type: DataType, unit: str) -> str:
+def _format(item: RegisterItem, value: RegisterValue, data_type: DataType, unit: str) -> str:
     return f"{item.name} = {value:g} {item.register.unit(data_type, unit)}".rstrip()
 
 
@@ -267,7 +267,7 @@ def _joins(registers: RegisterMap, group: list[RegisterItem], item: RegisterItem
     if group[0].register.space is not space or item.address + item.size - start > _MOST[space]:
         return False
     gap = item.address - end
-    between = registers.pieces(space, end, gap)
+    between = registers.slices(space, end, gap)
     return gap <= BRIDGE[space] and all(p.whole and p.register is not None and p.register.reads for p in between)
 
 
@@ -349,8 +349,8 @@ def _written(
         case pdu.WriteRegisterRequest(address, value):
             return [(registers.find(Space.HOLDING, address), value)]
         case pdu.WriteRegistersRequest(address, values):
-            pieces = registers.pieces(Space.HOLDING, address, len(values))
-            return [(piece.register, values[piece.address - address]) for piece in pieces]
+            slices = registers.slices(Space.HOLDING, address, len(values))
+            return [(one.register, values[one.address - address]) for one in slices]
 
 
 def _repeatable(register: Register, value: int) -> bool:

@@ -80,13 +80,13 @@ def compile_registers(
     function = request.function
     count = len(request.values) if isinstance(request, WriteRegistersRequest) else 1
     chosen: list[Register] = []
-    for piece in registers.pieces(Space.HOLDING, request.address, count):
-        register = piece.register
+    for one in registers.slices(Space.HOLDING, request.address, count):
+        register = one.register
         if register is None or function not in register.accepts:
             raise ModbusException(function, ILLEGAL_DATA_ADDRESS)
         # MIC-6: JOG_SPEED alone takes function 06.
         one_word = function == WRITE_SINGLE_REGISTER and register.word_write
-        if piece.address != register.address if one_word else not piece.whole:
+        if one.address != register.address if one_word else not one.whole:
             raise ModbusException(function, ILLEGAL_DATA_ADDRESS)
         chosen.append(register)
     if chosen[0].type is Type.MEMORY:

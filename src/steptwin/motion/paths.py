@@ -159,15 +159,15 @@ class Circular:
 
     def first_beyond(self, edge_p: float, side: int, begin_w: float, end_w: float) -> float | None:
         """As `Straight.first_beyond`."""
-        for part in self.parts(begin_w, end_w):
-            if part.direction != side or (part.end_p - edge_p) * side <= BEYOND_P:
+        for section in self.sections(begin_w, end_w):
+            if section.direction != side or (section.end_p - edge_p) * side <= BEYOND_P:
                 continue
-            if (self.position(part.begin_w) - edge_p) * side >= 0.0:
-                return part.begin_w
-            return min(max((_angle_q(self, part.half, edge_p) - self.angle_q) / self.turn_q, part.begin_w), part.end_w)
+            if (self.position(section.begin_w) - edge_p) * side >= 0.0:
+                return section.begin_w
+            return min(max((_angle_q(self, section.half, edge_p) - self.angle_q) / self.turn_q, section.begin_w), section.end_w)
         return None
 
-    def parts(self, begin_w: float, end_w: float) -> Iterator[CircularPart]:
+    def sections(self, begin_w: float, end_w: float) -> Iterator[ArcSection]:
         """The intervals in which the axis moves in one direction, in order."""
         forward = self.turn_q > 0.0
         angle_q = self.angle_q + self.turn_q * begin_w
@@ -179,10 +179,10 @@ class Circular:
             until_w = (turning_q - self.angle_q) / self.turn_q
             falls = (half & 1 == 0) is forward
             if until_w >= end_w:
-                yield CircularPart(begin_w, end_w, half, -1 if falls else 1, self.position(end_w))
+                yield ArcSection(begin_w, end_w, half, -1 if falls else 1, self.position(end_w))
                 return
             if until_w > begin_w:
-                yield CircularPart(
+                yield ArcSection(
                     begin_w, until_w, half, -1 if falls else 1, self.centre_p + self.radius_p * (-1.0 if falls else 1.0)
                 )
             begin_w = until_w
@@ -195,9 +195,9 @@ class Circular:
         begin_w = travel.segments[0].position(0.0) if travel.segments else travel.final_p
         for i, s in enumerate(travel.segments):
             end_w = travel.final_p if i == len(travel.segments) - 1 else s.position(s.end_s)
-            for part in local.parts(begin_w, end_w):
-                end_s = s.end_s if part.end_w >= end_w else s.when(part.end_w)
-                segments.append(ArcSegment(end_s, part.direction, s, local, part.half, part.end_p))
+            for section in local.sections(begin_w, end_w):
+                end_s = s.end_s if section.end_w >= end_w else s.when(section.end_w)
+                segments.append(ArcSegment(end_s, section.direction, s, local, section.half, section.end_p))
             begin_w = end_w
         if travel.segments and (not segments or segments[-1].end_s < travel.segments[-1].end_s):
             # The last interval is too short to lead anywhere, but it takes its time.
@@ -215,7 +215,7 @@ class Circular:
         return ArcProfile(travel.start, count, tuple(segments), float(final - count))
 
 
-class CircularPart(NamedTuple):
+class ArcSection(NamedTuple):
     """An interval of a `Circular` curve in which the axis does not turn round.
 
     The angle is between ``2 · half`` and ``2 · half + 2`` quarter turns; the axis goes in ``direction`` to ``end_p``.
@@ -253,7 +253,7 @@ class ArcSegment:
     travel: Segment
     curve: Circular
     half: int
-    """As in `CircularPart`."""
+    """As in `ArcSection`."""
     end_p: float
 
     def position(self, t_s: float) -> float:

@@ -53,15 +53,15 @@ def plan_distance(now: Nanos, begin: int, target: float, curve: SpeedCurve) -> P
     if distance == 0.0:
         return at_rest(now, begin)
     sign = 1 if target > begin else -1
-    rise: list[_Part] = []
+    rise: list[_RampSection] = []
     left = 0.5 * distance
-    for part in _parts(curve):
-        if part.distance >= left:
-            rise.append(part.until_distance(left))
+    for section in _sections(curve):
+        if section.distance >= left:
+            rise.append(section.until_distance(left))
             left = 0.0
             break
-        rise.append(part)
-        left -= part.distance
+        rise.append(section)
+        left -= section.distance
     segments = _rising(rise, sign)
     t = segments[-1].end_s if segments else 0.0
     if left > 0.0:
@@ -69,8 +69,8 @@ def plan_distance(now: Nanos, begin: int, target: float, curve: SpeedCurve) -> P
         end = t + 2.0 * left / curve.top
         segments.append(cruise(t, end, sign * from_u, sign * curve.top))
         t = end
-    for part in rise:
-        t += part.duration
+    for section in rise:
+        t += section.duration
     segments += _falling(rise, sign, t, distance)
     return Profile(now, begin, tuple(segments), sign * distance)
 
@@ -91,10 +91,10 @@ def longest_within(duration: Nanos, grid: int, curve: SpeedCurve) -> int:
 def plan_endless(now: Nanos, begin: int, direction: int, curve: SpeedCurve) -> Profile:
     """From rest at ``begin`` (u) to ``top``, without an end. ``direction`` is +1 or −1. Errors as `plan_distance`."""
     _check(curve)
-    parts = _parts(curve)
-    segments = _rising(parts, direction)
+    sections = _sections(curve)
+    segments = _rising(sections, direction)
     t = segments[-1].end_s if segments else 0.0
-    segments.append(cruise(t, inf, direction * sum(part.distance for part in parts), direction * curve.top))
+    segments.append(cruise(t, inf, direction * sum(section.distance for section in sections), direction * curve.top))
     return Profile(now, begin, tuple(segments), 0.0)
 
 
@@ -110,16 +110,16 @@ def plan_forced_stop(state: MotionState, curve: SpeedCurve, landing: int, origin
         return Profile(now, count, (), phase)
     sign = 1 if velocity > 0.0 else -1
     speed = abs(velocity)
-    fall: list[_Part] = []
-    for part in _parts(curve):
-        if part.speed >= speed:
+    fall: list[_RampSection] = []
+    for section in _sections(curve):
+        if section.speed >= speed:
             break
-        fall.append(part.until_speed(speed))
+        fall.append(section.until_speed(speed))
     # Along the direction of motion, from the counted position.
-    stop_u = sign * phase + sum(part.distance for part in fall)
+    stop_u = sign * phase + sum(section.distance for section in fall)
     lead = sign * (count - origin) % landing
     landing_u = float(ceil((stop_u - _SAME_U + lead) / landing) * landing - lead)
-    t = sum(part.duration for part in fall)
+    t = sum(section.duration for section in fall)
     segments = _falling(fall, sign, t, min(stop_u, landing_u))
     if landing_u > stop_u:
         final_speed = min(speed, curve.start)
@@ -127,8 +127,8 @@ def plan_forced_stop(state: MotionState, curve: SpeedCurve, landing: int, origin
     return Profile(now, count, tuple(segments), sign * landing_u)
 
 
-class _Part(NamedTuple):
-    """One part of the speed curve, from its slow end: ``speed·t + c2·t² + c3·t³``."""
+class _RampSection(NamedTuple):
+    """One section of the speed curve, from its slow end: ``speed·t + c2·t² + c3·t³``."""
 
     speed: float
     c2: float
@@ -136,12 +136,12 @@ class _Part(NamedTuple):
     duration: float
     distance: float
 
-    def until_distance(self, distance: float) -> _Part:
-        """The slow end of this part, ``distance`` long."""
+    def until_distance(self, distance: float) -> _RampSection:
+        """The slow end of this section, ``distance`` long."""
         return self._replace(duration=self._segment().when(distance), distance=distance)
 
-    def until_speed(self, speed: float) -> _Part:
-        """The slow end of this part, up to ``speed``; the whole part when it does not reach it."""
+    def until_speed(self, speed: float) -> _RampSection:
+        """The slow end of this section, up to ``speed``; the whole section when it does not reach it."""
         segment = self._segment()
         duration = segment.when_speed(speed)
         return self if duration >= self.duration else self._replace(duration=duration, distance=segment.position(duration))
@@ -150,38 +150,38 @@ class _Part(NamedTuple):
         return Segment(self.duration, 0.0, 0.0, self.speed, self.c2, self.c3, 1)
 
 
-def _parts(curve: SpeedCurve) -> list[_Part]:
-    """The parts of the curve, slow to fast; empty when there is no ramp (M-8)."""
+def _sections(curve: SpeedCurve) -> list[_RampSection]:
+    """The sections of the curve, slow to fast; empty when there is no ramp (M-8)."""
     start, acc, knee, top = curve
-    parts: list[_Part] = []
+    sections: list[_RampSection] = []
     middle = min(knee, top)
     if start < middle:
         duration = (middle - start) / acc
-        parts.append(_Part(start, 0.5 * acc, 0.0, duration, 0.5 * (start + middle) * duration))
+        sections.append(_RampSection(start, 0.5 * acc, 0.0, duration, 0.5 * (start + middle) * duration))
     low = max(knee, start)
     if low < top:
         # M-6: v(t) = P + A·t − A²·t² / (4·(V − P)). A motion that starts above P enters this curve at its start speed.
         steepness = acc * sqrt((top - low) / (top - knee))
         duration = 2.0 * (top - low) / steepness
         c3 = -steepness * steepness / (12.0 * (top - low))
-        parts.append(_Part(low, 0.5 * steepness, c3, duration, duration * (low + 2.0 * top) / 3.0))
-    return parts
+        sections.append(_RampSection(low, 0.5 * steepness, c3, duration, duration * (low + 2.0 * top) / 3.0))
+    return sections
 
 
-def _rising(parts: list[_Part], sign: int) -> list[Segment]:
+def _rising(sections: list[_RampSection], sign: int) -> list[Segment]:
     segments: list[Segment] = []
     t = p = 0.0
-    for speed, c2, c3, duration, distance in parts:
+    for speed, c2, c3, duration, distance in sections:
         segments.append(Segment(t + duration, t, sign * p, sign * speed, sign * c2, sign * c3, sign))
         t += duration
         p += distance
     return segments
 
 
-def _falling(parts: list[_Part], sign: int, end_s: float, end_u: float) -> list[Segment]:
+def _falling(sections: list[_RampSection], sign: int, end_s: float, end_u: float) -> list[Segment]:
     """The mirror image of `_rising`: ends at ``end_s``, ``end_u`` along the direction of motion."""
     segments: list[Segment] = []
-    for speed, c2, c3, duration, distance in parts:
+    for speed, c2, c3, duration, distance in sections:
         segments.append(Segment(end_s, end_s, sign * end_u, sign * speed, -sign * c2, sign * c3, sign))
         end_s -= duration
         end_u -= distance

@@ -16,7 +16,7 @@ from steptwin.studio.requesttype import request
 class Branches(Protocol):
     """Branches of one world. Awaits only `steptwin.later.Later`."""
 
-    def plain(self) -> Sequence[Mapping[str, object]]:
+    def to_json(self) -> Sequence[Mapping[str, object]]:
         """As `_BRANCH`."""
         ...
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from steptwin.calc import TIMES, Calculator, DriveMechanics, MoveQuantity, calculator_of, plain
+from steptwin.calc import TIMES, Calculator, DriveMechanics, MoveQuantity, calculator_of, to_json
 from steptwin.errors import Refusal
 from steptwin.messages import Message
 from steptwin.studio.controllers import Sheets
@@ -31,7 +31,7 @@ class Calculations:
 
     def calculate(self, controller: str, axis: int, given: Mapping[str, float], find: str | None) -> Mapping[str, object]:
         """See `steptwin.calc.Calculator.calculate`."""
-        return plain(self._calculator(controller, axis).calculate(given, find))
+        return to_json(self._calculator(controller, axis).calculate(given, find))
 
     def _calculator(self, controller: str, axis: int) -> Calculator:
         found = calculator_of(self._sheets.of(controller), axis)

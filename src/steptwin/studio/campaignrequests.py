@@ -15,7 +15,7 @@ from steptwin.studio.requesttype import request
 class Campaigns(Protocol):
     """Campaigns of one description of a world. Awaits only `steptwin.later.Later`."""
 
-    async def plain(self) -> Sequence[Mapping[str, object]]:
+    async def to_json(self) -> Sequence[Mapping[str, object]]:
         """As `_CAMPAIGN`."""
         ...
 

@@ -6,9 +6,9 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 
 from steptwin.configuration import ConfigurationFormat, ConfigurationKey, Form, Section
 from steptwin.datasheet import Datasheet
-from steptwin.diagnostics import SourceText, to_json
+from steptwin.diagnostics import SourceText, diagnostics_to_json
 from steptwin.errors import Refusal
-from steptwin.jsonvalues import plain
+from steptwin.jsonvalues import to_json
 from steptwin.messages import Message
 from steptwin.simulation.kinds.registry import KINDS
 from steptwin.simulation.world.worldprograms import FINDING
@@ -40,7 +40,7 @@ class Configurations:
         kind, sheet = self._kind(controller)
         source = await self._given(controller)
         if source is not None:
-            return {**_plain(kind.form(source.text, source.name, sheet)), "is_file": True}
+            return {**_to_json(kind.form(source.text, source.name, sheet)), "is_file": True}
         name = f"{controller}.cfg"
         paths = [
             setting.point for section in kind.form("", name, sheet).sections for setting in section.settings if setting.point
@@ -48,13 +48,13 @@ class Configurations:
         readings = await self._present([f"{controller}.{path}" for path in paths])
         values = {path: (reading.value, reading.unit) for path, reading in zip(paths, readings, strict=True)}
         text = kind.with_values("", name, kind.known(values, sheet))
-        return {**_plain(kind.form(text, name, sheet)), "is_file": False}
+        return {**_to_json(kind.form(text, name, sheet)), "is_file": False}
 
     def edit(self, controller: str, text: str, changes: Mapping[str, str]) -> Mapping[str, object]:
         """A text with other values. Raises `Misuse`, also for settings that are not there, and `Refusal` as `read`."""
         kind, sheet = self._kind(controller)
         name = f"{controller}.cfg"
-        return {**_plain(kind.form(kind.with_values(text, name, changes), name, sheet)), "is_file": True}
+        return {**_to_json(kind.form(kind.with_values(text, name, changes), name, sheet)), "is_file": True}
 
     def _kind(self, controller: str) -> tuple[ConfigurationFormat, Datasheet]:
         sheet = self._sheets.of(controller)
@@ -64,8 +64,8 @@ class Configurations:
         return kind.configuration_format, sheet
 
 
-def _plain(form: Form) -> Mapping[str, object]:
-    findings = [{key: row[key] for key in FINDING} for row in to_json(form.source, form.diagnostics)]
+def _to_json(form: Form) -> Mapping[str, object]:
+    findings = [{key: row[key] for key in FINDING} for row in diagnostics_to_json(form.source, form.diagnostics)]
     return {
         "name": form.source.name,
         "text": form.source.text,
@@ -80,4 +80,4 @@ def _section(section: Section) -> Mapping[str, object]:
 
 
 def _setting(setting: ConfigurationKey) -> Mapping[str, object]:
-    return plain(setting)
+    return to_json(setting)

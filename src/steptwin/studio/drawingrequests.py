@@ -16,7 +16,7 @@ from steptwin.studio.requesttype import request
 class Arrangement(Protocol):
     """Arrangement of one world."""
 
-    def plain(self) -> Mapping[str, object]:
+    def to_json(self) -> Mapping[str, object]:
         """As `_DRAWING`."""
         ...
 

@@ -63,12 +63,12 @@ class Lease:
     jog: command.Jog
     held: ExtendableJog
 
-    def plain(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, object]:
         head = {"lease": self.number, "viewer": self.viewer.number, "controller": self.jog.controller, "axis": self.jog.axis}
         return {**head, "velocity": self.jog.velocity}
 
 
-class SharedParts:
+class SharedState:
     """Parts of the state that are sent to all viewers after a change. ``changes`` counts the changes of all of them."""
 
     __slots__ = ("_changed", "_texts", "_values", "changes")
@@ -139,12 +139,12 @@ class Hub:
         self._clock_due: Nanos = 0
         self._running: tuple[bool, float] | None = None
         self._moment: tuple[Nanos, str] = (-1, "")
-        self.shared = SharedParts(lost=None, control=None, viewers=0, leases=[], clock=None)
+        self.shared = SharedState(lost=None, control=None, viewers=0, leases=[], clock=None)
 
     def _describe(self) -> None:
         if self.subject.description is not self._described:
             self._described = self.subject.description
-            self.description = json.dumps(self._described.plain(), separators=(",", ":"))
+            self.description = json.dumps(self._described.to_json(), separators=(",", ":"))
             self.descriptions += 1
 
     @property
@@ -318,7 +318,7 @@ class Hub:
         self.shared.put("leases", self.leases())
 
     def leases(self) -> list[dict[str, object]]:
-        return [lease.plain() for lease in self._leases.values()]
+        return [lease.to_json() for lease in self._leases.values()]
 
     # ------------------------------------------------------------------ what the subject is asked
 
@@ -340,10 +340,10 @@ class Hub:
 
     def present(self) -> tuple[dict[str, object], int]:
         """The state of the subject for the message hello but its description, and the number of the command that has read it."""
-        plans = [plan.plain() for plan in self.subject.plans(filter_of(["plan", "sample"]))]
-        plain: dict[str, object] = {**self.subject.present(), "plans": plans}
+        plans = [plan.to_json() for plan in self.subject.plans(filter_of(["plan", "sample"]))]
+        data: dict[str, object] = {**self.subject.present(), "plans": plans}
         self.streams.flush()
-        return plain, self.subject.result_of(None).number
+        return data, self.subject.result_of(None).number
 
     def read(self, points: Sequence[str]) -> tuple[Reading, ...]:
         if not points:
@@ -391,4 +391,4 @@ class Hub:
         goes = moment.running, moment.speed
         if goes != self._running or now >= self._clock_due:
             self._running, self._clock_due = goes, now + CLOCK_NS
-            self.shared.repeat("clock", moment.plain())  # where time stands, too: pages see that the studio is there
+            self.shared.repeat("clock", moment.to_json())  # where time stands, too: pages see that the studio is there

@@ -15,7 +15,7 @@ from steptwin.studio.requesttype import request
 class Recordings(Protocol):
     """Recordings of one world. Awaits only `steptwin.later.Later`."""
 
-    async def plain(self) -> Mapping[str, object]:
+    async def to_json(self) -> Mapping[str, object]:
         """As `_RECORDINGS`."""
         ...
 

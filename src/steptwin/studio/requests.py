@@ -13,12 +13,12 @@ from typing import Annotated, Any, TypeAlias, get_args
 from steptwin.access.commands import PERMITS
 from steptwin.access.roles import ACT, LOOK, ROLES, SERVICE, TAKE, Permit
 from steptwin.controller import Nanos
+from steptwin.datatypes import format_short
 from steptwin.errors import Misuse
 from steptwin.fields import PROGRAM, TIME, Meaning, RequestType, Schema, choices, number, whole
 from steptwin.jsonvalues import FLAG, MOMENT, TEXT, WHOLE, list_of, members, or_null
 from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
-from steptwin.plaintypes import shown
 from steptwin.simulation.kinds.registry import KINDS as CONTROLLERS
 from steptwin.studio.branchrequests import BranchRequest
 from steptwin.studio.campaignrequests import CampaignRequest
@@ -356,7 +356,7 @@ def request_called(name: str) -> RequestType:
     """Raises `Misuse` for what is no request."""
     found = ALL.get(name)
     if found is None:
-        raise Misuse(UNKNOWN_REQUEST(name=shown(name), hint=NearMiss().hint(name, ALL), names=list(ALL)))
+        raise Misuse(UNKNOWN_REQUEST(name=format_short(name), hint=NearMiss().hint(name, ALL), names=list(ALL)))
     return found
 
 

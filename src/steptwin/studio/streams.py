@@ -171,7 +171,7 @@ class Streams:
             text = ""
             for stream in streams:
                 if stream.wants(event):
-                    text = text or json.dumps(event.plain(), separators=(",", ":"))
+                    text = text or json.dumps(event.to_json(), separators=(",", ":"))
                     stream.add(text)
         for stream in streams:
             stream.drop_read()

@@ -28,7 +28,7 @@ class PresentMoment(NamedTuple):
     running: bool
     speed: float
 
-    def plain(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, object]:
         return {"time_ns": str(self.time), "running": self.running, "speed": "max" if self.speed == inf else self.speed}
 
 
@@ -98,7 +98,7 @@ class LongWork(Protocol):
         """Begin the checks of a device. Raises `Refusal` while another work is running."""
         ...
 
-    def plain(self) -> dict[str, object] | None:
+    def to_json(self) -> dict[str, object] | None:
         """Work that was begun last, as JSON."""
         ...
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Protocol, TypeVar
 
 from steptwin.controller import SECOND, Nanos
-from steptwin.devices.worldpart import present_of
+from steptwin.devices.worldmember import present_of
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.later import Later
 from steptwin.messages import Message
@@ -151,7 +151,7 @@ class ShownMoment:
         present, batch = await time_travel.events(begin, end, filter_of(kinds), MOST_PAST_EVENTS, _present)
         if batch.missed:  # what held at the begin says nothing of the first event that is left
             begin, present = batch.events[0].time, {"state": {}, "faults": [], "plans": []}
-        events = [event.plain() for event in batch.events]
+        events = [event.to_json() for event in batch.events]
         return {"from_ns": str(begin), "to_ns": str(end), **present, "events": events}
 
     # ------------------------------------------------------------------ what the viewer is sent
@@ -177,7 +177,7 @@ class ShownMoment:
 
 
 def _present(subject: PlannedSubject) -> dict[str, object]:
-    plans = [plan.plain() for plan in subject.plans(filter_of(["plan"]))]
+    plans = [plan.to_json() for plan in subject.plans(filter_of(["plan"]))]
     return {**present_of(subject), "plans": plans}
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, TypeAlias
 
 from steptwin.access.roles import LOOK
-from steptwin.calc import Formula, MovePart, RequiredSetting
+from steptwin.calc import Formula, MovePhase, RequiredSetting
 from steptwin.controller import Nanos
 from steptwin.diagnostics import Severity
 from steptwin.errors import Misuse
@@ -68,7 +68,7 @@ _MOVE = with_sentences(
         "times": _NUMBERS,
         "peak": NUMBER,
         "reaches": {**FLAG, "description": "Whether the peak is the velocity."},
-        "parts": list_of(members({name: TEXT if name == "name" else NUMBER for name in MovePart._fields})),
+        "parts": list_of(members({name: TEXT if name == "name" else NUMBER for name in MovePhase._fields})),
         "formulas": list_of(with_sentences(dict.fromkeys(Formula._fields, TEXT), "name", "text")),
         "notes": list_of(TEXT),
         "settings": list_of(members({name: NUMBER if name == "value" else TEXT for name in RequiredSetting._fields})),

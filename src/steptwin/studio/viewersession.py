@@ -334,7 +334,7 @@ class ViewerSession:
         if len(self._follows) >= MOST_FOLLOWS:
             raise Misuse(TOO_MANY_FOLLOWS(most=MOST_FOLLOWS))
         what = filter_of(wanted.kinds, wanted.controllers, wanted.axes)
-        plans = [plan.plain() for plan in self._hub.subject.plans(what)]
+        plans = [plan.to_json() for plan in self._hub.subject.plans(what)]
         self._follows[identity] = what, wanted.bound
         self._move()
         return self._hub.subject.result_of({"plans": plans})
@@ -438,7 +438,7 @@ class ViewerSession:
             "leases": hub.leases(),
             "number": number,
             "time_ns": str(moment.time),
-            "pace": {key: value for key, value in moment.plain().items() if key != "time_ns"},
+            "pace": {key: value for key, value in moment.to_json().items() if key != "time_ns"},
             "virtual": hub.is_virtual,
             "device_kinds": list(hub.around.connections.kinds),
             **present,
@@ -469,7 +469,7 @@ class ViewerSession:
             ask.Connect: _connect,
             ask.Disconnect: lambda self, wanted: self._hub.around.connections.disconnect(wanted.controller),
             ask.ReadTraffic: lambda self, _: self._hub.traffic(),
-            ask.ReadAudit: lambda self, wanted: [entry.plain() for entry in self._hub.around.audit.last(wanted.most)],
+            ask.ReadAudit: lambda self, wanted: [entry.to_json() for entry in self._hub.around.audit.last(wanted.most)],
             tool.ReadConfiguration: lambda self, wanted: self._hub.configurations.read(wanted.controller),
             tool.EditConfiguration: lambda self, one: self._hub.configurations.edit(one.controller, one.text, one.changes),
             tool.ReadQuantities: lambda self, wanted: self._hub.calculations.quantities(wanted.controller, wanted.axis),
@@ -481,10 +481,10 @@ class ViewerSession:
                 wanted.controller, wanted.after
             ),
             device.SetDigitalShadow: lambda self, wanted: self._hub.around.connections.shadow(wanted.controller, on=wanted.on),
-            recording.ReadRecordings: lambda self, _: self._hub.recordings.plain(),
+            recording.ReadRecordings: lambda self, _: self._hub.recordings.to_json(),
             recording.SaveRecording: lambda self, wanted: self._hub.recordings.save(wanted.name),
             recording.ViewRecording: _view_recording,
-            branch.ListBranches: lambda self, _: self._hub.branches.plain(),
+            branch.ListBranches: lambda self, _: self._hub.branches.to_json(),
             branch.StartBranch: lambda self, wanted: self._hub.branches.start(wanted.moment),
             branch.EndBranch: lambda self, wanted: self._hub.branches.end(wanted.branch),
             services.ReadGateways: lambda self, _: self._hub.services.gateways(),
@@ -494,14 +494,14 @@ class ViewerSession:
             services.CompareHistory: lambda self, one: self._hub.services.compare(
                 one.points, (one.run, one.other), one.from_s, one.to_s
             ),
-            campaign.ListCampaigns: lambda self, _: self._hub.campaigns.plain(),
+            campaign.ListCampaigns: lambda self, _: self._hub.campaigns.to_json(),
             campaign.RunCampaign: lambda self, wanted: self._hub.campaigns.run(wanted.campaign),
             campaign.EndCampaign: lambda self, wanted: self._hub.campaigns.end(wanted.campaign),
-            drawing.ReadDrawing: lambda self, _: self._hub.arrangement.plain(),
+            drawing.ReadDrawing: lambda self, _: self._hub.arrangement.to_json(),
             drawing.SaveDrawing: lambda self, wanted: self._hub.arrangement.save(wanted.places),
             work.Scan: lambda self, one: self._hub.around.work.scan(one.places, one.kind, one.units, one.baud, one.timeout),
             work.Verify: lambda self, wanted: self._hub.around.work.verify(wanted.address, write=wanted.write),
-            work.ReadWork: lambda self, _: self._hub.around.work.plain(),
+            work.ReadWork: lambda self, _: self._hub.around.work.to_json(),
             work.CancelWork: lambda self, _: self._hub.around.work.cancel(),
         },
     )

@@ -33,7 +33,7 @@ class Work:
     problems: list[str] = field(default_factory=list)
     report: dict[str, object] | None = None
 
-    def plain(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, object]:
         return {
             "work": self.kind,
             "is_running": self.is_running,
@@ -101,8 +101,8 @@ class DeviceWork:
 
         self._begin("verify", checks)
 
-    def plain(self) -> dict[str, object] | None:
-        return None if self._work is None else self._work.plain()
+    def to_json(self) -> dict[str, object] | None:
+        return None if self._work is None else self._work.to_json()
 
     def cancel(self) -> None:
         if self._work is not None:

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from typing import Annotated, TypeAlias, get_args
 
 from steptwin.controller import Nanos
+from steptwin.datatypes import format_short
 from steptwin.errors import Misuse
 from steptwin.fields import ID, SPEED, TIME, ControllerName, Meaning, choices, whole
 from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
-from steptwin.plaintypes import shown
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.command import CommandType, command, declared
 from steptwin.simulation.script.control import ControlProgram, Enable, Home, Jog, Move, StopAxes
@@ -257,7 +257,7 @@ def read_command(name: object, given: Mapping[str, object]) -> Command:
     found = COMMANDS.get(name) if isinstance(name, str) else None
     if found is None:
         hint = NearMiss().hint(name, COMMANDS) if isinstance(name, str) else ""
-        raise Misuse(UNKNOWN_COMMAND(name=shown(name), hint=hint, names=list(COMMANDS)))
+        raise Misuse(UNKNOWN_COMMAND(name=format_short(name), hint=hint, names=list(COMMANDS)))
     return found.read(given)
 
 
@@ -265,12 +265,12 @@ def type_of(command: Command) -> CommandType:
     return declared(type(command))
 
 
-def plain_command(command: Command) -> dict[str, object]:
+def command_to_json(command: Command) -> dict[str, object]:
     """A command as JSON; what has its default is left out."""
     kind = type_of(command)
-    plain: dict[str, object] = {"do": kind.name}
+    data: dict[str, object] = {"do": kind.name}
     for field in kind.fields:
         value = getattr(command, field.key)
         if field.is_required or value != field.default:
-            plain[field.name] = field.form.plain(value)
-    return plain
+            data[field.name] = field.form.to_json(value)
+    return data

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Protocol
 
 from steptwin.controller import Nanos
 from steptwin.datasheet import Datasheet
-from steptwin.jsonvalues import plain, read
+from steptwin.jsonvalues import read, to_json
 from steptwin.messages import read_message_text, with_messages
 from steptwin.subject.commands import VERSION, Command
 from steptwin.subject.controls import ControlDescription
@@ -41,7 +41,7 @@ class Result(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class ControllerPart:
+class ControllerDescription:
     """A controller. The position of an axis is (pulses of its plan + origin) / ``pulses_per_unit`` of its data sheet."""
 
     name: str
@@ -72,7 +72,7 @@ class ControllerPart:
 
 
 @dataclass(frozen=True, slots=True)
-class SwitchPart:
+class SwitchDescription:
     """A switch at an axis: on from ``low`` to ``high``, in units of the axis, and again after each ``period``.
 
     ``low`` or ``high`` is None if it is unbounded on that side.
@@ -85,7 +85,7 @@ class SwitchPart:
 
 
 @dataclass(frozen=True, slots=True)
-class MechanicsPart:
+class MechanicsDescription:
     """The mechanics of an axis of a controller."""
 
     name: str
@@ -97,13 +97,13 @@ class MechanicsPart:
     """``linear`` or ``rotary``."""
     travel: tuple[float, float] | None = None
     """Hard stops, in units of the axis."""
-    switches: tuple[SwitchPart, ...] = ()
+    switches: tuple[SwitchDescription, ...] = ()
     pulses_per_unit: float = 1.0
     """Pulses per unit of its drive; negative if positive pulses move it in the negative direction."""
 
 
 @dataclass(frozen=True, slots=True)
-class SignalPart:
+class SignalDescription:
     """A value of an element that changes, with its unit and range where they are known."""
 
     name: str
@@ -113,7 +113,7 @@ class SignalPart:
 
 
 @dataclass(frozen=True, slots=True)
-class DrawingPart:
+class DrawingDescription:
     """How an element is drawn: a track of ``length`` from ``low`` on with what moves along it."""
 
     shape: str
@@ -125,7 +125,7 @@ class DrawingPart:
     """Signals of the element, places on the track in their unit; unknown where there is nothing."""
     size: float
     """Length of a body: it ends so far before its place."""
-    switches: tuple[SwitchPart, ...]
+    switches: tuple[SwitchDescription, ...]
     low: float = 0.0
     across: float = 0.0
     across_low: float = 0.0
@@ -133,7 +133,7 @@ class DrawingPart:
 
 
 @dataclass(frozen=True, slots=True)
-class ElementPart:
+class ElementDescription:
     """An element around the controllers that is no axis and no button. Its terminals and signals are read as ``NAME.SIGNAL``."""
 
     name: str
@@ -141,15 +141,15 @@ class ElementPart:
     """The name of its table, such as ``cylinder``."""
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    signals: tuple[SignalPart, ...]
+    signals: tuple[SignalDescription, ...]
     """Those that are no terminals."""
-    drawing: DrawingPart | None = None
+    drawing: DrawingDescription | None = None
     function: str | None = None
     """Function among those of its kind: ``and`` of a gate, ``on-delay`` of a timer."""
 
 
 @dataclass(frozen=True, slots=True)
-class ConnectionPart:
+class ConnectionDescription:
     """One of the sources of an input."""
 
     source: str
@@ -165,7 +165,7 @@ class ConnectionPart:
 
 
 @dataclass(frozen=True, slots=True)
-class LinePart:
+class LineDescription:
     """A line with controllers on it."""
 
     name: str
@@ -179,17 +179,17 @@ class Description:
     """The constant description of a subject."""
 
     name: str
-    controllers: tuple[ControllerPart, ...]
-    axes: tuple[MechanicsPart, ...] = ()
+    controllers: tuple[ControllerDescription, ...]
+    axes: tuple[MechanicsDescription, ...] = ()
     buttons: tuple[str, ...] = ()
-    elements: tuple[ElementPart, ...] = ()
-    connections: tuple[ConnectionPart, ...] = ()
-    lines: tuple[LinePart, ...] = ()
+    elements: tuple[ElementDescription, ...] = ()
+    connections: tuple[ConnectionDescription, ...] = ()
+    lines: tuple[LineDescription, ...] = ()
     commands: tuple[str, ...] = ()
     """Names of the supported commands."""
     version: int = VERSION
 
-    def plain(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, object]:
         """As JSON. Data sheets are in a separate list, because controllers may share them."""
         sheets = {id(part.datasheet): part.datasheet for part in self.controllers}
         numbers = {key: number for number, key in enumerate(sheets)}
@@ -201,7 +201,7 @@ class Description:
                     "line": part.line,
                     "unit": part.unit,
                     "controls": part.controls,
-                    "takes": [plain(taken) for taken in part.takes],
+                    "takes": [to_json(taken) for taken in part.takes],
                     "real": part.is_real,
                     "moved": part.is_moved,
                     "no_twin": part.no_twin,
@@ -209,15 +209,15 @@ class Description:
             )
             for part in self.controllers
         ]
-        sheets_of_all = [plain(sheet) for sheet in sheets.values()]
-        return {**plain(replace(self, controllers=())), "controllers": controllers, "datasheets": sheets_of_all}
+        sheets_of_all = [to_json(sheet) for sheet in sheets.values()]
+        return {**to_json(replace(self, controllers=())), "controllers": controllers, "datasheets": sheets_of_all}
 
 
 def read_description(data: Mapping[str, Any]) -> Description:
     """The description in JSON. Raises `TypeError`, `ValueError` or `LookupError`."""
     sheets = [read(Datasheet, sheet) for sheet in data["datasheets"]]
     controllers = [
-        ControllerPart(
+        ControllerDescription(
             one["name"],
             sheets[one["datasheet"]],
             one["line"],

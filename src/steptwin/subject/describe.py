@@ -13,15 +13,15 @@ from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.wiring import connections, terminal_name
 from steptwin.subject.commands import COMMANDS
 from steptwin.subject.contract import (
-    ConnectionPart,
-    ControllerPart,
+    ConnectionDescription,
+    ControllerDescription,
     Description,
-    DrawingPart,
-    ElementPart,
-    LinePart,
-    MechanicsPart,
-    SignalPart,
-    SwitchPart,
+    DrawingDescription,
+    ElementDescription,
+    LineDescription,
+    MechanicsDescription,
+    SignalDescription,
+    SwitchDescription,
 )
 from steptwin.subject.controls import controls_of
 
@@ -33,63 +33,63 @@ def describe(world: Simulation) -> Description:
         world.spec.name,
         tuple(_controller(world, name, is_moved=name in moved) for name in world.controllers),
         tuple(_mechanics(world, name) for name in world.axes),
-        tuple(world.parts.built(BUTTON)),
+        tuple(world.objects.built(BUTTON)),
         tuple(_elements(world)),
         tuple(_connections(world)),
-        tuple(LinePart(line.name, line.kind, world.lines[line.name].baud) for line in world.spec.lines),
+        tuple(LineDescription(line.name, line.kind, world.lines[line.name].baud) for line in world.spec.lines),
         tuple(COMMANDS),
     )
 
 
-def _controller(world: Simulation, name: str, *, is_moved: bool) -> ControllerPart:
-    on = world.parts.line_of.get(name)
+def _controller(world: Simulation, name: str, *, is_moved: bool) -> ControllerDescription:
+    on = world.objects.line_of.get(name)
     line, unit = (None, None) if on is None else (on[0].name, on[1])
     kind = world.kind(name)
     sheet = kind.datasheet(world.controllers[name])
-    return ControllerPart(name, sheet, line, unit, controls_of(sheet, kind.commands), is_moved=is_moved)
+    return ControllerDescription(name, sheet, line, unit, controls_of(sheet, kind.commands), is_moved=is_moved)
 
 
-def _mechanics(world: Simulation, name: str) -> MechanicsPart:
+def _mechanics(world: Simulation, name: str) -> MechanicsDescription:
     fitted = world.axes[name]
     place = fitted.mechanism.controller, str(fitted.mechanism.number)
     points = tuple(f"{name}.{what}" for what in MECHANICS)
     spec = fitted.spec
     switches = tuple(_switch(one.zone) for one in spec.switches)
     scale = fitted.mechanism.build.sign * float(fitted.scale.pulses_per_unit)
-    return MechanicsPart(name, *place, fitted.scale.unit, points, spec.kind, spec.travel, switches, scale)
+    return MechanicsDescription(name, *place, fitted.scale.unit, points, spec.kind, spec.travel, switches, scale)
 
 
-def _elements(world: Simulation) -> Iterator[ElementPart]:
-    for kind, built in world.parts.elements.items():
+def _elements(world: Simulation) -> Iterator[ElementDescription]:
+    for kind, built in world.objects.elements.items():
         if kind not in (AXIS.name, BUTTON.name):
             yield from (_element(world, kind, name) for name in built)
 
 
-def _element(world: Simulation, kind: str, name: str) -> ElementPart:
+def _element(world: Simulation, kind: str, name: str) -> ElementDescription:
     drawn = ELEMENTS[kind].drawing
-    drawing = None if drawn is None else _drawing(drawn(world.parts.elements[kind][name]))
-    terminals = world.parts.terminals.get(name, Terminals())
+    drawing = None if drawn is None else _drawing(drawn(world.objects.elements[kind][name]))
+    terminals = world.objects.terminals.get(name, Terminals())
     inputs = tuple(pin.lower() for pin in (*terminals.digital_inputs, *terminals.analog_inputs))
     outputs = tuple(pin.lower() for pin in terminals.outputs)
-    signals = world.parts.element_signals(name) or {}
+    signals = world.objects.element_signals(name) or {}
     others = {signal: of for signal, of in signals.items() if signal not in (*inputs, *outputs)}
-    parts = tuple(SignalPart(signal, of.unit, *(of.bounds or (None, None))) for signal, of in others.items())
+    parts = tuple(SignalDescription(signal, of.unit, *(of.bounds or (None, None))) for signal, of in others.items())
     function_of = ELEMENTS[kind].function
-    function = None if function_of is None else function_of(world.parts.elements[kind][name])
-    return ElementPart(name, kind, inputs, outputs, parts, drawing, function)
+    function = None if function_of is None else function_of(world.objects.elements[kind][name])
+    return ElementDescription(name, kind, inputs, outputs, parts, drawing, function)
 
 
-def _connections(world: Simulation) -> Iterator[ConnectionPart]:
-    for one in connections(world.parts):
-        target = terminal_name(world.parts, one.target)
-        yield ConnectionPart(one.source, target, one.inverted, one.delay, one.join)
+def _connections(world: Simulation) -> Iterator[ConnectionDescription]:
+    for one in connections(world.objects):
+        target = terminal_name(world.objects, one.target)
+        yield ConnectionDescription(one.source, target, one.inverted, one.delay, one.join)
 
 
-def _drawing(drawing: Drawing) -> DrawingPart:
+def _drawing(drawing: Drawing) -> DrawingDescription:
     switches = tuple(map(_switch, drawing.sensors))
     across = drawing.across, drawing.across_low
-    return DrawingPart(drawing.shape, drawing.length, drawing.places, drawing.size, switches, drawing.low, *across)
+    return DrawingDescription(drawing.shape, drawing.length, drawing.places, drawing.size, switches, drawing.low, *across)
 
 
-def _switch(zone: SensorZone) -> SwitchPart:
-    return SwitchPart(".".join(zone.target), zone.low, zone.high, zone.period)
+def _switch(zone: SensorZone) -> SwitchDescription:
+    return SwitchDescription(".".join(zone.target), zone.low, zone.high, zone.period)

@@ -6,10 +6,10 @@ import json
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, TypeAlias
 
+from steptwin.datatypes import format_short
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 from steptwin.fields import ID
 from steptwin.messages import Message, read_message_text, text_of, with_messages
-from steptwin.plaintypes import shown
 from steptwin.subject.commands import COMMANDS, VERSION, Command, read_command, type_of
 from steptwin.subject.contract import Result
 
@@ -102,7 +102,7 @@ def fields_of(message: Mapping[str, object]) -> dict[str, object]:
     """The fields in a request. Raises `Misuse` for another version."""
     version = message.get("version", VERSION)
     if version != VERSION or isinstance(version, bool):
-        raise Misuse(OTHER_VERSION(version=shown(version), own=VERSION))
+        raise Misuse(OTHER_VERSION(version=format_short(version), own=VERSION))
     fields = dict(message)
     for name in ("do", "id", "version"):
         fields.pop(name, None)

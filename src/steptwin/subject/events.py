@@ -72,10 +72,10 @@ class Event:
     def __str__(self) -> str:
         return line_of(self.time, self.owner, self.text)
 
-    def plain(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, object]:
         """As JSON. ``text`` describes it; it adds nothing to the rest."""
         head = {"number": self.number, "time_ns": str(self.time), "controller": self.controller, "kind": self.kind}
-        return with_messages({**head, **self.payload.plain(), "cause": self.cause, "text": self.text})
+        return with_messages({**head, **self.payload.to_json(), "cause": self.cause, "text": self.text})
 
 
 def line_of(time: Nanos, controller: str, text: str) -> str:
@@ -134,7 +134,7 @@ def payload_of(record: TraceRecord) -> Payload:
     return _MAKE[record.kind](record)
 
 
-def shown(record: TraceRecord) -> str:
+def format_record(record: TraceRecord) -> str:
     """A record in one line."""
     payload = payload_of(record)
     return line_of(record.time, _owner(record.controller, payload), payload.text)
@@ -145,7 +145,7 @@ def _owner(controller: str, payload: Payload) -> str:
 
 
 def read_event(data: Mapping[str, Any]) -> Event:
-    """The event in JSON. Raises `TypeError`, `ValueError` or `LookupError` for what `Event.plain` does not give."""
+    """The event in JSON. Raises `TypeError`, `ValueError` or `LookupError` for what `Event.to_json` does not give."""
     payload: Any = PAYLOADS[data["kind"]].read(data)
     return Event(data["number"], int(data["time_ns"]), data["controller"], payload, data["cause"])
 

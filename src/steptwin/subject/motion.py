@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from steptwin.controller import Nanos
 from steptwin.motion.divisions import Plan, profile_of
-from steptwin.subject.contract import ControllerPart
+from steptwin.subject.contract import ControllerDescription
 from steptwin.subject.events import Event
 from steptwin.subject.payloads import CoordinatePayload, PlanPayload
 
@@ -14,7 +14,7 @@ from steptwin.subject.payloads import CoordinatePayload, PlanPayload
 class Motions:
     """The axes of a controller; ``plans`` are those that hold when following begins."""
 
-    def __init__(self, controller: ControllerPart, plans: Iterable[Event]) -> None:
+    def __init__(self, controller: ControllerDescription, plans: Iterable[Event]) -> None:
         self._controller = controller.name
         self._scales = {str(axis.number): axis.pulses_per_unit or 1.0 for axis in controller.datasheet.axes}
         self._rounds = {str(axis.number): axis.round_p for axis in controller.datasheet.axes}

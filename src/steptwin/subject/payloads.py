@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Self, TypeAlias, get_args
 
 from steptwin.controller import Fact, Nanos
-from steptwin.jsonvalues import FLAG, MOMENT, NUMBER, TEXT, WHOLE, Hexadecimal, JsonForm, list_of, members, or_null, plain, read
+from steptwin.jsonvalues import FLAG, MOMENT, NUMBER, TEXT, WHOLE, Hexadecimal, JsonForm, list_of, members, or_null, read, to_json
 from steptwin.messages import Message, read_message_text, text_of
 from steptwin.motion.divisions import Plan as MotionPlan
 from steptwin.motion.divisions import profile_of
-from steptwin.motion.plain import plain_plan, read_plan
+from steptwin.motion.planjson import plan_to_json, read_plan
 
 _NUMBERS = list_of({"type": ["number", "null"]})
 _ARC = members(
@@ -38,7 +38,7 @@ _PLAN = {
     "required": ["start_ns", "base", "final", "segments"],
     "additionalProperties": False,
 }
-_JsonPlan: TypeAlias = Annotated[MotionPlan, JsonForm(_PLAN, read_plan, plain_plan)]
+_JsonPlan: TypeAlias = Annotated[MotionPlan, JsonForm(_PLAN, read_plan, plan_to_json)]
 
 
 class JsonPayload:
@@ -46,8 +46,8 @@ class JsonPayload:
 
     __slots__ = ()
 
-    def plain(self) -> dict[str, object]:
-        return plain(self)
+    def to_json(self) -> dict[str, object]:
+        return to_json(self)
 
     @classmethod
     def read(cls, data: Mapping[str, Any]) -> Self:
@@ -225,7 +225,7 @@ class StatusPayload(JsonPayload):
     def text(self) -> str:
         return self.words
 
-    def plain(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, object]:
         """Its text is that of the event, and its axis one of the facts."""
         return {"code": self.code, "axis": self.axis, "facts": dict(self.facts)}
 

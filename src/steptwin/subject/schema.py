@@ -114,7 +114,7 @@ def _message() -> dict[str, object]:
 
 
 def _description() -> dict[str, object]:
-    """As `Description.plain` writes it."""
+    """As `Description.to_json` writes it."""
     controller = with_sentences(
         {
             "name": TEXT,

@@ -32,10 +32,10 @@ class Snapshots:
             raise Misuse(TOO_MANY_SNAPSHOTS(most=MOST_SNAPSHOTS, names=list(self._kept)))
         self._kept.pop(name, None)
         self._kept[name] = snapshot
-        return _plain(name, snapshot)
+        return _to_json(name, snapshot)
 
-    def plain(self) -> list[dict[str, object]]:
-        return [_plain(name, snapshot) for name, snapshot in self._kept.items()]
+    def to_json(self) -> list[dict[str, object]]:
+        return [_to_json(name, snapshot) for name, snapshot in self._kept.items()]
 
     def find(self, wanted: RestoreSnapshot | DropSnapshot) -> SimulationSnapshot:
         """Raises `Misuse` with those there are."""
@@ -51,5 +51,5 @@ class Snapshots:
         del self._kept[wanted.name]
 
 
-def _plain(name: str, snapshot: SimulationSnapshot) -> dict[str, object]:
+def _to_json(name: str, snapshot: SimulationSnapshot) -> dict[str, object]:
     return {"name": name, "time_ns": str(snapshot.now)}

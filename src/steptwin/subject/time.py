@@ -48,7 +48,7 @@ def shown_of(wanted: Advance) -> Filter:
 def happened(following: Following) -> dict[str, object]:
     """The events in the answer to a step."""
     missed, events = following.take()
-    return {"events": [event.plain() for event in events if event.is_shown or event.kind not in SHOWN_KINDS], "missed": missed}
+    return {"events": [event.to_json() for event in events if event.is_shown or event.kind not in SHOWN_KINDS], "missed": missed}
 
 
 def end_of(world: Simulation, wanted: Advance, due: Nanos | None) -> Nanos | None:

@@ -9,11 +9,11 @@ from typing import Any, get_args
 
 from steptwin.controller import Nanos
 from steptwin.errors import Refusal
-from steptwin.jsonvalues import plain
+from steptwin.jsonvalues import to_json
 from steptwin.messages import Message
 from steptwin.simulation.components.registry import failing
 from steptwin.simulation.faults.kinds import rows
-from steptwin.simulation.kinds.lines import LineWords, LineWrite
+from steptwin.simulation.kinds.lines import LineWrite, TrafficLog
 from steptwin.simulation.kinds.programs import StatementFollower
 from steptwin.simulation.kinds.registry import line_kinds
 from steptwin.simulation.scheduler.trace import TraceRecord
@@ -59,7 +59,7 @@ class WorldSubject:
         self.world = world
         self.description: Description = describe(world)
         self._apply_input = apply_input or world.apply_input
-        lines = {name: line.name for name, (line, _) in world.parts.line_of.items()}
+        lines = {name: line.name for name, (line, _) in world.objects.line_of.items()}
         self.numbering = Numbering(lines)
         self.followers = Followers(self._followed)
         self.on_followed: Callable[[], None] = lambda: None
@@ -68,10 +68,10 @@ class WorldSubject:
         self.dispatcher = Dispatcher(self._actions(), self._begin, self._end)
         self.sources: dict[tuple[str, str], str] = {}
         """Who is at a place of a line, for writes; a place that is not named here stands for itself."""
-        self._words: dict[str, LineWords] = {}
+        self._traffic: dict[str, TrafficLog] = {}
         self._writes: list[Callable[[], None]] = []
         """Functions that end the observation of writes; empty while they are not followed."""
-        self._controller_of = {(line.name, unit): name for name, (line, unit) in world.parts.line_of.items()}
+        self._controller_of = {(line.name, unit): name for name, (line, unit) in world.objects.line_of.items()}
         self._is_watching = False
         self._statements: StatementFollower | None = None
         self._jogs: list[tuple[Jog, DeadManJog]] = []
@@ -89,16 +89,16 @@ class WorldSubject:
             steps.Request: self._request,
             steps.SetFault: self._set_fault,
             steps.Expect: self._expect,
-            command.Describe: lambda _: self.description.plain(),
+            command.Describe: lambda _: self.description.to_json(),
             command.ReadPoints: lambda wanted: [reading._asdict() for reading in self.read(*wanted.points)],
             command.ReadPins: self._pins,
             command.ReadState: self._state,
             command.Encoders: self._encoders,
             command.ListFaults: lambda _: self._faults(),
-            command.ListFaultKinds: lambda _: [{**kind.plain(), "elements": list(failing(kind))} for kind in rows()],
+            command.ListFaultKinds: lambda _: [{**kind.to_json(), "elements": list(failing(kind))} for kind in rows()],
             command.Time: lambda _: self.time(),
             command.TakeSnapshot: lambda wanted: self.snapshots.add(wanted, self.world.snapshot()),
-            command.ListSnapshots: lambda _: self.snapshots.plain(),
+            command.ListSnapshots: lambda _: self.snapshots.to_json(),
             command.RestoreSnapshot: self._restore,
             command.DropSnapshot: self.snapshots.drop,
             command.Advance: self._advance,
@@ -204,7 +204,7 @@ class WorldSubject:
         world, name = self.world, wanted.controller
         kind, controller = world.kind(name), world.controller(name)
         world.sync(name)
-        on = world.parts.line_of.get(name)
+        on = world.objects.line_of.get(name)
         held = kind.dead_man_jog(controller, None if on is None else on[0].name, wanted)
         self._jogs = [(one, jog) for one, jog in self._jogs if jog.over is None] + [(wanted, held)]
         return held
@@ -226,7 +226,7 @@ class WorldSubject:
 
     def _set_fault(self, step: steps.SetFault) -> object:
         self._apply_input(step)
-        return {"name": self.world.parts.faults.active[-1].name}
+        return {"name": self.world.objects.faults.active[-1].name}
 
     def _expect(self, step: steps.Expect) -> object:
         before = len(self.world.failures)
@@ -249,12 +249,12 @@ class WorldSubject:
         reader = self.world.kind(wanted.controller).state
         if wanted.parts is not None:
             return reader.parts(controller, self.world.now, wanted.parts)
-        return plain(reader(controller, self.world.now))
+        return to_json(reader(controller, self.world.now))
 
     def _encoders(self, wanted: command.Encoders) -> object:
         encoders = self.world.encoders(wanted.controller)
         self.world.sync(wanted.controller)
-        return encoders.shown(self.world.controller(wanted.controller), self.world.now)
+        return encoders.to_json(self.world.controller(wanted.controller), self.world.now)
 
     def _advance(self, wanted: command.Advance) -> object:
         done = advance(self.world, self.follow, wanted)
@@ -274,7 +274,8 @@ class WorldSubject:
 
     def _faults(self) -> object:
         return [
-            {"name": a.name, "fault": str(a.fault), "seen": a.seen, "happened": a.struck} for a in self.world.parts.faults.active
+            {"name": a.name, "fault": str(a.fault), "seen": a.seen, "happened": a.struck}
+            for a in self.world.objects.faults.active
         ]
 
     def time(self) -> dict[str, object]:
@@ -314,10 +315,10 @@ class WorldSubject:
     def _recorded(self, record: TraceRecord) -> None:
         if record.kind == "frame":  # lines report frames themselves, recorded or not
             return
-        if self._words:
-            line, _ = self.world.parts.line_of.get(record.controller, (None, 0))
+        if self._traffic:
+            line, _ = self.world.objects.line_of.get(record.controller, (None, 0))
             if line is not None:
-                self._words[line.name].recorded(record)
+                self._traffic[line.name].recorded(record)
         payload = payload_of(record)
         if isinstance(payload, PlanPayload):
             payload = self._with_origin(record.controller, payload)
@@ -348,15 +349,15 @@ class WorldSubject:
                 self._statements = None
         self._follow_writes(is_wanted="write" in self.followers.kinds)
         wanted = "frame" in self.followers.kinds
-        if wanted is bool(self._words):
+        if wanted is bool(self._traffic):
             return
         for spec in self.world.spec.lines:
             line = self.world.lines[spec.name]
             if wanted:
-                self._words[line.name] = line_kinds()[spec.kind].words(line, "", partial(self._framed, line.name))
-                line.follow_frames(self._words[line.name])
+                self._traffic[line.name] = line_kinds()[spec.kind].traffic_log(line, "", partial(self._framed, line.name))
+                line.follow_frames(self._traffic[line.name])
             else:
-                line.unfollow_frames(self._words.pop(line.name))
+                line.unfollow_frames(self._traffic.pop(line.name))
 
     def _follow_writes(self, *, is_wanted: bool) -> None:
         if is_wanted is bool(self._writes):

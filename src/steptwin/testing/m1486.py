@@ -16,7 +16,7 @@ from steptwin.drivers.address import parse_device
 from steptwin.drivers.place import parse_line_address
 from steptwin.drivers.tcp import Channel
 from steptwin.errors import Misuse
-from steptwin.files.beginning import set_faults
+from steptwin.files.loader import set_faults
 from steptwin.files.world import World
 from steptwin.inputfiles import read_bytes
 from steptwin.live.world import LiveWorld

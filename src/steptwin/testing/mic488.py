@@ -14,7 +14,7 @@ from steptwin.controller import Nanos, Port
 from steptwin.drivers import Mic488, load_config
 from steptwin.drivers.address import parse_device
 from steptwin.errors import Misuse
-from steptwin.files.beginning import set_faults
+from steptwin.files.loader import set_faults
 from steptwin.files.world import World
 from steptwin.inputfiles import read_bytes
 from steptwin.live.world import LiveWorld

@@ -163,7 +163,7 @@ class WorldRig(Rig):
             if controller not in self._given:
                 self.twin_only(f"controller {controller!r}")
             return driver_of(self._given[controller])
-        on = self._live.world.parts.line_of.get(controller)
+        on = self._live.world.objects.line_of.get(controller)
         if on is None:
             raise Misuse(f"{controller!r} is on no line: its table in {self.options.file} needs line = NAME")
         line, unit, firmware = on[0].name, on[1], device.firmware.name

@@ -99,7 +99,7 @@ class CheckResult:
     probes: tuple[Probe, ...] = ()
     why: str = ""
 
-    def plain(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, object]:
         probes = [{"what": p.what, "expected": p.expected, "came": p.came, "holds": p.holds} for p in self.probes]
         return {"id": self.id, "outcome": str(self.outcome), "what": self.what, "why": self.why, "probes": probes}
 

@@ -32,7 +32,7 @@ class Report:
         found = Counter(result.outcome for result in self.results)
         return {str(outcome): found[outcome] for outcome in CheckOutcome}
 
-    def plain(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, object]:
         return {
             "format": FORMAT,
             "steptwin": self.version,
@@ -41,11 +41,11 @@ class Report:
             "permitted": self.permitted,
             "is_complete": self.is_complete,
             "counts": dict(self.counts),
-            "results": [result.plain() for result in self.results],
+            "results": [result.to_json() for result in self.results],
         }
 
-    def to_json(self) -> str:
-        return json.dumps(self.plain(), indent=2, ensure_ascii=False) + "\n"
+    def json_text(self) -> str:
+        return json.dumps(self.to_json(), indent=2, ensure_ascii=False) + "\n"
 
     def to_text(self) -> str:
         device = ", ".join(f"{name} {value}" for name, value in self.device.items() if value is not None)

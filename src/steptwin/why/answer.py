@@ -21,7 +21,7 @@ class ChainLink(NamedTuple):
     subject: str
     text: MessageText
 
-    def plain(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         return with_messages({"time_ns": str(self.time), "subject": self.subject, "text": self.text})
 
 
@@ -51,36 +51,36 @@ class Answer(NamedTuple):
             lines.append(f"{'':12}    (earlier causes are not shown)")
         return "\n".join(lines)
 
-    def plain(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """The answer as plain data, for JSON; moments in ns, as text."""
-        plain = {
+        data = {
             "question": self.question,
             "at_ns": str(self.at),
             "state": self.state,
             "since_ns": None if self.since is None else str(self.since),
-            "links": [link.plain() for link in self.links],
+            "links": [link.to_json() for link in self.links],
             "complete": self.is_complete,
             "known_from_ns": str(self.known_from),
             "cut": self.is_cut,
             "text": self.text(),
         }
-        return with_messages(plain)
+        return with_messages(data)
 
 
-def read_answer(plain: Mapping[str, Any]) -> Answer:
+def read_answer(data: Mapping[str, Any]) -> Answer:
     """An answer from its plain data."""
-    links = tuple(ChainLink(int(link["time_ns"]), link["subject"], read_message_text(link, "text")) for link in plain["links"])
-    since = None if plain["since_ns"] is None else int(plain["since_ns"])
-    known_from = int(plain["known_from_ns"])
+    links = tuple(ChainLink(int(link["time_ns"]), link["subject"], read_message_text(link, "text")) for link in data["links"])
+    since = None if data["since_ns"] is None else int(data["since_ns"])
+    known_from = int(data["known_from_ns"])
     return Answer(
-        plain["question"],
-        int(plain["at_ns"]),
-        read_message_text(plain, "state"),
+        data["question"],
+        int(data["at_ns"]),
+        read_message_text(data, "state"),
         since,
         links,
-        plain["complete"],
+        data["complete"],
         known_from,
-        plain["cut"],
+        data["cut"],
     )
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeAlias
 from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message, MessageText, text_of
 from steptwin.motion.divisions import profile_of
-from steptwin.simulation.components.logic import BoardPart
+from steptwin.simulation.components.logic import TerminalComponent
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.kinds.programs import Place, Resource, ResourceKind, StatementUse
@@ -21,7 +21,7 @@ from steptwin.simulation.script.control import Halt
 from steptwin.simulation.world.inputs import Download, See, SetVariable
 from steptwin.why.answer import ChainLink, since_before
 from steptwin.why.log import Act, CauseLog, Change
-from steptwin.why.sentences import Frames, statement, words_of
+from steptwin.why.sentences import Frames, describe_input, statement
 
 BECAME = Message("why.became", "{signal} became {value:g}{how}")
 IS_SINCE = Message("why.is-since", "{signal} is {value:g} {since}{how}")
@@ -79,11 +79,11 @@ class Causes:
         self._world = log.world
         self._frames = Frames(log.world)
         self._uses: dict[tuple[str, Place], StatementUse] = {}
-        built = log.world.parts.elements
+        built = log.world.objects.elements
         self._at_begin = nothing if log.is_whole else unknown
         self.is_far = False
         """Whether the chain that was followed last ends because nothing older was looked at (`MOST_UNDECIDED`)."""
-        self._parts: dict[str, BoardPart] = {
+        self._parts: dict[str, TerminalComponent] = {
             name: part for kind, parts in built.items() if ELEMENTS[kind].terminals is not None for name, part in parts.items()
         }
 
@@ -153,7 +153,7 @@ class Causes:
         if held is None or (first is not None and time <= first.link.time):
             return first
 
-        link = ChainLink(time, signal.partition(".")[0], IS(signal=signal, value=held.words()))
+        link = ChainLink(time, signal.partition(".")[0], IS(signal=signal, value=held.description()))
 
         def before() -> FoundCause:
             return first or self._at_begin()
@@ -191,10 +191,10 @@ class Causes:
 
     def _sources(self, target: PinName) -> Iterator[str]:
         """The signals that drive an input: an output at the other end of a wire, or contacts."""
-        circuit = self._world.parts.circuits.get(target)
+        circuit = self._world.objects.circuits.get(target)
         if circuit is not None:
             yield from (contact.channel for contact in circuit.contacts if contact.channel)
-        for scheduler in (self._world.parts.scheduler_of[target.controller],):
+        for scheduler in (self._world.objects.scheduler_of[target.controller],):
             wire = scheduler.wire_to(target)
             if wire is not None:
                 yield self._name(wire.source)
@@ -204,7 +204,7 @@ class Causes:
         return str(pin) if pin.controller in self._world.controllers else f"{pin.controller}.{pin.pin.lower()}"
 
     def _of_pin(self, pin: PinName, change: Change) -> FoundCause:
-        wire = self._world.parts.scheduler_of[pin.controller].wire_to(pin)
+        wire = self._world.objects.scheduler_of[pin.controller].wire_to(pin)
         if wire is not None:
             found = self._before(self._name(wire.source), change, change.time - wire.delay)
             if found is not None and found[0].time == change.time - wire.delay:
@@ -217,7 +217,7 @@ class Causes:
         act = next((act for act in self._log.acts_at(change.time) if _sets(act, pin)), None)
         if act is not None:
             return _acted(act)
-        path = self._world.parts.driven.get(pin)
+        path = self._world.objects.driven.get(pin)
         if path is not None:
             where = self._world.spec.text.where(path)
             return Cause(ChainLink(change.time, pin.controller, DRIVES(kind=path[0], where=where, pin=str(pin))), nothing)
@@ -288,7 +288,7 @@ class Causes:
 
     def _from_outside(self, controller: str, change: Change, since: int) -> FoundCause:
         """A request or another action that reached a controller at the moment of a change, after the position ``since``."""
-        on = self._world.parts.line_of.get(controller)
+        on = self._world.objects.line_of.get(controller)
         for position, record in self._log.at(change.group, change.time):
             if position < since:
                 break
@@ -335,7 +335,7 @@ class Causes:
 
     def _asked_before(self, controller: str, change: Change) -> FoundCause:
         """A request on a line with timing, which is answered later than it came."""
-        on = self._world.parts.line_of.get(controller)
+        on = self._world.objects.line_of.get(controller)
         if on is None or not on[0].is_timed:
             return None
         records = self._log.records[change.group]
@@ -357,7 +357,7 @@ class Causes:
         return None
 
     def _is_input(self, pin: PinName) -> bool:
-        return pin in self._world.parts.driven or pin in self._world.parts.circuits
+        return pin in self._world.objects.driven or pin in self._world.objects.circuits
 
     def _frame(self, record: TraceRecord) -> Cause:
         place = record.subject.rpartition("/")[0]
@@ -368,7 +368,7 @@ class Causes:
 
     def _requested(self, record: TraceRecord) -> FoundCause:
         """The step that made a request, which a line with timing carries later."""
-        members = {name for name, (line, _) in self._world.parts.line_of.items() if line.name == record.controller}
+        members = {name for name, (line, _) in self._world.objects.line_of.items() if line.name == record.controller}
         for act in self._log.acts_before(record.time, MOST_LOOKED_BACK):
             if _requests(act, record.controller, members):
                 return _acted(act)
@@ -486,8 +486,8 @@ class Causes:
         return Cause(ChainLink(executed[0].time, controller, PROGRAM_STARTED()), nothing)
 
 
-def _inputs(part: BoardPart) -> list[str]:
-    return [terminal for terminal in part.board.levels if terminal not in part.board.outputs]
+def _inputs(part: TerminalComponent) -> list[str]:
+    return [terminal for terminal in part.block.levels if terminal not in part.block.outputs]
 
 
 def _matches(writes: Sequence[Resource], wanted: Resource | None) -> bool:
@@ -498,7 +498,7 @@ def _matches(writes: Sequence[Resource], wanted: Resource | None) -> bool:
 
 
 def _acted(act: Act) -> Cause:
-    what = words_of(act.what)
+    what = describe_input(act.what)
     text = SCRIPT(name=act.script, what=what) if act.script else FROM_OUTSIDE(what=what)
     return Cause(ChainLink(act.time, act.script or "outside", text), nothing)
 

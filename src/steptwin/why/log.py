@@ -101,7 +101,7 @@ class CauseLog:
         self.world = world
         self.begin = world.now
         self._most = most
-        parts = world.parts
+        parts = world.objects
         numbers = {id(scheduler): number for number, scheduler in enumerate(world.schedulers)}
         self._group_of = {name: numbers[id(scheduler)] for name, scheduler in parts.scheduler_of.items()}
         self._pins = {name: frozenset(controller.pins()) for name, controller in world.controllers.items()}
@@ -179,7 +179,7 @@ class CauseLog:
         records.append(record)
 
     def _note_holds(self, owner: str, now: Nanos) -> None:
-        held = self.world.parts.faults.held(owner)
+        held = self.world.objects.faults.held(owner)
         for signal in (*held, *(name for name in self._holds if name.startswith(f"{owner}.") and name not in held)):
             holds = self._holds[signal]
             if (holds[-1].held if holds else None) != held.get(signal):
@@ -342,11 +342,11 @@ def in_parts(world: Simulation, inputs: Sequence[RecordedInput], end: Nanos) -> 
 def levels_of(world: Simulation) -> dict[str, float]:
     """The present levels of all that has edges: pins, outputs of elements, contacts."""
     found = {f"{name}.{pin}": level for name, controller in world.controllers.items() for pin, level in controller.pins().items()}
-    for kind, parts in world.parts.elements.items():
+    for kind, parts in world.objects.elements.items():
         if ELEMENTS[kind].terminals is not None:
             for name, part in parts.items():
-                found |= {f"{name}.{output.lower()}": part.board.levels[output] for output in part.board.outputs}
-    contacts = [contact for circuit in world.parts.circuits.values() for contact in circuit.contacts if contact.channel]
+                found |= {f"{name}.{output.lower()}": part.block.levels[output] for output in part.block.outputs}
+    contacts = [contact for circuit in world.objects.circuits.values() for contact in circuit.contacts if contact.channel]
     return found | {contact.channel: float(contact.level) for contact in contacts}
 
 

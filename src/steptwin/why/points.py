@@ -32,7 +32,7 @@ class NotedPoints:
         self._readers = {owner: _Reader(self, world, owner) for owner in world.controllers}
         self._noted = self._looks = 0
         for owner, reader in self._readers.items():
-            scheduler = world.parts.scheduler_of[owner]
+            scheduler = world.objects.scheduler_of[owner]
             scheduler.hears_requests = True
             scheduler.follow(reader, (owner,))
 
@@ -48,7 +48,7 @@ class NotedPoints:
         self._looks += 1
         if self._noted > MOST_CHANGES or self._looks > MOST_LOOKS:
             for owner, reader in self._readers.items():
-                self._world.parts.scheduler_of[owner].unfollow(reader)
+                self._world.objects.scheduler_of[owner].unfollow(reader)
             self._readers.clear()
 
     def series(self, name: str) -> Sequence[TimedValue] | None:

@@ -440,7 +440,7 @@ class Why:
             driven = DRIVEN_BY(names=reduce(lambda one, other: AND(one=one, other=other), drivers)) if drivers else ""
             hold = self.log.hold(name, at)
             if hold is not None and hold.held is not None:
-                text = IS_HELD(signal=name, held=hold.held.words(), time=hold.time / SECOND)
+                text = IS_HELD(signal=name, held=hold.held.description(), time=hold.time / SECOND)
             else:
                 text = IS_SINCE(signal=name, value=self.log.level(name, at), since=when, how=driven)
             yield ChainLink(at, name.partition(".")[0], text)

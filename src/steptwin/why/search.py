@@ -151,7 +151,7 @@ class LastChanges:
             return True
         if not point.is_kept:
             return all(one.path != path for one in present.kind(owner).datasheet(present.controller(owner)).points)
-        on = present.parts.line_of.get(owner)
+        on = present.objects.line_of.get(owner)
         if on is not None and on[0].is_timed:
             return True  # a request is executed later than it was made
         if ACTED in after.changed or self._value_at(after, name) != self._value_at(state, name):

@@ -7,7 +7,7 @@ from typing import Any
 
 from steptwin.diagnostics import visible
 from steptwin.messages import Message, MessageText
-from steptwin.simulation.kinds.lines import LineWords
+from steptwin.simulation.kinds.lines import TrafficLog
 from steptwin.simulation.kinds.registry import line_kinds
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.script import steps as do
@@ -58,7 +58,7 @@ _WORDS: Mapping[type, Callable[[Any], MessageText]] = {
 }
 
 
-def words_of(what: ExternalInput) -> MessageText:
+def describe_input(what: ExternalInput) -> MessageText:
     """An action in words."""
     words = _WORDS.get(type(what))
     return MessageText(type(what).__name__) if words is None else words(what)
@@ -79,15 +79,16 @@ class Frames:
 
     def __init__(self, world: Simulation) -> None:
         self._told: list[FrameLine] = []
-        self.words: dict[str, LineWords] = {
-            spec.name: line_kinds()[spec.kind].words(world.lines[spec.name], "", self._told.append) for spec in world.spec.lines
+        self.traffic: dict[str, TrafficLog] = {
+            spec.name: line_kinds()[spec.kind].traffic_log(world.lines[spec.name], "", self._told.append)
+            for spec in world.spec.lines
         }
 
     def meaning(self, record: TraceRecord) -> str:
         """A request in words."""
         place, _, _ = record.subject.rpartition("/")
         self._told.clear()
-        self.words[record.controller].frame(record.time, place, FrameDirection.IN, record.data())
+        self.traffic[record.controller].frame(record.time, place, FrameDirection.IN, record.data())
         if self._told:
             return self._told[-1].meaning
         return record.data().decode("ascii", "backslashreplace")
@@ -95,4 +96,4 @@ class Frames:
     def reaches(self, record: TraceRecord, unit: int) -> bool:
         """Whether a record is a request that may change the controller with an address."""
         place, _, direction = record.subject.rpartition("/")
-        return direction == FrameDirection.IN.value and unit in self.words[record.controller].changes(place, record.data())
+        return direction == FrameDirection.IN.value and unit in self.traffic[record.controller].changes(place, record.data())

@@ -77,8 +77,8 @@ class StatesOnTheWay:
 
 def _moving(world: Simulation) -> Iterator[tuple[str, SignalOf]]:
     """The quantities that move, and can tell when their trajectory is another one."""
-    elements = (name for built in world.parts.elements.values() for name in built)
-    names = [f"{name}.{signal}" for name in elements for signal in world.parts.element_signals(name) or ()]
+    elements = (name for built in world.objects.elements.values() for name in built)
+    names = [f"{name}.{signal}" for name in elements for signal in world.objects.element_signals(name) or ()]
     for owner, controller in world.controllers.items():
         kind = world.kind(owner)
         for point in kind.datasheet(controller).points:

@@ -102,7 +102,7 @@ def test_a_campaign_says_what_matters(tmp_path: Path) -> None:
     assert [one.name for one in report.indices] == ["t", "idle"]
     assert report.indices[0].total == pytest.approx(1.0, abs=0.25)
     assert (report.indices[1].first, report.indices[1].total) == (0.0, 0.0)
-    assert report.plain(tmp_path)["sobol_indices"][1]["name"] == "idle"
+    assert report.to_json(tmp_path)["sobol_indices"][1]["name"] == "idle"
     page = report.html(tmp_path)
     assert "Sobol indices of the least robustness" in page
     assert "Spearman" not in page

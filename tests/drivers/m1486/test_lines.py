@@ -27,7 +27,7 @@ from steptwin.drivers.m1486 import (
     watching,
 )
 from steptwin.drivers.m1486.identify import SearchLine, end_line, searching, select_all
-from steptwin.drivers.m1486.lines import AsyncM1486Line, ThreadM1486Line, in_words
+from steptwin.drivers.m1486.lines import AsyncM1486Line, ThreadM1486Line, described
 from steptwin.drivers.m1486.unit import SLICE_NS
 from steptwin.drivers.threads import ThreadLine
 from steptwin.errors import Misuse
@@ -486,4 +486,4 @@ def test_foreign_bytes_on_a_line_are_ended_without_selecting_a_chip() -> None:
     [(b"f12800\r", "f12800 CR"), (b"\x7f", "7FH"), (b"\x99r\r", "99H r CR"), (b"\x1f ~\x7f", "1FH  ~ 7FH"), (b"", "")],
 )
 def test_bytes_of_a_log_are_text(data: bytes, text: str) -> None:
-    assert in_words(data) == text
+    assert described(data) == text

@@ -90,7 +90,7 @@ def test_an_m1486_jogs_and_stops(drum: DeviceSubject, rig: Rig) -> None:
     rig.time.sleep(2.0)
     status, sample = following.take().events
     assert status.text == "is at rest"
-    assert sample.payload.plain()["velocity"] == 0.0
+    assert sample.payload.to_json()["velocity"] == 0.0
     assert rig.world.read("drum.velocity") == 0.0
     rig.time.sleep(2.0)
     assert following.take().events == []
@@ -110,7 +110,7 @@ def test_an_m1486_is_moved_and_shown_in_the_unit_of_its_driver(rig: Rig) -> None
         rig.time.sleep(60.0)
         assert rig.world.read("drum.counter") == 40 * 40 * 64
         (sample,) = drum.follow(filter_of(), 9).take().events
-        assert sample.payload.plain() == {"axis": "1", "position": -60.0, "unit": "mm", "velocity": 0.0}
+        assert sample.payload.to_json() == {"axis": "1", "position": -60.0, "unit": "mm", "velocity": 0.0}
         drum.do(command.Move("drum", 1, by=-2.0))
         rig.time.sleep(60.0)
         assert rig.world.read("drum.counter") == 38 * 40 * 64
@@ -246,4 +246,4 @@ def test_a_move_that_is_stopped_leaves_the_position_unknown(drum: DeviceSubject,
     rig.time.sleep(1.0)
     drum.do(command.StopAxes("drum", 1))
     rig.time.sleep(2.0)
-    assert following.take().events[-1].payload.plain() == {"axis": "1", "position": None, "unit": "step", "velocity": 0.0}
+    assert following.take().events[-1].payload.to_json() == {"axis": "1", "position": None, "unit": "step", "velocity": 0.0}

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import pytest
 
 from steptwin.drivers import LineLost
-from steptwin.drivers.m1486.terminal import ChipTerminal, TerminalWords, command_of
+from steptwin.drivers.m1486.terminal import ChipTerminal, TerminalDecoder, command_of
 from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.variants import variant
 
@@ -56,7 +56,7 @@ def inverted(text: str) -> bytes:
     ],
 )
 def test_what_comes_back_in_words(typed: list[str], heard: bytes, told: list[str]) -> None:
-    words = TerminalWords()
+    words = TerminalDecoder()
     for line in typed:
         words.typed(line)
     assert words.decode(heard) == told
@@ -64,7 +64,7 @@ def test_what_comes_back_in_words(typed: list[str], heard: bytes, told: list[str
 
 
 def test_an_answer_that_takes_its_time_is_still_known() -> None:
-    words = TerminalWords()
+    words = TerminalDecoder()
     words.typed("u3")
     assert words.decode(b"u3\r") == []
     assert words.is_awaiting

@@ -24,7 +24,7 @@ from steptwin.drivers import (
 )
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.exchange import Overtaken, SentLate
-from steptwin.drivers.mic488.frames import FrameWords
+from steptwin.drivers.mic488.frames import FrameLog
 from steptwin.drivers.mic488.lines import ThreadModbusLine, modbus_exchanger
 from steptwin.drivers.modbus import ModbusQuery
 from steptwin.drivers.place import LineAddress
@@ -520,7 +520,7 @@ def test_frames_in_words_of_both_sorts_of_lines(*, framed: bool) -> None:
     log: list[str] = []
     _, shared = modbus_exchanger(LineAddress(MemoryEndpoint(Wire()), framed=framed), None, log.append)
     frames = shared["frames"]
-    assert isinstance(frames, FrameWords)
+    assert isinstance(frames, FrameLog)
     request = bytes.fromhex("03 27 24 00 02")
     frame = bytes.fromhex("00 01 00 00 00 06 01") + request if framed else rtu.encode_frame(1, request)
     frames.observe(0, FrameDirection.IN, frame)

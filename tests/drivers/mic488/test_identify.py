@@ -49,7 +49,7 @@ def answering(wire: Wire, answer: Callable[[bytes], bytes | None]) -> None:
     wire.before_each = reply
 
 
-def words_of(request: bytes, word: int) -> bytes:
+def describe_input(request: bytes, word: int) -> bytes:
     count = struct.unpack(">H", request[3:5])[0]
     return bytes((3, 2 * count)) + word.to_bytes(2, "big") * count
 
@@ -57,7 +57,7 @@ def words_of(request: bytes, word: int) -> bytes:
 def test_silent_where_another_refuses_is_found_too() -> None:
     """A real controller may not answer at addresses it does not have."""
     wire = Wire()
-    answering(wire, lambda request: words_of(request, 0) if request[1:3] < (2000).to_bytes(2, "big") else None)
+    answering(wire, lambda request: describe_input(request, 0) if request[1:3] < (2000).to_bytes(2, "big") else None)
     mic = Mic488(thread_line(wire))
     mic.open()
     assert mic.firmware == "1.23"
@@ -77,7 +77,7 @@ def test_an_answer_that_is_lost_makes_no_older_controller(faults: tuple[Fault, .
 
 def test_somebody_else_is_named() -> None:
     wire = Wire()
-    answering(wire, lambda request: words_of(request, 0x7777))
+    answering(wire, lambda request: describe_input(request, 0x7777))
     with pytest.raises(NoMic488, match=r"unit 1 responds, but does not have the registers of a MIC488 \(implausible values\)"):
         opened(wire)
     wire = Wire()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from steptwin.controller import MILLISECOND
-from steptwin.drivers.mic488.frames import FrameWords, ObservedFrame
+from steptwin.drivers.mic488.frames import FrameLog, ObservedFrame
 from steptwin.drivers.mic488.listening import RtuListener, TcpListener
 from steptwin.mic488.registermap import DataType
 from steptwin.wire import mbap
@@ -18,7 +18,7 @@ WRITE = bytes.fromhex("01 05 17 71 00 00 98 65")
 
 
 def listener() -> tuple[RtuListener, list[ObservedFrame]]:
-    words = FrameWords()
+    words = FrameLog()
     heard: list[ObservedFrame] = []
     words.sinks.append(heard.append)
     return RtuListener(words), heard
@@ -62,7 +62,7 @@ def test_the_beginning_of_a_frame_that_never_ends_is_told_with_the_next() -> Non
 
 
 def test_both_directions_of_modbus_tcp() -> None:
-    words = FrameWords(tcp=True)
+    words = FrameLog(tcp=True)
     heard: list[ObservedFrame] = []
     words.sinks.append(heard.append)
     ear = TcpListener(words)
@@ -83,7 +83,7 @@ def test_both_directions_of_modbus_tcp() -> None:
 def test_what_is_too_short_for_a_frame_is_none() -> None:
     """A unit, a function and a checksum, or an MBAP header and a function; what the function makes of it is its own affair."""
     for is_tcp, raw in ((False, bytes.fromhex("01 03 40 21")), (True, bytes.fromhex("0001 0000 0002 01 03"))):
-        words = FrameWords(tcp=is_tcp)
+        words = FrameLog(tcp=is_tcp)
         shorter, whole = words.frame(5, FrameDirection.IN, raw[:-1]), words.frame(5, FrameDirection.IN, raw)
         assert (shorter.time, shorter.direction, shorter.unit, shorter.meaning) == (5, None, None, "no frame")
         assert (whole.time, whole.direction, whole.unit) == (5, FrameDirection.IN, 1)
@@ -95,7 +95,7 @@ def test_what_is_too_short_for_a_frame_is_none() -> None:
 )
 def test_a_read_of_data_type_tells_how_values_travel(first: int, count: int, is_learnt: bool) -> None:
     """DATA_TYPE is 10000; 1 is DINT."""
-    words = FrameWords(tcp=True)
+    words = FrameLog(tcp=True)
     address = words._registers.of("DATA_TYPE").address
     begin = address + first - 10000
     request = bytes((3, *begin.to_bytes(2, "big"), 0, count))
@@ -108,7 +108,7 @@ def test_a_read_of_data_type_tells_how_values_travel(first: int, count: int, is_
 
 @pytest.mark.parametrize(("address", "is_learnt"), [(10000, True), (10001, False), (9999, False)])
 def test_a_write_of_data_type_tells_how_values_travel(address: int, is_learnt: bool) -> None:
-    words = FrameWords(tcp=True)
+    words = FrameLog(tcp=True)
     request = bytes((6, *address.to_bytes(2, "big"), 0, 1))
     words.observe(0, FrameDirection.IN, mbap.encode_frame(1, 1, request))
     words.observe(1, FrameDirection.OUT, mbap.encode_frame(1, 1, request))
@@ -117,7 +117,7 @@ def test_a_write_of_data_type_tells_how_values_travel(address: int, is_learnt: b
 
 @pytest.mark.parametrize("gap_ms", [4, 35])
 def test_the_gap_that_ends_a_frame_is_a_choice(gap_ms: int) -> None:
-    ear = RtuListener(FrameWords(), gap_ms * MILLISECOND)
+    ear = RtuListener(FrameLog(), gap_ms * MILLISECOND)
     ear.feed(READ[:3], 0)
     due = ear.deadline()
     assert due is not None

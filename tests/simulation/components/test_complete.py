@@ -52,7 +52,7 @@ def test_it_is_in_the_world_of_all_elements_with_its_signals(name: str) -> None:
         world = everything()
         assert world.spec.elements[name]
         for spec in ELEMENTS[name].named(world.spec.elements[name]):
-            assert world.parts.element_signals(spec.name)
+            assert world.objects.element_signals(spec.name)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -73,7 +73,7 @@ def test_places_lie_on_the_belt() -> None:
     """The scale of a chart is the length of the belt."""
     world = World.from_toml(TEXT)
     assert CONVEYOR.signals is not None
-    signals = CONVEYOR.signals(world.parts.built(CONVEYOR)["belt"])
+    signals = CONVEYOR.signals(world.objects.built(CONVEYOR)["belt"])
     assert (signals["place1"].bounds, signals["place1"].unit) == ((0.0, 400.0), "mm")
     assert signals["count"].bounds is None
 
@@ -355,7 +355,7 @@ def test_a_workpiece_waits_until_the_next_belt_has_room() -> None:
 @pytest.mark.parametrize("mm_per_unit", [160.0, 7.0, 333.0])
 def test_places_are_the_nearest_pulses(mm_per_unit: float) -> None:
     world = World.from_toml(ON_AN_AXIS.replace("mm_per_unit = 160.0", f"mm_per_unit = {mm_per_unit}"))
-    belt = world.parts.built(CONVEYOR)["belt"]
+    belt = world.objects.built(CONVEYOR)["belt"]
     assert belt.per_mm == Fraction(3200) / Fraction(mm_per_unit)
     for n in range(1, 30):
         assert abs(belt.places(n * 0.37) - Fraction(str(round(n * 0.37, 2))) * belt.per_mm) <= Fraction(1, 2) + Fraction(1, 10**6)

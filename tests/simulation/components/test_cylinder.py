@@ -198,7 +198,7 @@ def test_mistakes_have_their_places(old: str, new: str, text: str) -> None:
 @pytest.mark.parametrize("stroke", [3.0, 7.0, 50.0])
 def test_places_are_the_nearest(stroke: float) -> None:
     world = World.from_toml(TEXT.replace("stroke = 50.0", f"stroke = {stroke}").replace("above = 45.0", "above = 2.5"))
-    cylinder = world.parts.built(CYLINDER)["clamp"]
+    cylinder = world.objects.built(CYLINDER)["clamp"]
     for n in range(1, 40):
         units = stroke * n / 41
         assert abs(cylinder.places(units) - Fraction(str(units)) / Fraction(str(stroke)) * cylinder.travel.full) <= Fraction(1, 2)

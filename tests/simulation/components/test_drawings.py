@@ -116,7 +116,7 @@ def test_drawings(kind: str, name: str, drawing: Drawing) -> None:
     world = World.from_toml(WORLD)
     draw = ELEMENTS[kind].drawing
     assert draw is not None
-    found = draw(world.parts.elements[kind][name])
+    found = draw(world.objects.elements[kind][name])
     assert found.length == pytest.approx(drawing.length)
     assert found.low == pytest.approx(drawing.low)
     assert (found.shape, found.places, found.size, found.sensors) == (

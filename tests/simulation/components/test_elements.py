@@ -91,7 +91,7 @@ def test_it_is_described_built_recorded_and_asked_for() -> None:
     assert notes == [("lit", 50 * MILLISECOND), ("dark", 200 * MILLISECOND)]
     # At the end of the move the lamp is dark in the same moment.
     assert [record.value for record in world.failures] == ["busy.lit == 1; busy.lit is 0"]
-    assert world.parts.built(LAMP)["busy"].lit is False
+    assert world.objects.built(LAMP)["busy"].lit is False
 
 
 def test_its_faults_are_recorded_set_and_cleared() -> None:
@@ -101,7 +101,7 @@ def test_its_faults_are_recorded_set_and_cleared() -> None:
     world.run(for_=0)
     assert world.read("busy.lit") == 0.0
     assert [(record.subject, record.value) for record in world.trace.of("fault")] == [("now", "it is burnt out")]
-    world.parts.faults.remove("now", world.now)
+    world.objects.faults.remove("now", world.now)
     assert world.read("busy.lit") == 1.0
     world.run(for_=1)
     texts = [(record.time, record.value) for record in world.trace.of("fault") if record.subject == "burnt-out"]
@@ -158,7 +158,7 @@ def test_run_and_up_have_it(tmp_path: Path, capfd: pytest.CaptureFixture[str], m
 
 def test_a_fault_of_an_element_happens_once_from_its_beginning_to_its_end() -> None:
     world = World.from_toml(TEXT)
-    (active,) = world.parts.faults.active
+    (active,) = world.objects.faults.active
     happened = []
     for moment in (0.199, 0.2, 0.25, 0.3, 0.9):
         world.run(until=moment)
@@ -172,7 +172,7 @@ def test_what_elements_of_a_kind_do() -> None:
         name: element.function(built)
         for element in ELEMENTS.values()
         if element.function is not None
-        for name, built in world.parts.built(element).items()
+        for name, built in world.objects.built(element).items()
     }
     assert found == {"both": "or", "start-time": "pulse"}
 

@@ -228,14 +228,14 @@ def test_its_place_is_the_nearest_also_where_its_cam_is_worn(share: float, place
     world = World.from_toml(TEXT.replace("offset = 20.0", "offset = 120.0"))
     world.fault(f"worn-cam element=knife share={share}")
     world.run(for_=0.1)
-    assert world.parts.built(FOLLOWER)["knife"].place(world.now) == place
+    assert world.objects.built(FOLLOWER)["knife"].place(world.now) == place
 
 
 def test_where_it_may_turn_is_after_the_present_moment() -> None:
     """Also a nanosecond before it comes to a corner of its cam."""
     world = start(World.from_toml(TEXT))
     world.run(for_=0.01)
-    follower = world.parts.built(FOLLOWER)["knife"]
+    follower = world.objects.built(FOLLOWER)["knife"]
     turning_points = [*follower.turning_points(world.now)]
     assert len(turning_points) > 4
     for turn in turning_points:

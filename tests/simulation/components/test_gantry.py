@@ -233,7 +233,7 @@ def test_a_beam_that_is_too_heavy_for_both_stands(old: str, new: str) -> None:
 def test_its_beam_is_drawn_from_both_ends() -> None:
     """640 pulses are a mm; the second end goes the other way."""
     found = World.from_toml(text().replace('drive = "b.M1"', 'drive = "b.M1"\ninverted = true'))
-    (gantry,) = found.parts.built(ELEMENT).values()
+    (gantry,) = found.objects.built(ELEMENT).values()
     assert ELEMENT.moved is not None
     ((end, channel),) = ELEMENT.moved(gantry)
     assert end == "ya"
@@ -244,4 +244,4 @@ def test_its_beam_is_drawn_from_both_ends() -> None:
 def test_there_may_be_several() -> None:
     others = "".join(CONTROLLER.format(name=name, acc=400.0) for name in "cd")
     second = GANTRY.replace("beam", "bridge").replace("ya", "yc").replace("yb", "yd").replace("a.OUT3", "c.OUT3")
-    assert list(World.from_toml(text() + others + second).parts.built(ELEMENT)) == ["beam", "bridge"]
+    assert list(World.from_toml(text() + others + second).objects.built(ELEMENT)) == ["beam", "bridge"]

@@ -143,7 +143,7 @@ def test_timers_are_those_of_the_standard(kind: str, expected: list[tuple[float,
 def test_a_timer_whose_time_is_broken_off_is_not_due() -> None:
     text = '[[mic488]]\nname = "a"\n[[button]]\nname = "one"\nto = "it.in"\n[[timer]]\nname = "it"\n'
     there = World.from_toml(text + 'kind = "on-delay"\ntime = "100 ms"\n[[wire]]\nfrom = "it.out"\nto = "a.IN1"\n')
-    timer = there.parts.built(TIMER)["it"]
+    timer = there.objects.built(TIMER)["it"]
     deadlines = []
     for pressed in (True, False):
         press(there, "one", pressed)

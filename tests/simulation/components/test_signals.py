@@ -61,7 +61,7 @@ def test_turns_are_the_ends_of_segments_that_are_still_to_come() -> None:
     world = moving()
     world.run(for_=0.5)
     for name in ("a.M1.position", "a.M1.velocity", "a.M1.moving", "a.M1.encoder"):
-        signal = find_signal(world.parts, name)
+        signal = find_signal(world.objects, name)
         assert signal.continuous, name
         ends = [1.025] if name == "a.M1.moving" else [0.4, 0.625, 1.025]
         assert list(signal.turning_points(world.now)) == pytest.approx([end * SECOND for end in ends if end > 0.5], abs=2), name
@@ -69,13 +69,13 @@ def test_turns_are_the_ends_of_segments_that_are_still_to_come() -> None:
         (first, *_) = signal.turning_points(world.now)
         assert first not in signal.turning_points(first), "a turn at the moment itself is not to come"
     for name in ("x.position", "x.lost", "x.stalled"):
-        turning_points = list(find_signal(world.parts, name).turning_points(world.now))
+        turning_points = list(find_signal(world.objects, name).turning_points(world.now))
         assert turning_points == sorted(set(turning_points)), name
         assert turning_points[:1] == pytest.approx([0.625 * SECOND], abs=2), name
     for name in ("a.M1.status", "a.M1.enabled", "a.status", "a.program", "a.IN1", "d.variable", "d.moving", "go.pressed"):
-        signal = find_signal(world.parts, name)
+        signal = find_signal(world.objects, name)
         assert (signal.continuous, list(signal.turning_points(0)), signal.version()) == (False, [], None), name
-    time = find_signal(world.parts, "time")
+    time = find_signal(world.objects, "time")
     assert (time.continuous, list(time.turning_points(0)), time.sync(0), time.version()) == (True, [], (), "time")
 
 
@@ -83,12 +83,12 @@ def test_an_endless_motion_has_no_last_turn() -> None:
     world = small()
     world.mic488["a"].write("M1_EN", 1)
     world.mic488["a"].write("M1_VEL_ABS", -40.0)
-    assert list(find_signal(world.parts, "a.M1.velocity").turning_points(0)) == pytest.approx([0.4 * SECOND], abs=2)
+    assert list(find_signal(world.objects, "a.M1.velocity").turning_points(0)) == pytest.approx([0.4 * SECOND], abs=2)
 
 
 def test_a_version_changes_with_the_plan_and_with_the_coordinate() -> None:
     world = moving()
-    signals = {name: find_signal(world.parts, name) for name in ("a.M1.position", "a.M1.velocity", "a.M1.moving", "x.position")}
+    signals = {name: find_signal(world.objects, name) for name in ("a.M1.position", "a.M1.velocity", "a.M1.moving", "x.position")}
     before = {name: signal.version() for name, signal in signals.items()}
     world.run(for_=0.1)
     assert {name: signal.version() for name, signal in signals.items()} == before
@@ -111,7 +111,7 @@ def test_a_chip_has_signals_of_its_own() -> None:
     assert start == {"position": 0.0, "velocity": 0.0, "counter": 0.0, "moving": 0.0, "variable": float(chip.unit.variable)}
     idle = world.read("idle")
     world.line["bus"].send(b"x3\rf12800\rr\r")
-    signals = {name: find_signal(world.parts, f"d.{name}") for name in names}
+    signals = {name: find_signal(world.objects, f"d.{name}") for name in names}
     versions = {name: signals[name].version() for name in ("position", "velocity")}
     world.run(for_=0.05)
     now = world.now
@@ -143,16 +143,16 @@ def test_controllers_have_status_program_and_pins() -> None:
 
 def test_to_sync_a_signal_is_to_advance_the_scheduler_of_its_source() -> None:
     world = small()
-    signal = find_signal(world.parts, "c.status")
+    signal = find_signal(world.objects, "c.status")
     assert isinstance(signal, SignalOf)
-    assert signal.sync(SECOND) == ((world.parts.scheduler_of["c"], "c"),)
+    assert signal.sync(SECOND) == ((world.objects.scheduler_of["c"], "c"),)
     assert [scheduler.now for scheduler in world.schedulers] == [0, SECOND]
 
 
 def test_a_condition_makes_no_scheduler_step_exact_unless_requests_change_its_signal() -> None:
     """What a controller counts changes with events; what a master stores does not."""
     for is_kept in (False, True):
-        scheduler = small().parts.scheduler_of["c"]
+        scheduler = small().objects.scheduler_of["c"]
         options = {"is_kept": True} if is_kept else {}
         SignalOf((scheduler.source("c"),), lambda now: 0.0, **options).watch("c.status")  # type: ignore[arg-type]
         assert scheduler.is_step_exact is is_kept
@@ -160,19 +160,19 @@ def test_a_condition_makes_no_scheduler_step_exact_unless_requests_change_its_si
 
 def test_idle_looks_at_what_was_busy_last_and_at_all_when_nothing_is() -> None:
     world = moving()
-    idle = find_signal(world.parts, "idle")
+    idle = find_signal(world.objects, "idle")
     assert isinstance(idle, Idle)
     assert (idle.continuous, list(idle.turning_points(0)), idle.version()) == (False, [], None)
-    assert idle.sync(world.now) == (world.parts.scheduler_of["a"].source("a"),)
+    assert idle.sync(world.now) == (world.objects.scheduler_of["a"].source("a"),)
     assert idle.value(world.now) == 0.0
     assert [scheduler.now for scheduler in world.schedulers] == [0, 0, 0]
     world.run(for_=1.1)
-    assert idle.sync(world.now) == tuple(world.parts.scheduler_of[name].source(name) for name in world.controllers)
+    assert idle.sync(world.now) == tuple(world.objects.scheduler_of[name].source(name) for name in world.controllers)
     assert idle.value(world.now) == 1.0
     assert [scheduler.now for scheduler in world.schedulers] == [world.now] * 3
     world.mic488["c"].axis[1].enable()
     world.mic488["c"].axis[1].move_to(100.0)
-    assert idle.sync(world.now) == (world.parts.scheduler_of["c"].source("c"),)
+    assert idle.sync(world.now) == (world.objects.scheduler_of["c"].source("c"),)
     assert world.read("idle") == 0.0
 
 
@@ -213,7 +213,7 @@ def test_a_program_and_a_line_keep_a_world_busy() -> None:
 )  # fmt: skip
 def test_a_name_that_is_no_signal_is_refused_with_those_that_are(name: str, message: str) -> None:
     with pytest.raises(Misuse, match=message):
-        find_signal(small(CHIP).parts, name)
+        find_signal(small(CHIP).objects, name)
 
 
 MASTER = """

@@ -15,7 +15,7 @@ from steptwin.files.world import World
 from steptwin.mic488.config import AxisConfig, ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.status import AxisStatus
-from steptwin.simulation.faults import Faults, FaultyController, read, rig
+from steptwin.simulation.faults import Faults, FaultyController, prepare_for_faults, read
 from steptwin.simulation.kinds.mic488.faults import Mic488Body
 from steptwin.simulation.logic.contacts import PositionSwitch, place
 from steptwin.simulation.scheduler.scheduler import Scheduler
@@ -174,7 +174,7 @@ def test_master_error_stays_when_the_controller_is_switched_off_and_on() -> None
 def test_what_shows_no_master_error_says_so() -> None:
     scheduler, faults = Scheduler(), Faults()
     scheduler.add("old", Mic488Device(ControllerConfig(), "1.40"))
-    rig(scheduler, "old", faults, Mic488Body(scheduler.controllers["old"], 1))  # type: ignore[arg-type]
+    prepare_for_faults(scheduler, "old", faults, Mic488Body(scheduler.controllers["old"], 1))  # type: ignore[arg-type]
     with pytest.raises(Misuse, match=r"fault master-error: 'old' has firmware 1\.40, which has no M_STATUS: 1\.70 has"):
         faults.add(read("master-error"))
 
@@ -332,7 +332,7 @@ def test_what_is_stored_outside_is_what_the_memory_has() -> None:
     device = Mic488Device(ControllerConfig())
     device.store = kept.append
     scheduler.add("1", device)
-    rig(scheduler, "1", held, Mic488Body(device, 1))
+    prepare_for_faults(scheduler, "1", held, Mic488Body(device, 1))
     held.add(read("power-cut written=3 nth=1"))
     device.user[:] = array("H", [0x5555] * len(device.user))
     device.save_memory()
@@ -499,7 +499,7 @@ class Heard(Bare):
 def faulty(fault: str) -> tuple[Heard, FaultyController]:
     scheduler, faults, inner = Scheduler(), Faults(0), Heard()
     scheduler.add("a", inner)
-    controller = rig(scheduler, "a", faults, ToyBody())
+    controller = prepare_for_faults(scheduler, "a", faults, ToyBody())
     faults.add(read(fault), 0)
     inner.asked.clear()
     return inner, controller

@@ -11,7 +11,7 @@ from steptwin.m1486.encoding import encode
 from steptwin.m1486.lines import DUAL_DAC
 from steptwin.m1486.syntax import parse as parse_m1486
 from steptwin.m1486.variants import variant
-from steptwin.simulation.faults import Faults, read, rig
+from steptwin.simulation.faults import Faults, prepare_for_faults, read
 from steptwin.simulation.kinds.m1486.faults import M1486Body
 from steptwin.simulation.scheduler.scheduler import Scheduler
 
@@ -20,7 +20,7 @@ def chip(*faults: str) -> tuple[M1486Chip, Scheduler]:
     chip = M1486Chip(variant("E1"), address=1)
     scheduler, held = Scheduler(), Faults()
     scheduler.add("1", chip)
-    rig(scheduler, "1", held, M1486Body(chip))
+    prepare_for_faults(scheduler, "1", held, M1486Body(chip))
     for fault in faults:
         held.add(read(fault))
     return chip, scheduler

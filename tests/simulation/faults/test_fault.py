@@ -155,7 +155,7 @@ _CRC, _STALL = KINDS["crc"], KINDS["stall"]
             (replace(kind, effect=None), f"fault {kind.name} lacks its effect: {effect}")
             for kind, effect in (
                 (KINDS["flip"], "ByteEffect"),
-                (KINDS["split"], "InsertEffect or PiecesEffect"),
+                (KINDS["split"], "InsertEffect or SplitEffect"),
                 (_CRC, "AnswerEffect"),
                 (KINDS["busy"], "RequestEffect"),
                 (_STALL, "MomentEffect"),

@@ -17,7 +17,7 @@ from steptwin import m1486
 from steptwin.datasheet import Access, Limits, PointAddress, PointEffect
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.jsonvalues import plain
+from steptwin.jsonvalues import to_json
 from steptwin.m1486.events import M1486Event
 from steptwin.m1486.variants import VARIANTS
 from steptwin.mic488.events import EVENTS
@@ -71,7 +71,7 @@ def test_every_pin_and_every_point_of_a_data_sheet_can_be_named(name: str) -> No
 
 @pytest.mark.parametrize("name", SHEETS)
 def test_a_data_sheet_is_json(name: str) -> None:
-    data = json.loads(json.dumps(plain(SHEETS[name]), allow_nan=False))
+    data = json.loads(json.dumps(to_json(SHEETS[name]), allow_nan=False))
     assert data["kind"] == SHEETS[name].kind
     assert [point["path"] for point in data["points"]] == [point.path for point in SHEETS[name].points]
 

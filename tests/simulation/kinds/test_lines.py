@@ -59,7 +59,7 @@ def followed(there: World, line: str) -> list[str]:
     """The frames of a line as text, from now on."""
     found: list[str] = []
     spec = next(one for one in there.spec.lines if one.name == line)
-    words = line_kinds()[spec.kind].words(there.lines[line], "", lambda frame: found.append(str(frame)))
+    words = line_kinds()[spec.kind].traffic_log(there.lines[line], "", lambda frame: found.append(str(frame)))
     there.lines[line].follow_frames(words)
     there.trace.watchers.append(words.recorded)
     return found
@@ -203,7 +203,7 @@ def test_whom_a_request_may_change(kind: str) -> None:
     there = world()
     line, framed = there.lines["bus"], rtu if kind == "rtu" else tcp
     line.connect("p", kind)
-    words = line_kinds()["modbus"].words(line, "", lambda _: None)
+    words = line_kinds()["modbus"].traffic_log(line, "", lambda _: None)
     assert [sorted(words.changes("p", framed(pdu, unit))) for pdu, unit in ((READ_STATUS, 1), (ON, 1), (ON, 2), (ON, 0))] == [
         [],
         [1],

@@ -88,7 +88,7 @@ def test_every_change_of_a_load_is_another_version() -> None:
         change()
         versions.append(load.version())
     assert len(set(versions)) == 4
-    assert load.pieces == (OTHER,)
+    assert load.workpieces == (OTHER,)
 
 
 class Both:

@@ -20,7 +20,7 @@ from steptwin.motion import MotionState, plan_position
 from steptwin.simulation.faults import read
 from steptwin.simulation.mechanics.mechanics import EncoderBuild, Mechanism
 from steptwin.simulation.mechanics.motor import StepperMotor
-from steptwin.simulation.mechanics.trajectory import Build, LoadPiece, MechanicalState
+from steptwin.simulation.mechanics.trajectory import Build, LoadSection, MechanicalState
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.script import steps as do
@@ -353,8 +353,8 @@ def test_the_trace_is_told_where_the_load_is_only_when_it_does_not_go_with_its_d
     held = met.pulse_time(56, 0)
     assert held is not None
     first = loads[0].value
-    assert first == (LoadPiece(0, True, 0), LoadPiece(held, False, 55), LoadPiece(met.end or 0, True, -45))
-    assert all(carried == LoadPiece(10 * SECOND, True, -45) for record in loads[1:] for carried in record.value)  # type: ignore[attr-defined]
+    assert first == (LoadSection(0, True, 0), LoadSection(held, False, 55), LoadSection(met.end or 0, True, -45))
+    assert all(carried == LoadSection(10 * SECOND, True, -45) for record in loads[1:] for carried in record.value)  # type: ignore[attr-defined]
 
 
 def test_a_motor_without_torque_is_told_when_it_loses_the_field_and_when_it_is_caught() -> None:

@@ -6,7 +6,7 @@ from math import acos, exp, log, pi, sqrt
 
 import pytest
 
-from steptwin.simulation.mechanics.resonance import MotionPart, Resonance, ResonanceInterval, limit, resonance_intervals
+from steptwin.simulation.mechanics.resonance import MotionPhase, Resonance, ResonanceInterval, limit, resonance_intervals
 
 BAND = Resonance(1000.0, 2000.0, 12.0, 8.0, 0.1)
 
@@ -33,14 +33,14 @@ def test_without_torque_to_spare_it_is_lost_at_once() -> None:
     ("speed", "grows"), [(999.0, False), (1000.0, False), (1000.1, True), (1999.9, True), (2000.0, False), (2001.0, False)]
 )
 def test_it_grows_between_the_ends_of_the_band(speed: float, grows: bool) -> None:
-    ((interval, lost),) = resonance_intervals(BAND, [MotionPart(1.0, 1.01, speed, 0.0)], 0.2)
+    ((interval, lost),) = resonance_intervals(BAND, [MotionPhase(1.0, 1.01, speed, 0.0)], 0.2)
     assert interval == ResonanceInterval(1.0, 0.2, 12.0 if grows else -8.0)
     assert lost is None
 
 
 def test_the_moment_at_which_the_field_is_lost() -> None:
     """Two parts: the amplitude fades in the first one, and grows in the second to its limit."""
-    parts = [MotionPart(0.0, 0.05, 500.0, 0.0), MotionPart(0.05, 1.0, 1500.0, 0.5), MotionPart(1.0, 2.0, 500.0, 0.0)]
+    parts = [MotionPhase(0.0, 0.05, 500.0, 0.0), MotionPhase(0.05, 1.0, 1500.0, 0.5), MotionPhase(1.0, 2.0, 500.0, 0.0)]
     first, second = resonance_intervals(BAND, parts, 0.4)
     at = 0.4 * exp(-0.4)
     assert first == (ResonanceInterval(0.0, 0.4, -8.0), None)
@@ -51,15 +51,15 @@ def test_the_moment_at_which_the_field_is_lost() -> None:
 def test_a_part_that_ends_before_is_survived() -> None:
     needed = log(limit(0.5) / 0.2) / 12.0
     for share, count in ((0.999, 2), (1.001, 1)):
-        parts = [MotionPart(0.0, needed * share, 1500.0, 0.5), MotionPart(needed * share, 9.0, 500.0, 0.0)]
+        parts = [MotionPhase(0.0, needed * share, 1500.0, 0.5), MotionPhase(needed * share, 9.0, 500.0, 0.0)]
         assert len(list(resonance_intervals(BAND, parts, 0.2))) == count
 
 
 def test_an_amplitude_above_the_limit_loses_the_field_at_once() -> None:
-    ((_, lost),) = resonance_intervals(BAND, [MotionPart(3.0, 4.0, 1500.0, 0.5)], 2.0 * limit(0.5))
+    ((_, lost),) = resonance_intervals(BAND, [MotionPhase(3.0, 4.0, 1500.0, 0.5)], 2.0 * limit(0.5))
     assert lost == 3.0
 
 
 def test_after_a_part_without_end_there_is_the_least_vibration() -> None:
-    parts = [MotionPart(0.0, float("inf"), 500.0, 0.0), MotionPart(1.0, 2.0, 500.0, 0.0)]
+    parts = [MotionPhase(0.0, float("inf"), 500.0, 0.0), MotionPhase(1.0, 2.0, 500.0, 0.0)]
     assert [interval.amplitude for interval, _ in resonance_intervals(BAND, parts, 0.4)] == [0.4, 0.1]

@@ -130,7 +130,7 @@ def test_rotor_and_load_are_where_a_simulation_has_them(
         _, rotor, load = [step for step in way if step[0] <= now][-1]
         assert trajectory.at(now)[:2] == (rotor, load)
         # What a trace is told, in the pulses of the drive.
-        _, follows, pulses = [said for said in trajectory.load_pieces() if said.begin <= now][-1]
+        _, follows, pulses = [said for said in trajectory.load_sections() if said.begin <= now][-1]
         assert (pulses + (plan.count(now) if follows else 0)) * sign == load
 
 

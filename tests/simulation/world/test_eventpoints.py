@@ -54,7 +54,7 @@ class Follows:
         self._found = EventPoints(world, "m", self._points)
         self._values = self._all(world.now)
         self.changes = 0
-        world.parts.scheduler_of["m"].follow(self, ("m",))
+        world.objects.scheduler_of["m"].follow(self, ("m",))
 
     def _all(self, now: Nanos) -> dict[str, float]:
         return {path: point.read(now) for path, point in self._points.items() if point.read is not None}

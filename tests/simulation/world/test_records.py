@@ -68,7 +68,7 @@ def ran() -> World:
 
 
 def shown(world: World, names: str = "", kinds: str = "") -> list[str]:
-    selection = read_selection([names], [kinds], named_in(world.parts))
+    selection = read_selection([names], [kinds], named_in(world.objects))
     return [describe(record)[16:].strip() for record in world.trace if selection.shows(record)]
 
 

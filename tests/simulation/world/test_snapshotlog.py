@@ -294,7 +294,7 @@ def test_nothing_watches_the_trace_after_the_end() -> None:
     assert world.trace.watchers != watchers
     snapshots.close()
     assert world.trace.watchers == watchers
-    followers = world.parts.scheduler_of["m"].followers
+    followers = world.objects.scheduler_of["m"].followers
     assert followers is None or not followers.by_name["m"]
 
 

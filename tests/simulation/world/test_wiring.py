@@ -39,7 +39,7 @@ TEXT = """
 
 
 def test_each_input_has_its_sources() -> None:
-    parts = World.from_toml(TEXT).parts
+    parts = World.from_toml(TEXT).objects
     found = {(one.source, terminal_name(parts, one.target)): (one.inverted, one.delay, one.join) for one in connections(parts)}
     assert found == {
         ("x.switch1", "a.IN1"): (False, 0, None),
@@ -52,4 +52,4 @@ def test_each_input_has_its_sources() -> None:
 
 
 def test_a_world_without_wiring_has_no_connections() -> None:
-    assert not list(connections(World.from_toml('[[mic488]]\nname = "a"\n').parts))
+    assert not list(connections(World.from_toml('[[mic488]]\nname = "a"\n').objects))

@@ -57,7 +57,7 @@ class ToyView(ControllerView):
         return self._toy.axis.plan.count(self._toy.now)
 
 
-class ToyWords:
+class ToyTrafficLog:
     """``M`` and ``P`` with their numbers."""
 
     def __init__(self, line: ToyLine, prefix: str, sink: Callable[[FrameLine], None]) -> None:
@@ -144,8 +144,8 @@ class ToyLines(LineKind[Toy, ToyLine]):
             raise Misuse("a toy is alone on its line")
         return ToyLine(scheduler, spec.name, members[0].controller, faults, record)
 
-    def words(self, line: ToyLine, prefix: str, sink: Callable[[FrameLine], None]) -> ToyWords:
-        return ToyWords(line, prefix, sink)
+    def traffic_log(self, line: ToyLine, prefix: str, sink: Callable[[FrameLine], None]) -> ToyTrafficLog:
+        return ToyTrafficLog(line, prefix, sink)
 
 
 class ToyKind(ControllerKind[ToySpec, Toy, ToyView]):

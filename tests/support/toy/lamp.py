@@ -8,9 +8,9 @@ from typing import ClassVar
 
 from steptwin.controller import Nanos
 from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.components.registry import forget, register
-from steptwin.simulation.components.site import Site
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.logic.signal import SignalOf
@@ -71,8 +71,8 @@ def _refers(spec: LampSpec, described: ElementSpecs) -> Iterator[Reference]:
     yield Reference(spec.source[0], spec.source[0], (*spec.path, "from"))
 
 
-def _build(spec: LampSpec, site: Site) -> Lamp:
-    lamp = Lamp(spec, site.scheduler(spec.source[0]), site.terminal(spec.source, OUTPUT))
+def _build(spec: LampSpec, context: ElementContext) -> Lamp:
+    lamp = Lamp(spec, context.scheduler(spec.source[0]), context.terminal(spec.source, OUTPUT))
     lamp.scheduler.add_part(lamp, name=spec.name)
     return lamp
 

@@ -33,7 +33,7 @@ def _no_collision(rest: str, world: Simulation | None) -> str:
     _nothing("no-collision", rest)
     if world is None:
         return "never any.count > 0"
-    names = world.parts.built(COLLISION)
+    names = world.objects.built(COLLISION)
     if not names:
         raise Misuse("property 'no-collision': this world has no [[collision]]")
     return _all(f"never {name}.count > 0" for name in names)

@@ -9,12 +9,12 @@ from typing import Any
 
 from steptwin.campaign.case import Verdict
 from steptwin.campaign.properties.evaluate import Evaluation
+from steptwin.campaign.properties.formatting import formula_text, found_text
 from steptwin.campaign.properties.ready import check_ready, written_out
 from steptwin.campaign.properties.records import ComparisonRecords
 from steptwin.campaign.properties.slopes import TINY, Shape, Slope, shortest, value_at
 from steptwin.campaign.properties.text import parse_property
 from steptwin.campaign.properties.tree import Atom, CycleTime, Delayed, Holding, Lasting, PropertyFormula, Tally, measured, nodes
-from steptwin.campaign.properties.words import formula_text, found_text
 from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.simulation.world.simulation import Simulation

@@ -34,12 +34,12 @@ class CampaignReport:
     histograms: Sequence[Histogram]
     search: str
 
-    def plain(self, folder: Path) -> dict[str, Any]:
+    def to_json(self, folder: Path) -> dict[str, Any]:
         """As JSON; paths are relative to ``folder``."""
         return {
-            **self.summary.plain(),
+            **self.summary.to_json(),
             "search": self.search,
-            "causes": [one.plain(folder) for one in self.found],
+            "causes": [one.to_json(folder) for one in self.found],
             "influences": [one._asdict() for one in self.influences],
             "sobol_indices": [one._asdict() for one in self.indices],
             "measures": [one._asdict() for one in self.histograms],
@@ -106,7 +106,7 @@ class CampaignReport:
     def _causes(self, folder: Path) -> str:
         rows: list[tuple[str, ...]] = []
         for one in self.found:
-            files = {} if one.files is None else one.files.plain(folder)
+            files = {} if one.files is None else one.files.to_json(folder)
             links = ", ".join(link(Path(path).as_posix(), name) for name, path in files.items())
             what = escape(summary(one.result))
             rows.append((escape(one.failure.property), str(len(one.numbers)), what, escape(_simplest(one)), links))

@@ -98,7 +98,7 @@ def lines(found: Mapping[str, Any]) -> list[str]:
     p_value = "" if found["p_value"] is None else f" (p = {found['p_value']:.2g})"
     text.append(f"{found['verdict']}{p_value}")
     for name, both in found["properties"].items():
-        text.append(f"  {name}: {_shown(both['before'])} -> {_shown(both['after'])}")
+        text.append(f"  {name}: {_format(both['before'])} -> {_format(both['after'])}")
     for name, both in found["measures"].items():
         text.append(f"  mean of {name}: {_number(both['before'])} -> {_number(both['after'])}")
     text += [f"gone: {name}: {cause}" for name, cause in found["gone"]]
@@ -106,7 +106,7 @@ def lines(found: Mapping[str, Any]) -> list[str]:
     return text
 
 
-def _shown(one: Mapping[str, Any] | None) -> str:
+def _format(one: Mapping[str, Any] | None) -> str:
     return "-" if one is None else f"failed in {one['failed']}, least robustness {_number(one['robustness'])}"
 
 

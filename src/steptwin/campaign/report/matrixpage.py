@@ -35,7 +35,7 @@ def write_matrix(matrix: FaultMatrix, folder: Path) -> list[Path]:
     texts = {
         "faults.html": matrix_page(matrix),
         "faults.csv": matrix.csv(),
-        "faults.json": json.dumps(matrix.plain(), ensure_ascii=False, indent=1) + "\n",
+        "faults.json": json.dumps(matrix.to_json(), ensure_ascii=False, indent=1) + "\n",
     }
     for name, text in texts.items():
         write_bytes(folder / name, text.encode())

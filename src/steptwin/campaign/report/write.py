@@ -56,7 +56,7 @@ def write_report(campaign: Campaign, summary: CampaignSummary, folder: Path, fil
         histograms=[one for one in shown if one is not None],
         search=campaign.description.search,
     )
-    text = json.dumps(report.plain(folder), ensure_ascii=False, indent=1) + "\n"
+    text = json.dumps(report.to_json(folder), ensure_ascii=False, indent=1) + "\n"
     for name, content in {
         "report.html": report.html(folder).encode(),
         "report.json": text.encode(),

@@ -257,13 +257,13 @@ class AsyncM1486:
         stopped."""
         counter = await self.counter()
         self._check_position()
-        return self._shown(counter)
+        return self._in_units(counter)
 
     def _check_position(self) -> None:
         if not self._unit.shared.is_position_valid:
             raise PositionUnknown(COUNTER_SHOWS_THE_TARGET(place=self.line.place, chip=self._unit.name))
 
-    def _shown(self, counter_u: int) -> float:
+    def _in_units(self, counter_u: int) -> float:
         return (counter_u - self.origin_u) / self.scale_u
 
     def _counter_of(self, position: float) -> int:
@@ -271,7 +271,7 @@ class AsyncM1486:
             raise Misuse(NO_POSITION(position=position, unit=self.unit))
         counter = self._on_grid(position, self.origin_u)
         if not 0 <= counter <= LARGEST:
-            least, most = self._shown(0), self._shown(LARGEST)
+            least, most = self._in_units(0), self._in_units(LARGEST)
             raise Misuse(POSITION_IS_OUT_OF_RANGE(position=position, unit=self.unit, least=least, most=most))
         return counter
 
@@ -330,7 +330,7 @@ class AsyncM1486:
             interface=None if shared.interface is None else shared.interface.title,
             series=shared.readings.get(16),
             counter_u=counter,
-            position=None if counter is None else self._shown(counter),
+            position=None if counter is None else self._in_units(counter),
             unit=self.unit,
             is_position_valid=is_valid,
             variable=shared.reading(4),
@@ -610,7 +610,7 @@ class AsyncM1486:
         unknown length keeps the line, except for stops. Raises `ChipMoveFailed` unless the motion ended as intended, and a
         `LineFailure` if the line fails; with ``check`` false both are returned as the end.
         """
-        end = await wait_for(self._unit, timeout_s, self.unit, self._shown, check=check)
+        end = await wait_for(self._unit, timeout_s, self.unit, self._in_units, check=check)
         if check and not end.ok:
             raise ChipMoveFailed(end)
         return end

@@ -86,7 +86,7 @@ class Garbled(LineFailure):
     def __init__(self, place: str, request: object, sent: bytes, received: bytes, *, uncertain: bool) -> None:
         self.uncertain = uncertain
         doubt = EXECUTED_OR_NOT() if uncertain else NOT_EXECUTED()
-        super().__init__(GARBLED(place=place, request=request, received=_shown(received), sent=_shown(sent), doubt=doubt))
+        super().__init__(GARBLED(place=place, request=request, received=_format(received), sent=_format(sent), doubt=doubt))
 
 
 class NoEcho(LineFailure):
@@ -120,5 +120,5 @@ def unconfirmed(chip: str, cause: LineFailure) -> Unconfirmed:
     return Unconfirmed(NOT_STOPPED(chip=chip, cause=text_of(cause)))
 
 
-def _shown(data: bytes) -> str:
+def _format(data: bytes) -> str:
     return repr(data.decode("latin-1")) if data else NOTHING()

@@ -67,7 +67,7 @@ class JoggedChip(Protocol):
 
     async def configure(self, *, velocity: int | None = None) -> None: ...
 
-    def _shown(self, counter_u: int) -> float: ...
+    def _in_units(self, counter_u: int) -> float: ...
 
 
 class AsyncM1486Jog:
@@ -172,7 +172,7 @@ class AsyncM1486Jog:
     async def __aexit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         """Wait for the end of the present move, and put V back."""
         try:
-            end = await wait_for(self._unit, None, self._chip.unit, self._chip._shown, check=False)
+            end = await wait_for(self._unit, None, self._chip.unit, self._chip._in_units, check=False)
             self.end = self.end or (RELEASED if end.ok else str(end))
             await self._put_back()
         except SteptwinError:

@@ -41,7 +41,7 @@ from steptwin.drivers.m1486.motion import ChipMoveEnd, ChipReason
 from steptwin.drivers.m1486.subject import M1486Part
 from steptwin.drivers.m1486.sync import M1486, M1486Jog, M1486Line, download_to
 from steptwin.drivers.m1486.talk import chip_name
-from steptwin.drivers.typed import shown
+from steptwin.drivers.typed import format_value
 from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.microsteps import UNIT
 from steptwin.m1486.syntax import parse
@@ -127,7 +127,7 @@ class M1486Driver(DriverKind[M1486]):
         position."""
         names = named.NAMES if driver.variant.store is Store.EEPROM else ("POSITION", "COUNTER", "TYPE")
         found: dict[str, Any] = dict.fromkeys(named.NAMES) | {name: one.value for name, one in named.read(driver, names).items()}
-        position = "unknown" if found["POSITION"] is None else f"{shown(found['POSITION'])} {driver.unit}"
+        position = "unknown" if found["POSITION"] is None else f"{format_value(found['POSITION'])} {driver.unit}"
         which = "" if driver.address is None else f", chip {driver.address:X}"
         head = [f"{found['TYPE']}{which} at {driver.place}", f"position {position} ({found['COUNTER']} {UNIT})"]
         if names is named.NAMES:

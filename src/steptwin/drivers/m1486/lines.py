@@ -33,7 +33,9 @@ def talking(
 
     def log_bytes(now: Nanos, direction: FrameDirection, data: bytes) -> None:
         if log is not None:
-            log(f"{now / SECOND:12.6f} s  {'→' if direction is FrameDirection.IN else '←'} {data.hex(' '):<24}  {in_words(data)}")
+            log(
+                f"{now / SECOND:12.6f} s  {'→' if direction is FrameDirection.IN else '←'} {data.hex(' '):<24}  {described(data)}"
+            )
 
     def observe(followed: bool) -> None:
         if followed:
@@ -53,7 +55,7 @@ def talking(
     return exchanger, {TALK: talk, FRAMES: frames}
 
 
-def in_words(data: bytes) -> str:
+def described(data: bytes) -> str:
     """Bytes as text, such as ``f12800 CR``; bytes that are not characters as hexadecimal."""
     return "".join(" CR " if byte == 0x0D else chr(byte) if 0x20 <= byte < 0x7F else f" {byte:02X}H " for byte in data).strip()
 

@@ -17,7 +17,7 @@ from steptwin.m1486.syntax import ChipCommand, parse_line
 from steptwin.m1486.variants import Variant
 
 
-class LabelledPart(NamedTuple):
+class LabelledCommands(NamedTuple):
     """Commands that can be executed from a label on. ``begins_at``: the bits that had been sent before its first command."""
 
     begins_at: int
@@ -49,7 +49,7 @@ class SentCommands:
         here = {command.number for command in self._commands if command.key == "@"}
         return not here.issuperset(jumps) or (label is not None and label not in here)
 
-    def part(self, label: int, variant: Variant, interface: Interface | None) -> LabelledPart | None:
+    def part(self, label: int, variant: Variant, interface: Interface | None) -> LabelledCommands | None:
         """Commands that can be executed from a label on; None for a label that was not downloaded."""
         stream = stream_of(None, self._commands)
         places = stream.labels.get(label)
@@ -57,7 +57,7 @@ class SentCommands:
             return None
         reached = flow_of(stream, variant, interface or STEP_DIRECTION).reached((places[-1],))
         end = len(self._commands)
-        return LabelledPart(min(self._before[place] for place in reached - {end}), end in reached)
+        return LabelledCommands(min(self._before[place] for place in reached - {end}), end in reached)
 
     def begins_at(self, lost_before: int) -> int | None:
         """The bits that had been sent before the oldest command that can be started again and was sent after ``lost_before``

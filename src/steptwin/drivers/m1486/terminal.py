@@ -57,7 +57,7 @@ def command_of(text: str, variant: Variant | None) -> ChipCommand | None:
     return command
 
 
-class TerminalWords:
+class TerminalDecoder:
     """Decodes the bytes from a line, given the lines typed. It has neither I/O nor a clock.
 
     The bytes carry no type, so their order decides. With function 41 ON the echo of the line comes first; then its end
@@ -198,7 +198,7 @@ class ChipTerminal:
         self._quiet_s = QUIET_S + self._serial.duration(3) / SECOND
         self._write_s = variant.write_ns / SECOND if variant is not None and variant.store is Store.EEPROM else 0.0
         self._show = show
-        self._words = TerminalWords()
+        self._words = TerminalDecoder()
         self._changed = threading.Condition()
         self._outgoing: deque[str] = deque()
         self._unsettled = 0  # lines whose echo may be to come

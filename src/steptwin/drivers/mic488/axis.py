@@ -61,22 +61,22 @@ class AsyncMic488Axis:
 
     async def position(self) -> float:
         """Counted position in u."""
-        return await self._shown("POS_ACT")
+        return await self._value_in_units("POS_ACT")
 
     async def velocity(self) -> float:
         """Present velocity in u/s."""
-        return await self._shown("VEL_ACT")
+        return await self._value_in_units("VEL_ACT")
 
     async def encoder(self) -> int:
         """Counter of the axis' encoder, in encoder pulses."""
         item = self._unit.item("ENC_IMP", self.number)
         return int((await self._unit.read([item]))[item])
 
-    async def _shown(self, key: str) -> float:
+    async def _value_in_units(self, key: str) -> float:
         unit = self._unit
         item = unit.item(key, self.number)
         data_type = (await unit.control()).data_type
-        value, _ = unit.shown(item, (await unit.read([item], data_type))[item], data_type)
+        value, _ = unit.in_units(item, (await unit.read([item], data_type))[item], data_type)
         return float(value)
 
     # ------------------------------------------------------------------ drive and settings

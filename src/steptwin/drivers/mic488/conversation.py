@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager
 from steptwin.drivers.mic488.named import map_of, read, writing
 from steptwin.drivers.mic488.sync import Mic488
 from steptwin.drivers.mic488.transcript import carry_out_one
-from steptwin.drivers.typed import shown
+from steptwin.drivers.typed import format_value
 
 HELP = """\
 NAME                read a register; also 'M?_ACC', USER_REGISTER[0-9], 10020, hr:10020:hex, several with blanks between
@@ -56,10 +56,10 @@ class Mic488Terminal:
             writing([line.removeprefix("set ")])(self._mic)
         elif line.split(maxsplit=1)[0] in ("wait", "raw", "sleep"):
             for name, result in carry_out_one(self._mic, line).items():
-                yield f"{name}: {', '.join(map(shown, result.values())) if isinstance(result, dict) else result}"
+                yield f"{name}: {', '.join(map(format_value, result.values())) if isinstance(result, dict) else result}"
         else:
             for name, found in read(self._mic, line.removeprefix("get ").split()).items():
-                yield f"{name} = {shown(found.value)} {found.unit}".rstrip()
+                yield f"{name} = {format_value(found.value)} {found.unit}".rstrip()
 
     def close(self) -> None:
         self._opened.__exit__(None, None, None)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from steptwin.controller import Nanos
-from steptwin.drivers.mic488.frames import FrameWords
+from steptwin.drivers.mic488.frames import FrameLog
 from steptwin.drivers.mic488.listening import RtuListener, TcpListener
 from steptwin.mic488.registers import register_map
 from steptwin.wire.frameline import FrameLine
@@ -16,10 +16,10 @@ class ModbusDecoder:
     """Decodes Modbus RTU or TCP, with the register names of a MIC488."""
 
     def __init__(self, sink: Callable[[FrameLine], None], firmware: str, *, tcp: bool) -> None:
-        words = FrameWords(register_map(firmware), tcp=tcp)
-        words.sinks.append(lambda h: sink(FrameLine(h.time, "", h.direction or FrameDirection.OUT, h.raw, h.meaning)))
-        self._tcp = TcpListener(words) if tcp else None
-        self._rtu = RtuListener(words)
+        log = FrameLog(register_map(firmware), tcp=tcp)
+        log.sinks.append(lambda h: sink(FrameLine(h.time, "", h.direction or FrameDirection.OUT, h.raw, h.meaning)))
+        self._tcp = TcpListener(log) if tcp else None
+        self._rtu = RtuListener(log)
 
     def feed(self, data: bytes, now: Nanos, direction: FrameDirection | None) -> None:
         if self._tcp is not None and direction is not None:

@@ -176,7 +176,7 @@ class AsyncMic488:
         data_type = control.data_type
         moving = unit.axis_items("POS_ACT") + unit.axis_items("VEL_ACT")
         values = await unit.read(moving, data_type)
-        shown = [unit.shown(item, values[item], data_type) for item in moving]
+        shown = [unit.in_units(item, values[item], data_type) for item in moving]
         return Mic488Status(
             positions=tuple(float(value) for value, _ in shown[:AXES]),
             velocities=tuple(float(value) for value, _ in shown[AXES:]),
@@ -194,7 +194,7 @@ class AsyncMic488:
         data_type = unit.wording.data_type
         items = unit.axis_items("POS_ACT")
         values = await unit.read(items, data_type)
-        return tuple(float(unit.shown(item, values[item], data_type)[0]) for item in items)
+        return tuple(float(unit.in_units(item, values[item], data_type)[0]) for item in items)
 
     async def inputs(self) -> tuple[bool, ...]:
         """IN1 to IN20."""
@@ -291,7 +291,7 @@ class AsyncMic488:
         items = {name: named(unit.registers, name) for name in names}
         data_type = (await unit.control()).data_type
         values = await unit.read(items.values(), data_type)
-        return {name: unit.shown(item, values[item], data_type) for name, item in items.items()}
+        return {name: unit.in_units(item, values[item], data_type) for name, item in items.items()}
 
     async def set(self, name: str, value: float) -> None:
         """Write a register by name, in units where it has one. A motion register moves.

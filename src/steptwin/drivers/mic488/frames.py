@@ -28,7 +28,7 @@ class ObservedFrame(NamedTuple):
         return f"{self.time / SECOND:12.6f} s  {arrow} {raw}{self.meaning}"
 
 
-class FrameWords:
+class FrameLog:
     """Decodes the frames of a line and passes them to ``sinks``.
 
     DATA_TYPE of each unit is taken from the frames that read or write it.

@@ -7,7 +7,7 @@ from collections.abc import Callable, Hashable
 from steptwin.controller import SECOND, Nanos
 from steptwin.drivers.exchange import Exchanger
 from steptwin.drivers.lineframes import FRAMES, LineFrames
-from steptwin.drivers.mic488.frames import FrameWords
+from steptwin.drivers.mic488.frames import FrameLog
 from steptwin.drivers.modbus import ModbusQuery, RtuMaster, TcpMaster
 from steptwin.drivers.place import LineAddress, parse_line_address
 from steptwin.drivers.tasks import TaskLine
@@ -26,7 +26,7 @@ def modbus_exchanger(
     if frames_per_second is not None and frames_per_second <= 0.0:
         raise Misuse(f"{frames_per_second:g} frames per second: must be above 0")
     interval: Nanos = 0 if frames_per_second is None else round(SECOND / frames_per_second)
-    words = FrameWords(tcp=place.framed)
+    words = FrameLog(tcp=place.framed)
     where = str(place.endpoint)
     discipline = TcpMaster(where) if place.framed else RtuMaster(place.serial)
     exchanger = Exchanger(discipline, where, interval)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from steptwin.controller import Nanos
-from steptwin.drivers.mic488.frames import FrameWords
+from steptwin.drivers.mic488.frames import FrameLog
 from steptwin.wire import mbap
 from steptwin.wire.rtu import BURSTY_GAP_NS, FrameRole, RtuFrame, RtuFramer
 from steptwin.wire.slave import FrameDirection
@@ -12,8 +12,8 @@ from steptwin.wire.slave import FrameDirection
 class RtuListener:
     """Decodes requests and answers on one wire; the frames show which is which."""
 
-    def __init__(self, words: FrameWords, gap_ns: Nanos = BURSTY_GAP_NS) -> None:
-        self._words = words
+    def __init__(self, log: FrameLog, gap_ns: Nanos = BURSTY_GAP_NS) -> None:
+        self._log = log
         self._framer = RtuFramer(gap_ns=gap_ns)
         self._unframed = 0
 
@@ -33,26 +33,26 @@ class RtuListener:
     def _take(self, frames: list[RtuFrame], now: Nanos) -> None:
         for frame in frames:
             if frame.role is FrameRole.UNKNOWN:
-                self._words.unframed(now, frame.raw)
+                self._log.unframed(now, frame.raw)
             else:
-                self._words.observe(now, FrameDirection.IN if frame.role is FrameRole.REQUEST else FrameDirection.OUT, frame.raw)
+                self._log.observe(now, FrameDirection.IN if frame.role is FrameRole.REQUEST else FrameDirection.OUT, frame.raw)
         lost = self._framer.unframed - self._unframed
         if lost:
             self._unframed += lost
-            self._words.lost(now, lost)
+            self._log.lost(now, lost)
 
 
 class TcpListener:
     """Decodes the two directions of a Modbus TCP connection."""
 
-    def __init__(self, words: FrameWords) -> None:
-        self._words = words
+    def __init__(self, log: FrameLog) -> None:
+        self._log = log
         self._framers = {FrameDirection.IN: mbap.TcpFramer(), FrameDirection.OUT: mbap.TcpFramer()}
 
     def feed(self, data: bytes, now: Nanos, direction: FrameDirection) -> None:
         framer = self._framers[direction]
         for frame in framer.feed(data):
-            self._words.observe(now, direction, frame.raw)
+            self._log.observe(now, direction, frame.raw)
         if framer.broken is not None:
-            self._words.unframed(now, data)
+            self._log.unframed(now, data)
             self._framers[direction] = mbap.TcpFramer()

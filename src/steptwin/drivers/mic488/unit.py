@@ -14,7 +14,7 @@ from steptwin.controller import SECOND, Nanos
 from steptwin.drivers.exchange import Job, SentLate
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.mic488.failures import ModbusRefusal, NotReady, Unconfirmed, unconfirmed
-from steptwin.drivers.mic488.frames import FrameWords
+from steptwin.drivers.mic488.frames import FrameLog
 from steptwin.drivers.modbus import ModbusQuery, bits, words
 from steptwin.drivers.permission import Permission
 from steptwin.errors import LineFailure, Misuse
@@ -126,7 +126,7 @@ class Unit:
         self.registers = registers
         self.wording = Wording(registers, self.scales)
         frames = self.line.shared.get("frames")
-        if isinstance(frames, FrameWords):
+        if isinstance(frames, FrameLog):
             frames.know(self.number, self.wording)
         self._queries = {}
         self._plans = {}
@@ -269,7 +269,7 @@ class Unit:
 
     # ------------------------------------------------------------------ units
 
-    def shown(self, item: RegisterItem, value: RegisterValue, data_type: DataType) -> tuple[RegisterValue, str]:
+    def in_units(self, item: RegisterItem, value: RegisterValue, data_type: DataType) -> tuple[RegisterValue, str]:
         """A value in the form of ``data_type``, converted into units if these are known, and its unit."""
         register = item.register
         axis = register.axis

@@ -95,7 +95,7 @@ class AxisWait:
         item = unit.item("POS_ACT", self._axis)
         control = unit.shared.control
         data_type = unit.wording.data_type if control is None else control.data_type
-        value, name = unit.shown(item, (await unit.read([item], data_type))[item], data_type)
+        value, name = unit.in_units(item, (await unit.read([item], data_type))[item], data_type)
         return float(value), name
 
     async def _time_out_s(self, status: int) -> float:
@@ -125,7 +125,7 @@ async def dynamics(unit: Unit, axis: int) -> tuple[float, float, float, float, f
     items = [unit.item(key, axis) for key in ("POS_ACT", "VEL_ACT", "ACC", "DEC", "VMAX")]
     data_type = unit.wording.data_type
     values = await unit.read(items, data_type)
-    position, velocity, acc, dec, vmax = (float(unit.shown(item, values[item], data_type)[0]) for item in items)
+    position, velocity, acc, dec, vmax = (float(unit.in_units(item, values[item], data_type)[0]) for item in items)
     return position, velocity, acc, dec, vmax
 
 

@@ -22,7 +22,7 @@ def axis_views(world: Simulation) -> AxisViews:
     moved: dict[str, list[MovedChannel]] = {}
     for element in ELEMENTS.values():
         if element.moved is not None:
-            for built in world.parts.built(element).values():
+            for built in world.objects.built(element).values():
                 for axis, channel in element.moved(built):
                     moved.setdefault(axis, []).append(channel)
     for name, fitted in world.axes.items():

@@ -29,7 +29,7 @@ class PolylineCurve(NamedTuple):
     velocities: list[float]
 
 
-class PolylinePiece(NamedTuple):
+class PolylineSection(NamedTuple):
     """A segment, or rest (None), from ``begin`` to ``end``."""
 
     profile: Profile
@@ -47,45 +47,45 @@ class PolylinePiece(NamedTuple):
 
 def curve(track: AxisTrack, begin: Nanos, until: Nanos, resolution: Nanos = 0) -> PolylineCurve:
     """The motion of ``track`` from ``begin`` to ``until``. What happens within ``resolution`` gets no points between."""
-    pieces = [piece for plan, a, b in track.intervals(begin, until) for piece in pieces_of(profile_of(plan), a, b)]
-    ends = [(piece.look(piece.begin), piece.look(piece.end)) for piece in pieces]
+    sections = [section for plan, a, b in track.intervals(begin, until) for section in sections_of(profile_of(plan), a, b)]
+    ends = [(section.look(section.begin), section.look(section.end)) for section in sections]
     positions = [p for pair in ends for p, _ in pair]
     speeds = [v for pair in ends for _, v in pair]
     position_slack = _range(positions) / _POSITION_STEPS
     speed_slack = _range([0.0, *speeds]) / _SPEED_STEPS
     points = PolylineCurve([], [], [])
-    for piece, ((p0, v0), (p1, v1)) in zip(pieces, ends, strict=True):
-        _add(points, piece.begin, p0, v0)
-        if piece.segment is not None and piece.end - piece.begin > resolution:
-            count = _points(piece, (p0, p1, position_slack), (v0, v1, speed_slack))
+    for section, ((p0, v0), (p1, v1)) in zip(sections, ends, strict=True):
+        _add(points, section.begin, p0, v0)
+        if section.segment is not None and section.end - section.begin > resolution:
+            count = _points(section, (p0, p1, position_slack), (v0, v1, speed_slack))
             if resolution:
-                count = min(count, ceil((piece.end - piece.begin) / resolution))
+                count = min(count, ceil((section.end - section.begin) / resolution))
             for i in range(1, count):
-                time = piece.begin + (piece.end - piece.begin) * i // count
-                _add(points, time, *piece.look(time))
-        _add(points, piece.end, p1, v1)
+                time = section.begin + (section.end - section.begin) * i // count
+                _add(points, time, *section.look(time))
+        _add(points, section.end, p1, v1)
     return points
 
 
-def pieces_of(profile: Profile, begin: Nanos, until: Nanos) -> list[PolylinePiece]:
+def sections_of(profile: Profile, begin: Nanos, until: Nanos) -> list[PolylineSection]:
     """Motion of ``profile`` from ``begin`` to ``until``, without gaps."""
-    pieces: list[PolylinePiece] = []
+    sections: list[PolylineSection] = []
     at = begin
     for segment, end_ns in zip(profile.segments, profile.ends, strict=True):
         end = until if end_ns == inf else min(profile.start + int(end_ns), until)
         if end > at:
-            pieces.append(PolylinePiece(profile, segment, at, end))
+            sections.append(PolylineSection(profile, segment, at, end))
             at = end
     if at < until:
-        pieces.append(PolylinePiece(profile, None, at, until))
-    return pieces
+        sections.append(PolylineSection(profile, None, at, until))
+    return sections
 
 
-def _points(piece: PolylinePiece, *curves: tuple[float, float, float]) -> int:
+def _points(section: PolylineSection, *curves: tuple[float, float, float]) -> int:
     """In how many equal parts to divide; each curve is the value at the beginning, at the end, and what may be missed."""
     most = 0.0
     for quarter in (1, 2, 3):
-        values = piece.look(piece.begin + (piece.end - piece.begin) * quarter // 4)
+        values = section.look(section.begin + (section.end - section.begin) * quarter // 4)
         for value, (first, last, slack) in zip(values, curves, strict=True):
             if slack > 0.0:
                 most = max(most, abs(value - first - (last - first) * quarter / 4) / slack)

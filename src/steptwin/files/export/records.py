@@ -3,7 +3,7 @@
 The first line is the head of the file: a title, the controllers, how their axes are shown, the end of the run, the digest.
 A file that is written while a world runs has the end of the run and the digest in its last line; one that was cut has none.
 Every other line is a record: ``time_ns``, ``machine``, ``kind``, ``subject``, ``value``, and ``facts`` where its text has some.
-The value of a plan is as `steptwin.motion.plain` has it; bytes are ``{"hex": …}``.
+The value of a plan is as `steptwin.motion.planjson` has it; bytes are ``{"hex": …}``.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from itertools import pairwise
 from typing import IO, Any, NamedTuple
 
 from steptwin.controller import Nanos
+from steptwin.datatypes import fields_fit, fits, fitting, format_short
 from steptwin.durations import LONGEST_NS as LATEST_NS
 from steptwin.errors import Misuse
 from steptwin.files.export.progress import TimeProgress
 from steptwin.motion import Profile
 from steptwin.motion.divisions import StepTrain
-from steptwin.motion.plain import plain_plan, read_plan
-from steptwin.plaintypes import fields_fit, fits, fitting, shown
+from steptwin.motion.planjson import plan_to_json, read_plan
 from steptwin.simulation.mechanics.channels import AxisChannel, AxisViews, Mechanics, MovedChannel, PhaseOutputs, StepOutputs
 from steptwin.simulation.scheduler.trace import KINDS, Trace, TraceRecord
 
@@ -106,7 +106,7 @@ def read_records(file: IO[bytes], name: str) -> SavedTrace:
     except (Misuse, ArithmeticError, struct.error):
         digest = ""
     if digest != saved.digest:
-        raise Misuse(f"{name}: the records are not those that were written: their digest is not {shown(saved.digest)}")
+        raise Misuse(f"{name}: the records are not those that were written: their digest is not {format_short(saved.digest)}")
     return saved
 
 
@@ -127,7 +127,7 @@ def _line(data: dict[str, Any]) -> str:
 
 def _head(data: dict[str, Any]) -> SavedTrace:
     if data["steptwin_trace"] != FORMAT:
-        raise Misuse(f"a trace of format {shown(data['steptwin_trace'])}: this version reads format {FORMAT}")
+        raise Misuse(f"a trace of format {format_short(data['steptwin_trace'])}: this version reads format {FORMAT}")
     views: dict[tuple[str, str], AxisChannel] = {}
     for axis in data["axes"]:
         view = _view_from_json(axis)
@@ -153,10 +153,10 @@ def _until(data: dict[str, Any]) -> Nanos:
 def _record(data: dict[str, Any]) -> TraceRecord:
     kind = data["kind"]
     if kind not in KINDS:
-        raise Misuse(f"no kind of record {shown(kind)}: kinds are {', '.join(KINDS)}")
+        raise Misuse(f"no kind of record {format_short(kind)}: kinds are {', '.join(KINDS)}")
     value = _from_json(data["value"])
     if not _is_value(kind, value):
-        raise Misuse(f"{shown(value)} is not a value of a record of kind {kind!r}")
+        raise Misuse(f"{format_short(value)} is not a value of a record of kind {kind!r}")
     time = fitting("time_ns", data["time_ns"], int)
     if not 0 <= time <= LATEST_NS:
         raise Misuse(f"time_ns is {time}: permitted are 0 to {LATEST_NS}")
@@ -182,7 +182,7 @@ _VALUES: Mapping[str, Any] = {"load": tuple[tuple[int, bool, int], ...], "coordi
 
 def _to_json(value: object) -> object:
     if isinstance(value, Profile | StepTrain):
-        return plain_plan(value)
+        return plan_to_json(value)
     if isinstance(value, bytes):
         return {"hex": value.hex()}
     if isinstance(value, tuple):

@@ -13,12 +13,12 @@ from importlib.resources import files
 from typing import IO
 
 from steptwin.controller import Nanos
-from steptwin.files.export.polyline import PolylinePiece, pieces_of
+from steptwin.files.export.polyline import PolylineSection, sections_of
 from steptwin.files.export.progress import TimeProgress
 from steptwin.files.export.tracetracks import TraceTracks
 from steptwin.files.export.tracks import AxisTrack, PinTrack
 from steptwin.motion.divisions import Plan, StepTrain, profile_of
-from steptwin.motion.plain import plain_plan
+from steptwin.motion.planjson import plan_to_json
 from steptwin.simulation.scheduler.trace import TraceRecord
 
 _SCRIPTS = ("model.js", "draw.js", "timeline.js")
@@ -64,20 +64,20 @@ def _axis(track: AxisTrack, tracks: TraceTracks, progress: TimeProgress, number:
 
 
 def _motion(track: AxisTrack, tracks: TraceTracks) -> dict[str, object]:
-    """The ``plans``, as `steptwin.motion.plain` writes them, and flat ``pieces`` of them, six numbers each: begin (ns from that
-    of the window), number of the plan and of its segment (-1: at rest), counted position, direction (0: no pulses), pulses of
-    the profile for one STEP pulse.
+    """The ``plans``, as `steptwin.motion.planjson` writes them, and flat ``pieces`` of them, six numbers each: begin (ns from
+    that of the window), number of the plan and of its segment (-1: at rest), counted position, direction (0: no pulses), pulses
+    of the profile for one STEP pulse.
     """
     plans: list[dict[str, object]] = []
     pieces: list[int] = []
     for plan, after, until in track.intervals(tracks.begin, tracks.until):
         profile = profile_of(plan)
-        for piece, grid, count in _divided(plan, after, until):
+        for section, grid, count in _divided(plan, after, until):
             number, direction = -1, 0
-            if piece.segment is not None:
-                number, direction = profile.segments.index(piece.segment), piece.segment.direction
-            pieces += [piece.begin - tracks.begin, len(plans), number, count, direction, grid]
-        plans.append(plain_plan(profile))
+            if section.segment is not None:
+                number, direction = profile.segments.index(section.segment), section.segment.direction
+            pieces += [section.begin - tracks.begin, len(plans), number, count, direction, grid]
+        plans.append(plan_to_json(profile))
     view = track.view
     return {
         "controller": track.controller, "name": view.name, "unit": view.unit, "scale": view.pulses_per_unit,
@@ -91,7 +91,7 @@ def _moved(track: AxisTrack, tracks: TraceTracks) -> dict[str, object]:
     pieces: list[int] = []
     for plan, after, _ in track.intervals(tracks.begin, tracks.until):
         pieces += [after - tracks.begin, len(plans), 0 if profile_of(plan).segments else -1, 0, 0, 1]
-        plans.append(plain_plan(plan))
+        plans.append(plan_to_json(plan))
     view = track.view
     return {
         "controller": track.controller,
@@ -104,7 +104,7 @@ def _moved(track: AxisTrack, tracks: TraceTracks) -> dict[str, object]:
     }
 
 
-def _divided(plan: Plan, after: Nanos, until: Nanos) -> Iterator[tuple[PolylinePiece, int, int]]:
+def _divided(plan: Plan, after: Nanos, until: Nanos) -> Iterator[tuple[PolylineSection, int, int]]:
     """(piece, grid, counted position where it begins); a piece ends where the division changes."""
     profile = profile_of(plan)
     cuts: list[Nanos] = []
@@ -114,8 +114,8 @@ def _divided(plan: Plan, after: Nanos, until: Nanos) -> Iterator[tuple[PolylineP
     for begin, end in zip([after, *cuts], [*cuts, until], strict=True):
         now = max(begin, profile.start)
         grid = plan.division(now).grid if isinstance(plan, StepTrain) else 1
-        for piece in pieces_of(profile, begin, end):
-            yield piece, grid, plan.count(max(piece.begin, profile.start))
+        for section in sections_of(profile, begin, end):
+            yield section, grid, plan.count(max(section.begin, profile.start))
 
 
 # ---------------------------------------------------------------------- pins and marks

@@ -13,7 +13,7 @@ from steptwin.files.export.tracks import AxisTrack, PinTrack
 from steptwin.motion import Profile, at_rest
 from steptwin.motion.divisions import StepTrain, profile_of
 from steptwin.simulation.mechanics.channels import AxisViews, plain_view
-from steptwin.simulation.mechanics.trajectory import LoadPiece
+from steptwin.simulation.mechanics.trajectory import LoadSection
 from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 
 
@@ -90,9 +90,9 @@ class _Sorting:
             track.times.append(time)
             track.plans.append(value)
         elif isinstance(value, tuple) and kind == "load":
-            self._axis(controller, subject).place(time, [LoadPiece(*one) for one in value])
+            self._axis(controller, subject).place(time, [LoadSection(*one) for one in value])
         elif isinstance(value, Profile) and kind == "free":
-            self._axis(controller, subject).place(time, [LoadPiece(time, False, value.base)], value)
+            self._axis(controller, subject).place(time, [LoadSection(time, False, value.base)], value)
         elif isinstance(value, int) and kind == "coordinate":
             self._axis(controller, subject).origins.append((time, value))
         elif isinstance(value, (int, float)) and kind == "edge":

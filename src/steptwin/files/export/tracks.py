@@ -11,7 +11,7 @@ from steptwin.controller import Nanos
 from steptwin.motion import Profile, at_rest
 from steptwin.motion.divisions import Plan, profile_of
 from steptwin.simulation.mechanics.channels import AxisChannel, Mechanics
-from steptwin.simulation.mechanics.trajectory import LoadPiece
+from steptwin.simulation.mechanics.trajectory import LoadSection
 
 
 @dataclass(slots=True)
@@ -22,7 +22,7 @@ class AxisTrack:
     view: AxisChannel
     times: list[Nanos] = field(default_factory=list)
     plans: list[Plan] = field(default_factory=list)
-    loads: list[LoadPiece] = field(default_factory=list)
+    loads: list[LoadSection] = field(default_factory=list)
     """Positions of the load by moment, if it does not follow the pulses throughout."""
     coasting: dict[Nanos, Profile] = field(default_factory=dict)
     """Motions of the load without current, by the moments of ``loads`` in whose place they are."""
@@ -67,7 +67,7 @@ class AxisTrack:
         self.times.append(begin)
         self.plans.append(type(profile)(profile.start, profile.base + above_p, profile.segments, profile.final_p))
 
-    def place(self, time: Nanos, loads: list[LoadPiece], coasting: Profile | None = None) -> None:
+    def place(self, time: Nanos, loads: list[LoadSection], coasting: Profile | None = None) -> None:
         """From ``time`` on the load is otherwise than was known before: at ``loads``, or it moves freely."""
         while self.loads and self.loads[-1].begin >= time:
             self.coasting.pop(self.loads.pop().begin, None)
@@ -86,7 +86,7 @@ class AxisTrack:
         track = AxisTrack(self.controller, view)
         for begin in sorted({*self.times, *(load.begin for load in self.loads if load.begin >= self.times[0])}):
             past = bisect_right(self.loads, begin, key=attrgetter("begin")) - 1
-            since, follows, pulses = self.loads[past] if past >= 0 else LoadPiece(begin, True, 0)
+            since, follows, pulses = self.loads[past] if past >= 0 else LoadSection(begin, True, 0)
             profile = profile_of(self.plan(begin)) if follows else self.coasting.get(since) or at_rest(begin, pulses)
             off = mechanics.zero_p + (pulses if follows else 0)
             track.add(begin, profile, off)

@@ -47,7 +47,7 @@ from steptwin.gateways.sampling import Sample
 from steptwin.simulation.script.control import Halt
 from steptwin.simulation.script.steps import Write
 from steptwin.subject.commands import Enable, Home, Jog, Move, StopAxes
-from steptwin.subject.contract import ControllerPart
+from steptwin.subject.contract import ControllerDescription
 from steptwin.subject.following import Following
 from steptwin.subject.payloads import InputPayload
 
@@ -97,7 +97,7 @@ class MotorRecord(RecordBase):
     User coordinates are dial coordinates with DIR and OFF, raw ones are steps of MRES.
     """
 
-    def __init__(self, name: str, part: ControllerPart, axis: AxisDescription, controller: EpicsController) -> None:
+    def __init__(self, name: str, part: ControllerDescription, axis: AxisDescription, controller: EpicsController) -> None:
         super().__init__()
         self.values = first_values()
         self.alarm = NOT_KNOWN
@@ -650,7 +650,7 @@ class MotorRecord(RecordBase):
         self._controller.check_may_change(who)
 
 
-def _conditions(part: ControllerPart, axis: AxisDescription) -> dict[int, Condition]:
+def _conditions(part: ControllerDescription, axis: AxisDescription) -> dict[int, Condition]:
     try:
         return dict(part.datasheet.point(f"{axis.name}.status").conditions)
     except KeyError:

@@ -96,7 +96,7 @@ class PointRecord(RecordBase):
         if not self.is_asked_for:
             return
         self.at_s = sample.at.timestamp()
-        value = None if sample.state is None else self._point.shown(sample.state)
+        value = None if sample.state is None else self._point.typed_value(sample.state)
         if value is None:
             self.alarm = LOST if sample.state is None else NOT_KNOWN
         elif isinstance(value, int) and not -LONG <= value < LONG:

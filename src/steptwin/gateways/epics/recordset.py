@@ -12,7 +12,7 @@ from steptwin.gateways.epics.pointrecord import CommandRecord, PointRecord
 from steptwin.gateways.epics.recordnames import commands_of, record_name
 from steptwin.gateways.epics.records import Record
 from steptwin.gateways.points import CLOCK, CLOCK_POINTS, GatewayPoint, points_of
-from steptwin.subject.contract import ControllerPart
+from steptwin.subject.contract import ControllerDescription
 
 LONGEST_NAME = 60
 """Characters of the name of a record."""
@@ -39,7 +39,7 @@ def make_records(
 
 
 def _records(
-    prefix: str, part: ControllerPart, points: tuple[GatewayPoint, ...], controller: EpicsController
+    prefix: str, part: ControllerDescription, points: tuple[GatewayPoint, ...], controller: EpicsController
 ) -> Iterator[tuple[str, Record]]:
     for axis in part.datasheet.axes:
         name = record_name(prefix, part.name, axis.name)

@@ -22,7 +22,7 @@ from steptwin.gateways.contract import ClientState, GatewayState, GatewaySubject
 from steptwin.gateways.modbus.options import ModbusSpec
 from steptwin.simulation.script.steps import Request
 from steptwin.simulation.toml.addresses import is_loopback, parse_address
-from steptwin.subject.contract import ControllerPart, Result
+from steptwin.subject.contract import ControllerDescription, Result
 from steptwin.system import reason
 from steptwin.wire import rtu
 from steptwin.wire.mbap import HEADER_BYTES, TcpFramer
@@ -46,7 +46,7 @@ READ_BYTES = 4096
 MODBUS = "modbus"
 
 
-def _by_unit(spec: ModbusSpec, subject: GatewaySubject) -> dict[int, ControllerPart]:
+def _by_unit(spec: ModbusSpec, subject: GatewaySubject) -> dict[int, ControllerDescription]:
     """The devices on Modbus lines. Raises `Misuse`."""
     kinds = {line.name: line.kind for line in subject.description.lines}
     parts = {part.name: part for part in subject.description.controllers}
@@ -54,7 +54,7 @@ def _by_unit(spec: ModbusSpec, subject: GatewaySubject) -> dict[int, ControllerP
         raise Misuse(f"[gateway.modbus]: units: no controller is called {min(strange)!r}; there are {', '.join(parts)}")
     if not all(part.is_real for part in parts.values()):
         raise Misuse("[gateway.modbus] is for devices (steptwin bridge): masters reach a line of a world by its key tcp")
-    found: dict[int, ControllerPart] = {}
+    found: dict[int, ControllerDescription] = {}
     for part in parts.values():
         unit = spec.units.get(part.name, part.unit)
         if kinds.get(part.line or "") != MODBUS or unit is None:
@@ -76,7 +76,7 @@ class MasterGateway:
     def __init__(self, spec: ModbusSpec, subject: GatewaySubject, folder: Path) -> None:
         self._spec = spec
         self._subject = subject
-        self._units: Mapping[int, ControllerPart] = {}
+        self._units: Mapping[int, ControllerDescription] = {}
         self._server: asyncio.Server | None = None
         self._masters: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
         self._reads = 0
@@ -109,7 +109,7 @@ class MasterGateway:
             del self._masters[task]
             writer.transport.abort()
 
-    def devices_at(self, unit: int) -> list[ControllerPart]:
+    def devices_at(self, unit: int) -> list[ControllerDescription]:
         """Those that a unit addresses: 0 all of them, of a single one 0 and 255, too (MIC-2, MIC-23)."""
         if unit == rtu.BROADCAST or (unit == 255 and len(self._units) == 1):
             return list(self._units.values())
@@ -119,7 +119,7 @@ class MasterGateway:
         host = client.place.rpartition(":")[0]
         self._notices.say(host, f"{client}: {why}; its connection is closed")
 
-    async def ask(self, client: GatewayClient, part: ControllerPart, pdu: bytes) -> bytes:
+    async def ask(self, client: GatewayClient, part: ControllerDescription, pdu: bytes) -> bytes:
         """The answer of a device, or an exception."""
         function = pdu[0]
         wanted = Request(cast("str", part.line), cast("int", part.unit), pdu, SECOND)
@@ -197,7 +197,7 @@ class _Master:
             self._answers.add(task)
             task.add_done_callback(self._answers.discard)
 
-    async def _ask(self, request: bytes, part: ControllerPart, pdu: bytes, *, is_answered: bool) -> None:
+    async def _ask(self, request: bytes, part: ControllerDescription, pdu: bytes, *, is_answered: bool) -> None:
         answer = await self._gateway.ask(self._client, part, pdu)
         if is_answered:
             self._answer(request, answer)

@@ -153,7 +153,7 @@ class BrokerConnection:
             try:
                 await self._session(connected)
             except (MqttError, SessionOver, OSError, ssl.SSLError, Misuse) as error:
-                self.lost = _words(error)
+                self.lost = _describe_error(error)
                 if self.lost != reported:
                     reported = self.lost
                     self._notice(f"{self._where}: {reported}; it is tried again")
@@ -259,7 +259,7 @@ _LOST = ("unspecified error", "disconnected during message iteration")
 """Names of the library for it."""
 
 
-def _words(error: Exception) -> str:
+def _describe_error(error: Exception) -> str:
     if isinstance(error.__cause__, MqttError):  # why it was lost
         error = error.__cause__
     if isinstance(error, OSError):

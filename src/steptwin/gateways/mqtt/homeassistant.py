@@ -13,7 +13,7 @@ from steptwin import __version__
 from steptwin.gateways.mqtt.connection import Publication
 from steptwin.gateways.mqtt.jsontopics import DO, ONLINE, Group, Topics, encode
 from steptwin.gateways.points import GatewayPoint, PointType
-from steptwin.subject.contract import ControllerPart, Description
+from steptwin.subject.contract import ControllerDescription, Description
 
 PREFIX = "homeassistant"
 _CLASSES: Mapping[str, str] = {
@@ -78,7 +78,7 @@ def _component(point: GatewayPoint) -> dict[str, Any]:
     return found
 
 
-def _buttons(identity: str, topics: Topics, part: ControllerPart) -> dict[str, dict[str, Any]]:
+def _buttons(identity: str, topics: Topics, part: ControllerDescription) -> dict[str, dict[str, Any]]:
     found: dict[str, dict[str, Any]] = {}
     for one in part.takes:
         if one.command != "stop":

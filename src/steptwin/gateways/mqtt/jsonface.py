@@ -129,9 +129,9 @@ class JsonFace:
     async def _publish_events(self, link: BrokerLink) -> None:
         missed, events = self._following.take()
         for event in events:
-            plain = event.plain() | ({"missed": missed} if missed else {})
+            data = event.to_json() | ({"missed": missed} if missed else {})
             missed = 0
-            await link.publish(Publication(self._topics(EVENTS), encode(plain), qos=1))
+            await link.publish(Publication(self._topics(EVENTS), encode(data), qos=1))
 
     # ------------------------------------------------------------------ commands
 

@@ -80,7 +80,7 @@ class _Device:
             first = rows[0][1]
             part = None if sample.state is None else first.part(sample.state)
             if part is None or before is None or first.part(before) is not part:
-                yield from ((row, None if part is None else point.shown_in(part)) for row, point in rows)
+                yield from ((row, None if part is None else point.typed_in(part)) for row, point in rows)
 
 
 class SparkplugFace:

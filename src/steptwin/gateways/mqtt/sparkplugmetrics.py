@@ -13,7 +13,7 @@ from steptwin.gateways.methods import METHODS, MethodRow, methods_of
 from steptwin.gateways.mqtt.sparkplugcodec import SparkplugMetric, SparkplugProperty, SparkplugType, SparkplugValue
 from steptwin.gateways.points import CLOCK_POINTS, GatewayPoint, PointType, points_of
 from steptwin.subject.commands import Command
-from steptwin.subject.contract import ControllerPart, Description
+from steptwin.subject.contract import ControllerDescription, Description
 
 BDSEQ, REBIRTH, RESULT, DROPPED = "bdSeq", "Node Control/Rebirth", "Commands/Result", "Store/Dropped"
 TYPES: Mapping[PointType, SparkplugType] = {
@@ -114,11 +114,11 @@ def _of_point(point: GatewayPoint, alias: int, name: str) -> MetricRow:
 class _BoundMethod:
     path: str
     row: MethodRow
-    part: ControllerPart
+    part: ControllerDescription
     axis: int | None
 
 
-def _methods(part: ControllerPart) -> Iterator[_BoundMethod]:
+def _methods(part: ControllerDescription) -> Iterator[_BoundMethod]:
     """Those with one argument at most: a jog has a lease besides, which no metric carries."""
     places = [("", "Controller", None), ("program/", "Program", None)]
     places += [(f"{axis.name}/", "Axis", axis.number) for axis in part.datasheet.axes]

@@ -16,7 +16,7 @@ from asyncua import Server, ua
 from steptwin.gateways.methods import METHODS, MethodArgument, MethodRow, methods_of
 from steptwin.gateways.opcua.nodetypes import VARIANTS, ZEROS, engineering_unit, standard, value_range
 from steptwin.gateways.points import CLOCK, CLOCK_POINTS, GatewayPoint, PointType, points_of
-from steptwin.subject.contract import ControllerPart, Description
+from steptwin.subject.contract import ControllerDescription, Description
 
 NAMESPACE_URI = "urn:steptwin:machines"
 NAMESPACE: Any = 2
@@ -60,7 +60,7 @@ class BoundMethod:
     """A method of an object, which is a controller, its program, or one of its axes."""
 
     row: MethodRow
-    part: ControllerPart
+    part: ControllerDescription
     axis: int | None
 
 
@@ -128,7 +128,7 @@ class AddressSpaceBuilder:
 
     # ------------------------------------------------------------------ objects
 
-    def _controller(self, part: ControllerPart, registers: Iterable[str]) -> None:
+    def _controller(self, part: ControllerDescription, registers: Iterable[str]) -> None:
         name, sheet = part.name, part.datasheet
         self._object(name, node_id(ROOT), name, "types.Controller", sheet.title)
         self._bind(part, name, "Controller", None)
@@ -169,7 +169,7 @@ class AddressSpaceBuilder:
         profile = ua.Variant(_MOTION_PROFILES.get(kind or "", _OTHER_PROFILE), ua.VariantType.Int32)
         self._property(f"{path}.MotionProfile", node_id(path), "MotionProfile", profile, ua.ObjectIds.Int32)
 
-    def _bind(self, part: ControllerPart, path: str, kind: str, axis: int | None) -> None:
+    def _bind(self, part: ControllerDescription, path: str, kind: str, axis: int | None) -> None:
         """Give an object those methods of its type that its controller takes."""
         for row in methods_of(part, METHODS[kind], axis):
             method = node_id(f"types.{kind}.{row.name}")

@@ -42,7 +42,7 @@ class _OpenBranch(NamedTuple):
     begin: Nanos
     url: str
 
-    def plain(self, number: int) -> Mapping[str, object]:
+    def to_json(self, number: int) -> Mapping[str, object]:
         return {"branch": number, "from_ns": str(self.begin), "url": self.url}
 
 
@@ -71,8 +71,8 @@ class WorldBranches:
         self._starting = 0
         self._numbers = count(1)
 
-    def plain(self) -> Sequence[Mapping[str, object]]:
-        return [branch.plain(number) for number, branch in self._running().items()]
+    def to_json(self) -> Sequence[Mapping[str, object]]:
+        return [branch.to_json(number) for number, branch in self._running().items()]
 
     def _running(self) -> dict[int, _OpenBranch]:
         """Without those that have ended by themselves."""
@@ -93,7 +93,7 @@ class WorldBranches:
         finally:
             self._starting -= 1
         self._open[number] = branch
-        return branch.plain(number)
+        return branch.to_json(number)
 
     def _begin(self, own: StudioOptions, number: int, snapshot: SimulationSnapshot) -> _OpenBranch:
         """Blocks until its page is there. Its trace and its inputs begin anew: nothing of the past is recorded there."""

@@ -65,18 +65,18 @@ class FolderCampaigns:
 
     # ------------------------------------------------------------------ requests
 
-    async def plain(self) -> Sequence[Mapping[str, object]]:
+    async def to_json(self) -> Sequence[Mapping[str, object]]:
         running = self._present()
         found = await later(asyncio.to_thread(lambda: [(name, *_contents(one)) for name, one in self._known().items()]))
         return [
             {
                 "campaign": name,
                 "results": str(PurePosixPath(name).with_suffix(SUFFIX)),
-                **plain,
+                **data,
                 "error": error or self._errors.get(name),
                 "is_running": name == running,
             }
-            for name, plain, error in found
+            for name, data, error in found
         ]
 
     async def run(self, campaign: str) -> None:
@@ -154,7 +154,7 @@ def _contents(known: _CampaignFile) -> tuple[dict[str, object], str | None]:
     """As `steptwin.studio.campaignrequests` has it, and what is wrong with it."""
     total = known.table.get("runs")
     database = known.results / RESULTS
-    plain: dict[str, object] = {
+    data: dict[str, object] = {
         "name": str(known.table.get("name", known.file.stem)),
         "done": 0,
         "failed": 0,
@@ -163,17 +163,17 @@ def _contents(known: _CampaignFile) -> tuple[dict[str, object], str | None]:
         "result": None,
     }
     if known.error is not None or not known.results.is_dir():
-        return plain, known.error
-    plain["result"] = _result(known.results / REPORT)
+        return data, known.error
+    data["result"] = _result(known.results / REPORT)
     try:
         if database.is_file():
             from steptwin.campaign.store import counted
 
-            plain["done"], plain["failed"] = counted(database)
-            plain["changed"] = _changed(database)
+            data["done"], data["failed"] = counted(database)
+            data["changed"] = _changed(database)
     except (SteptwinError, ImportError) as error:
-        return plain, str(error)
-    return plain, None
+        return data, str(error)
+    return data, None
 
 
 def _changed(database: Path) -> str:
@@ -185,17 +185,17 @@ def _changed(database: Path) -> str:
 def _result(report: Path) -> dict[str, object] | None:
     """Result of a campaign that has ended; None where it has not."""
     with suppress(SteptwinError, LookupError, TypeError, ValueError, AttributeError):
-        plain = json.loads(read_recorded(report))
+        data = json.loads(read_recorded(report))
         return {
-            "runs": plain["runs"],
-            "failed": plain["failed"],
-            "pass_rate": plain["pass_rate"],
-            "interval": plain["interval"],
+            "runs": data["runs"],
+            "failed": data["failed"],
+            "pass_rate": data["pass_rate"],
+            "interval": data["interval"],
             "properties": [
                 {"name": name, "failed": one["failed"], "robustness": one["robustness"]}
-                for name, one in plain["properties"].items()
+                for name, one in data["properties"].items()
             ],
-            "causes": [_cause(one) for one in plain["causes"][:MOST_CAUSES]],
+            "causes": [_cause(one) for one in data["causes"][:MOST_CAUSES]],
         }
     return None
 

@@ -25,7 +25,7 @@ class WorldArrangement:
         self._file = file
         self._places: Sequence[DrawnPlace] = spec.drawing
 
-    def plain(self) -> Mapping[str, object]:
+    def to_json(self) -> Mapping[str, object]:
         places = {of: [x, y] for of, x, y in self._places}
         return {"places": places, "file": None if self._file is None else str(self._file)}
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.files import recording as recordings
-from steptwin.files.beginning import is_recording
+from steptwin.files.loader import is_recording
 from steptwin.files.world import World
 from steptwin.simulation.world.snapshotlog import SnapshotLog, replay
 

@@ -14,8 +14,8 @@ from pathlib import Path
 from steptwin.errors import Misuse, Refusal
 from steptwin.eventloop import later
 from steptwin.files import recording as recordings
-from steptwin.files.beginning import RECORDING_SUFFIX, is_recording
 from steptwin.files.export import FORMATS
+from steptwin.files.loader import RECORDING_SUFFIX, is_recording
 from steptwin.files.ownfolder import place_in
 from steptwin.files.savedrecordings import SavedRecording, path_of, read_saved, saved_recordings
 from steptwin.live.realtimedriver import RealTimeDriver
@@ -56,21 +56,21 @@ class WorldRecordings:
 
     # ------------------------------------------------------------------ requests
 
-    async def plain(self) -> Mapping[str, object]:
+    async def to_json(self) -> Mapping[str, object]:
         saved = await later(asyncio.to_thread(saved_recordings, self._folder))
         return {
             "recording": self._recorded(),
             "past": self._past(),
             "trace": self._trace(),
             "folder": str(self._folder),
-            "saved": [_plain(one) for one in saved],
+            "saved": [_to_json(one) for one in saved],
             "formats": [name for name, form in FORMATS.items() if not form.missing],
         }
 
     async def save(self, name: str | None) -> Mapping[str, object]:
         path = place_in(self._folder, path_of(self._folder, name or f"{self._stem}-{datetime.now(UTC):%Y%m%d-%H%M%S}").name)
         self._realtime.enter()
-        return _plain(await later(asyncio.to_thread(_save, self._live.recording(), path)))
+        return _to_json(await later(asyncio.to_thread(_save, self._live.recording(), path)))
 
     def place(self, file: str) -> str:
         path = place_in(self._folder, file)
@@ -199,5 +199,5 @@ def _save(recording: recordings.Recording, path: Path) -> SavedRecording:
     return read_saved(path)
 
 
-def _plain(saved: SavedRecording) -> Mapping[str, object]:
+def _to_json(saved: SavedRecording) -> Mapping[str, object]:
     return {"name": saved.name, "bytes": saved.size, "saved": saved.saved, "until_ns": str(saved.until)}

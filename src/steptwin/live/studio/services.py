@@ -89,7 +89,7 @@ def _contents(past: HistoryDatabase) -> Mapping[str, object]:
 
     points = {point.name: point for point in past.points()}
     return {
-        "database": past.shown,
+        "database": past.address,
         "runs": [_run(run) for run in past.runs()[-MOST_RUNS:]],
         "points": [{"point": one.name, "unit": one.unit, "is_text": one.type == TEXTS} for one in points.values()],
     }
@@ -148,13 +148,13 @@ def _compare(
             "unit": found.unit,
             "most": None if isinf(found.most) else found.most,
             "at_s": found.at_s,
-            "values": [_plain(value) for value in found.values],
+            "values": [_to_json(value) for value in found.values],
         }
         for found in compare(past, chosen, one, other)
     ]
 
 
-def _plain(value: object) -> object:
+def _to_json(value: object) -> object:
     """Number of numpy as one for JSON."""
     return None if value is None or value != value else value if isinstance(value, str) else float(value)  # type: ignore[arg-type]  # noqa: PLR0124
 

@@ -22,12 +22,12 @@ from steptwin.access.tokens import AccessGate, Token
 from steptwin.devices.composite import CompositeSubject
 from steptwin.devices.connections import Computer, DeviceConnections
 from steptwin.devices.device import DeviceSurroundings
-from steptwin.devices.worldpart import WorldPart
+from steptwin.devices.worldmember import WorldMember
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.files.auditfile import AuditFile, wall_clock
-from steptwin.files.beginning import is_recording
 from steptwin.files.export.tracefile import read_kept
+from steptwin.files.loader import is_recording
 from steptwin.files.tokenfiles import tokens_in
 from steptwin.files.world import World
 from steptwin.httpservice import Tls, listen
@@ -54,7 +54,7 @@ from steptwin.live.world import LiveWorld
 from steptwin.messages import Message
 from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.description import read_world
-from steptwin.simulation.describe.pieces import given_files
+from steptwin.simulation.describe.includes import given_files
 from steptwin.simulation.toml.addresses import Address, is_loopback, parse_address
 from steptwin.simulation.world.snapshotlog import SnapshotLog
 from steptwin.simulation.world.worldprograms import WorldPrograms, configuration_text
@@ -211,7 +211,7 @@ class _Page:
 
         jogs = WorldJogs(live.subject, running.control.at_present)
         live.external_actor = jogs
-        world = WorldPart(running.control, live.subject.followers, jogs)
+        world = WorldMember(running.control, live.subject.followers, jogs)
         subject = CompositeSubject(world, lambda: moment().time, live.subject.numbering)
 
         def configuration(controller: str) -> SourceText | None:

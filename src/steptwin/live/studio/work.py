@@ -40,4 +40,4 @@ class LineWork:
         found = verify(
             find_device(address), now, __version__, write=write, progress=work.check, is_cancelled=lambda: work.is_cancelled
         )
-        return found.plain()
+        return found.to_json()

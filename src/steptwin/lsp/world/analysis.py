@@ -19,7 +19,7 @@ from steptwin.lsp.world.items import ItemBuilder, keys_of
 from steptwin.lsp.world.outline import TableOutline, WorldOutline
 from steptwin.lsp.world.signals import WorldSignals
 from steptwin.simulation.components.registry import ELEMENTS
-from steptwin.simulation.describe.pieces import FILE_KEYS, USE
+from steptwin.simulation.describe.includes import FILE_KEYS, USE
 from steptwin.simulation.kinds.kind import AnyKind
 from steptwin.simulation.kinds.registry import KINDS
 from steptwin.simulation.toml.names import RESERVED

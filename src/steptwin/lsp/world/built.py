@@ -12,7 +12,7 @@ from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.build import build
 from steptwin.simulation.describe.description import describe
-from steptwin.simulation.describe.pieces import USE
+from steptwin.simulation.describe.includes import USE
 from steptwin.simulation.kinds.registry import KINDS
 
 UnitsOfSignals = Mapping[str, Mapping[str, str]]

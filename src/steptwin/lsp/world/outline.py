@@ -11,7 +11,7 @@ from steptwin.diagnostics import Span
 from steptwin.errors import Misuse
 from steptwin.lsp.positions import LineIndex
 from steptwin.simulation.components.registry import ELEMENTS
-from steptwin.simulation.describe.pieces import referring_keys
+from steptwin.simulation.describe.includes import referring_keys
 from steptwin.simulation.describe.tables import tables
 from steptwin.simulation.kinds.registry import KINDS
 from steptwin.simulation.toml.tomlplaces import Path, find_places

@@ -1,1 +1,1 @@
-"""Elements around controllers, a file each, and the site where they are built. Sees kinds and what is below them."""
+"""Elements around controllers, a file each, and the context in which they are built. Sees kinds and what is below them."""

@@ -11,10 +11,10 @@ from typing import Any
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.components.encoder import EncoderSpec
 from steptwin.simulation.components.motor import MotorSpec, motor_of
-from steptwin.simulation.components.site import Site
 from steptwin.simulation.components.switch import SwitchSpec, channel_of, put_switch, zone_of
 from steptwin.simulation.kinds.kind import EncoderInputs
 from steptwin.simulation.logic.contacts import Switch, Zone
@@ -127,30 +127,30 @@ def _refers(spec: AxisSpec, described: ElementSpecs) -> Iterator[Reference]:
             yield Reference(spec.drive[0], drives.get(followed, followed), (*spec.encoder.path, "follows"))
 
 
-def _build(spec: AxisSpec, site: Site) -> BuiltAxis:
+def _build(spec: AxisSpec, context: ElementContext) -> BuiltAxis:
     controller = spec.drive[0]
-    scheduler = site.scheduler(controller)
-    number, scale, build = site.memo.once(spec.path, lambda: _checked(spec, site))
+    scheduler = context.scheduler(controller)
+    number, scale, build = context.memo.once(spec.path, lambda: _checked(spec, context))
     mechanism = Mechanism(scheduler, controller, number, build, spec.name)
     scheduler.add_part(mechanism, (controller,), spec.name)
     fitted = BuiltAxis(spec, scheduler, mechanism, scale)
     for n, switch in enumerate(spec.switches, start=1):
-        site.text.unless_wrong(switch.path, partial(_put_switch, fitted, switch, channel_of(spec.name, n), site))
+        context.text.unless_wrong(switch.path, partial(_put_switch, fitted, switch, channel_of(spec.name, n), context))
     return fitted
 
 
-def _checked(spec: AxisSpec, site: Site) -> tuple[int, Scale, Build]:
+def _checked(spec: AxisSpec, context: ElementContext) -> tuple[int, Scale, Build]:
     """The number of its drive, its scale and its mechanics. Raises `Misuse`."""
     controller, drive = spec.drive
     number = axis_number(drive)
-    axes = len(site.controller(controller).axes)
+    axes = len(context.controller(controller).axes)
     if not 1 <= number <= axes:
         there = ", ".join(f"M{n}" for n in range(1, axes + 1))
         raise WrongTerminal(f"{controller}.{drive}", f"drive = '{controller}.{drive}': {controller} has {there}", None)
-    taken = [axis.spec.name for axis in site.parts.built(AXIS).values() if axis.spec.drive == spec.drive]
+    taken = [axis.spec.name for axis in context.objects.built(AXIS).values() if axis.spec.drive == spec.drive]
     if taken:
         raise Misuse(f"drive = '{controller}.{drive}' moves {taken[0]!r} already")
-    scale = scale_of(spec.scale, site.kind(controller).scale(spec.scale, site.controller(controller), number))
+    scale = scale_of(spec.scale, context.kind(controller).scale(spec.scale, context.controller(controller), number))
     pulses = scale.nearest
     build = Build(
         sign=-1 if spec.inverted else 1,
@@ -167,25 +167,25 @@ def _checked(spec: AxisSpec, site: Site) -> tuple[int, Scale, Build]:
     return number, scale, build
 
 
-def _put_switch(axis: BuiltAxis, spec: SwitchSpec, channel: str, site: Site) -> None:
+def _put_switch(axis: BuiltAxis, spec: SwitchSpec, channel: str, context: ElementContext) -> None:
     def zone() -> Zone:
         usual = axis.scale.turn if axis.spec.kind == "rotary" else None
         period = usual if spec.period is None else axis.scale.pulses(spec.period)
         return zone_of(spec, axis.scale.nearest, period)
 
-    put_switch(axis.scheduler, axis.mechanism, axis.spec.drive[0], site.memo.once(spec.path, zone), spec, channel, site)
+    put_switch(axis.scheduler, axis.mechanism, axis.spec.drive[0], context.memo.once(spec.path, zone), spec, channel, context)
 
 
-def _connect(spec: AxisSpec, fitted: BuiltAxis, site: Site) -> None:
-    _fit_encoder(fitted, spec.encoder, site.parts.built(AXIS), site)
+def _connect(spec: AxisSpec, fitted: BuiltAxis, context: ElementContext) -> None:
+    _fit_encoder(fitted, spec.encoder, context.objects.built(AXIS), context)
 
 
-def _fit_encoder(axis: BuiltAxis, spec: EncoderSpec | None, axes: Mapping[str, BuiltAxis], site: Site) -> None:
+def _fit_encoder(axis: BuiltAxis, spec: EncoderSpec | None, axes: Mapping[str, BuiltAxis], context: ElementContext) -> None:
     """Put an encoder on an axis, or on the one that it follows. Without one, mechanics between pulses and load turn that of the
     controller."""
     mechanism = axis.mechanism
     name = axis.spec.drive[0]
-    kind, controller = site.kind(name), site.controller(name)
+    kind, controller = context.kind(name), context.controller(name)
     encoders = kind.encoders
     if encoders is None:
         if spec is not None:
@@ -210,7 +210,7 @@ def _fit_encoder(axis: BuiltAxis, spec: EncoderSpec | None, axes: Mapping[str, B
     if spec.index:
         low = axis.scale.nearest(spec.offset)
         target = (name, encoders.index_input(mechanism.number))
-        circuit = site.circuit(axis.scheduler, target, (*spec.path, "index"), None)
+        circuit = context.circuit(axis.scheduler, target, (*spec.path, "index"), None)
         zone = Zone(low, low + spec.index_width - 1, 0, axis.scale.pulses_per_rev)
         axis.scheduler.add_part(Switch(circuit, RotorMark(turned.mechanism), zone, now), (turned.mechanism.controller,))
 
@@ -229,9 +229,9 @@ def _counts(spec: EncoderSpec, turned: BuiltAxis, encoders: EncoderInputs[Any], 
     return counts
 
 
-def find_axis(name: str, site: Site) -> BuiltAxis:
+def find_axis(name: str, context: ElementContext) -> BuiltAxis:
     """The axis called ``name``."""
-    found = site.parts.built(AXIS).get(name)
+    found = context.objects.built(AXIS).get(name)
     if found is None:
         raise Unknown(name, f"no axis is called {name!r}")
     return found

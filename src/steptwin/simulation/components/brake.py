@@ -9,15 +9,15 @@ from steptwin.controller import MILLISECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.simulation.components.axis import find_axis
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs
-from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
-from steptwin.simulation.components.site import Site
+from steptwin.simulation.components.logic import STUCK, Joint, TerminalComponent, TerminalComponentSpec, with_terminals
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.faults.table import number
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.mechanics.mechanics import Mechanism
-from steptwin.simulation.scheduler.scheduler import Board
+from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, time_value
 from steptwin.simulation.toml.values import number as number_value
@@ -26,7 +26,7 @@ RELEASE, RELEASED = "RELEASE", "RELEASED"
 
 
 @table("[[brake]]")
-class BrakeSpec(BoardSpec):
+class BrakeSpec(TerminalComponentSpec):
     """``torque`` in N·m at the motor."""
 
     axis: str = key(NameOf("axis"), "the axis whose motor it holds")
@@ -48,15 +48,15 @@ class BrakeSpec(BoardSpec):
         yield "axis", self.axis
 
 
-class Brake(BoardPart):
+class Brake(TerminalComponent):
     """Lets go ``release_time`` after RELEASE is switched on, and acts ``apply_time`` after it is switched off. A shorter pulse
     does not move it."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("_mechanism", "_spec")
     __slots__ = (*FIXED, "_due", "_is_released", "_was_on", "is_stuck", "share")
 
-    def __init__(self, board: Board, spec: BrakeSpec, mechanism: Mechanism) -> None:
-        super().__init__(board)
+    def __init__(self, block: TerminalBlock, spec: BrakeSpec, mechanism: Mechanism) -> None:
+        super().__init__(block)
         self._spec = spec
         self._mechanism = mechanism
         self._was_on = False
@@ -67,15 +67,15 @@ class Brake(BoardPart):
         """Fault: it does not let go."""
         self.share = 1.0
         """Share of its torque that it has; less while it is worn."""
-        if not board.scheduler.is_blank:
-            mechanism.brake(spec.torque, board.scheduler.now)
+        if not block.scheduler.is_blank:
+            mechanism.brake(spec.torque, block.scheduler.now)
 
     def acts_on(self, mechanism: Mechanism) -> bool:
         return self._mechanism is mechanism
 
     def update(self, now: Nanos) -> None:
         self._move(now)  # before the input changes: an input at a moment comes after what is due then
-        is_on = self.board.is_on(RELEASE)
+        is_on = self.block.is_on(RELEASE)
         if is_on is not self._was_on:
             self._was_on = is_on
             wait = self._spec.release_time if is_on else self._spec.apply_time
@@ -83,7 +83,7 @@ class Brake(BoardPart):
             self._move(now)
         is_open = self._is_released and not self.is_stuck
         self._mechanism.brake(0.0 if is_open else self._spec.torque * self.share, now)
-        self.board.put(RELEASED, float(is_open))
+        self.block.put(RELEASED, float(is_open))
 
     def _move(self, now: Nanos) -> None:
         """Let go or act, if that is due."""
@@ -101,7 +101,7 @@ IS_AS_NEW = Message("simulation.brake-is-as-new", "{name} is as new")
 
 def _wear(active: ActiveFault, brake: Brake, begins: bool, now: Nanos) -> str:
     brake.share = active.fault.number("share") if begins else 1.0
-    return IS_WORN(name=brake.board.name, share=brake.share) if begins else IS_AS_NEW(name=brake.board.name)
+    return IS_WORN(name=brake.block.name, share=brake.share) if begins else IS_AS_NEW(name=brake.block.name)
 
 
 DOES_NOT_LET_GO = Message("simulation.does-not-let-go", "{name} does not let go")
@@ -110,19 +110,19 @@ LETS_GO_AGAIN = Message("simulation.lets-go-again", "{name} lets go again")
 
 def _stick(active: ActiveFault, brake: Brake, begins: bool, now: Nanos) -> str:
     brake.is_stuck = begins
-    return (DOES_NOT_LET_GO if begins else LETS_GO_AGAIN)(name=brake.board.name)
+    return (DOES_NOT_LET_GO if begins else LETS_GO_AGAIN)(name=brake.block.name)
 
 
-def _make(spec: BrakeSpec, site: Site) -> Brake:
-    mechanism = find_axis(spec.axis, site).mechanism
+def _make(spec: BrakeSpec, context: ElementContext) -> Brake:
+    mechanism = find_axis(spec.axis, context).mechanism
     motor = mechanism.build.motor
     if motor is None or not mechanism.build.coasts_unpowered:
         raise Misuse(f"axis {spec.axis!r} stands without current: a brake needs an [axis.motor] with when_off = 'free'")
-    braked = [name for name, other in site.parts.built(BRAKE).items() if other.acts_on(mechanism)]
+    braked = [name for name, other in context.objects.built(BRAKE).items() if other.acts_on(mechanism)]
     if braked:
         raise Misuse(f"axis {spec.axis!r} has the brake {braked[0]!r} already")
     motor.check_coasting(spec.torque)
-    return Brake(site.board(spec.name), spec, mechanism)
+    return Brake(context.terminal_block(spec.name), spec, mechanism)
 
 
 BRAKE = with_terminals(

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 
 from steptwin.simulation.components.contact import ContactSpec
 from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
-from steptwin.simulation.components.site import Site
 from steptwin.simulation.logic.contacts import Button
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.scheduler.scheduler import Scheduler
@@ -24,15 +24,15 @@ def _refers(spec: ButtonSpec, described: ElementSpecs) -> Iterator[Reference]:
     yield Reference(spec.target[0], spec.target[0], (*spec.path, "to"))
 
 
-def _build(spec: ButtonSpec, site: Site) -> tuple[Button, Scheduler]:
-    scheduler = site.scheduler(spec.target[0])
-    circuit = site.circuit(scheduler, spec.target, spec.path, spec.join)
+def _build(spec: ButtonSpec, context: ElementContext) -> tuple[Button, Scheduler]:
+    scheduler = context.scheduler(spec.target[0])
+    circuit = context.circuit(scheduler, spec.target, spec.path, spec.join)
     button = Button(
         circuit,
         normally_closed=spec.contact == "NC",
         bounce_ns=spec.bounce,
         bounces=spec.bounces,
-        chance=site.bounce_of(circuit),
+        chance=context.bounce_of(circuit),
         channel=spec.name,
     )
     button.rest_at(spec.contact == "NC")

@@ -13,8 +13,8 @@ from steptwin.messages import Message
 from steptwin.motion.elastic import Response, Spring
 from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis
 from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
-from steptwin.simulation.components.site import Site
 from steptwin.simulation.components.switch import SwitchSpec, channel_of, put_switch, zone_of
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
@@ -154,20 +154,22 @@ def _refers(spec: CarriageSpec, described: ElementSpecs) -> Iterator[Reference]:
         yield Reference(controller, switch.target[0], (*switch.path, "to"))
 
 
-def _build(spec: CarriageSpec, site: Site) -> Carriage:
-    carriage = Carriage(spec, find_axis(spec.axis, site))
+def _build(spec: CarriageSpec, context: ElementContext) -> Carriage:
+    carriage = Carriage(spec, find_axis(spec.axis, context))
     mechanism = carriage.axis.mechanism
     carriage.axis.scheduler.add_part(carriage, (mechanism.controller, spec.axis), spec.name)
     for n, switch in enumerate(spec.switches, start=1):
-        site.text.unless_wrong(switch.path, partial(_put_switch, carriage, switch, channel_of(spec.name, n), site))
+        context.text.unless_wrong(switch.path, partial(_put_switch, carriage, switch, channel_of(spec.name, n), context))
     return carriage
 
 
-def _put_switch(carriage: Carriage, spec: SwitchSpec, channel: str, site: Site) -> None:
+def _put_switch(carriage: Carriage, spec: SwitchSpec, channel: str, context: ElementContext) -> None:
     scale = carriage.axis.scale
     usual = scale.turn if carriage.axis.spec.kind == "rotary" else None
     period = usual if spec.period is None else scale.pulses(spec.period)
-    put_switch(carriage.axis.scheduler, carriage, carriage.spec.name, zone_of(spec, scale.nearest, period), spec, channel, site)
+    put_switch(
+        carriage.axis.scheduler, carriage, carriage.spec.name, zone_of(spec, scale.nearest, period), spec, channel, context
+    )
 
 
 def _signals(carriage: Carriage) -> Mapping[str, SignalOf]:

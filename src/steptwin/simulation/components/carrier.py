@@ -9,12 +9,12 @@ from typing import ClassVar
 from steptwin.controller import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.conveyor import find_conveyor
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs
-from steptwin.simulation.components.logic import BoardPart, BoardSpec, Joint
-from steptwin.simulation.components.site import Site
+from steptwin.simulation.components.logic import Joint, TerminalComponent, TerminalComponentSpec
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.belt import Workpiece, next_change
-from steptwin.simulation.scheduler.scheduler import Board
+from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, number
 
@@ -22,7 +22,7 @@ PICK, PLACE, HELD = "PICK", "PLACE", "HELD"
 
 
 @table()
-class CarrierSpec(BoardSpec):
+class CarrierSpec(TerminalComponentSpec):
     pick: Terminal | None = key(OUTPUT_PIN, "output connected to PICK: it is where it picks up", default=None)
     place: Terminal | None = key(OUTPUT_PIN, "output connected to PLACE: it is where it puts down", default=None)
     source: str | None = key(
@@ -56,19 +56,19 @@ class CarrierSpec(BoardSpec):
             yield "onto", self.onto
 
 
-HOLDS = Message("simulation.holds-a-workpiece", "{cup} holds {piece}")
-FALLS_FROM = Message("simulation.falls-from", "{piece} falls from {cup}")
+HOLDS = Message("simulation.holds-a-workpiece", "{cup} holds {workpiece}")
+FALLS_FROM = Message("simulation.falls-from", "{workpiece} falls from {cup}")
 
 
-class Carrier(BoardPart):
+class Carrier(TerminalComponent):
     """It carries a workpiece while it holds it. Then it lies on the belt below, or has fallen."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("_pick_at", "_place_at", "onto", "source")
     __slots__ = (*FIXED, "carried", "dropped")
 
-    def __init__(self, board: Board, spec: CarrierSpec, site: Site) -> None:
-        super().__init__(board)
-        self.source, self.onto = (None if name is None else find_conveyor(name, site) for name in (spec.source, spec.onto))
+    def __init__(self, block: TerminalBlock, spec: CarrierSpec, context: ElementContext) -> None:
+        super().__init__(block)
+        self.source, self.onto = (None if name is None else find_conveyor(name, context) for name in (spec.source, spec.onto))
         self._pick_at, self._place_at = spec.pick_at, spec.place_at
         self.carried: Workpiece | None = None
         """As it was on the belt it was taken from."""
@@ -77,7 +77,7 @@ class Carrier(BoardPart):
 
     @property
     def watches(self) -> tuple[str, ...]:
-        return (self.board.name, *(() if self.source is None else (self.source.board.name,)))
+        return (self.block.name, *(() if self.source is None else (self.source.block.name,)))
 
     def is_occupied(self, now: Nanos) -> bool:
         """Whether it carries a workpiece, or one is where it would pick it up."""
@@ -85,7 +85,7 @@ class Carrier(BoardPart):
 
     def _below(self, now: Nanos) -> Workpiece | None:
         """The workpiece where it picks up. Without a conveyor there is one wherever PICK is on."""
-        if not self.board.is_on(PICK):
+        if not self.block.is_on(PICK):
             return None
         source = self.source
         if source is None:
@@ -94,38 +94,38 @@ class Carrier(BoardPart):
 
     def take(self, now: Nanos) -> None:
         """It holds what is there from now on."""
-        piece = self._below(now)
-        if self.carried is None and piece is not None:
-            self.carried = piece
+        workpiece = self._below(now)
+        if self.carried is None and workpiece is not None:
+            self.carried = workpiece
             if self.source is not None:
-                self.source.take(piece)
-                self.source.report(HOLDS(cup=self.board.name, piece=piece.name), piece.name, "held")
+                self.source.take(workpiece)
+                self.source.report(HOLDS(cup=self.block.name, workpiece=workpiece.name), workpiece.name, "held")
 
     def let_go(self, now: Nanos) -> None:
         """It does not hold anything from now on."""
-        piece, self.carried = self.carried, None
+        workpiece, self.carried = self.carried, None
         source, onto = self.source, self.onto
-        if piece is None or source is None:
+        if workpiece is None or source is None:
             return
-        if onto is not None and self.board.is_on(PLACE):
-            onto.take_over(piece, source, self._place_at, now)
-        elif self.board.is_on(PICK):
-            source.put(piece, self._pick_at, now)
+        if onto is not None and self.block.is_on(PLACE):
+            onto.take_over(workpiece, source, self._place_at, now)
+        elif self.block.is_on(PICK):
+            source.put(workpiece, self._pick_at, now)
         else:
             self.dropped += 1
-            source.report(FALLS_FROM(piece=piece.name, cup=self.board.name), piece.name, "falls")
+            source.report(FALLS_FROM(workpiece=workpiece.name, cup=self.block.name), workpiece.name, "falls")
 
     def passing(self, now: Nanos) -> Nanos | None:
         """When a belt that moves brings a workpiece to where it picks up, or takes it away."""
         source = self.source
-        if source is None or self.carried is not None or not self.board.is_on(PICK):
+        if source is None or self.carried is not None or not self.block.is_on(PICK):
             return None
         edges = source.load.edges(source.places(self._pick_at), source.drive.place(now))
         return next_change(source.drive, *edges, now)
 
 
 def carrier_signals(carrier: Carrier) -> Mapping[str, SignalOf]:
-    source = (carrier.board.source,)
+    source = (carrier.block.source,)
     return {
         "dropped": SignalOf(source, lambda now: float(carrier.dropped)),
         "mass": SignalOf(source, lambda now: 0.0 if carrier.carried is None else carrier.carried.mass, unit="kg"),

@@ -6,13 +6,13 @@ from collections.abc import Iterable, Iterator
 
 from steptwin.simulation.components.axis import AXIS
 from steptwin.simulation.components.carriage import CARRIAGE
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.components.follower import FOLLOWER
 from steptwin.simulation.components.gantry import GANTRY
-from steptwin.simulation.components.logic import STUCK, BoardSpec, Joint, with_terminals
+from steptwin.simulation.components.logic import STUCK, Joint, TerminalComponentSpec, with_terminals
 from steptwin.simulation.components.quantity import TIME, check_condition, condition_of, owners_of
 from steptwin.simulation.components.shaft import SHAFT
-from steptwin.simulation.components.site import Site
 from steptwin.simulation.components.tool import TOOL
 from steptwin.simulation.components.touch import HIT, JAM, REPORT, RESET, Touch
 from steptwin.simulation.kinds.kind import Terminals
@@ -24,7 +24,7 @@ from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, text_value, wo
 
 
 @table("[[collision]]")
-class CollisionSpec(BoardSpec):
+class CollisionSpec(TerminalComponentSpec):
     when: str = key(text_value, "the condition under which parts touch, such as 'x.position > 300 and z.position < 50'")
     effect: str = key(word(REPORT, JAM), "report, or jam: the axes in the condition, or of what is in it, stand", default=REPORT)
     reset: Terminal | None = key(OUTPUT_PIN, "output connected to RESET, which frees jammed axes", default=None)
@@ -50,23 +50,23 @@ class CollisionSpec(BoardSpec):
         check_condition(text, self.path, self.name, self.when)
 
 
-def _make(spec: CollisionSpec, site: Site) -> Touch:
-    board = site.board(spec.name)
-    return Touch(board, spec.effect == JAM, condition_of(spec.when, board, site), dict(_axes_of(spec, site)))
+def _make(spec: CollisionSpec, context: ElementContext) -> Touch:
+    block = context.terminal_block(spec.name)
+    return Touch(block, spec.effect == JAM, condition_of(spec.when, block, context), dict(_axes_of(spec, context)))
 
 
-def _axes_of(spec: CollisionSpec, site: Site) -> Iterator[tuple[str, Mechanism]]:
+def _axes_of(spec: CollisionSpec, context: ElementContext) -> Iterator[tuple[str, Mechanism]]:
     """The axes in the condition, and those that move what is in it."""
-    parts = site.parts
+    objects = context.objects
     moved_by = {
-        **parts.built(AXIS),
-        **{name: carriage.axis for name, carriage in parts.built(CARRIAGE).items()},
-        **{name: shaft.axis for name, shaft in parts.built(SHAFT).items()},
-        **{name: follower.shaft.axis for name, follower in parts.built(FOLLOWER).items()},
+        **objects.built(AXIS),
+        **{name: carriage.axis for name, carriage in objects.built(CARRIAGE).items()},
+        **{name: shaft.axis for name, shaft in objects.built(SHAFT).items()},
+        **{name: follower.shaft.axis for name, follower in objects.built(FOLLOWER).items()},
     }
     moved_by_two = {
-        **{name: tool.axes for name, tool in parts.built(TOOL).items()},
-        **{name: gantry.ends for name, gantry in parts.built(GANTRY).items()},
+        **{name: tool.axes for name, tool in objects.built(TOOL).items()},
+        **{name: gantry.ends for name, gantry in objects.built(GANTRY).items()},
     }
     for owner in spec.owners:
         axes = (moved_by[owner],) if owner in moved_by else moved_by_two.get(owner, ())
@@ -76,6 +76,6 @@ def _axes_of(spec: CollisionSpec, site: Site) -> Iterator[tuple[str, Mechanism]]
 COLLISION = with_terminals(
     CollisionSpec,
     make=_make,
-    signals=lambda collision: {"count": SignalOf((collision.board.source,), lambda now: float(collision.count))},
+    signals=lambda collision: {"count": SignalOf((collision.block.source,), lambda now: float(collision.count))},
     faults=STUCK,
 )

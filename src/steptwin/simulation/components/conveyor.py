@@ -18,16 +18,16 @@ from steptwin.messages import Message
 from steptwin.simulation.components.axis import find_axis, turning_points_of_axis
 from steptwin.simulation.components.beltsensor import Sensor, SensorSpec
 from steptwin.simulation.components.conveyortable import FEED, RUN, ConveyorSpec, stop_terminal
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import Reference
-from steptwin.simulation.components.logic import STUCK_INPUT, BoardPart, with_terminals
-from steptwin.simulation.components.site import Site
+from steptwin.simulation.components.logic import STUCK_INPUT, TerminalComponent, with_terminals
 from steptwin.simulation.faults import ActiveFault, Fault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.belt import BeltDrive, ConstantDrive, Load, Workpiece, next_change
 from steptwin.simulation.mechanics.drawing import BELT, Drawing, SensorZone
 from steptwin.simulation.mechanics.scale import exact_fraction
-from steptwin.simulation.scheduler.scheduler import Board
+from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.names import Unknown
 
 FEEDER_STANDS = "feeder_stands"
@@ -43,15 +43,15 @@ _PULSE = 1
 # ---------------------------------------------------------------------- what is built
 
 
-IS_ON = Message("simulation.is-on-a-belt", "{piece} is on {belt}")
-GOES_BACK = Message("simulation.goes-back-on-a-belt", "{piece} goes back on {belt}")
-GOES_ON = Message("simulation.goes-on-on-a-belt", "{piece} goes on on {belt}")
-LEAVES = Message("simulation.leaves-a-belt", "{piece} leaves {belt}")
-FALLS_OFF = Message("simulation.falls-off-a-belt", "{piece} falls off the beginning of {belt}")
-STANDS_AT = Message("simulation.stands-on-a-belt", "{piece} stands at {place:g} mm of {belt}")
+IS_ON = Message("simulation.is-on-a-belt", "{workpiece} is on {belt}")
+GOES_BACK = Message("simulation.goes-back-on-a-belt", "{workpiece} goes back on {belt}")
+GOES_ON = Message("simulation.goes-on-on-a-belt", "{workpiece} goes on on {belt}")
+LEAVES = Message("simulation.leaves-a-belt", "{workpiece} leaves {belt}")
+FALLS_OFF = Message("simulation.falls-off-a-belt", "{workpiece} falls off the beginning of {belt}")
+STANDS_AT = Message("simulation.stands-on-a-belt", "{workpiece} stands at {place:g} mm of {belt}")
 
 
-class Conveyor(BoardPart):
+class Conveyor(TerminalComponent):
     """A belt with its workpieces. ``drive`` moves it, in places of which ``per_mm`` are a millimetre.
 
     What leaves it is put at the beginning of the following one, or is gone. Workpieces stand before a stop that is on, behind
@@ -87,7 +87,7 @@ class Conveyor(BoardPart):
 
     def __init__(
         self,
-        board: Board,
+        block: TerminalBlock,
         spec: ConveyorSpec,
         drive: BeltDrive,
         per_mm: Fraction,
@@ -97,7 +97,7 @@ class Conveyor(BoardPart):
     ) -> None:
         """``own``: the drive, where it is the conveyor's own; ``moved_by``: otherwise the controller that moves it, between
         ``turning_points`` one way."""
-        super().__init__(board)
+        super().__init__(block)
         self.spec = spec
         self.drive = drive
         self.per_mm = per_mm
@@ -106,7 +106,7 @@ class Conveyor(BoardPart):
         self._own = own
         self._moved_by = moved_by
         self._turning_points = turning_points
-        self._then = drive.place(board.scheduler.now)
+        self._then = drive.place(block.scheduler.now)
         """The place of the belt when it was looked at last: since then it has moved one way while anything stands."""
         self.following: Conveyor | None = None
         self.load = Load()
@@ -140,7 +140,7 @@ class Conveyor(BoardPart):
 
     @property
     def watches(self) -> tuple[str, ...]:
-        return (self.board.name, *self._moved_by, *(() if self.spec.next is None else (self.spec.next,)))
+        return (self.block.name, *self._moved_by, *(() if self.spec.next is None else (self.spec.next,)))
 
     def _state(self) -> object:
         """Another value whenever workpieces may move or stand otherwise."""
@@ -148,12 +148,12 @@ class Conveyor(BoardPart):
 
     def _raised(self) -> tuple[int, ...]:
         """The places of the stops that are on."""
-        return tuple(place for terminal, place in self._stops if self.board.is_on(terminal))
+        return tuple(place for terminal, place in self._stops if self.block.is_on(terminal))
 
     def update(self, now: Nanos) -> None:
         if self._own is not None:
-            self._own.run(self.board.is_on(RUN) and not self.is_stopped, now)
-        is_fed = self.board.is_on(FEED)
+            self._own.run(self.block.is_on(RUN) and not self.is_stopped, now)
+        is_fed = self.block.is_on(FEED)
         if is_fed and not self._is_fed:
             self._feed(now)
         self._is_fed = is_fed
@@ -164,84 +164,86 @@ class Conveyor(BoardPart):
             self._hold(now)
             self._deliver(now)
             self._seen = self._state()
-            self.board.scheduler.notify(self.board.name)
+            self.block.scheduler.notify(self.block.name)
             self._due = self._next(now)
 
     def _feed(self, now: Nanos) -> None:
         """Put a workpiece at the beginning, where there is room for it."""
         if self.feeder_stands or self.load.covering(0, self.drive.place(now)) is not None:
             self.missed += 1
-            self.board.scheduler.notify(self.board.name)
+            self.block.scheduler.notify(self.block.name)
             return
         self.fed += 1
         spec = self.spec
         marks = tuple((self.places(mark), self.places(mark + spec.mark_width)) for mark in spec.marks)
         self.put(Workpiece(f"{spec.name}.{self.fed}", 0, self.places(spec.workpiece), spec.mass, marks), 0.0, now)
 
-    def put(self, piece: Workpiece, front: float, now: Nanos) -> None:
+    def put(self, workpiece: Workpiece, front: float, now: Nanos) -> None:
         """Put a workpiece, whose lengths are places of this belt, with its front ``front`` mm from the beginning."""
         self._then = self.drive.place(now)
-        self.load.put(piece._replace(origin=self.drive.place(now) - self.places(front), held=None))
-        self.report(IS_ON(piece=piece.name, belt=self.spec.name), piece.name, "on")
-        self.board.scheduler.notify(self.board.name)
+        self.load.put(workpiece._replace(origin=self.drive.place(now) - self.places(front), held=None))
+        self.report(IS_ON(workpiece=workpiece.name, belt=self.spec.name), workpiece.name, "on")
+        self.block.scheduler.notify(self.block.name)
 
-    def take_over(self, piece: Workpiece, other: Conveyor, front: float, now: Nanos) -> None:
+    def take_over(self, workpiece: Workpiece, other: Conveyor, front: float, now: Nanos) -> None:
         """Put a workpiece that was on another belt on this one."""
         ratio = self.per_mm / other.per_mm
 
         def places(length: int) -> int:
             return floor(length * ratio + Fraction(1, 2))
 
-        marks = tuple((places(begin), places(end)) for begin, end in piece.marks)
-        self.put(piece._replace(length=places(piece.length), marks=marks), front, now)
+        marks = tuple((places(begin), places(end)) for begin, end in workpiece.marks)
+        self.put(workpiece._replace(length=places(workpiece.length), marks=marks), front, now)
 
-    def take(self, piece: Workpiece) -> None:
+    def take(self, workpiece: Workpiece) -> None:
         """Take a workpiece off the belt."""
-        self.load.take(piece)
-        self.board.scheduler.notify(self.board.name)
+        self.load.take(workpiece)
+        self.block.scheduler.notify(self.block.name)
 
     def front(self, number: int, now: Nanos) -> float:
         """How far the front of a workpiece is from the beginning, mm. 0 is the workpiece that was put there first; NaN if
         there are fewer."""
-        pieces = self.load.pieces
-        return float(pieces[number].front(self.drive.place(now)) / self.per_mm) if number < len(pieces) else nan
+        workpieces = self.load.workpieces
+        return float(workpieces[number].front(self.drive.place(now)) / self.per_mm) if number < len(workpieces) else nan
 
     def mass(self, now: Nanos) -> float:
         """kg of the workpieces on it."""
-        return sum(piece.mass for piece in self.load.pieces)
+        return sum(workpiece.mass for workpiece in self.load.workpieces)
 
     def report(self, text: str, name: str, what: str) -> None:
         """Something has happened to a workpiece."""
-        scheduler = self.board.scheduler
+        scheduler = self.block.scheduler
         facts = ("workpiece", name), ("element", self.spec.name), ("what", what)
-        scheduler.record(scheduler.owner(self.board.name), "event", "workpiece", text, *facts)
+        scheduler.record(scheduler.owner(self.block.name), "event", "workpiece", text, *facts)
 
     def _hold(self, now: Nanos) -> None:
         """Let workpieces stand where they cannot go on, and let those go on that can."""
         belt, stride = self.drive.place(now), _PULSE if self._own is None else self._own.stride
         back, self._then = self._then - belt, belt
         if back > 0:
-            for piece in self.load.pieces:
-                if piece.held is not None:
-                    self.load.release(piece, belt + back)
-                    self.report(GOES_BACK(piece=piece.name, belt=self.spec.name), piece.name, "goes back")
+            for workpiece in self.load.workpieces:
+                if workpiece.held is not None:
+                    self.load.release(workpiece, belt + back)
+                    self.report(GOES_BACK(workpiece=workpiece.name, belt=self.spec.name), workpiece.name, "goes back")
         ahead: int | None = None
-        for piece in sorted(self.load.pieces, key=lambda one: one.front(belt), reverse=True):
-            front = piece.front(belt)
+        for workpiece in sorted(self.load.workpieces, key=lambda one: one.front(belt), reverse=True):
+            front = workpiece.front(belt)
             limit = self._limit(front, stride, ahead, now)
             if limit is not None and front >= limit:
                 at = limit if front - limit <= stride else front
-                if piece.held != at:
-                    self.load.hold(piece, at)
+                if workpiece.held != at:
+                    self.load.hold(workpiece, at)
                     self.report(
-                        STANDS_AT(piece=piece.name, place=float(at / self.per_mm), belt=self.spec.name), piece.name, "stands"
+                        STANDS_AT(workpiece=workpiece.name, place=float(at / self.per_mm), belt=self.spec.name),
+                        workpiece.name,
+                        "stands",
                     )
-                ahead = at - piece.length - 1
+                ahead = at - workpiece.length - 1
                 continue
             ahead = None
-            if piece.held is not None:
-                self.load.release(piece, belt)
-                self.report(GOES_ON(piece=piece.name, belt=self.spec.name), piece.name, "goes on")
+            if workpiece.held is not None:
+                self.load.release(workpiece, belt)
+                self.report(GOES_ON(workpiece=workpiece.name, belt=self.spec.name), workpiece.name, "goes on")
 
     def _limit(self, front: int, stride: int, ahead: int | None, now: Nanos) -> int | None:
         """The place up to which a workpiece can go, with its front at ``front``. ``ahead``: behind one that stands before it."""
@@ -263,39 +265,39 @@ class Conveyor(BoardPart):
     def _deliver(self, now: Nanos) -> None:
         """Let go what has come to an end of the belt."""
         belt, length = self.drive.place(now), self._length
-        for piece in self.load.pieces:
-            front = piece.front(belt)
-            if front >= length and piece.held is None:
+        for workpiece in self.load.workpieces:
+            front = workpiece.front(belt)
+            if front >= length and workpiece.held is None:
                 self.delivered += 1
-                self.take(piece)
-                self.report(LEAVES(piece=piece.name, belt=self.spec.name), piece.name, "leaves")
+                self.take(workpiece)
+                self.report(LEAVES(workpiece=workpiece.name, belt=self.spec.name), workpiece.name, "leaves")
                 if self.following is not None:
-                    self.following.take_over(piece, self, 0.0, now)
+                    self.following.take_over(workpiece, self, 0.0, now)
             elif front < 0:
-                self.take(piece)
-                self.report(FALLS_OFF(piece=piece.name, belt=self.spec.name), piece.name, "falls")
+                self.take(workpiece)
+                self.report(FALLS_OFF(workpiece=workpiece.name, belt=self.spec.name), workpiece.name, "falls")
 
     def _next(self, now: Nanos) -> Nanos | None:
         """When the next workpiece is lost at the beginning, is delivered or cannot go on; or can again, at the end."""
         belt = self.drive.place(now)
-        moving = [piece for piece in self.load.pieces if piece.held is None]
-        below = max((piece.origin for piece in moving), default=None)
-        above = min((piece.origin + self._way(piece, belt, now) for piece in moving), default=None)
+        moving = [workpiece for workpiece in self.load.workpieces if workpiece.held is None]
+        below = max((workpiece.origin for workpiece in moving), default=None)
+        above = min((workpiece.origin + self._way(workpiece, belt, now) for workpiece in moving), default=None)
         due = next_change(self.drive, None if below is None else below - 1, above, now)
-        if len(moving) < len(self.load.pieces):
+        if len(moving) < len(self.load.workpieces):
             due = min(
                 filter(None, (due, next(self._turning_points(now), None), self.drive.reaches(belt - 1, now, -1))), default=None
             )
         following = self.following
-        if following is None or not self.load.pieces or not self._is_blocked(now):
+        if following is None or not self.load.workpieces or not self._is_blocked(now):
             return due
         free = next_change(following.drive, *following.load.edges(0, following.drive.place(now)), now)
         return free if due is None else due if free is None else min(due, free)
 
-    def _way(self, piece: Workpiece, belt: int, now: Nanos) -> int:
+    def _way(self, workpiece: Workpiece, belt: int, now: Nanos) -> int:
         """Up to where a moving workpiece can go."""
-        front = piece.front(belt)
-        before = [one for one in self.load.pieces if one.held is not None and one.held > front]
+        front = workpiece.front(belt)
+        before = [one for one in self.load.workpieces if one.held is not None and one.held > front]
         ahead = min((one.front(belt) - one.length - 1 for one in before), default=None)
         found = self._limit(front, 0, ahead, now)
         return self._length if found is None else min(found, self._length)
@@ -328,21 +330,21 @@ FEEDER_WORKS_AGAIN = Message("simulation.feeder-works-again", "the feeder of {na
 
 def _stop_feeder(active: ActiveFault, conveyor: Conveyor, begins: bool, now: Nanos) -> str:
     conveyor.feeder_stands = begins
-    scheduler, name = conveyor.board.scheduler, conveyor.spec.name
+    scheduler, name = conveyor.block.scheduler, conveyor.spec.name
     scheduler.record(scheduler.owner(name), "edge", f"{name}.{FEEDER_STANDS}", float(begins))
     return (FEEDER_FAILS if begins else FEEDER_WORKS_AGAIN)(name=name)
 
 
-def _make(spec: ConveyorSpec, site: Site) -> Conveyor:
-    board = site.board(spec.name)
+def _make(spec: ConveyorSpec, context: ElementContext) -> Conveyor:
+    block = context.terminal_block(spec.name)
     if spec.axis is None:
-        own = ConstantDrive(exact_fraction(spec.speed), board.scheduler.now)
-        conveyor = Conveyor(board, spec, own, Fraction(PICOMETRES), own)
+        own = ConstantDrive(exact_fraction(spec.speed), block.scheduler.now)
+        conveyor = Conveyor(block, spec, own, Fraction(PICOMETRES), own)
     else:
-        axis = find_axis(spec.axis, site)
+        axis = find_axis(spec.axis, context)
         per_mm = axis.scale.pulses_per_unit / exact_fraction(spec.mm_per_unit)
         turning_points = partial(turning_points_of_axis, axis)
-        conveyor = Conveyor(board, spec, axis.mechanism, per_mm, None, (axis.mechanism.controller,), turning_points)
+        conveyor = Conveyor(block, spec, axis.mechanism, per_mm, None, (axis.mechanism.controller,), turning_points)
     if conveyor.places(spec.length) < 1:
         raise Misuse(
             f"length = {spec.length:g} mm: the belt is shorter than one step of its drive, {float(1 / conveyor.per_mm):g} mm"
@@ -350,14 +352,14 @@ def _make(spec: ConveyorSpec, site: Site) -> Conveyor:
     return conveyor
 
 
-def _connect(spec: ConveyorSpec, conveyor: Conveyor, site: Site) -> None:
+def _connect(spec: ConveyorSpec, conveyor: Conveyor, context: ElementContext) -> None:
     if spec.next is not None:
-        conveyor.following = find_conveyor(spec.next, site)
+        conveyor.following = find_conveyor(spec.next, context)
 
 
-def find_conveyor(name: str, site: Site) -> Conveyor:
+def find_conveyor(name: str, context: ElementContext) -> Conveyor:
     """The conveyor ``name`` as it is built."""
-    found = site.parts.built(CONVEYOR).get(name)
+    found = context.objects.built(CONVEYOR).get(name)
     if found is None:
         raise Unknown(name, f"no conveyor is called {name!r}")
     return found
@@ -372,16 +374,16 @@ def _channel(spec: ConveyorSpec, number: int) -> str:
     return f"{spec.name}.sensor{number}"
 
 
-def _put_sensors(spec: ConveyorSpec, conveyor: Conveyor, site: Site) -> None:
+def _put_sensors(spec: ConveyorSpec, conveyor: Conveyor, context: ElementContext) -> None:
     for n, sensor in enumerate(spec.sensors, start=1):
-        site.text.unless_wrong(sensor.path, partial(_put_sensor, conveyor, sensor, _channel(spec, n), site))
+        context.text.unless_wrong(sensor.path, partial(_put_sensor, conveyor, sensor, _channel(spec, n), context))
 
 
-def _put_sensor(conveyor: Conveyor, spec: SensorSpec, channel: str, site: Site) -> None:
-    scheduler = conveyor.board.scheduler
-    circuit = site.circuit(scheduler, spec.target, (*spec.path, "to"), spec.join)
-    sensor = Sensor(circuit, conveyor, spec, site.bounce_of(circuit), channel)
-    scheduler.add_part(sensor, (conveyor.board.name,), drives=circuit.target.controller)
+def _put_sensor(conveyor: Conveyor, spec: SensorSpec, channel: str, context: ElementContext) -> None:
+    scheduler = conveyor.block.scheduler
+    circuit = context.circuit(scheduler, spec.target, (*spec.path, "to"), spec.join)
+    sensor = Sensor(circuit, conveyor, spec, context.bounce_of(circuit), channel)
+    scheduler.add_part(sensor, (conveyor.block.name,), drives=circuit.target.controller)
 
 
 def _place_names(spec: ConveyorSpec) -> tuple[str, ...]:
@@ -401,14 +403,14 @@ def _refuse_place() -> None:
 
 
 def _signals(conveyor: Conveyor) -> Mapping[str, SignalOf]:
-    source = (conveyor.board.source,)
+    source = (conveyor.block.source,)
     places = {
         name: SignalOf(source, partial(conveyor.front, n), unit="mm", bounds=(0.0, conveyor.spec.length), check=_refuse_place)
         for n, name in enumerate(_place_names(conveyor.spec))
     }
     return {
         **places,
-        "count": SignalOf(source, lambda now: float(len(conveyor.load.pieces))),
+        "count": SignalOf(source, lambda now: float(len(conveyor.load.workpieces))),
         "fed": SignalOf(source, lambda now: float(conveyor.fed)),
         "delivered": SignalOf(source, lambda now: float(conveyor.delivered)),
         "missed": SignalOf(source, lambda now: float(conveyor.missed)),

@@ -9,7 +9,7 @@ from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.simulation.components.beltsensor import SensorSpec
 from steptwin.simulation.components.elementspec import ElementSpecs
-from steptwin.simulation.components.logic import BoardSpec, Joint
+from steptwin.simulation.components.logic import Joint, TerminalComponentSpec
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import TableSpec, key, table, tables_in
@@ -36,7 +36,7 @@ def _mark_places(value: Any) -> tuple[float, ...]:
 
 
 @table("[[conveyor]]")
-class ConveyorSpec(BoardSpec):
+class ConveyorSpec(TerminalComponentSpec):
     length: float = key(number(0.0, above=True), "mm")
     speed: float | None = key(number(0.0, above=True), "mm/s while RUN is on", default=None)
     run: Terminal | None = key(OUTPUT_PIN, "with speed: output connected to RUN; without it a wire may be", default=None)

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from steptwin.controller import Nanos
-from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.simulation.components.logic import STUCK, Joint, TerminalComponent, TerminalComponentSpec, with_terminals
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.scheduler.scheduler import Board
+from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, whole
 
@@ -18,7 +18,7 @@ MOST = 2**31 - 1
 
 
 @table("[[counter]]")
-class CounterSpec(BoardSpec):
+class CounterSpec(TerminalComponentSpec):
     preset: int = key(whole(1, MOST), "the count from which OUT is on")
     up: Terminal | None = key(OUTPUT_PIN, "output connected to UP, whose edges from 0 to 1 count up", default=None)
     down: Terminal | None = key(OUTPUT_PIN, "output connected to DOWN, whose edges from 0 to 1 count down", default=None)
@@ -35,32 +35,32 @@ class CounterSpec(BoardSpec):
                 yield Joint(name, terminal, source)
 
 
-class Counter(BoardPart):
+class Counter(TerminalComponent):
     """Counts edges from 0 to 1, from 0 to `MOST`, and begins anew at 0 while RESET is on. OUT is on from ``preset`` on."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("_preset",)
     __slots__ = (*FIXED, "_levels", "count")
 
-    def __init__(self, board: Board, preset: int) -> None:
-        super().__init__(board)
+    def __init__(self, block: TerminalBlock, preset: int) -> None:
+        super().__init__(block)
         self._preset = preset
         self._levels = (False, False)
         self.count = 0
 
     def update(self, now: Nanos) -> None:
-        before, self._levels = self._levels, (self.board.is_on(UP), self.board.is_on(DOWN))
+        before, self._levels = self._levels, (self.block.is_on(UP), self.block.is_on(DOWN))
         up, down = (after and not level for level, after in zip(before, self._levels, strict=True))
-        self.count = 0 if self.board.is_on(RESET) else min(max(self.count + up - down, 0), MOST)
-        self.board.put(OUT, float(self.count >= self._preset))
+        self.count = 0 if self.block.is_on(RESET) else min(max(self.count + up - down, 0), MOST)
+        self.block.put(OUT, float(self.count >= self._preset))
 
 
 def _signals(counter: Counter) -> Mapping[str, SignalOf]:
-    return {"count": SignalOf((counter.board.source,), lambda now: float(counter.count))}
+    return {"count": SignalOf((counter.block.source,), lambda now: float(counter.count))}
 
 
 COUNTER = with_terminals(
     CounterSpec,
     faults=STUCK,
-    make=lambda spec, site: Counter(site.board(spec.name), spec.preset),
+    make=lambda spec, context: Counter(context.terminal_block(spec.name), spec.preset),
     signals=_signals,
 )

@@ -10,9 +10,9 @@ from typing import ClassVar
 
 from steptwin.controller import MILLISECOND, Nanos
 from steptwin.messages import Message
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import Reference
-from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
-from steptwin.simulation.components.site import Site
+from steptwin.simulation.components.logic import STUCK, Joint, TerminalComponent, TerminalComponentSpec, with_terminals
 from steptwin.simulation.components.switch import SwitchSpec, channel_of, put_switch, zone_of
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
@@ -21,7 +21,7 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.drawing import ROD, Drawing
 from steptwin.simulation.mechanics.scale import exact_fraction
 from steptwin.simulation.mechanics.travel import Travel
-from steptwin.simulation.scheduler.scheduler import Board
+from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table, tables_in
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, number, positive_time, time_value, word
@@ -31,7 +31,7 @@ SINGLE, DOUBLE = "single", "double"
 
 
 @table("[[cylinder]]")
-class CylinderSpec(BoardSpec):
+class CylinderSpec(TerminalComponentSpec):
     valve: str = key(word(SINGLE, DOUBLE), "single: one coil and a spring; double: two coils", default=SINGLE)
     extend: Terminal | None = key(OUTPUT_PIN, "output connected to the coil EXTEND; without it a wire may be", default=None)
     retract: Terminal | None = key(OUTPUT_PIN, "valve double: output connected to the coil RETRACT", default=None)
@@ -63,7 +63,7 @@ class CylinderSpec(BoardSpec):
             )
 
 
-class Cylinder(BoardPart):
+class Cylinder(TerminalComponent):
     """Moves between its ends at the constant speeds of its throttles.
 
     A valve with one coil and a spring extends it while the coil is on. One with two coils stays where it was switched last; while
@@ -73,8 +73,8 @@ class Cylinder(BoardPart):
     FIXED: ClassVar[tuple[str, ...]] = ("_spec",)
     __slots__ = (*FIXED, "_due", "_spool", "_wanted", "has_air", "is_jammed", "travel")
 
-    def __init__(self, board: Board, spec: CylinderSpec) -> None:
-        super().__init__(board)
+    def __init__(self, block: TerminalBlock, spec: CylinderSpec) -> None:
+        super().__init__(block)
         self._spec = spec
         starts_out = spec.start == "extended"
         self._spool = self._wanted = 1 if starts_out and spec.valve == DOUBLE else -1
@@ -82,7 +82,7 @@ class Cylinder(BoardPart):
         """When the spool of the valve moves."""
         self.has_air = True
         self.is_jammed = False
-        self.travel = Travel(spec.extend_time, spec.retract_time, is_forth=starts_out, now=board.scheduler.now)
+        self.travel = Travel(spec.extend_time, spec.retract_time, is_forth=starts_out, now=block.scheduler.now)
 
     def update(self, now: Nanos) -> None:
         self._switch(now)  # before the coils change: an input at a moment comes after what is due then
@@ -94,10 +94,10 @@ class Cylinder(BoardPart):
         force = self._force()
         if force != self.travel.direction:
             self.travel.send(force, now)
-            self.board.scheduler.notify(self.board.name)
+            self.block.scheduler.notify(self.block.name)
         place = self.travel.place(now)
-        self.board.put(EXTENDED, float(place == self.travel.full))
-        self.board.put(RETRACTED, float(place == 0))
+        self.block.put(EXTENDED, float(place == self.travel.full))
+        self.block.put(RETRACTED, float(place == 0))
 
     def _switch(self, now: Nanos) -> None:
         """Move the spool if that is due."""
@@ -107,10 +107,10 @@ class Cylinder(BoardPart):
 
     def _coils(self) -> int:
         """Where the coils move the spool."""
-        extend = self.board.is_on(EXTEND)
+        extend = self.block.is_on(EXTEND)
         if self._spec.valve == SINGLE:
             return 1 if extend else -1
-        retract = self.board.is_on(RETRACT)
+        retract = self.block.is_on(RETRACT)
         return self._wanted if extend is retract else 1 if extend else -1
 
     def _force(self) -> int:
@@ -122,7 +122,7 @@ class Cylinder(BoardPart):
         return self._spool
 
     def deadline(self) -> Nanos | None:
-        moments = (*self.travel.turning_points(self.board.scheduler.now), *(() if self._due is None else (self._due,)))
+        moments = (*self.travel.turning_points(self.block.scheduler.now), *(() if self._due is None else (self._due,)))
         return min(moments, default=None)
 
     @property
@@ -152,7 +152,7 @@ HAS_AIR_AGAIN = Message("simulation.has-air-again", "{name} has air again")
 
 def _take_air(active: ActiveFault, cylinder: Cylinder, begins: bool, now: Nanos) -> str:
     cylinder.has_air = not begins
-    return (HAS_NO_AIR if begins else HAS_AIR_AGAIN)(name=cylinder.board.name)
+    return (HAS_NO_AIR if begins else HAS_AIR_AGAIN)(name=cylinder.block.name)
 
 
 IS_JAMMED = Message("simulation.is-jammed", "{name} is jammed")
@@ -161,7 +161,7 @@ IS_FREE_AGAIN = Message("simulation.cylinder-is-free-again", "{name} is free aga
 
 def _jam(active: ActiveFault, cylinder: Cylinder, begins: bool, now: Nanos) -> str:
     cylinder.is_jammed = begins
-    return (IS_JAMMED if begins else IS_FREE_AGAIN)(name=cylinder.board.name)
+    return (IS_JAMMED if begins else IS_FREE_AGAIN)(name=cylinder.block.name)
 
 
 # ---------------------------------------------------------------------- the element
@@ -172,25 +172,25 @@ def _refers_of_switches(spec: CylinderSpec) -> Iterator[Reference]:
         yield Reference(spec.name, switch.target[0], (*switch.path, "to"))
 
 
-def _put_switches(spec: CylinderSpec, cylinder: Cylinder, site: Site) -> None:
+def _put_switches(spec: CylinderSpec, cylinder: Cylinder, context: ElementContext) -> None:
     for n, switch in enumerate(spec.switches, start=1):
-        site.text.unless_wrong(switch.path, partial(_put_switch, cylinder, switch, channel_of(spec.name, n), site))
+        context.text.unless_wrong(switch.path, partial(_put_switch, cylinder, switch, channel_of(spec.name, n), context))
 
 
-def _put_switch(cylinder: Cylinder, spec: SwitchSpec, channel: str, site: Site) -> None:
+def _put_switch(cylinder: Cylinder, spec: SwitchSpec, channel: str, context: ElementContext) -> None:
     zone = zone_of(spec, cylinder.places, None if spec.period is None else cylinder.places(spec.period))
-    put_switch(cylinder.board.scheduler, cylinder.travel, cylinder.board.name, zone, spec, channel, site)
+    put_switch(cylinder.block.scheduler, cylinder.travel, cylinder.block.name, zone, spec, channel, context)
 
 
 def _signals(cylinder: Cylinder) -> Mapping[str, SignalOf]:
-    source, travel = cylinder.board.source, cylinder.travel
+    source, travel = cylinder.block.source, cylinder.travel
     bounds = (0.0, cylinder.stroke)
     return {"position": SignalOf((source,), cylinder.position, travel.turning_points, travel.version, unit="mm", bounds=bounds)}
 
 
 CYLINDER = with_terminals(
     CylinderSpec,
-    make=lambda spec, site: Cylinder(site.board(spec.name), spec),
+    make=lambda spec, context: Cylinder(context.terminal_block(spec.name), spec),
     signals=_signals,
     drawing=lambda cylinder: cylinder.drawing,
     faults=(

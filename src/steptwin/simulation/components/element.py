@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, TypeAlias, cast
 
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import B, ElementSpecs, ElementTable, NamedSpec, Reference, S
-from steptwin.simulation.components.site import Site
 from steptwin.simulation.faults.table import FaultKind, Layer
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
@@ -28,12 +28,13 @@ class Element(ElementTable[S, B]):
 
     refers: Callable[[S, ElementSpecs], Iterable[Reference]]
     """All controllers, lines and elements with terminals that it names. Names that do not exist are reported at the path."""
-    build: Callable[[S, Site], B]
+    build: Callable[[S, ElementContext], B]
     """Adds it to its scheduler. Raises `Misuse` if it does not fit."""
-    connect: Callable[[S, B, Site], None] | None = None
+    connect: Callable[[S, B, ElementContext], None] | None = None
     """Called after all elements of this kind were built, because they may refer to each other."""
     terminals: Callable[[S], Terminals] | None = None
-    """Its own inputs and outputs, as pins of a controller: others join ``NAME.TERMINAL``. `Site.board` has their levels."""
+    """Its own inputs and outputs, as pins of a controller: others join ``NAME.TERMINAL``. `ElementContext.terminal_block` has
+    their levels."""
     signals: Callable[[B], Mapping[str, SignalOf]] | None = None
     """Signals for conditions, by name. Exactly the elements with a ``name`` have signals."""
     drawing: Callable[[B], Drawing] | None = None

@@ -13,9 +13,9 @@ from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.simulation.components.axis import AXIS, turning_points_of_axis
 from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.components.shaft import SHAFT, TURN, GearedShaft
-from steptwin.simulation.components.site import Site
 from steptwin.simulation.components.switch import SwitchSpec, channel_of, put_switch, zone_of
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
@@ -194,15 +194,15 @@ def _refers(spec: FollowerSpec, described: ElementSpecs) -> Iterator[Reference]:
         yield Reference(controller, switch.target[0], (*switch.path, "to"))
 
 
-def _build(spec: FollowerSpec, site: Site) -> Follower:
-    shaft = site.parts.built(SHAFT).get(spec.shaft)
+def _build(spec: FollowerSpec, context: ElementContext) -> Follower:
+    shaft = context.objects.built(SHAFT).get(spec.shaft)
     if shaft is None:
         raise Unknown(spec.shaft, f"no shaft is called {spec.shaft!r}")
-    follower = Follower(spec, shaft, site.memo.once(spec.path, lambda: _cam(spec, shaft)))
+    follower = Follower(spec, shaft, context.memo.once(spec.path, lambda: _cam(spec, shaft)))
     scheduler = shaft.axis.scheduler
     scheduler.add_part(follower, (shaft.axis.mechanism.controller, shaft.axis.spec.name, spec.shaft, spec.name), spec.name)
     for n, switch in enumerate(spec.switches, start=1):
-        site.text.unless_wrong(switch.path, partial(_put_switch, follower, switch, channel_of(spec.name, n), site))
+        context.text.unless_wrong(switch.path, partial(_put_switch, follower, switch, channel_of(spec.name, n), context))
     return follower
 
 
@@ -214,17 +214,17 @@ def _cam(spec: FollowerSpec, shaft: GearedShaft) -> Cam:
     return Cam(((place - floor(place / turn) * turn, lift) for place, lift in found), turn)
 
 
-def _put_switch(follower: Follower, spec: SwitchSpec, channel: str, site: Site) -> None:
+def _put_switch(follower: Follower, spec: SwitchSpec, channel: str, context: ElementContext) -> None:
     if spec.period is not None:
         raise Misuse(f"period = {spec.period:g}: a follower moves between two ends, its switches have one zone")
 
     def places(units: float) -> int:
         return floor(exact_fraction(units) * PLACES + Fraction(1, 2))
 
-    zone = site.memo.once(spec.path, lambda: zone_of(spec, places))
+    zone = context.memo.once(spec.path, lambda: zone_of(spec, places))
     mechanism = follower.shaft.axis.mechanism
     scheduler = follower.shaft.axis.scheduler
-    put_switch(scheduler, follower, (mechanism.controller, follower.spec.shaft, follower.spec.name), zone, spec, channel, site)
+    put_switch(scheduler, follower, (mechanism.controller, follower.spec.shaft, follower.spec.name), zone, spec, channel, context)
 
 
 def _signals(follower: Follower) -> Mapping[str, SignalOf]:

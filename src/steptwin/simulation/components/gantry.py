@@ -11,9 +11,9 @@ from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.simulation.components.axis import BuiltAxis, find_axis
 from steptwin.simulation.components.coordinate import Coordinate, Pulled
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs
-from steptwin.simulation.components.logic import STUCK, BoardSpec, Joint, with_terminals
-from steptwin.simulation.components.site import Site
+from steptwin.simulation.components.logic import STUCK, Joint, TerminalComponentSpec, with_terminals
 from steptwin.simulation.components.touch import JAM, REPORT, RESET, Touch
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
@@ -24,7 +24,7 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.channels import MovedChannel
 from steptwin.simulation.mechanics.drawing import Drawing, rail
 from steptwin.simulation.mechanics.scale import Loading, burden_of
-from steptwin.simulation.scheduler.scheduler import Board
+from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, word
@@ -37,7 +37,7 @@ SHARES = {SKEW: (1.0, -1.0), "position": (0.5, 0.5)}
 
 
 @table("[[gantry]]")
-class GantrySpec(BoardSpec):
+class GantrySpec(TerminalComponentSpec):
     """``limit`` in the unit of its axes, ``mass`` in kg, ``friction_force`` in N."""
 
     axis: str = key(NameOf("axis"), "the axis that moves one end")
@@ -78,11 +78,11 @@ class Gantry(Touch):
     FIXED: ClassVar[tuple[str, ...]] = ("_loads", "ends", "signals")
     __slots__ = (*FIXED, "_failed", "_looked_at", "_pulling", "is_stiff")
 
-    def __init__(self, board: Board, spec: GantrySpec, ends: tuple[BuiltAxis, BuiltAxis]) -> None:
+    def __init__(self, block: TerminalBlock, spec: GantrySpec, ends: tuple[BuiltAxis, BuiltAxis]) -> None:
         self.ends = ends
         self.signals = dict(_moving(ends))
         skewed = SignalCondition(f"abs({SKEW}) > {spec.limit!r}", self.signals.__getitem__)
-        super().__init__(board, spec.effect == JAM, skewed, {end.spec.name: end.mechanism for end in ends})
+        super().__init__(block, spec.effect == JAM, skewed, {end.spec.name: end.mechanism for end in ends})
         beam = Loading(mass=spec.mass, friction_force=spec.friction_force)
         self._loads = tuple(burden_of(beam, end.scale, "gantry") for end in ends)
         """The whole beam, for each motor."""
@@ -98,8 +98,8 @@ class Gantry(Touch):
         return SKEWED
 
     def touching(self) -> str:
-        skew = self.signals[SKEW].value(self.board.scheduler.now)
-        return ENDS_ARE_SKEWED(name=self.board.name, skew=skew, unit=self.unit)
+        skew = self.signals[SKEW].value(self.block.scheduler.now)
+        return ENDS_ARE_SKEWED(name=self.block.name, skew=skew, unit=self.unit)
 
     def update(self, now: Nanos) -> None:
         one, other = (end.mechanism for end in self.ends)
@@ -113,11 +113,11 @@ class Gantry(Touch):
         shares = (0.5, 0.5) if self._pulling[0] is self._pulling[1] else tuple(map(float, self._pulling))
         for end, whole, share in zip(self.ends, self._loads, shares, strict=True):
             held = whole.times(share)
-            end.mechanism.burden(self.board.name, held._replace(friction=held.friction * self.is_stiff), now)
+            end.mechanism.burden(self.block.name, held._replace(friction=held.friction * self.is_stiff), now)
         super().update(now)
 
     def deadline(self) -> Nanos | None:
-        now = self.board.scheduler.now
+        now = self.block.scheduler.now
         deadlines = (super().deadline(), *(end.mechanism.next_stall(now) for end in self.ends))
         return min((due for due in deadlines if due is not None), default=None)
 
@@ -131,7 +131,7 @@ class Gantry(Touch):
         other = self.ends[1].mechanism
         place = other.controller, str(other.number)
         return self.ends[0].spec.name, MovedChannel(
-            self.board.name, "position", self.unit, half, other=place, other_per_pulse=other_half
+            self.block.name, "position", self.unit, half, other=place, other_per_pulse=other_half
         )
 
     @property
@@ -152,25 +152,25 @@ GUIDES_ARE_STIFF = Message("simulation.guides-are-stiff", "the guides of {name} 
 
 def _stiffen(active: ActiveFault, gantry: Gantry, begins: bool, now: Nanos) -> str:
     gantry.is_stiff = active.fault.number("factor") if begins else 1.0
-    return GUIDES_ARE_STIFF(name=gantry.board.name, factor=gantry.is_stiff)
+    return GUIDES_ARE_STIFF(name=gantry.block.name, factor=gantry.is_stiff)
 
 
-def _make(spec: GantrySpec, site: Site) -> Gantry:
-    board = site.board(spec.name)
-    one, other = find_axis(spec.axis, site), find_axis(spec.other, site)
+def _make(spec: GantrySpec, context: ElementContext) -> Gantry:
+    block = context.terminal_block(spec.name)
+    one, other = find_axis(spec.axis, context), find_axis(spec.other, context)
     for end in (one, other):
         if end.mechanism.build.motor is None:
             raise Misuse(f"axis {end.spec.name!r} has no [axis.motor]: a gantry shares the load of two")
     if one.scale.unit != other.scale.unit:
         raise Misuse(f"{spec.axis!r} is in {one.scale.unit} and {spec.other!r} in {other.scale.unit}: a gantry has one unit")
-    for name, gantry in site.parts.built(GANTRY).items():
+    for name, gantry in context.objects.built(GANTRY).items():
         if taken := [end.spec.name for end in (one, other) if gantry.is_moved_by(end.mechanism)]:
             raise Misuse(f"axis {taken[0]!r} moves the gantry {name!r} already")
-    return Gantry(board, spec, (one, other))
+    return Gantry(block, spec, (one, other))
 
 
 def _signals(gantry: Gantry) -> Mapping[str, SignalOf]:
-    return {**gantry.signals, "count": SignalOf((gantry.board.source,), lambda now: float(gantry.count))}
+    return {**gantry.signals, "count": SignalOf((gantry.block.source,), lambda now: float(gantry.count))}
 
 
 _GANTRY = with_terminals(

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 from steptwin.controller import Nanos
-from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.simulation.components.logic import STUCK, Joint, TerminalComponent, TerminalComponentSpec, with_terminals
 from steptwin.simulation.kinds.kind import Terminals
-from steptwin.simulation.scheduler.scheduler import Board
+from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT, PinOf, Terminal, whole, word
@@ -37,7 +37,7 @@ class GateInputs(PinOf):
 
 
 @table("[[gate]]")
-class GateSpec(BoardSpec):
+class GateSpec(TerminalComponentSpec):
     kind: str = key(word(*FUNCTIONS), ", ".join(FUNCTIONS))
     inputs: int | tuple[Terminal, ...] = key(
         GateInputs(OUTPUT, MOST_INPUTS),
@@ -63,25 +63,25 @@ class GateSpec(BoardSpec):
             text.wrong((*self.path, "inputs"), "D007", f"a gate of kind 'not' has one input, not {len(self.names)}")
 
 
-class Gate(BoardPart):
+class Gate(TerminalComponent):
     """Gives its output the level that follows from its inputs, without delay."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("_function", "_inputs", "kind")
     __slots__ = (*FIXED,)
 
-    def __init__(self, board: Board, kind: str, inputs: Iterable[str]) -> None:
-        super().__init__(board)
+    def __init__(self, block: TerminalBlock, kind: str, inputs: Iterable[str]) -> None:
+        super().__init__(block)
         self.kind = kind
         self._function = FUNCTIONS[kind]
         self._inputs = tuple(inputs)
 
     def update(self, now: Nanos) -> None:
-        self.board.put(OUT, float(self._function([self.board.is_on(name) for name in self._inputs])))
+        self.block.put(OUT, float(self._function([self.block.is_on(name) for name in self._inputs])))
 
 
 _GATE = with_terminals(
     GateSpec,
     faults=STUCK,
-    make=lambda spec, site: Gate(site.board(spec.name), spec.kind, spec.names),
+    make=lambda spec, context: Gate(context.terminal_block(spec.name), spec.kind, spec.names),
 )
 GATE = replace(_GATE, function=lambda gate: gate.kind)

@@ -9,8 +9,8 @@ from typing import ClassVar
 from steptwin.controller import MILLISECOND, Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.carrier import HELD, PICK, PLACE, Carrier, CarrierSpec, carrier_signals
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.logic import STUCK, Joint, with_terminals
-from steptwin.simulation.components.site import Site
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.kinds.kind import Terminals
@@ -18,7 +18,7 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.drawing import ROD, Drawing
 from steptwin.simulation.mechanics.scale import exact_fraction
 from steptwin.simulation.mechanics.travel import Travel
-from steptwin.simulation.scheduler.scheduler import Board
+from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, number, positive_time
@@ -60,10 +60,10 @@ class Gripper(Carrier):
     FIXED: ClassVar[tuple[str, ...]] = ("_at", "_spec")
     __slots__ = (*FIXED, "_is_narrow", "is_held", "slips", "travel")
 
-    def __init__(self, board: Board, spec: GripperSpec, site: Site) -> None:
-        super().__init__(board, spec, site)
+    def __init__(self, block: TerminalBlock, spec: GripperSpec, context: ElementContext) -> None:
+        super().__init__(block, spec, context)
         self._spec = spec
-        self.travel = Travel(spec.close_time, spec.open_time, is_forth=False, now=board.scheduler.now)
+        self.travel = Travel(spec.close_time, spec.open_time, is_forth=False, now=block.scheduler.now)
         share = 1 - exact_fraction(spec.width) / exact_fraction(spec.stroke)
         self._at = floor(share * self.travel.full)
         """The place of the jaws at a workpiece."""
@@ -74,7 +74,7 @@ class Gripper(Carrier):
         """Fault: the jaws hold nothing."""
 
     def update(self, now: Nanos) -> None:
-        closes = self.board.is_on(CLOSE)
+        closes = self.block.is_on(CLOSE)
         is_narrow = self.travel.place(now) >= self._at
         if self.is_held and (not closes or self.slips):
             self.is_held = False
@@ -86,14 +86,14 @@ class Gripper(Carrier):
         direction = 0 if self.is_held else 1 if closes else -1
         if direction != self.travel.direction:
             self.travel.send(direction, now)
-            self.board.scheduler.notify(self.board.name)
+            self.block.scheduler.notify(self.block.name)
         place = self.travel.place(now)
-        self.board.put(OPENED, float(place == 0))
-        self.board.put(CLOSED, float(place == self.travel.full))
-        self.board.put(HELD, float(self.is_held))
+        self.block.put(OPENED, float(place == 0))
+        self.block.put(CLOSED, float(place == self.travel.full))
+        self.block.put(HELD, float(self.is_held))
 
     def deadline(self) -> Nanos | None:
-        now = self.board.scheduler.now
+        now = self.block.scheduler.now
         touches = self.travel.reaches(self._at, now, 1)
         moments = (*self.travel.turning_points(now), *(() if touches is None else (touches,)))
         return min(moments, default=None)
@@ -113,11 +113,11 @@ HOLDS_AGAIN = Message("simulation.holds-again", "{name} holds again")
 
 def _slip(active: ActiveFault, gripper: Gripper, begins: bool, now: Nanos) -> str:
     gripper.slips = begins
-    return (LETS_WORKPIECES_SLIP if begins else HOLDS_AGAIN)(name=gripper.board.name)
+    return (LETS_WORKPIECES_SLIP if begins else HOLDS_AGAIN)(name=gripper.block.name)
 
 
 def _signals(gripper: Gripper) -> Mapping[str, SignalOf]:
-    source, travel = gripper.board.source, gripper.travel
+    source, travel = gripper.block.source, gripper.travel
     bounds = (0.0, gripper.stroke)
     return {
         "position": SignalOf((source,), gripper.position, travel.turning_points, travel.version, unit="mm", bounds=bounds),
@@ -127,7 +127,7 @@ def _signals(gripper: Gripper) -> Mapping[str, SignalOf]:
 
 GRIPPER = with_terminals(
     GripperSpec,
-    make=lambda spec, site: Gripper(site.board(spec.name), spec, site),
+    make=lambda spec, context: Gripper(context.terminal_block(spec.name), spec, context),
     signals=_signals,
     drawing=lambda gripper: Drawing(ROD, gripper.stroke, ("position",)),
     faults=(

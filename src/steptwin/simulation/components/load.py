@@ -9,8 +9,9 @@ from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.simulation.components.axis import BuiltAxis, find_axis
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs
-from steptwin.simulation.components.logic import BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.simulation.components.logic import Joint, TerminalComponent, TerminalComponentSpec, with_terminals
 from steptwin.simulation.components.quantity import (
     TIME,
     check_condition,
@@ -20,7 +21,6 @@ from steptwin.simulation.components.quantity import (
     owners_of,
     signal_of,
 )
-from steptwin.simulation.components.site import Site
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.faults.table import number
@@ -30,7 +30,7 @@ from steptwin.simulation.logic.curve import Stepped
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.motor import Burden
 from steptwin.simulation.mechanics.scale import Loading, burden_of
-from steptwin.simulation.scheduler.scheduler import Board
+from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import NameOf, points, text_value
@@ -45,7 +45,7 @@ _not_negative = number_value(0.0)
 
 
 @table("[[load]]")
-class LoadSpec(BoardSpec):
+class LoadSpec(TerminalComponentSpec):
     """``mass`` in kg, ``force`` and ``friction_force`` in N on a linear axis, the others in kg·m² and N·m at the motor."""
 
     axis: str = key(NameOf("axis"), "the axis whose motor moves it")
@@ -96,16 +96,16 @@ class LoadSpec(BoardSpec):
             text.wrong((*self.path, "points"), "D003", f"shares of {there}: permitted are 0 to {MOST_SHARE:g}")
 
 
-class FurtherLoad(BoardPart):
+class FurtherLoad(TerminalComponent):
     """Loads the motor while its condition holds, with the share of its curve. ACTS is on while there is any."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("_axis", "_condition", "_whole")
     __slots__ = (*FIXED, "_curve", "_due", "_share", "factor")
 
     def __init__(
-        self, board: Board, axis: BuiltAxis, whole: Burden, condition: SignalCondition | None, curve: Stepped | None
+        self, block: TerminalBlock, axis: BuiltAxis, whole: Burden, condition: SignalCondition | None, curve: Stepped | None
     ) -> None:
-        super().__init__(board)
+        super().__init__(block)
         self._axis = axis
         self._whole = whole
         self._condition = condition
@@ -136,8 +136,8 @@ class FurtherLoad(BoardPart):
             self._curve.update(now)
             share *= self._curve.value
         self._share = share if self._condition is None or self._condition.holds(now) else 0.0
-        self._axis.mechanism.burden(self.board.name, self._whole.times(self._share), now)
-        self.board.put(ACTS, float(self._share > 0.0))
+        self._axis.mechanism.burden(self.block.name, self._whole.times(self._share), now)
+        self.block.put(ACTS, float(self._share > 0.0))
         self._due = None if self._condition is None else self._condition.change(now)
 
     def deadline(self) -> Nanos | None:
@@ -155,11 +155,11 @@ LOAD_IS_CHANGED = Message("simulation.load-is-changed", "{name} is {factor:g} ti
 
 def _change(active: ActiveFault, load: FurtherLoad, begins: bool, now: Nanos) -> str:
     load.factor = active.fault.number("factor") if begins else 1.0
-    return LOAD_IS_CHANGED(name=load.board.name, factor=load.factor)
+    return LOAD_IS_CHANGED(name=load.block.name, factor=load.factor)
 
 
-def _make(spec: LoadSpec, site: Site) -> FurtherLoad:
-    board, axis = site.board(spec.name), find_axis(spec.axis, site)
+def _make(spec: LoadSpec, context: ElementContext) -> FurtherLoad:
+    block, axis = context.terminal_block(spec.name), find_axis(spec.axis, context)
     build = axis.mechanism.build
     if build.motor is None:
         raise Misuse(f"axis {spec.axis!r} has no [axis.motor]: without, it moves any load")
@@ -169,14 +169,14 @@ def _make(spec: LoadSpec, site: Site) -> FurtherLoad:
         build.motor.check_coasting(most * (abs(whole.load) + whole.friction))
     curve = None
     if spec.of is not None and spec.points is not None:
-        curve = Stepped(signal_of("of", board, site, spec.of), spec.points, spec.resolution)
-    return FurtherLoad(board, axis, whole, None if spec.when is None else condition_of(spec.when, board, site), curve)
+        curve = Stepped(signal_of("of", block, context, spec.of), spec.points, spec.resolution)
+    return FurtherLoad(block, axis, whole, None if spec.when is None else condition_of(spec.when, block, context), curve)
 
 
 LOAD = with_terminals(
     LoadSpec,
     make=_make,
-    signals=lambda load: {"share": SignalOf((load.board.source,), load.share, bounds=(0.0, load.most))},
+    signals=lambda load: {"share": SignalOf((load.block.source,), load.share, bounds=(0.0, load.most))},
     faults=(
         FaultKind(
             "other-load",

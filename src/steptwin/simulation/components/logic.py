@@ -1,4 +1,4 @@
-"""Common part of elements with terminals: a board, keys that join outputs of others to it, its levels as signals,
+"""Base of elements with terminals: a terminal block, keys that join outputs of others to it, its levels as signals,
 and the faults of terminals that are stuck."""
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
-from steptwin.simulation.components.site import Site
 from steptwin.simulation.faults import ActiveFault, Fault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.faults.table import Parameter, ParameterForm, whole
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.drawing import Drawing
-from steptwin.simulation.scheduler.scheduler import Board
+from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.scheduler.wires import PinName, Wire
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.tomlplaces import Path
@@ -37,7 +37,7 @@ class Joint(NamedTuple):
 
 
 @table()
-class BoardSpec(NamedSpec, ABC):
+class TerminalComponentSpec(NamedSpec, ABC):
     """The table of an element with terminals."""
 
     name: str = key(name_value, "how others name it", order=-2)
@@ -57,18 +57,18 @@ class BoardSpec(NamedSpec, ABC):
         return ()
 
 
-class BoardPart(Stateful, ABC):
-    """The part of a scheduler that gives the outputs of a board their levels."""
+class TerminalComponent(Stateful, ABC):
+    """A component with terminals: gives the outputs of its terminal block their levels."""
 
-    __slots__ = ("board",)
+    __slots__ = ("block",)
 
-    def __init__(self, board: Board) -> None:
-        self.board = board
+    def __init__(self, block: TerminalBlock) -> None:
+        self.block = block
 
     @property
     def watches(self) -> tuple[str, ...] | None:
         """The controllers and elements whose changes concern it; None: all."""
-        return (self.board.name,)
+        return (self.block.name,)
 
     @property
     def delays(self) -> tuple[Nanos, ...]:
@@ -84,11 +84,11 @@ class BoardPart(Stateful, ABC):
         return None
 
 
-S = TypeVar("S", bound=BoardSpec)
-P = TypeVar("P", bound=BoardPart)
+S = TypeVar("S", bound=TerminalComponentSpec)
+P = TypeVar("P", bound=TerminalComponent)
 
 
-def _wires(spec: BoardSpec) -> Iterator[tuple[Wire, Path]]:
+def _wires(spec: TerminalComponentSpec) -> Iterator[tuple[Wire, Path]]:
     """To its inputs, with the keys that name their sources."""
     for joint in spec.joints:
         yield Wire(PinName(*joint.source), PinName(spec.name, joint.input)), (*spec.path, joint.key)
@@ -97,29 +97,29 @@ def _wires(spec: BoardSpec) -> Iterator[tuple[Wire, Path]]:
 # ---------------------------------------------------------------------- faults
 
 
-def _check_terminal(part: BoardPart, fault: Fault, key: str, permitted: tuple[str, ...]) -> None:
-    board, given = part.board, str(fault.get(key))
+def _check_terminal(component: TerminalComponent, fault: Fault, key: str, permitted: tuple[str, ...]) -> None:
+    block, given = component.block, str(fault.get(key))
     if given.upper() not in permitted:
         there = ", ".join(name.lower() for name in permitted) or "none"
-        raise Misuse(f"fault {fault.kind.name}: {key} = {given!r}: {key}s of {board.name!r} are {there}")
+        raise Misuse(f"fault {fault.kind.name}: {key} = {given!r}: {key}s of {block.name!r} are {there}")
 
 
-def _check_output(part: BoardPart, fault: Fault) -> None:
-    _check_terminal(part, fault, "output", part.board.outputs)
+def _check_output(component: TerminalComponent, fault: Fault) -> None:
+    _check_terminal(component, fault, "output", component.block.outputs)
 
 
-def _check_input(part: BoardPart, fault: Fault) -> None:
-    _check_terminal(part, fault, "input", part.board.inputs)
+def _check_input(component: TerminalComponent, fault: Fault) -> None:
+    _check_terminal(component, fault, "input", component.block.inputs)
 
 
 IS_STUCK_AT = Message("simulation.is-stuck-at", "{name} is stuck at {level}")
 TERMINAL_IS_FREE = Message("simulation.terminal-is-free", "{name} is free again")
 
 
-def _stick(active: ActiveFault, part: BoardPart, begins: bool, now: Nanos) -> str:
+def _stick(active: ActiveFault, component: TerminalComponent, begins: bool, now: Nanos) -> str:
     terminal, level = str(active.fault.get("output") or active.fault.get("input")), active.fault.whole("level") or 0
-    part.board.hold(terminal.upper(), float(level) if begins else None)
-    name = f"{part.board.name}.{terminal.lower()}"
+    component.block.hold(terminal.upper(), float(level) if begins else None)
+    name = f"{component.block.name}.{terminal.lower()}"
     return IS_STUCK_AT(name=name, level=level) if begins else TERMINAL_IS_FREE(name=name)
 
 
@@ -159,12 +159,12 @@ STUCK = (STUCK_OUTPUT, STUCK_INPUT)
 def with_terminals(
     spec: type[S],
     *,
-    make: Callable[[S, Site], P],
-    signals: Callable[[P], Mapping[str, SignalOf]] = lambda part: {},
+    make: Callable[[S, ElementContext], P],
+    signals: Callable[[P], Mapping[str, SignalOf]] = lambda component: {},
     faults: Sequence[FaultKind] = (),
     refers: Callable[[S], Iterable[Reference]] = lambda spec: (),
-    fit: Callable[[S, P, Site], None] = lambda spec, part, site: None,
-    connect: Callable[[S, P, Site], None] | None = None,
+    fit: Callable[[S, P, ElementContext], None] = lambda spec, component, context: None,
+    connect: Callable[[S, P, ElementContext], None] | None = None,
     drawing: Callable[[P], Drawing] | None = None,
 ) -> Element[S, P]:
     """An element with a name and terminals. Each terminal is a signal, each output a channel.
@@ -177,13 +177,13 @@ def with_terminals(
         yield from _references(found, described)
         yield from refers(found)
 
-    def build(found: S, site: Site) -> P:
-        part = make(found, site)
-        part.board.scheduler.add_part(part, part.watches, found.name)
-        for wire, path in site.memo.once((*found.path, "wires"), lambda: tuple(_wires(found))):
-            site.join(wire, path)
-        fit(found, part, site)
-        return part
+    def build(found: S, context: ElementContext) -> P:
+        component = make(found, context)
+        component.block.scheduler.add_part(component, component.watches, found.name)
+        for wire, path in context.memo.once((*found.path, "wires"), lambda: tuple(_wires(found))):
+            context.join(wire, path)
+        fit(found, component, context)
+        return component
 
     return Element(
         spec=spec,
@@ -191,13 +191,13 @@ def with_terminals(
         build=build,
         connect=connect,
         terminals=lambda found: found.terminals,
-        signals=lambda part: {**_terminal_signals(part.board), **signals(part)},
+        signals=lambda component: {**_terminal_signals(component.block), **signals(component)},
         drawing=drawing,
         faults=tuple(faults),
     )
 
 
-def _references(found: BoardSpec, described: ElementSpecs) -> Iterator[Reference]:
+def _references(found: TerminalComponentSpec, described: ElementSpecs) -> Iterator[Reference]:
     """References of the terminals and keys of an element."""
     yield Reference(found.name, found.name, found.path)
     for joint in found.joints:
@@ -206,13 +206,13 @@ def _references(found: BoardSpec, described: ElementSpecs) -> Iterator[Reference
         yield Reference(found.name, other, (*found.path, name))
 
 
-def _terminal_signals(board: Board) -> Mapping[str, SignalOf]:
-    return {terminal.lower(): level_signal(board, terminal) for terminal in board.levels}
+def _terminal_signals(block: TerminalBlock) -> Mapping[str, SignalOf]:
+    return {terminal.lower(): level_signal(block, terminal) for terminal in block.levels}
 
 
-def level_signal(board: Board, terminal: str) -> SignalOf:
-    return SignalOf((board.source,), partial(_level, board, terminal))
+def level_signal(block: TerminalBlock, terminal: str) -> SignalOf:
+    return SignalOf((block.source,), partial(_level, block, terminal))
 
 
-def _level(board: Board, terminal: str, now: Nanos) -> float:
-    return board.levels[terminal]
+def _level(block: TerminalBlock, terminal: str, now: Nanos) -> float:
+    return block.levels[terminal]

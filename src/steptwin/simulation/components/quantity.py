@@ -5,12 +5,12 @@ from __future__ import annotations
 from functools import partial
 
 from steptwin.errors import Misuse
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.signals import Idle, find_signal
-from steptwin.simulation.components.site import Site
 from steptwin.simulation.logic.condition import SignalCondition
 from steptwin.simulation.logic.expression import parse_condition
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.scheduler.scheduler import Board
+from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.tomlplaces import Path
 
@@ -46,14 +46,14 @@ def owner_of(signal: str) -> str:
     return signal.partition(".")[0]
 
 
-def signal_of(key: str, board: Board, site: Site, name: str) -> SignalOf | Idle:
-    """A signal of what is in one scheduler with a board. Raises `Misuse`."""
-    found = find_signal(site.parts, name)
-    if isinstance(found, Idle) or any(source.scheduler is not board.scheduler for source in found.sources):
+def signal_of(key: str, block: TerminalBlock, context: ElementContext, name: str) -> SignalOf | Idle:
+    """A signal of what is in one scheduler with a terminal block. Raises `Misuse`."""
+    found = find_signal(context.objects, name)
+    if isinstance(found, Idle) or any(source.scheduler is not block.scheduler for source in found.sources):
         raise Misuse(f"{key}: {name!r} is no quantity of a controller or an element")
     found.watch(name)
     return found
 
 
-def condition_of(text: str, board: Board, site: Site) -> SignalCondition:
-    return SignalCondition(text, partial(signal_of, "when", board, site))
+def condition_of(text: str, block: TerminalBlock, context: ElementContext) -> SignalCondition:
+    return SignalCondition(text, partial(signal_of, "when", block, context))

@@ -7,11 +7,11 @@ from typing import ClassVar
 
 from steptwin.controller import Nanos
 from steptwin.messages import Message
-from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.simulation.components.logic import STUCK, Joint, TerminalComponent, TerminalComponentSpec, with_terminals
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.kinds.kind import Terminals
-from steptwin.simulation.scheduler.scheduler import Board
+from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, time_value
 
@@ -19,7 +19,7 @@ COIL, NO, NC = "COIL", "NO", "NC"
 
 
 @table("[[relay]]")
-class RelaySpec(BoardSpec):
+class RelaySpec(TerminalComponentSpec):
     coil: Terminal | None = key(
         OUTPUT_PIN, "output connected to COIL; without it wires and contacts may be, such as emergency stops", default=None
     )
@@ -36,15 +36,15 @@ class RelaySpec(BoardSpec):
             yield Joint("coil", COIL, self.coil)
 
 
-class Relay(BoardPart):
+class Relay(TerminalComponent):
     """NO is on and NC off from ``pull_in`` after its coil is energised until ``drop_out`` after it is not. A shorter pulse, or a
     shorter gap, does not move the contact."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("_drop_out", "_pull_in")
     __slots__ = (*FIXED, "_due", "_was_on", "is_on", "is_open", "is_welded")
 
-    def __init__(self, board: Board, pull_in: Nanos, drop_out: Nanos) -> None:
-        super().__init__(board)
+    def __init__(self, block: TerminalBlock, pull_in: Nanos, drop_out: Nanos) -> None:
+        super().__init__(block)
         self._pull_in = pull_in
         self._drop_out = drop_out
         self._was_on = False
@@ -62,14 +62,14 @@ class Relay(BoardPart):
 
     def update(self, now: Nanos) -> None:
         self._move(now)  # before the coil changes: an input at a moment comes after what is due then
-        is_on = self.board.is_on(COIL) and not self.is_open
+        is_on = self.block.is_on(COIL) and not self.is_open
         if is_on is not self._was_on:
             self._was_on = is_on
             self._due = None if is_on is self.is_on else now + (self._pull_in if is_on else self._drop_out)
             self._move(now)
-        closed = self.is_on or (self.is_welded and self.board.is_on(NO))
-        self.board.put(NO, float(closed))
-        self.board.put(NC, float(not closed))
+        closed = self.is_on or (self.is_welded and self.block.is_on(NO))
+        self.block.put(NO, float(closed))
+        self.block.put(NC, float(not closed))
 
     def _move(self, now: Nanos) -> None:
         """Move the contact if that is due."""
@@ -87,7 +87,7 @@ CONTACT_IS_FREE = Message("simulation.contact-is-free", "the contact of {name} i
 
 def _weld(active: ActiveFault, relay: Relay, begins: bool, now: Nanos) -> str:
     relay.is_welded = begins
-    return (CONTACT_WELDS if begins else CONTACT_IS_FREE)(name=relay.board.name)
+    return (CONTACT_WELDS if begins else CONTACT_IS_FREE)(name=relay.block.name)
 
 
 COIL_IS_INTERRUPTED = Message("simulation.coil-is-interrupted", "the coil of {name} is interrupted")
@@ -96,12 +96,12 @@ COIL_IS_CONNECTED = Message("simulation.coil-is-connected", "the coil of {name} 
 
 def _interrupt(active: ActiveFault, relay: Relay, begins: bool, now: Nanos) -> str:
     relay.is_open = begins
-    return (COIL_IS_INTERRUPTED if begins else COIL_IS_CONNECTED)(name=relay.board.name)
+    return (COIL_IS_INTERRUPTED if begins else COIL_IS_CONNECTED)(name=relay.block.name)
 
 
 RELAY = with_terminals(
     RelaySpec,
-    make=lambda spec, site: Relay(site.board(spec.name), spec.pull_in, spec.drop_out),
+    make=lambda spec, context: Relay(context.terminal_block(spec.name), spec.pull_in, spec.drop_out),
     faults=(
         *STUCK,
         FaultKind(

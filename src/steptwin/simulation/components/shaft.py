@@ -14,8 +14,8 @@ from steptwin.messages import Message
 from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, turning_points_of_axis
 from steptwin.simulation.components.contact import ContactSpec
 from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
-from steptwin.simulation.components.site import Site
 from steptwin.simulation.components.switch import channel_of, put_switch
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
@@ -156,18 +156,18 @@ def _refers(spec: ShaftSpec, described: ElementSpecs) -> Iterator[Reference]:
         yield Reference(controller, cam.target[0], (*cam.path, "to"))
 
 
-def _build(spec: ShaftSpec, site: Site) -> GearedShaft:
-    shaft = GearedShaft(spec, find_axis(spec.axis, site))
+def _build(spec: ShaftSpec, context: ElementContext) -> GearedShaft:
+    shaft = GearedShaft(spec, find_axis(spec.axis, context))
     mechanism = shaft.axis.mechanism
     shaft.axis.scheduler.add_part(shaft, (mechanism.controller, spec.axis, spec.name), spec.name)
     for n, cam in enumerate(spec.cams, start=1):
-        site.text.unless_wrong(cam.path, partial(_put_cam, shaft, cam, channel_of(spec.name, n), site))
+        context.text.unless_wrong(cam.path, partial(_put_cam, shaft, cam, channel_of(spec.name, n), context))
     return shaft
 
 
-def _put_cam(shaft: GearedShaft, cam: CamSpec, channel: str, site: Site) -> None:
+def _put_cam(shaft: GearedShaft, cam: CamSpec, channel: str, context: ElementContext) -> None:
     moved_by = shaft.axis.mechanism.controller, shaft.spec.name
-    put_switch(shaft.axis.scheduler, shaft, moved_by, shaft.zone(cam), cam, channel, site)
+    put_switch(shaft.axis.scheduler, shaft, moved_by, shaft.zone(cam), cam, channel, context)
 
 
 def _signals(shaft: GearedShaft) -> Mapping[str, SignalOf]:

@@ -11,7 +11,7 @@ from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss, alike
-from steptwin.simulation.components.parts import WorldParts
+from steptwin.simulation.components.builtobjects import BuiltObjects
 from steptwin.simulation.kinds.kind import AnyKind
 from steptwin.simulation.kinds.lines import Line
 from steptwin.simulation.logic.signal import SignalOf
@@ -34,7 +34,7 @@ class Idle:
     unit = ""
     freeze = None
 
-    def __init__(self, plan: WorldParts) -> None:
+    def __init__(self, plan: BuiltObjects) -> None:
         at_rest: dict[str, Callable[[Nanos], bool]] = {
             **{name: partial(plan.kind_of[name].is_idle, controller) for name, controller in plan.controllers.items()},
             **{name: partial(_is_quiet, line) for name, line in plan.lines.items()},
@@ -78,7 +78,7 @@ NOTHING_IS_CALLED = Message(
 )
 
 
-def find_signal(plan: WorldParts, name: str) -> SignalOf | Idle:
+def find_signal(plan: BuiltObjects, name: str) -> SignalOf | Idle:
     """The signal called ``name``. Raises `Misuse` with the existing names."""
     if name == "time":
         return SignalOf((), _seconds, lambda now: (), lambda: name, unit="s", freeze=lambda now: _seconds)

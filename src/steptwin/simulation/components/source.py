@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator, Mapping
 from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
-from steptwin.simulation.components.site import Site
 from steptwin.simulation.components.voltage import BROKEN_WIRE, DRIFT
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.logic.sources import (
@@ -82,9 +82,9 @@ def _refers(spec: SourceSpec, described: ElementSpecs) -> Iterator[Reference]:
     yield Reference(spec.target[0], spec.target[0], (*spec.path, "to"))
 
 
-def _build(spec: SourceSpec, site: Site) -> AnalogSource:
-    scheduler = site.scheduler(spec.target[0])
-    target = site.input(spec.target, spec.path, ANALOG_INPUT)
+def _build(spec: SourceSpec, context: ElementContext) -> AnalogSource:
+    scheduler = context.scheduler(spec.target[0])
+    target = context.input(spec.target, spec.path, ANALOG_INPUT)
     source = AnalogSource(scheduler, target, WAVEFORMS[spec.kind](spec), spec.period, spec.name)
     scheduler.add_part(source, (), spec.name or None)
     return source

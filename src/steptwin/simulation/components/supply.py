@@ -9,17 +9,17 @@ from typing import Any, ClassVar, NamedTuple
 from steptwin.controller import MILLISECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs
-from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
-from steptwin.simulation.components.rigging import Rigging
-from steptwin.simulation.components.site import Site
+from steptwin.simulation.components.faultsetup import FaultSetup
+from steptwin.simulation.components.logic import STUCK, Joint, TerminalComponent, TerminalComponentSpec, with_terminals
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.controller import FaultyController
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.faults.table import number as parameter
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.scheduler.scheduler import Board
+from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, flag, name_value, number, permitting, time_value
@@ -42,7 +42,7 @@ def _names(value: Any) -> tuple[str, ...]:
 
 
 @table("[[supply]]")
-class SupplySpec(BoardSpec):
+class SupplySpec(TerminalComponentSpec):
     """Voltages in V."""
 
     feeds: tuple[str, ...] = key(_names, "the controllers that it feeds: a name, or a list of them")
@@ -119,17 +119,17 @@ SUPPLY_IS_ON = Message("simulation.supply-is-on", "{supply} is on, with {fed}")
 SUPPLY_IS_OFF = Message("simulation.supply-is-off", "{supply} is off, with {fed}")
 
 
-class Supply(BoardPart):
+class Supply(TerminalComponent):
     """GOOD is on, and so are the controllers, while its voltage is sufficient."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("_fed", "_spec")
     __slots__ = (*FIXED, "_is_on", "_is_wanted", "_ramp", "_switch_due", "is_good", "sag")
 
-    def __init__(self, board: Board, spec: SupplySpec, fed: tuple[FaultyController, ...]) -> None:
-        super().__init__(board)
+    def __init__(self, block: TerminalBlock, spec: SupplySpec, fed: tuple[FaultyController, ...]) -> None:
+        super().__init__(block)
         self._spec = spec
         self._fed = fed
-        self._ramp = Ramp(board.scheduler.now, 0.0, 0.0, 0.0)
+        self._ramp = Ramp(block.scheduler.now, 0.0, 0.0, 0.0)
         self._is_wanted = False
         self._is_on = False
         self._switch_due: Nanos | None = None
@@ -137,7 +137,7 @@ class Supply(BoardPart):
         self.sag: float | None = None
         """Fault: the voltage that it has at most."""
         for controller in fed:
-            controller.supply(False, board.scheduler.now)
+            controller.supply(False, block.scheduler.now)
 
     def volts(self, now: Nanos) -> float:
         return self._ramp.at(now)
@@ -155,7 +155,7 @@ class Supply(BoardPart):
 
     def update(self, now: Nanos) -> None:
         self._switch(now)  # before the input changes: an input at a moment comes after what is due then
-        is_wanted = not self._spec.is_switched or self.board.is_on(ON)
+        is_wanted = not self._spec.is_switched or self.block.is_on(ON)
         if is_wanted is not self._is_wanted:
             self._is_wanted = is_wanted
             wait = self._spec.delay if is_wanted else self._spec.hold_up
@@ -166,7 +166,7 @@ class Supply(BoardPart):
         if is_good is not self.is_good:
             self.is_good = is_good
             self._feed(now)
-        self.board.put(GOOD, float(is_good))
+        self.block.put(GOOD, float(is_good))
 
     def _switch(self, now: Nanos) -> None:
         if self._switch_due is not None and self._switch_due <= now:
@@ -186,14 +186,14 @@ class Supply(BoardPart):
     def _feed(self, now: Nanos) -> None:
         for controller in self._fed:
             controller.supply(self.is_good, now)
-        scheduler, name = self.board.scheduler, self.board.name
+        scheduler, name = self.block.scheduler, self.block.name
         fed = self._spec.feeds
         text = (SUPPLY_IS_ON if self.is_good else SUPPLY_IS_OFF)(supply=name, fed=list(fed))
         facts = ("element", name), ("on", self.is_good), ("fed", ", ".join(fed))
         scheduler.record(scheduler.owner(name), "event", "supply", text, *facts)
 
     def deadline(self) -> Nanos | None:
-        now = self.board.scheduler.now
+        now = self.block.scheduler.now
         deadlines = (self._switch_due, self._ramp.crosses(self._spec.threshold, now), next(self.turning_points(now), None))
         return min((due for due in deadlines if due is not None), default=None)
 
@@ -204,12 +204,12 @@ SAGS = Message("simulation.supply-sags", "{name} has {volts:g} V at most")
 
 def _sag(active: ActiveFault, supply: Supply, begins: bool, now: Nanos) -> str:
     supply.sag = active.fault.number("volts") if begins else None
-    return FULL_VOLTAGE(name=supply.board.name) if supply.sag is None else SAGS(name=supply.board.name, volts=supply.sag)
+    return FULL_VOLTAGE(name=supply.block.name) if supply.sag is None else SAGS(name=supply.block.name, volts=supply.sag)
 
 
-def _check_order(spec: SupplySpec, site: Site) -> None:
+def _check_order(spec: SupplySpec, context: ElementContext) -> None:
     """Raises `Misuse` for supplies that wait for one another."""
-    waits_for = {one.name: one.on[0] for one in site.parts.described.of(SUPPLY) if one.on is not None and one.on[1] == GOOD}
+    waits_for = {one.name: one.on[0] for one in context.objects.described.of(SUPPLY) if one.on is not None and one.on[1] == GOOD}
     way = [spec.name]
     while (before := waits_for.get(way[-1])) is not None and before not in way[1:]:
         way.append(before)
@@ -217,23 +217,23 @@ def _check_order(spec: SupplySpec, site: Site) -> None:
             raise Misuse(f"on: {' waits for '.join(way)}, so that it never comes on")
 
 
-def _make(spec: SupplySpec, site: Site) -> Supply:
-    site.memo.once((*spec.path, "order"), lambda: _check_order(spec, site))
-    rigging = Rigging(site.parts)
-    site.parts.faults.expect_supplies()
+def _make(spec: SupplySpec, context: ElementContext) -> Supply:
+    context.memo.once((*spec.path, "order"), lambda: _check_order(spec, context))
+    fault_setup = FaultSetup(context.objects)
+    context.objects.faults.expect_supplies()
     fed = []
     for name in spec.feeds:
-        site.controller(name)
-        other = site.parts.supplied.get(name)
+        context.controller(name)
+        other = context.objects.supplied.get(name)
         if other is not None:
             raise Misuse(f"feeds: {name!r} has the supply {other!r} already")
-        site.parts.supplied[name] = spec.name
-        fed.append(rigging.rig(name))
-    return Supply(site.board(spec.name), spec, tuple(fed))
+        context.objects.supplied[name] = spec.name
+        fed.append(fault_setup.prepare_for_faults(name))
+    return Supply(context.terminal_block(spec.name), spec, tuple(fed))
 
 
 def _signals(supply: Supply) -> Mapping[str, SignalOf]:
-    of = SignalOf((supply.board.source,), supply.volts, supply.turning_points, supply.version, "V", (0.0, supply.full))
+    of = SignalOf((supply.block.source,), supply.volts, supply.turning_points, supply.version, "V", (0.0, supply.full))
     return {"volts": of}
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from fractions import Fraction
 
 from steptwin.simulation.components.contact import ContactSpec
-from steptwin.simulation.components.site import Site
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.logic.contacts import MovingPart, Switch, Zone
 from steptwin.simulation.mechanics.drawing import SensorZone
 from steptwin.simulation.scheduler.scheduler import Scheduler
@@ -59,11 +59,11 @@ def put_switch(
     zone: Zone,
     spec: ContactSpec,
     channel: str,
-    site: Site,
+    context: ElementContext,
 ) -> None:
     """Put a switch where a carriage, which the controllers or elements ``moved_by`` move, runs over it."""
-    circuit = site.circuit(scheduler, spec.target, (*spec.path, "to"), spec.join)
-    part = Switch(
+    circuit = context.circuit(scheduler, spec.target, (*spec.path, "to"), spec.join)
+    component = Switch(
         circuit,
         carriage,
         zone,
@@ -71,10 +71,10 @@ def put_switch(
         normally_closed=spec.contact == "NC",
         bounce_ns=spec.bounce,
         bounces=spec.bounces,
-        chance=site.bounce_of(circuit),
+        chance=context.bounce_of(circuit),
         channel=channel,
     )
-    scheduler.add_part(part, (moved_by,) if isinstance(moved_by, str) else moved_by, drives=circuit.target.controller)
+    scheduler.add_part(component, (moved_by,) if isinstance(moved_by, str) else moved_by, drives=circuit.target.controller)
 
 
 def zone_of(spec: SwitchSpec, places: Callable[[float], int], period: Fraction | int | None = None) -> Zone:

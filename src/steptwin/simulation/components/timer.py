@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import ClassVar
 
 from steptwin.controller import Nanos
-from steptwin.simulation.components.logic import STUCK, BoardPart, BoardSpec, Joint, with_terminals
+from steptwin.simulation.components.logic import STUCK, Joint, TerminalComponent, TerminalComponentSpec, with_terminals
 from steptwin.simulation.kinds.kind import Terminals
-from steptwin.simulation.scheduler.scheduler import Board
+from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, positive_time, word
 
@@ -18,7 +18,7 @@ ON_DELAY, OFF_DELAY, PULSE = "on-delay", "off-delay", "pulse"
 
 
 @table("[[timer]]")
-class TimerSpec(BoardSpec):
+class TimerSpec(TerminalComponentSpec):
     kind: str = key(word(ON_DELAY, OFF_DELAY, PULSE), "on-delay (TON), off-delay (TOF) or pulse (TP)")
     time: Nanos = key(positive_time, "such as '200 ms'")
     input: Terminal | None = key(OUTPUT_PIN, "output connected to IN; without it wires and contacts may be", default=None)
@@ -33,15 +33,15 @@ class TimerSpec(BoardSpec):
             yield Joint("input", IN, self.input)
 
 
-class Timer(BoardPart):
+class Timer(TerminalComponent):
     """On-delay (TON): on once the input has been on for ``time``. Off-delay (TOF): off once it has been off for ``time``.
     Pulse (TP): on for ``time`` from an edge of the input from 0 to 1; edges meanwhile do nothing."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("_time", "kind")
     __slots__ = (*FIXED, "_due", "_was_on")
 
-    def __init__(self, board: Board, kind: str, time: Nanos) -> None:
-        super().__init__(board)
+    def __init__(self, block: TerminalBlock, kind: str, time: Nanos) -> None:
+        super().__init__(block)
         self.kind = kind
         self._time = time
         self._was_on = False
@@ -53,7 +53,7 @@ class Timer(BoardPart):
         return (self._time,)
 
     def update(self, now: Nanos) -> None:
-        is_on = self.board.is_on(IN)
+        is_on = self.block.is_on(IN)
         if self._due is not None and self._due <= now:
             self._due = None
         if is_on is not self._was_on:
@@ -66,7 +66,7 @@ class Timer(BoardPart):
             level = is_on or runs
         else:
             level = runs
-        self.board.put(OUT, float(level))
+        self.block.put(OUT, float(level))
 
     def _turn(self, is_on: bool, now: Nanos) -> None:
         if self.kind == PULSE:
@@ -84,6 +84,6 @@ class Timer(BoardPart):
 _TIMER = with_terminals(
     TimerSpec,
     faults=STUCK,
-    make=lambda spec, site: Timer(site.board(spec.name), spec.kind, spec.time),
+    make=lambda spec, context: Timer(context.terminal_block(spec.name), spec.kind, spec.time),
 )
 TIMER = replace(_TIMER, function=lambda timer: timer.kind)

@@ -12,8 +12,8 @@ from steptwin.messages import Message
 from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis
 from steptwin.simulation.components.coordinate import PLACES, Coordinate, Pulled, pulled_to
 from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
-from steptwin.simulation.components.site import Site
 from steptwin.simulation.components.switch import SwitchSpec, put_switch, zone_of
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
@@ -164,15 +164,15 @@ def _refers(spec: ToolSpec, described: ElementSpecs) -> Iterator[Reference]:
         yield Reference(controller, switch.target[0], (*switch.path, "to"))
 
 
-def _build(spec: ToolSpec, site: Site) -> Tool:
-    one, other = find_axis(spec.axis, site), find_axis(spec.other, site)
+def _build(spec: ToolSpec, context: ElementContext) -> Tool:
+    one, other = find_axis(spec.axis, context), find_axis(spec.other, context)
     if one.scale.unit != other.scale.unit:
         raise Misuse(f"{spec.axis!r} is in {one.scale.unit} and {spec.other!r} in {other.scale.unit}: a tool has one unit")
     tool = Tool(spec, (one, other))
     one.scheduler.add_part(tool, (*_controllers(tool), spec.axis, spec.other, spec.name), spec.name)
     for name, n, switch in spec.switches:
         channel = f"{spec.name}.{name}_switch{n}"
-        site.text.unless_wrong(switch.path, partial(_put_switch, tool, name, switch, channel, site))
+        context.text.unless_wrong(switch.path, partial(_put_switch, tool, name, switch, channel, context))
     return tool
 
 
@@ -180,12 +180,14 @@ def _controllers(tool: Tool) -> tuple[str, ...]:
     return tuple(dict.fromkeys(axis.mechanism.controller for axis in tool.axes))
 
 
-def _put_switch(tool: Tool, name: str, spec: SwitchSpec, channel: str, site: Site) -> None:
+def _put_switch(tool: Tool, name: str, spec: SwitchSpec, channel: str, context: ElementContext) -> None:
     def places(units: float) -> int:
         return round(exact_fraction(units) * PLACES)
 
     zone = zone_of(spec, places, None if spec.period is None else places(spec.period))
-    put_switch(tool.axes[0].scheduler, tool.coordinates[name], (*_controllers(tool), tool.spec.name), zone, spec, channel, site)
+    put_switch(
+        tool.axes[0].scheduler, tool.coordinates[name], (*_controllers(tool), tool.spec.name), zone, spec, channel, context
+    )
 
 
 def _signals(tool: Tool) -> Mapping[str, SignalOf]:

@@ -7,10 +7,10 @@ from typing import ClassVar
 
 from steptwin.controller import Nanos
 from steptwin.messages import Message
-from steptwin.simulation.components.logic import BoardPart
+from steptwin.simulation.components.logic import TerminalComponent
 from steptwin.simulation.logic.condition import SignalCondition
 from steptwin.simulation.mechanics.mechanics import Mechanism
-from steptwin.simulation.scheduler.scheduler import Board
+from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.state import Plain
 
 RESET, HIT = "RESET", "HIT"
@@ -22,15 +22,15 @@ TOUCH = Message("simulation.axes-touch", "{zone}: {axes} touch")
 PARTS_TOUCH = Message("simulation.parts-touch", "{zone}: parts touch")
 
 
-class Touch(BoardPart):
+class Touch(TerminalComponent):
     """The output is on while parts touch. If that jams them, the axes stand from then on; they are free again when RESET is
     switched on, and jam again when they touch the next time."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("_axes", "_condition", "_jams")
     __slots__ = (*FIXED, "_due", "_is_jammed", "_is_short", "_touches", "_was_reset", "count")
 
-    def __init__(self, board: Board, jams: bool, condition: SignalCondition, axes: Mapping[str, Mechanism]) -> None:
-        super().__init__(board)
+    def __init__(self, block: TerminalBlock, jams: bool, condition: SignalCondition, axes: Mapping[str, Mechanism]) -> None:
+        super().__init__(block)
         self._jams = jams
         self._condition = condition
         self._axes = axes
@@ -58,7 +58,7 @@ class Touch(BoardPart):
 
     def touching(self) -> str:
         """Text of what happens when they touch."""
-        return TOUCH(zone=self.board.name, axes=" and ".join(self._axes)) if self._axes else PARTS_TOUCH(zone=self.board.name)
+        return TOUCH(zone=self.block.name, axes=" and ".join(self._axes)) if self._axes else PARTS_TOUCH(zone=self.block.name)
 
     def update(self, now: Nanos) -> None:
         touches = self._condition.holds(now) or self._is_short
@@ -67,12 +67,12 @@ class Touch(BoardPart):
             if touches:
                 self._touch(now)
             else:
-                self._report(APART_AGAIN(zone=self.board.name), touches=False)
-        is_reset = self.board.is_on(RESET)
+                self._report(APART_AGAIN(zone=self.block.name), touches=False)
+        is_reset = self.block.is_on(RESET)
         if is_reset and not self._was_reset and self._is_jammed:
             self._block(False, now)
         self._was_reset = is_reset
-        self.board.put(self.output, float(touches))
+        self.block.put(self.output, float(touches))
         self._due = self._condition.change(now)
 
     def _touch(self, now: Nanos) -> None:
@@ -85,12 +85,12 @@ class Touch(BoardPart):
     def _block(self, blocked: bool, now: Nanos) -> None:
         self._is_jammed, self._is_short = blocked, False
         for mechanism in self._axes.values():
-            mechanism.block(blocked, now, by=self.board.name)
+            mechanism.block(blocked, now, by=self.block.name)
 
     def _report(self, text: str, *, touches: bool) -> None:
-        scheduler = self.board.scheduler
-        facts = ("element", self.board.name), ("touches", touches), ("jams", self._jams)
-        scheduler.record(scheduler.owner(self.board.name), "event", "collision", text, *facts)
+        scheduler = self.block.scheduler
+        facts = ("element", self.block.name), ("touches", touches), ("jams", self._jams)
+        scheduler.record(scheduler.owner(self.block.name), "event", "collision", text, *facts)
 
     def deadline(self) -> Nanos | None:
         return self._due

@@ -8,10 +8,10 @@ from typing import ClassVar
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.components.quantity import check_owners, owner_of
 from steptwin.simulation.components.signals import find_signal
-from steptwin.simulation.components.site import Site
 from steptwin.simulation.components.voltage import BROKEN_WIRE, DRIFT
 from steptwin.simulation.logic.condition import Signal
 from steptwin.simulation.logic.curve import Stepped
@@ -85,10 +85,10 @@ def _refers(spec: TransducerSpec, described: ElementSpecs) -> Iterator[Reference
     yield Reference(spec.target[0], owner_of(spec.of), (*spec.path, "of"))
 
 
-def _build(spec: TransducerSpec, site: Site) -> Transducer:
-    scheduler = site.scheduler(spec.target[0])
-    site.input(spec.target, (*spec.path, "to"), ANALOG_INPUT)
-    found = find_signal(site.parts, spec.of)
+def _build(spec: TransducerSpec, context: ElementContext) -> Transducer:
+    scheduler = context.scheduler(spec.target[0])
+    context.input(spec.target, (*spec.path, "to"), ANALOG_INPUT)
+    found = find_signal(context.objects, spec.of)
     found.watch(spec.of)
     if all(source.scheduler is not scheduler for source in found.sync(scheduler.now)):
         raise Misuse(f"of = {spec.of!r} is no quantity of what {spec.target[0]!r} is connected to")

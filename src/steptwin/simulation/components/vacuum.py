@@ -10,13 +10,13 @@ from steptwin.controller import MILLISECOND, Nanos
 from steptwin.messages import Message
 from steptwin.motion.exponential import decay, logarithm
 from steptwin.simulation.components.carrier import HELD, PICK, PLACE, Carrier, CarrierSpec, carrier_signals
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.logic import STUCK, Joint, with_terminals
-from steptwin.simulation.components.site import Site
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.scheduler.scheduler import Board
+from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, number, positive_time
@@ -58,12 +58,12 @@ class Vacuum(Carrier):
     FIXED: ClassVar[tuple[str, ...]] = ("spec",)
     __slots__ = (*FIXED, "_begin", "_due", "_first", "_goal", "_is_held", "leaks")
 
-    def __init__(self, board: Board, spec: VacuumSpec, site: Site) -> None:
-        super().__init__(board, spec, site)
+    def __init__(self, block: TerminalBlock, spec: VacuumSpec, context: ElementContext) -> None:
+        super().__init__(block, spec, context)
         self.spec = spec
         self.leaks = False
         self._is_held = False
-        self._begin: Nanos = board.scheduler.now
+        self._begin: Nanos = block.scheduler.now
         self._first = 0.0
         """Pressure at `_begin`, kPa below that of the air."""
         self._goal = 0.0
@@ -101,7 +101,7 @@ class Vacuum(Carrier):
     # ------------------------------------------------------------------ time
 
     def update(self, now: Nanos) -> None:
-        goal = self.spec.vacuum if self.board.is_on(EJECTOR) and self.is_occupied(now) and not self.leaks else 0.0
+        goal = self.spec.vacuum if self.block.is_on(EJECTOR) and self.is_occupied(now) and not self.leaks else 0.0
         if goal != self._goal:
             self._go(goal, now)
         if self._due is not None and self._due <= now:
@@ -111,10 +111,10 @@ class Vacuum(Carrier):
                 self.take(now)
             else:
                 self.let_go(now)
-        self.board.put(HELD, float(self._is_held))
+        self.block.put(HELD, float(self._is_held))
 
     def deadline(self) -> Nanos | None:
-        passing = self.passing(self.board.scheduler.now) if self.board.is_on(EJECTOR) else None
+        passing = self.passing(self.block.scheduler.now) if self.block.is_on(EJECTOR) else None
         moments = (moment for moment in (self._due, passing) if moment is not None)
         return min(moments, default=None)
 
@@ -128,11 +128,11 @@ IS_TIGHT_AGAIN = Message("simulation.is-tight-again", "{name} is tight again")
 
 def _leak(active: ActiveFault, vacuum: Vacuum, begins: bool, now: Nanos) -> str:
     vacuum.leaks = begins
-    return (LEAKS if begins else IS_TIGHT_AGAIN)(name=vacuum.board.name)
+    return (LEAKS if begins else IS_TIGHT_AGAIN)(name=vacuum.block.name)
 
 
 def _signals(vacuum: Vacuum) -> Mapping[str, SignalOf]:
-    source = (vacuum.board.source,)
+    source = (vacuum.block.source,)
 
     def turning(now: Nanos) -> Iterator[Nanos]:
         yield from ()
@@ -146,7 +146,7 @@ def _signals(vacuum: Vacuum) -> Mapping[str, SignalOf]:
 
 VACUUM = with_terminals(
     VacuumSpec,
-    make=lambda spec, site: Vacuum(site.board(spec.name), spec, site),
+    make=lambda spec, context: Vacuum(context.terminal_block(spec.name), spec, context),
     signals=_signals,
     faults=(
         *STUCK,

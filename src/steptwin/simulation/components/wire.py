@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 from steptwin.controller import Nanos
 from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, Reference
-from steptwin.simulation.components.site import Site
 from steptwin.simulation.scheduler.wires import PinName, Wire
 from steptwin.simulation.toml.table import TableSpec, key, table
 from steptwin.simulation.toml.values import INPUT_PIN, OUTPUT_PIN, Terminal, flag, time_value
@@ -26,9 +26,9 @@ def _refers(spec: WireSpec, described: ElementSpecs) -> Iterator[Reference]:
     yield Reference(spec.source[0], spec.target[0], spec.path)
 
 
-def _build(spec: WireSpec, site: Site) -> Wire:
-    wire = site.memo.once(spec.path, lambda: Wire(PinName(*spec.source), PinName(*spec.target), spec.inverted, spec.delay))
-    site.join(wire, spec.path)
+def _build(spec: WireSpec, context: ElementContext) -> Wire:
+    wire = context.memo.once(spec.path, lambda: Wire(PinName(*spec.source), PinName(*spec.target), spec.inverted, spec.delay))
+    context.join(wire, spec.path)
     return wire
 
 

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 from steptwin.diagnostics import Diagnostic, Severity, SourceText, in_order, render
 from steptwin.errors import Misuse, SourceErrors
 from steptwin.simulation.components.buildmemo import BuildMemo
-from steptwin.simulation.describe.pieces import beside
+from steptwin.simulation.describe.includes import beside
 from steptwin.simulation.describe.spec import WorldSpec
 from steptwin.simulation.kinds.kind import ControllerSpec
 from steptwin.simulation.kinds.links import LineSpec

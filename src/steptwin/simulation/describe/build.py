@@ -8,11 +8,11 @@ from typing import Any
 
 from steptwin.controller import ControllerEvent, Nanos
 from steptwin.errors import Misuse
+from steptwin.simulation.components.builtobjects import BuiltObjects
 from steptwin.simulation.components.element import AnyElement
+from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import NamedSpec
-from steptwin.simulation.components.parts import WorldParts
 from steptwin.simulation.components.registry import ELEMENTS
-from steptwin.simulation.components.site import Site
 from steptwin.simulation.describe.blueprint import Blueprint, memory_file
 from steptwin.simulation.describe.connected import connected_names
 from steptwin.simulation.faults import Faults
@@ -20,7 +20,7 @@ from steptwin.simulation.faults.element import FaultyElement
 from steptwin.simulation.kinds.kind import ControllerSpec, Member, Terminals
 from steptwin.simulation.kinds.links import LineSpec
 from steptwin.simulation.kinds.registry import line_kinds
-from steptwin.simulation.scheduler.scheduler import Board, Scheduler
+from steptwin.simulation.scheduler.scheduler import Scheduler, TerminalBlock
 from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
 from steptwin.simulation.toml.table import TableSpec
 
@@ -28,12 +28,12 @@ Keep = Callable[[str, bytes, Nanos], None]
 """Stores the non-volatile memory of a controller (name, contents, moment); returns when it is on disk. Raises `OSError`."""
 
 
-def build(blueprint: Blueprint, record: RecordSink, keep: Keep | None = None, *, is_blank: bool = False) -> WorldParts:
+def build(blueprint: Blueprint, record: RecordSink, keep: Keep | None = None, *, is_blank: bool = False) -> BuiltObjects:
     """The controllers of a description at time 0. Raises `WorldError` where its parts do not fit together.
 
     ``keep`` is called whenever a controller has a new non-volatile memory. ``is_blank``: as for `Scheduler`.
     """
-    return _Builder(blueprint, record, keep, is_blank=is_blank).parts
+    return _Builder(blueprint, record, keep, is_blank=is_blank).objects
 
 
 class _Builder:
@@ -42,9 +42,9 @@ class _Builder:
         self.blueprint = blueprint
         self._keep = keep
         self._is_blank = is_blank
-        self.parts = WorldParts(spec.lines, spec.elements, Faults(spec.seed), record)
-        self.parts.faults.sinks.append(record)
-        self.site = Site(spec.text, spec.seed, blueprint.memo, self.parts)
+        self.objects = BuiltObjects(spec.lines, spec.elements, Faults(spec.seed), record)
+        self.objects.faults.sinks.append(record)
+        self.context = ElementContext(spec.text, spec.seed, blueprint.memo, self.objects)
         self._make_controllers()
         self._make_schedulers()
         self._make_lines()
@@ -60,9 +60,9 @@ class _Builder:
     def _add_controller(self, spec: ControllerSpec) -> None:
         memory = self.blueprint.files.get(memory_file(spec.name))
         controller = self.blueprint.makers[spec.name](memory)
-        self.parts.controllers[spec.name] = controller
-        self.parts.kind_of[spec.name] = spec.kind
-        spec.kind.watch_events(controller, partial(_record_event, self.parts.record, spec.name))
+        self.objects.controllers[spec.name] = controller
+        self.objects.kind_of[spec.name] = spec.kind
+        spec.kind.watch_events(controller, partial(_record_event, self.objects.record, spec.name))
         keep = self._keep
         if keep is not None:
             spec.kind.keep_memory(controller, memory, lambda data: keep(spec.name, data, controller.now))
@@ -73,31 +73,35 @@ class _Builder:
         """Controllers connected by a line, a wire or mechanics share a scheduler; schedulers are ordered by their first
         controller."""
         memo = self.blueprint.memo
-        boards = memo.once(("boards",), lambda: {spec.name: (spec, terminals) for spec, terminals in self._boards()})
+        terminal_blocks = memo.once(
+            ("terminal blocks",), lambda: {spec.name: (spec, terminals) for spec, terminals in self._terminal_blocks()}
+        )
         if self.blueprint.connected is None:
-            self.blueprint.connected = connected_names(self.spec, self.parts.controllers)
+            self.blueprint.connected = connected_names(self.spec, self.objects.controllers)
         for names in self.blueprint.connected:
-            scheduler = Scheduler(record=self.parts.record, is_checked=memo.is_checked, is_blank=self._is_blank)
-            self.parts.schedulers.append(scheduler)
+            scheduler = Scheduler(record=self.objects.record, is_checked=memo.is_checked, is_blank=self._is_blank)
+            self.objects.schedulers.append(scheduler)
             for name in names:
-                self.parts.scheduler_of[name] = scheduler
-                if name in self.parts.controllers:
-                    scheduler.add(name, self.parts.controllers[name])
-                elif name in boards:
-                    spec, terminals = boards[name]
-                    self._add_board(spec, terminals, scheduler)
+                self.objects.scheduler_of[name] = scheduler
+                if name in self.objects.controllers:
+                    scheduler.add(name, self.objects.controllers[name])
+                elif name in terminal_blocks:
+                    spec, terminals = terminal_blocks[name]
+                    self._add_terminal_block(spec, terminals, scheduler)
 
-    def _boards(self) -> Iterator[tuple[NamedSpec, Terminals]]:
+    def _terminal_blocks(self) -> Iterator[tuple[NamedSpec, Terminals]]:
         for element in ELEMENTS.values():
             if element.terminals is not None:
                 for spec in element.named(self.spec.elements[element.name]):
                     yield spec, element.terminals(spec)
 
-    def _add_board(self, spec: NamedSpec, terminals: Terminals, scheduler: Scheduler) -> None:
+    def _add_terminal_block(self, spec: NamedSpec, terminals: Terminals, scheduler: Scheduler) -> None:
         if not scheduler.controllers and not self.spec.text.findings:
             self.spec.text.wrong(spec.path, "D009", f"nothing joins {spec.name!r} to a controller")
-        self.parts.terminals[spec.name] = terminals
-        scheduler.add_board(Board(scheduler, spec.name, (*terminals.digital_inputs, *terminals.analog_inputs), terminals.outputs))
+        self.objects.terminals[spec.name] = terminals
+        scheduler.add_terminal_block(
+            TerminalBlock(scheduler, spec.name, (*terminals.digital_inputs, *terminals.analog_inputs), terminals.outputs)
+        )
 
     # ------------------------------------------------------------------ lines
 
@@ -106,26 +110,26 @@ class _Builder:
             self.spec.text.unless_wrong(spec.path, partial(self._line, spec))
 
     def _line(self, spec: LineSpec) -> None:
-        parts, kind = self.parts, line_kinds()[spec.kind]
+        objects, kind = self.objects, line_kinds()[spec.kind]
         members: list[Member] = []
         for described in self.spec.controllers:
-            if described.line != spec.name or described.name not in parts.controllers:
+            if described.line != spec.name or described.name not in objects.controllers:
                 continue
             if described.kind.line is not kind:
                 raise Misuse(f"{described.name!r} cannot be on a line of kind {kind.name}")
-            controller = parts.controllers[described.name]
+            controller = objects.controllers[described.name]
             members.append(Member(spec=described, controller=controller, address=described.kind.address(described, controller)))
         if not members and self.spec.text.is_any_wrong(*self.spec.text.controllers):
             self.spec.text.leave_out(spec.name)
             return
         if not members:
             raise Misuse("nothing is on this line")
-        scheduler = self.site.scheduler(spec.name)
-        line = kind.make(spec, members, scheduler, parts.record, parts.faults)
+        scheduler = self.context.scheduler(spec.name)
+        line = kind.make(spec, members, scheduler, objects.record, objects.faults)
         scheduler.add_part(line, (spec.name, *(member.spec.name for member in members)), spec.name)
-        parts.lines[spec.name] = line
+        objects.lines[spec.name] = line
         for member in members:
-            parts.line_of[member.spec.name] = line, member.address
+            objects.line_of[member.spec.name] = line, member.address
 
     # ------------------------------------------------------------------ elements
 
@@ -143,8 +147,8 @@ class _Builder:
             element, spec = later.pop(turn)
             self._build_elements(element, [spec])
         if not self.spec.text.findings:
-            self.site.close_circuits()
-            for number, scheduler in enumerate(self.parts.schedulers):
+            self.context.close_circuits()
+            for number, scheduler in enumerate(self.objects.schedulers):
                 if order := self.blueprint.memo.once(("order", number), scheduler.order):
                     scheduler.arrange(order)
 
@@ -152,35 +156,35 @@ class _Builder:
         """Whether it is over a signal of an element that is not built yet."""
         references = element.refers(spec, self.spec.elements)
         over = (reference.other for reference in references if reference.path[-1:] in (("of",), ("when",)))
-        return any(self.parts.unbuilt(owner) is not None for owner in over)
+        return any(self.objects.unbuilt(owner) is not None for owner in over)
 
     def _build_elements(self, element: AnyElement, specs: Iterable[TableSpec]) -> None:
         built = [(spec, self._element(element, spec)) for spec in specs]
         if element.connect is not None:
             for spec, part in built:
                 if part is not None:
-                    self.spec.text.unless_wrong(spec.path, partial(element.connect, spec, part, self.site))
+                    self.spec.text.unless_wrong(spec.path, partial(element.connect, spec, part, self.context))
 
     def _element(self, element: AnyElement, spec: TableSpec) -> Any:
         """The built element; None if it has errors."""
-        found = self.spec.text.unless_wrong(spec.path, partial(element.build, spec, self.site))
+        found = self.spec.text.unless_wrong(spec.path, partial(element.build, spec, self.context))
         if found is None:
             return None
         for named in element.named((spec,)):
-            self.parts.elements.setdefault(element.name, {})[named.name] = found
+            self.objects.elements.setdefault(element.name, {})[named.name] = found
             if element.signals is not None:
-                self.parts.signals_of[named.name] = partial(element.signals, found)
+                self.objects.signals_of[named.name] = partial(element.signals, found)
             if element.faults:
                 scheduler = self._scheduler_of(element, named)
-                failing = FaultyElement(scheduler, named.name, self.parts.faults, element.faults, found)
-                self.parts.faults.elements[named.name] = failing
+                failing = FaultyElement(scheduler, named.name, self.objects.faults, element.faults, found)
+                self.objects.faults.elements[named.name] = failing
                 scheduler.add_part(failing, ())
         return found
 
     def _scheduler_of(self, element: AnyElement, spec: NamedSpec) -> Scheduler:
         """The scheduler that an element is in: its own, or that of the first thing it refers to."""
         name = next(iter(element.refers(spec, self.spec.elements))).one if element.terminals is None else spec.name
-        return self.site.scheduler(name)
+        return self.context.scheduler(name)
 
 
 def _record_event(record: RecordSink, controller: str, event: ControllerEvent) -> None:

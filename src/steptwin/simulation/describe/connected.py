@@ -17,8 +17,8 @@ def connected_names(spec: WorldSpec, controllers: Iterable[str]) -> list[list[st
     Names that do not exist are reported in the text of the description.
     """
     with_terminals = [element for element in ELEMENTS.values() if element.terminals is not None]
-    boards = [one.name for element in with_terminals for one in element.named(spec.elements[element.name])]
-    connected = {name: name for name in [*controllers, *(line.name for line in spec.lines), *boards]}
+    terminal_blocks = [one.name for element in with_terminals for one in element.named(spec.elements[element.name])]
+    connected = {name: name for name in [*controllers, *(line.name for line in spec.lines), *terminal_blocks]}
 
     def root(name: str) -> str:
         while connected[name] != name:

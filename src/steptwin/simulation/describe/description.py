@@ -11,8 +11,8 @@ from steptwin.simulation.components.element import AnyElement
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.describe.arrangement import DRAWING, DrawnPlace, PlaceSpec, check_places
+from steptwin.simulation.describe.includes import PARAMETERS, USE, Includes, ReadFile, is_include, no_files
 from steptwin.simulation.describe.overrides import NO_OVERRIDES, Overrides, override
-from steptwin.simulation.describe.pieces import PARAMETERS, USE, Pieces, ReadFile, is_piece, no_files
 from steptwin.simulation.describe.servicetables import SERVICE_TABLES, SERVICES
 from steptwin.simulation.describe.spec import SEED, EventSpec, ScriptSpec, WorldSpec, WorldTable
 from steptwin.simulation.describe.steptable import STEPS, read_steps
@@ -22,7 +22,7 @@ from steptwin.simulation.kinds.links import LINK_KEYS, LineSpec
 from steptwin.simulation.kinds.registry import KINDS
 from steptwin.simulation.toml.names import RESERVED
 from steptwin.simulation.toml.reader import TomlText, read_table
-from steptwin.simulation.toml.table import TableSpec, check_sense, make_spec, read_row
+from steptwin.simulation.toml.table import TableSpec, check_cross_fields, make_spec, read_row
 
 CAMPAIGN = "campaign"
 """The table that only a campaign has (`steptwin.campaign`)."""
@@ -49,15 +49,15 @@ def describe(
     named = ("line", *(element.name for element in ELEMENTS.values() if element.needs_name))
     toml = TomlText(name, text, tuple(KINDS), named)
     data = toml.data
-    if is_piece(toml):
+    if is_include(toml):
         toml.wrong((PARAMETERS,), "D004", "a file with [parameters] is for [[use]] of a description")
         raise toml.error()
     if CAMPAIGN in data:
         toml.wrong((CAMPAIGN,), "D004", "this is a campaign, not a world", "steptwin campaign run checks it and runs its world")
         raise toml.error()
     late = override(data, overrides, USE)
-    pieces = Pieces(read, tables(), toml.controllers, named)
-    pieces.put_into(toml)
+    includes = Includes(read, tables(), toml.controllers, named)
+    includes.put_into(toml)
     override(data, late)
     inner = {key for element in ELEMENTS.values() for key in element.inner}
     known = list(dict.fromkeys([*(key for key in tables() if key not in inner), "fault", *SERVICES]))
@@ -83,7 +83,7 @@ def describe(
         faults=tuple(_faults(toml)),
         text=toml,
         overrides=dict(overrides),
-        pieces=pieces.files,
+        includes=includes.files,
     )
     for service in SERVICE_TABLES.values():
         service.check(toml)
@@ -116,7 +116,7 @@ def _tables(toml: TomlText, kind: str) -> list[tuple[dict[str, Any], Mapping[str
         values = read_row(toml, path, rows, table)
         if values is None:
             continue
-        check_sense(toml, path, rows, table)
+        check_cross_fields(toml, path, rows, table)
         if values.get("name") and values["name"] in names:
             toml.wrong((*path, "name"), "D006", f"there is a [[{kind}]] named {values['name']!r} already")
         names.add(values.get("name", ""))

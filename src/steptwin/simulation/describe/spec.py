@@ -77,7 +77,7 @@ class WorldSpec(WorldTable):
     text: TomlText
     overrides: Overrides
     """Values that replace those of the text."""
-    pieces: Mapping[str, Path]
+    includes: Mapping[str, Path]
     """Files of tables that it uses, and the keys that name them first."""
 
     def vision_addresses(self) -> Iterator[tuple[str, str]]:
@@ -89,7 +89,7 @@ class WorldSpec(WorldTable):
 
     def files(self) -> Iterator[tuple[str, Path]]:
         """Names of the files the description refers to, and the keys that do."""
-        yield from self.pieces.items()
+        yield from self.includes.items()
         for spec in self.controllers:
             for name, at in spec.kind.files(spec):
                 yield name, (*spec.path, at)

@@ -12,7 +12,7 @@ from functools import lru_cache
 
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.describe.arrangement import DRAWING, PlaceSpec
-from steptwin.simulation.describe.pieces import USE, UseSpec
+from steptwin.simulation.describe.includes import USE, UseSpec
 from steptwin.simulation.describe.servicetables import SERVICE_TABLES, inner_tables
 from steptwin.simulation.describe.spec import EventSpec, ScriptSpec, WorldTable
 from steptwin.simulation.kinds.kind import AnyKind

@@ -1,11 +1,12 @@
 """Faults, seeded and targeted: bytes, frames, protocol, physics.
 
 `parse` and `read` make a `Fault` of a table or a line of text; `Faults` is the set of those that are set. A `FaultyPort` stands
-between a link and a port, `rig` lets a controller in its scheduler have faults. `steptwin fault --kinds` shows `KINDS`.
+between a link and a port, `prepare_for_faults` lets a controller in its scheduler have faults. `steptwin fault --kinds` shows
+`KINDS`.
 """
 
 from steptwin.simulation.faults.active import ActiveFault, Faults
-from steptwin.simulation.faults.controller import AxisLoad, Body, FaultyController, rig
+from steptwin.simulation.faults.controller import AxisLoad, Body, FaultyController, prepare_for_faults
 from steptwin.simulation.faults.fault import EXAMPLE, GRAMMAR, FaultMistake, parse, read, schema
 from steptwin.simulation.faults.kinds import KINDS
 from steptwin.simulation.faults.places import RequestRoute, check_place
@@ -33,7 +34,7 @@ __all__ = [
     "RequestRoute",
     "check_place",
     "parse",
+    "prepare_for_faults",
     "read",
-    "rig",
     "schema",
 ]

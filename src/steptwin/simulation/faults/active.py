@@ -123,7 +123,7 @@ class HeldLevel(NamedTuple):
     fault: str
     level: float
 
-    def words(self) -> MessageText:
+    def description(self) -> MessageText:
         """As "held at 0 by fault stuck"."""
         return HELD_AT(level=self.level, fault=self.fault)
 

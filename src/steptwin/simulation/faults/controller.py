@@ -403,7 +403,7 @@ class FaultyController(Stateful):
         return True
 
 
-def rig(scheduler: Scheduler, name: str, faults: Faults, body: Body) -> FaultyController:
+def prepare_for_faults(scheduler: Scheduler, name: str, faults: Faults, body: Body) -> FaultyController:
     """Apply faults of physics and protocol to the controller ``name`` of a scheduler."""
 
     def on_edge(pin: str, now: Nanos, level: float) -> None:

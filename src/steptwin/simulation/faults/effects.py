@@ -43,7 +43,7 @@ class InsertEffect:
 
 
 @dataclass(frozen=True, slots=True)
-class PiecesEffect:
+class SplitEffect:
     """``act`` gives the pieces in which a run arrives, each with its delay; takes the run and the length of the delivery. Only
     one such fault happens to a delivery, the first."""
 
@@ -104,7 +104,7 @@ class ElementEffect:
 
 _FITTING: dict[Occasion, tuple[tuple[Layer, ...], tuple[type, ...]]] = {
     Occasion.BYTE: ((Layer.BYTES,), (ByteEffect,)),
-    Occasion.DELIVERY: ((Layer.BYTES,), (InsertEffect, PiecesEffect)),
+    Occasion.DELIVERY: ((Layer.BYTES,), (InsertEffect, SplitEffect)),
     Occasion.ANSWER: ((Layer.FRAMES,), (AnswerEffect,)),
     Occasion.REQUEST: ((Layer.FRAMES, Layer.PROTOCOL), (RequestEffect,)),
     Occasion.MOMENT: ((Layer.PHYSICS,), (MomentEffect,)),

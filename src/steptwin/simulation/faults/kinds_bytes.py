@@ -5,7 +5,7 @@ from __future__ import annotations
 from steptwin.controller import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.faults.active import ActiveFault, FaultReporter
-from steptwin.simulation.faults.effects import ByteEffect, InsertEffect, PiecesEffect, Run
+from steptwin.simulation.faults.effects import ByteEffect, InsertEffect, Run, SplitEffect
 from steptwin.simulation.faults.table import ALL_LINES, LONGEST_MS, SERIAL, FaultKind, Layer, Occasion, number, whole
 
 BECOMES = Message("simulation.byte-becomes", "{byte:02X} becomes {turned:02X}")
@@ -117,7 +117,7 @@ BYTES = (
             number("for_ms", "How long after each other pieces come.", 1e-3, LONGEST_MS, default=1.0),
         ),
         ALL_LINES,
-        effect=PiecesEffect(_split),
+        effect=SplitEffect(_split),
     ),
     FaultKind(
         "noise",

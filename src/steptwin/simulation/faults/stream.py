@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from steptwin.controller import Nanos
 from steptwin.messages import Message, text_of
 from steptwin.simulation.faults.active import ActiveFault, FaultReporter
-from steptwin.simulation.faults.effects import ByteEffect, InsertEffect, PiecesEffect, Run
+from steptwin.simulation.faults.effects import ByteEffect, InsertEffect, Run, SplitEffect
 
 BYTE_OF = Message("simulation.byte-of", "byte {place} of {count}: {what}")
 
@@ -35,7 +35,7 @@ def spoil(data: bytes, actives: Sequence[ActiveFault], now: Nanos, report: Fault
         run.put(data)
     for active in actives:
         effect = active.fault.kind.effect
-        if isinstance(effect, PiecesEffect) and active.strikes(now):
+        if isinstance(effect, SplitEffect) and active.strikes(now):
             return effect.act(active, run, len(data), report)
     return [(delay, bytes(piece)) for delay, piece in run.pieces if piece]
 

@@ -97,10 +97,10 @@ class Parameter:
         what = _PERMITTED[self.form]()
         if self.least is None:
             return what
-        least = _plain(self.least)
-        return AND_MORE(what=what, least=least) if self.most is None else TO(what=what, least=least, most=_plain(self.most))
+        least = _format(self.least)
+        return AND_MORE(what=what, least=least) if self.most is None else TO(what=what, least=least, most=_format(self.most))
 
-    def plain(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, object]:
         """As JSON. ``default`` is the text of the value that holds without one, or names its source."""
         return with_messages(
             {
@@ -114,7 +114,7 @@ class Parameter:
         )
 
 
-def _plain(number: float) -> str:
+def _format(number: float) -> str:
     """Without an exponent: 0.000001, 65535, 1 000 000 000."""
     if abs(number) >= 1e6:
         return f"{number:,.0f}".replace(",", " ")
@@ -143,7 +143,7 @@ class FaultKind:
         """All it takes: its own, where it happens, when it happens."""
         return (*self.own, *WHERE[self.layer], *WHEN[self.occasion])
 
-    def plain(self) -> dict[str, object]:
+    def to_json(self) -> dict[str, object]:
         """As JSON."""
         return {
             "name": self.name,
@@ -151,7 +151,7 @@ class FaultKind:
             "occasion": self.occasion.value,
             "meaning": self.meaning,
             "lines": [line.value for line in self.lines],
-            "parameters": [parameter.plain() for parameter in self.parameters],
+            "parameters": [parameter.to_json() for parameter in self.parameters],
         }
 
     def parameter(self, name: str) -> Parameter | None:

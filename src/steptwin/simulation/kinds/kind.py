@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from steptwin.diagnostics import Diagnostic, SourceText
     from steptwin.points import LivePoint
     from steptwin.simulation.faults import AxisLoad, Body, Faults
-    from steptwin.simulation.kinds.lines import Line, LineWords, LineWrite
+    from steptwin.simulation.kinds.lines import Line, LineWrite, TrafficLog
     from steptwin.simulation.kinds.programs import Programs
     from steptwin.simulation.kinds.programtexts import Destination, Downloading, ProgramText, TextLanguage
     from steptwin.simulation.mechanics.channels import AxisChannel
@@ -179,7 +179,7 @@ class EncoderInputs(ABC, Generic[M]):
         """The pin of channel C of an axis."""
 
     @abstractmethod
-    def shown(self, controller: M, now: Nanos, /) -> list[dict[str, object]]:
+    def to_json(self, controller: M, now: Nanos, /) -> list[dict[str, object]]:
         """Counts of each axis and what turns its encoder, as plain data."""
 
     @abstractmethod
@@ -577,8 +577,8 @@ class LineKind(ABC, Generic[M, L]):
         """The line with its members, at least one. Raises `Misuse` if they do not fit together."""
 
     @abstractmethod
-    def words(self, line: L, prefix: str, sink: Callable[[FrameLine], None], /) -> LineWords:
-        """Words for the traffic on a line, for a function; ``prefix`` is put before the name of a place."""
+    def traffic_log(self, line: L, prefix: str, sink: Callable[[FrameLine], None], /) -> TrafficLog:
+        """Log of the traffic on a line, for a function; ``prefix`` is put before the name of a place."""
 
     def writes(self, line: L, take: Callable[[LineWrite], None], /) -> Callable[[], None] | None:
         """Call a function with what programs write over a line, until the returned function is called; None where that is not

@@ -67,7 +67,7 @@ class LineWrite(NamedTuple):
     outcome: str
 
 
-class LineWords(FrameFollower, Protocol):
+class TrafficLog(FrameFollower, Protocol):
     """Decodes the traffic of a line into text."""
 
     def recorded(self, record: TraceRecord) -> None:

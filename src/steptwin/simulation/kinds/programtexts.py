@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from steptwin.controller import Nanos
 from steptwin.diagnostics import Diagnostic, SourceText
-from steptwin.explain.model import MemoryPart
+from steptwin.explain.model import MemoryUse
 from steptwin.simulation.script.steps import Step
 
 
@@ -47,7 +47,7 @@ class ProgramText:
     source: SourceText
     check: Callable[[], Sequence[Diagnostic]]
     """Findings of the checker of its language, in the order of the text."""
-    memory: Callable[[str], Sequence[MemoryPart]]
+    memory: Callable[[str], Sequence[MemoryUse]]
     """Use of the memory at this place by another text; empty for one with errors."""
     is_empty: bool = False
     """Whether nothing is there; the text is empty then."""

@@ -78,36 +78,36 @@ class Workpiece(NamedTuple):
 class Load(Stateful):
     """The workpieces on a belt."""
 
-    __slots__ = ("pieces",)
+    __slots__ = ("workpieces",)
 
     def __init__(self) -> None:
-        self.pieces: tuple[Workpiece, ...] = ()
+        self.workpieces: tuple[Workpiece, ...] = ()
 
     def version(self) -> object:
         """A value that changes with every change of the workpieces."""
-        return self.pieces
+        return self.workpieces
 
-    def put(self, piece: Workpiece) -> None:
-        self.pieces = (*self.pieces, piece)
+    def put(self, workpiece: Workpiece) -> None:
+        self.workpieces = (*self.workpieces, workpiece)
 
-    def take(self, piece: Workpiece) -> None:
-        self.pieces = tuple(one for one in self.pieces if one != piece)
+    def take(self, workpiece: Workpiece) -> None:
+        self.workpieces = tuple(one for one in self.workpieces if one != workpiece)
 
-    def hold(self, piece: Workpiece, front: int) -> None:
+    def hold(self, workpiece: Workpiece, front: int) -> None:
         """Let a workpiece stand with its front at ``front``, whatever the belt does."""
-        self._replace(piece, piece._replace(held=front))
+        self._replace(workpiece, workpiece._replace(held=front))
 
-    def release(self, piece: Workpiece, belt: int) -> None:
+    def release(self, workpiece: Workpiece, belt: int) -> None:
         """Let a workpiece that stood go on with the belt, which is at ``belt``."""
-        self._replace(piece, piece._replace(origin=belt - piece.front(belt), held=None))
+        self._replace(workpiece, workpiece._replace(origin=belt - workpiece.front(belt), held=None))
 
-    def _replace(self, piece: Workpiece, other: Workpiece) -> None:
-        self.pieces = tuple(other if one == piece else one for one in self.pieces)
+    def _replace(self, workpiece: Workpiece, other: Workpiece) -> None:
+        self.workpieces = tuple(other if one == workpiece else one for one in self.workpieces)
 
     def covering(self, position: int, belt: int, *, of_marks: bool = False) -> Workpiece | None:
         """The workpiece over ``position``, or with a mark there, while the belt is at ``belt``; of several the one put there
         first."""
-        for one in self.pieces:
+        for one in self.workpieces:
             behind = one.front(belt) - position
             if any(begin <= behind <= end for begin, end in one.zones(of_marks=of_marks)):
                 return one
@@ -117,7 +117,7 @@ class Load(Stateful):
         """The next positions of the belt below and above ``belt`` at which `covering` may change."""
         below: int | None = None
         above: int | None = None
-        for one in self.pieces:
+        for one in self.workpieces:
             if one.held is not None:
                 continue
             front = one.origin + position

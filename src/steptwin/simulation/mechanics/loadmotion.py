@@ -22,15 +22,15 @@ def load_intervals(trajectory: Trajectory, now: Nanos) -> Iterator[DriveInterval
     """The motion of the load of an axis from a moment on."""
     profile = profile_of(trajectory.plan) if trajectory.coasting is None else trajectory.coasting
     sign, zero = trajectory.build.sign, trajectory.build.zero
-    begun = [piece for piece in trajectory.pieces if piece.begin <= now]
-    pieces = [*begun[-1:], *trajectory.pieces[len(begun) :]]
-    for n, piece in enumerate(pieces):
-        begin = max(piece.begin, now)
-        end = pieces[n + 1].begin if n + 1 < len(pieces) else None
-        if not piece.load_follows:
-            yield DriveInterval(begin, float(piece.load), 0.0, 0.0, 0.0)
+    begun = [section for section in trajectory.sections if section.begin <= now]
+    sections = [*begun[-1:], *trajectory.sections[len(begun) :]]
+    for n, section in enumerate(sections):
+        begin = max(section.begin, now)
+        end = sections[n + 1].begin if n + 1 < len(sections) else None
+        if not section.load_follows:
+            yield DriveInterval(begin, float(section.load), 0.0, 0.0, 0.0)
             continue
-        offset = piece.load + zero
+        offset = section.load + zero
         for at, p, v, a, j in polynomials(profile, begin, end):
             yield DriveInterval(at, offset + sign * p, sign * v, sign * a, sign * j)
 

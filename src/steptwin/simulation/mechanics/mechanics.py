@@ -19,7 +19,7 @@ from steptwin.motion.divisions import profile_of
 from steptwin.motioncontroller import Drive
 from steptwin.simulation.mechanics.motor import NO_BURDEN, Burden
 from steptwin.simulation.mechanics.rotorhold import RotorHold
-from steptwin.simulation.mechanics.trajectory import Build, LoadPiece, MechanicalState, Trajectory
+from steptwin.simulation.mechanics.trajectory import Build, LoadSection, MechanicalState, Trajectory
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.state import Plain, Stateful
 
@@ -146,7 +146,7 @@ class Mechanism(Stateful):
         self._rest_due: Nanos | None = None
         """When a coasting rotor that moves comes to rest."""
         self._changes = 0
-        self._reported: tuple[LoadPiece, ...] | None = (LoadPiece(scheduler.now, True, 0),)
+        self._reported: tuple[LoadSection, ...] | None = (LoadSection(scheduler.now, True, 0),)
         """The position of the load as reported last; None while it moves freely."""
         self._reported_trajectory: Trajectory | None = None
         """The trajectory that was reported."""
@@ -229,10 +229,10 @@ class Mechanism(Stateful):
             )
             self._scheduler.record(self.controller, "free", str(self.number), moved)
             return
-        pieces = _from(trajectory.load_pieces(), now)
-        if self._reported is None or pieces != _from(self._reported, now):
-            self._reported = pieces
-            self._scheduler.record(self.controller, "load", str(self.number), pieces)
+        sections = _from(trajectory.load_sections(), now)
+        if self._reported is None or sections != _from(self._reported, now):
+            self._reported = sections
+            self._scheduler.record(self.controller, "load", str(self.number), sections)
 
     def deadline(self) -> Nanos | None:
         """Trajectories are computed in advance: what is due is to be reported, or concerns followers and the current of the
@@ -455,7 +455,7 @@ class Mechanism(Stateful):
         self._revision = self._drive.revision if is_current else _OUTDATED
 
 
-def _from(reported: tuple[LoadPiece, ...], now: Nanos) -> tuple[LoadPiece, ...]:
+def _from(reported: tuple[LoadSection, ...], now: Nanos) -> tuple[LoadSection, ...]:
     """The part of a report that concerns ``now`` and later."""
     past = max(bisect_right(reported, now, key=attrgetter("begin")) - 1, 0)
     return (reported[past]._replace(begin=now), *reported[past + 1 :])

@@ -22,7 +22,7 @@ from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.motion import Segment
-from steptwin.simulation.mechanics.resonance import MotionPart, Resonance
+from steptwin.simulation.mechanics.resonance import MotionPhase, Resonance
 
 FASTEST = 1e15
 """Limit of accelerations without current, pulses/s², far above all that is built, so that no product overflows."""
@@ -129,19 +129,19 @@ class StepperMotor:
         """Torque of the field at rest, with the whole current."""
         return self.curve[0][1]
 
-    def parts(self, s: Any, begin_s: float, end_s: float, sign: int) -> Iterator[MotionPart]:
-        """Parts of a segment for its resonance, between passages of the band and of corners of the curve."""
+    def phases(self, s: Any, begin_s: float, end_s: float, sign: int) -> Iterator[MotionPhase]:
+        """Phases of a segment for its resonance, between passages of the band and of corners of the curve."""
         band = () if self.resonance is None else (self.resonance.low, self.resonance.high)
         if not isinstance(s, Segment):
             for t, speed, need in self._looks(s, begin_s, end_s, sign):
-                yield MotionPart(t, min(t + LOOK_S, end_s), speed, self._use(speed, need))
+                yield MotionPhase(t, min(t + LOOK_S, end_s), speed, self._use(speed, need))
             return
         begins = [begin_s, *self._corners(s, begin_s, end_s, *band)] if end_s < inf else [begin_s]
         for t0, t1 in zip(begins, [*begins[1:], end_s], strict=True):
             middle = 0.5 * (t0 + t1) if t1 < inf else t0
             u, speed = middle - s.anchor_s, abs(s.velocity(middle))
             need = self.needs(sign * (2.0 * s.c2 + 6.0 * s.c3 * u), sign * s.direction)
-            yield MotionPart(t0, t1, speed, self._use(speed, need))
+            yield MotionPhase(t0, t1, speed, self._use(speed, need))
 
     def _use(self, speed: float, need: float) -> float:
         """The share of its torque that is needed, at most 1."""

@@ -30,8 +30,8 @@ class Resonance(NamedTuple):
     least: float
 
 
-class MotionPart(NamedTuple):
-    """A part of a motion, s from the beginning of its profile: speed (pulses/s), and the share of the torque that it needs."""
+class MotionPhase(NamedTuple):
+    """A phase of a motion, s from the beginning of its profile: speed (pulses/s), and the share of the torque that it needs."""
 
     begin_s: float
     end_s: float
@@ -63,17 +63,17 @@ def limit(use: float) -> float:
 
 
 def resonance_intervals(
-    of: Resonance, parts: Iterable[MotionPart], amplitude: float
+    of: Resonance, phases: Iterable[MotionPhase], amplitude: float
 ) -> Iterator[tuple[ResonanceInterval, float | None]]:
-    """The vibration through parts of a motion, with the moment at which the rotor loses the field, which ends them."""
-    for part in parts:
-        grows = of.low < part.speed < of.high
-        interval = ResonanceInterval(part.begin_s, amplitude, of.growth if grows else -of.fading)
+    """The vibration through phases of a motion, with the moment at which the rotor loses the field, which ends them."""
+    for phase in phases:
+        grows = of.low < phase.speed < of.high
+        interval = ResonanceInterval(phase.begin_s, amplitude, of.growth if grows else -of.fading)
         if grows:
-            times = limit(part.use) / amplitude
-            lost = part.begin_s + (logarithm(times) / of.growth if times > 1.0 else 0.0)
-            if lost < part.end_s:
+            times = limit(phase.use) / amplitude
+            lost = phase.begin_s + (logarithm(times) / of.growth if times > 1.0 else 0.0)
+            if lost < phase.end_s:
                 yield interval, lost
                 return
         yield interval, None
-        amplitude = interval.at(part.end_s, of.least) if part.end_s < inf else of.least
+        amplitude = interval.at(phase.end_s, of.least) if phase.end_s < inf else of.least

@@ -10,7 +10,7 @@ reverses: the loss is a whole number of electrical periods (four full steps). If
 stop, the rotor springs back to it; if it is beyond the stop, the rotor leaves the stop when the field has returned that far.
 
 Between two reversals of the field, rotor and load are constant or have a constant distance to the field: a trajectory is a list
-of such pieces. While no current drives the rotor of a `Build.coasts_unpowered` axis, its motion
+of such sections. While no current drives the rotor of a `Build.coasts_unpowered` axis, its motion
 (`steptwin.simulation.mechanics.coasting`) is in the place of the field, and the load keeps its distance to the rotor.
 """
 
@@ -73,7 +73,7 @@ class MechanicalState(NamedTuple):
     """Distance of the rotor's equilibrium position behind the field. The rotor is there unless something holds it."""
 
 
-class TrajectoryPiece(NamedTuple):
+class TrajectorySection(NamedTuple):
     """From ``begin`` on the rotor is the field (or the coasting motion) and ``rotor``, or at ``rotor``; likewise the load."""
 
     begin: Nanos
@@ -88,7 +88,7 @@ class TrajectoryPiece(NamedTuple):
     """The hard stop against which the field draws the rotor: 1 upper, -1 lower, 0 neither."""
 
 
-class LoadPiece(NamedTuple):
+class LoadSection(NamedTuple):
     """From ``begin`` on the load is ``pulses`` from where the drive has counted to (``follows``), or stands at ``pulses``.
 
     In pulses of the drive, whose direction and zero it has.
@@ -141,7 +141,7 @@ class Trajectory:
         self.begin = begin
         self.blocked = blocked
         self.coasting = coasting
-        self._laid: list[TrajectoryPiece] = []
+        self._laid: list[TrajectorySection] = []
         motor = build.motor
         self._resonance_intervals: list[ResonanceInterval] = []
         self._amplitude = vibration if motor is None or motor.resonance is None else max(vibration, motor.resonance.least)
@@ -153,7 +153,7 @@ class Trajectory:
     # ------------------------------------------------------------------ questions
 
     @property
-    def pieces(self) -> list[TrajectoryPiece]:
+    def sections(self) -> list[TrajectorySection]:
         """Computed on first use."""
         if not self._laid:
             self._lay(self.begin)
@@ -168,7 +168,7 @@ class Trajectory:
         build, profile = self.build, profile_of(self.plan)
         if build.ideal or not profile.segments:
             return True
-        return all(p.rotor_follows or (profile.end is not None and p.begin >= profile.end) for p in self.pieces) and (
+        return all(p.rotor_follows or (profile.end is not None and p.begin >= profile.end) for p in self.sections) and (
             profile.end is None or self.at(profile.end).rotor == self.field(profile.end)
         )
 
@@ -181,7 +181,7 @@ class Trajectory:
 
     def leads(self, now: Nanos) -> bool:
         """Whether the rotor goes with that."""
-        return self._piece(now).rotor_follows
+        return self._section(now).rotor_follows
 
     def _lead(self, now: Nanos) -> int:
         """Position that the rotor follows: that of the field, or of the coasting motion."""
@@ -189,70 +189,72 @@ class Trajectory:
 
     def at(self, now: Nanos) -> MechanicalState:
         """Where everything is at ``now``, not before ``begin``."""
-        piece = self._piece(now)
-        lead = self._lead(now) if piece.rotor_follows or piece.load_follows else 0
-        rotor = piece.rotor + lead if piece.rotor_follows else piece.rotor
-        load = piece.load + lead if piece.load_follows else piece.load
-        return MechanicalState(rotor, load, piece.stalled, piece.behind)
+        section = self._section(now)
+        lead = self._lead(now) if section.rotor_follows or section.load_follows else 0
+        rotor = section.rotor + lead if section.rotor_follows else section.rotor
+        load = section.load + lead if section.load_follows else section.load
+        return MechanicalState(rotor, load, section.stalled, section.behind)
 
     def load_at(self, now: Nanos) -> int:
         """The load of `at` alone, which is read most."""
-        piece = self._piece(now)
-        if not piece.load_follows:
-            return piece.load
+        section = self._section(now)
+        if not section.load_follows:
+            return section.load
         plan = self.plan if self.coasting is None else self.coasting
-        return piece.load + self.build.sign * plan.count(now) + self.build.zero
+        return section.load + self.build.sign * plan.count(now) + self.build.zero
 
     def position(self, now: Nanos) -> float:
         """Where the load is, between whole pulses as well."""
-        piece = self._piece(now)
-        if not piece.load_follows:
-            return float(piece.load)
+        section = self._section(now)
+        if not section.load_follows:
+            return float(section.load)
         lead = profile_of(self.plan) if self.coasting is None else self.coasting
-        return piece.load + (self.build.zero + self.build.sign * lead.position(now))
+        return section.load + (self.build.zero + self.build.sign * lead.position(now))
 
     def reaches(self, position: int, after: Nanos, direction: int, *, rotor: bool = False) -> Nanos | None:
         """First moment > ``after`` at which the load (or the rotor) has come to ``position`` in ``direction``, or beyond."""
-        first = max(bisect_right(self.pieces, after, key=attrgetter("begin")) - 1, 0)
-        for i in range(first, len(self.pieces)):
-            piece = self.pieces[i]
-            end = self.pieces[i + 1].begin if i + 1 < len(self.pieces) else None
-            follows, value = (piece.rotor_follows, piece.rotor) if rotor else (piece.load_follows, piece.load)
-            if piece.begin > after:
-                here = value + self._lead(piece.begin) if follows else value
+        first = max(bisect_right(self.sections, after, key=attrgetter("begin")) - 1, 0)
+        for i in range(first, len(self.sections)):
+            section = self.sections[i]
+            end = self.sections[i + 1].begin if i + 1 < len(self.sections) else None
+            follows, value = (section.rotor_follows, section.rotor) if rotor else (section.load_follows, section.load)
+            if section.begin > after:
+                here = value + self._lead(section.begin) if follows else value
                 if (here - position) * direction >= 0:
-                    return piece.begin
-            if follows and piece.direction == direction:
-                time = self._time(position - value, max(after, piece.begin))
+                    return section.begin
+            if follows and section.direction == direction:
+                time = self._time(position - value, max(after, section.begin))
                 if time is not None and (end is None or time < end):
                     return time
         return None
 
     def turning_points(self, now: Nanos) -> list[Nanos]:
         """Moments after ``now``, in order, between which field, rotor and load each go one way."""
-        found = {piece.begin for piece in self.pieces if piece.begin > now}  # a segment of the field begins one at least
+        found = {section.begin for section in self.sections if section.begin > now}  # a segment of the field begins one at least
         if self.coasting is not None:
             found.update(turning_points_of(lambda: profile_of(self.plan))(now))
         return sorted(found)
 
     def next_stall(self, after: Nanos) -> Nanos | None:
         """First moment > ``after`` at which the rotor loses the field or is caught again."""
-        stalled = self._piece(after).stalled
-        return next((piece.begin for piece in self.pieces if piece.begin > after and piece.stalled is not stalled), None)
+        stalled = self._section(after).stalled
+        return next(
+            (section.begin for section in self.sections if section.begin > after and section.stalled is not stalled), None
+        )
 
     def stop(self, now: Nanos) -> int:
-        """The hard stop against which the field draws the rotor, as in `TrajectoryPiece`."""
-        return self._piece(now).stop
+        """The hard stop against which the field draws the rotor, as in `TrajectorySection`."""
+        return self._section(now).stop
 
     def next_stop(self, after: Nanos) -> Nanos | None:
         """First moment > ``after`` at which that changes."""
-        stop = self._piece(after).stop
-        return next((piece.begin for piece in self.pieces if piece.begin > after and piece.stop != stop), None)
+        stop = self._section(after).stop
+        return next((section.begin for section in self.sections if section.begin > after and section.stop != stop), None)
 
     def vibration(self, now: Nanos) -> float:
         """The amplitude of the rotor about the field, full steps; 0 where no resonance is described."""
         motor = self.build.motor
-        if motor is None or motor.resonance is None or not self.pieces or not self._resonance_intervals:
+        if motor is None or motor.resonance is None or not self.sections or not self._resonance_intervals:
             return self._amplitude
         now_s = (now - profile_of(self.plan).start) / SECOND
         before = max(bisect_right(self._resonance_intervals, now_s, key=attrgetter("begin_s")) - 1, 0)
@@ -269,34 +271,34 @@ class Trajectory:
         lack = motor.lack(profile.segments[part], (now - profile.start) / SECOND, self.build.sign)
         return STALLS(axis=axis, why=lack or UNFOLLOWED())
 
-    def load_pieces(self) -> tuple[LoadPiece, ...]:
+    def load_sections(self) -> tuple[LoadSection, ...]:
         """Where the load is, with as few entries as possible; for a drive at rest the distance of the load from it."""
         build, end = self.build, profile_of(self.plan).end
-        found: list[LoadPiece] = []
-        for piece in self.pieces:
-            if piece.load_follows:
-                now = LoadPiece(piece.begin, True, piece.load * build.sign)
-            elif end is not None and piece.begin >= end:
-                now = LoadPiece(piece.begin, True, (piece.load - self.field(piece.begin)) * build.sign)
+        found: list[LoadSection] = []
+        for section in self.sections:
+            if section.load_follows:
+                now = LoadSection(section.begin, True, section.load * build.sign)
+            elif end is not None and section.begin >= end:
+                now = LoadSection(section.begin, True, (section.load - self.field(section.begin)) * build.sign)
             else:
-                now = LoadPiece(piece.begin, False, (piece.load - build.zero) * build.sign)
+                now = LoadSection(section.begin, False, (section.load - build.zero) * build.sign)
             if found and found[-1].begin == now.begin:
                 found.pop()
             if not found or found[-1][1:] != now[1:]:
                 found.append(now)
         return tuple(found)
 
-    def _piece(self, now: Nanos) -> TrajectoryPiece:
-        pieces = self._laid or self.pieces
-        after = bisect_left(pieces, (now + 1,))
-        return pieces[after - 1 if after else 0]
+    def _section(self, now: Nanos) -> TrajectorySection:
+        sections = self._laid or self.sections
+        after = bisect_left(sections, (now + 1,))
+        return sections[after - 1 if after else 0]
 
     def _time(self, lead: int, after: Nanos) -> Nanos | None:
         return (self.plan if self.coasting is None else self.coasting).pulse_time(
             (lead - self.build.zero) * self.build.sign, after
         )
 
-    # ------------------------------------------------------------------ laying out the pieces
+    # ------------------------------------------------------------------ laying out the sections
 
     def _lay(self, begin: Nanos) -> None:
         if self.coasting is not None:
@@ -338,27 +340,29 @@ class Trajectory:
         return (build.low is None or min(places) >= build.low) and (build.high is None or max(places) <= build.high)
 
     def _lay_at_distance(self, profile: Profile) -> None:
-        """Lay the pieces where nothing can come between field, rotor and load: most axes, most of the time."""
+        """Lay the sections where nothing can come between field, rotor and load: most axes, most of the time."""
         behind = self._state.behind
         for begin, direction in profile.legs(self.begin):
-            self._laid.append(TrajectoryPiece(begin, direction * self.build.sign, True, -behind, True, -behind, False, behind))
+            self._laid.append(TrajectorySection(begin, direction * self.build.sign, True, -behind, True, -behind, False, behind))
         if profile.end is not None:
             rest = max(profile.end, self.begin)
             here = self.field(rest) - behind
-            self._laid.append(TrajectoryPiece(rest, 1, False, here, False, here, False, behind))
+            self._laid.append(TrajectorySection(rest, 1, False, here, False, here, False, behind))
 
     def _lay_coasting(self, coasting: Profile) -> None:
         """The rotor goes with the coasting motion, the load keeps its distance to it."""
         rotor, load, stalled, behind = self._state
         away = load - rotor
         for moment, direction in coasting.legs(self.begin):
-            self._laid.append(TrajectoryPiece(moment, direction * self.build.sign, True, 0, True, away, stalled, behind))
+            self._laid.append(TrajectorySection(moment, direction * self.build.sign, True, 0, True, away, stalled, behind))
         if coasting.end is not None:
             rest = self._lead(coasting.end)
-            self._laid.append(TrajectoryPiece(max(coasting.end, self.begin), 1, False, rest, False, rest + away, stalled, behind))
+            self._laid.append(
+                TrajectorySection(max(coasting.end, self.begin), 1, False, rest, False, rest + away, stalled, behind)
+            )
 
     def _segment(self, s: Segment, begin: Nanos, end: Nanos | None) -> None:
-        """Lay the pieces while the field goes one way."""
+        """Lay the sections while the field goes one way."""
         direction = s.direction * self.build.sign
         motor, start = self.build.motor, profile_of(self.plan).start
         if self.blocked:
@@ -402,7 +406,7 @@ class Trajectory:
         if resonance is None:
             return weak
         least = resonance.least
-        for interval, lost in resonance_intervals(resonance, motor.parts(s, now_s, end_s, self.build.sign), self._amplitude):
+        for interval, lost in resonance_intervals(resonance, motor.phases(s, now_s, end_s, self.build.sign), self._amplitude):
             if weak is not None and interval.begin_s >= weak:
                 break
             self._resonance_intervals.append(interval)
@@ -443,11 +447,11 @@ class Trajectory:
             met = None
         if held != begin:
             if met != begin:
-                self._laid.append(TrajectoryPiece(begin, direction, True, offset, False, load, False, behind))
+                self._laid.append(TrajectorySection(begin, direction, True, offset, False, load, False, behind))
             if met is not None:
-                self._laid.append(TrajectoryPiece(met, direction, True, offset, True, offset + slack, False, behind))
+                self._laid.append(TrajectorySection(met, direction, True, offset, True, offset + slack, False, behind))
         if held is not None and stop is not None:
-            self._laid.append(TrajectoryPiece(held, direction, False, stop, False, stop + slack, False, behind, direction))
+            self._laid.append(TrajectorySection(held, direction, False, stop, False, stop + slack, False, behind, direction))
         if end is not None:
             rotor = offset + self.field(end)
             if stop is not None and (rotor - stop) * direction > 0:
@@ -465,7 +469,7 @@ class Trajectory:
 
     def _stand(self, now: Nanos, direction: int, *, stop: int = 0) -> None:
         rotor, load, stalled, behind = self._now
-        self._laid.append(TrajectoryPiece(now, direction, False, rotor, False, load, stalled, behind, stop))
+        self._laid.append(TrajectorySection(now, direction, False, rotor, False, load, stalled, behind, stop))
 
     def _catch(self, now: Nanos) -> None:
         """The rotor goes to the nearest place that has the electrical angle of the field, or towards it as far as a stop."""

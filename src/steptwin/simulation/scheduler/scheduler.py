@@ -36,7 +36,7 @@ class Source(NamedTuple):
     name: str
 
 
-class Board(Stateful):
+class TerminalBlock(Stateful):
     """Terminals of the element ``name``: levels that wires, contacts and other elements join as they join pins of controllers.
     All levels are 0 until something drives them.
 
@@ -128,7 +128,7 @@ class Scheduler:
         ``is_blank``: `restore` comes next, with all levels; until then it drives and records nothing."""
         self.now = now
         self.controllers: dict[str, MotionController] = {}
-        self.boards: dict[str, Board] = {}
+        self.terminal_blocks: dict[str, TerminalBlock] = {}
         """Terminals of elements."""
         self._parts = ScheduledParts()
         self.observers: list[Callable[[str, PinEdge], None]] = []
@@ -210,9 +210,9 @@ class Scheduler:
         controller.changed = partial(self.notify, name)
         self.notify(name)
 
-    def add_board(self, board: Board) -> None:
+    def add_terminal_block(self, block: TerminalBlock) -> None:
         """Add the terminals of an element, whose part has their state."""
-        self.boards[board.name] = board
+        self.terminal_blocks[block.name] = block
 
     def add_part(
         self, part: ScheduledPart, watches: Iterable[str] | None = None, name: str | None = None, drives: str | None = None
@@ -268,20 +268,20 @@ class Scheduler:
         """Raises `Misuse` if the controller or its pin does not exist."""
         if self._is_checked:
             return
-        if name.controller not in self.controllers and name.controller not in self.boards:
+        if name.controller not in self.controllers and name.controller not in self.terminal_blocks:
             raise Misuse(UNKNOWN_CONTROLLER(name=name.controller, names=list(self.controllers) or NONE()))
         pins = self._pin_names.get(name.controller)
         if pins is None:
-            board = self.boards.get(name.controller)
+            block = self.terminal_blocks.get(name.controller)
             pins = self._pin_names[name.controller] = tuple(
-                self.controllers[name.controller].pins() if board is None else board.levels
+                self.controllers[name.controller].pins() if block is None else block.levels
             )
         if name.pin not in pins:
             raise Misuse(NO_SUCH_PIN(controller=name.controller, pin=name.pin, names=list(pins)))
 
     def _level(self, name: PinName) -> float:
-        board = self.boards.get(name.controller)
-        return self.controllers[name.controller].pin(name.pin) if board is None else board.levels[name.pin]
+        block = self.terminal_blocks.get(name.controller)
+        return self.controllers[name.controller].pin(name.pin) if block is None else block.levels[name.pin]
 
     def drive_of(self, controller: str, axis: int) -> Drive:
         """The drive of ``axis`` (from 1). Raises `Misuse` if it does not exist."""
@@ -341,9 +341,9 @@ class Scheduler:
 
         The controller's own report of the same edge is not recorded again.
         """
-        board = self.boards.get(target.controller)
-        if board is not None:
-            board.set_pin(target.pin, level, self.now)
+        block = self.terminal_blocks.get(target.controller)
+        if block is not None:
+            block.set_pin(target.pin, level, self.now)
             self.notify(target.controller)
             return
         controller, (_, pin) = self.controllers[target.controller], target
@@ -364,7 +364,7 @@ class Scheduler:
 
     def owner(self, name: str) -> str:
         """The controller under which ``name`` is recorded: itself, or the first one for an element with terminals."""
-        return next(iter(self.controllers), name) if name in self.boards else name
+        return next(iter(self.controllers), name) if name in self.terminal_blocks else name
 
     def put(self, element: str, output: str, level: float) -> None:
         """An output of an element has another level now, or its first one."""

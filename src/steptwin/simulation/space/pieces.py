@@ -214,8 +214,8 @@ def pieces_of_trajectory(trajectory: Trajectory, now: Nanos) -> Iterator[Piece]:
     """The load of an axis between its whole pulses, in pulses."""
     profile = profile_of(trajectory.plan) if trajectory.coasting is None else trajectory.coasting
     sign, zero = trajectory.build.sign, trajectory.build.zero
-    begun = [piece for piece in trajectory.pieces if piece.begin <= now]
-    pieces = [*begun[-1:], *trajectory.pieces[len(begun) :]]
+    begun = [piece for piece in trajectory.sections if piece.begin <= now]
+    pieces = [*begun[-1:], *trajectory.sections[len(begun) :]]
     for n, piece in enumerate(pieces):
         begin, end = max(piece.begin, now), pieces[n + 1].begin if n + 1 < len(pieces) else None
         if end is not None and end <= begin:

@@ -225,7 +225,7 @@ def _read(text: TomlText, path: Path, spec: type[S], given: object, kind: object
     row = read_row(text, path, spec.rows, given)
     if row is None:
         return None
-    check_sense(text, path, spec.rows, given, kind)
+    check_cross_fields(text, path, spec.rows, given, kind)
     return make_spec(text, spec, row | {"path": path, **others}, given if isinstance(given, Mapping) else {})
 
 
@@ -240,7 +240,7 @@ def make_spec(text: TomlText, spec: type[S], row: Row, given: Table) -> S:
     return made
 
 
-def check_sense(text: TomlText, path: Path, rows: TableRows, given: object, kind: object = None) -> None:
+def check_cross_fields(text: TomlText, path: Path, rows: TableRows, given: object, kind: object = None) -> None:
     """Report keys without effect in a table. ``kind``: that of the table around it, for one without a kind of its own."""
     if not isinstance(given, Mapping):
         return  # reported already

@@ -121,7 +121,7 @@ class _Finder:
             if found is None:
                 raise _NotToml
             part = found[1]
-            parts.append(_plain(part) if part[0] in "\"'" else part)
+            parts.append(_unquoted(part) if part[0] in "\"'" else part)
             if len(parts) > MOST_NESTED:
                 raise UnsupportedToml(Span(*found.span(1)), f"a key of more than {MOST_NESTED} parts")
             self.at = found.end()
@@ -178,7 +178,7 @@ class _Finder:
         return not there
 
 
-def _plain(part: str) -> str:
+def _unquoted(part: str) -> str:
     """A part of a key without its quotes."""
     try:
         return tomllib.loads(f"x = {part}")["x"] if "\\" in part else part[1:-1]

@@ -126,9 +126,9 @@ def _write(model: Model, step: do.Write) -> Action:
     requests = model.requests(step)
 
     def action(scripts: Scripts) -> None:
-        parts, now = model.parts, model.now
+        objects, now = model.objects, model.now
         for name, pdus in requests:
-            scheduler, on = model.sync(name), parts.line_of.get(name)
+            scheduler, on = model.sync(name), objects.line_of.get(name)
             if on is not None:
                 line, unit = on
                 for pdu in pdus:
@@ -136,7 +136,7 @@ def _write(model: Model, step: do.Write) -> Action:
             else:
                 for pdu in pdus:
                     _record(model, name, "request", pdu)
-                    model.registers(name).execute(parts.controllers[name], pdu, now)
+                    model.registers(name).execute(objects.controllers[name], pdu, now)
             scheduler.notify(name if on is None else on[0].name)
             scheduler.propagate()
 
@@ -159,7 +159,7 @@ def _halt(model: Model, given: Halt) -> Action:
 
     def action(scripts: Scripts) -> None:
         with _now(model, given.controller):
-            on = model.parts.line_of.get(given.controller)
+            on = model.objects.line_of.get(given.controller)
             if on is not None:
                 line, unit = on
                 line.recall(unit, model.now)
@@ -221,7 +221,7 @@ def _download(model: Model, given: Download) -> Action:
     if not kind.offers(ControllerKind.download):
         raise kind.lacks(given.controller, "program memory")
     model.sync(given.controller)
-    on = model.parts.line_of.get(given.controller)
+    on = model.objects.line_of.get(given.controller)
     source = SourceText(name_of_text(model, given.controller, given.place), given.text)
     to = Destination(given.controller, None if on is None else on[0].name, given.place)
     found = kind.download(model.controller(given.controller), to, source)
@@ -268,7 +268,7 @@ IS_SWITCHED_BY_A_SUPPLY = Message(
 
 
 def _power_cycle(model: Model, step: do.PowerCycle) -> Action:
-    controller, supply = model.controller(step.controller), model.parts.supplied.get(step.controller)
+    controller, supply = model.controller(step.controller), model.objects.supplied.get(step.controller)
     if supply is not None:
         raise Misuse(IS_SWITCHED_BY_A_SUPPLY(controller=step.controller, supply=supply))
 
@@ -312,12 +312,12 @@ def _couple(model: Model, step: do.Couple) -> Action:
 
 
 def _set_fault(model: Model, step: do.SetFault) -> Action:
-    model.rigging.check(step.fault)
+    model.fault_setup.check(step.fault)
     return lambda scripts: model.put_fault(step.fault)
 
 
 def _clear_fault(model: Model, step: do.ClearFault) -> Action:
-    faults = model.parts.faults
+    faults = model.objects.faults
     faults.called(step.name)
 
     def action(scripts: Scripts) -> None:

@@ -10,7 +10,7 @@ from steptwin.diagnostics import Diagnostic, SourceText, in_order
 from steptwin.errors import Misuse
 from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.description import describe
-from steptwin.simulation.describe.pieces import is_piece
+from steptwin.simulation.describe.includes import is_include
 from steptwin.simulation.toml.reader import TomlText, WorldError
 from steptwin.simulation.world.simulation import Simulation
 
@@ -34,7 +34,7 @@ def diagnose(name: str, text: str, read: Callable[[str], bytes]) -> Diagnosis:
         return files[file]
 
     try:
-        if is_piece(TomlText(name, text)):
+        if is_include(TomlText(name, text)):
             return Diagnosis(())  # what it is depends on what uses it
         spec = describe(name, text, read=keep)
     except WorldError as error:

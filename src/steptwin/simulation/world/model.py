@@ -17,9 +17,9 @@ from steptwin.messages import NONE, Message, text_of
 from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.components.axis import AXIS, BuiltAxis
+from steptwin.simulation.components.builtobjects import BuiltObjects
 from steptwin.simulation.components.button import BUTTON
-from steptwin.simulation.components.parts import WorldParts
-from steptwin.simulation.components.rigging import Rigging
+from steptwin.simulation.components.faultsetup import FaultSetup
 from steptwin.simulation.components.signals import Idle, find_signal
 from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.build import Keep, build
@@ -61,7 +61,7 @@ class Model:
         self.spec = spec
         self.files = blueprint.files
         self.trace = Trace(names, keep=keep_trace)
-        self.parts: WorldParts = build(blueprint, self.trace.add, keep_memory, is_blank=is_blank)
+        self.objects: BuiltObjects = build(blueprint, self.trace.add, keep_memory, is_blank=is_blank)
         self.trace.read_together(blueprint.connected or ())
         self.now: Nanos = 0
         self.stopped: str | None = None
@@ -79,31 +79,31 @@ class Model:
         self.downloaded: dict[tuple[str, str], SourceText] = {}
         """Texts that have been put into controllers since the beginning, by controller and place, as it was written."""
         self.given = GivenFiles(spec.lines, self.files, self.downloaded)
-        self.rigging = Rigging(self.parts)
+        self.fault_setup = FaultSetup(self.objects)
 
     # ------------------------------------------------------------------ what is in it
 
     @property
     def controllers(self) -> Mapping[str, MotionController]:
-        return self.parts.controllers
+        return self.objects.controllers
 
     @property
     def lines(self) -> Mapping[str, Line]:
-        return self.parts.lines
+        return self.objects.lines
 
     @property
     def axes(self) -> Mapping[str, BuiltAxis]:
-        return self.parts.built(AXIS)
+        return self.objects.built(AXIS)
 
     @property
     def schedulers(self) -> list[Scheduler]:
-        return self.parts.schedulers
+        return self.objects.schedulers
 
     def sync(self, name: str) -> Scheduler:
         """The scheduler of a controller or line, advanced to the present. Raises `Misuse` with the existing names."""
-        scheduler = self.parts.scheduler_of.get(name)
+        scheduler = self.objects.scheduler_of.get(name)
         if scheduler is None:
-            raise self.unknown(A_CONTROLLER_OR_LINE(), name, self.parts.scheduler_of)
+            raise self.unknown(A_CONTROLLER_OR_LINE(), name, self.objects.scheduler_of)
         scheduler.advance(self.now)
         return scheduler
 
@@ -134,7 +134,7 @@ class Model:
         if found is None:
             if len(self._signals) >= MOST_REMEMBERED:
                 self._signals.clear()
-            found = self._signals[name] = find_signal(self.parts, name)
+            found = self._signals[name] = find_signal(self.objects, name)
         return found
 
     def read(self, name: str) -> float:
@@ -158,14 +158,14 @@ class Model:
 
     def controller(self, name: str) -> MotionController:
         """The controller called ``name``. Raises `Misuse` with the existing ones."""
-        controller = self.parts.controllers.get(name)
+        controller = self.objects.controllers.get(name)
         if controller is None:
             raise self.unknown(A_CONTROLLER(), name, self.controllers)
         return controller
 
     def kind(self, name: str) -> AnyKind:
         """The kind of a controller. Raises `Misuse` with the existing controllers."""
-        kind = self.parts.kind_of.get(name)
+        kind = self.objects.kind_of.get(name)
         if kind is None:
             raise self.unknown(A_CONTROLLER(), name, self.controllers)
         return kind
@@ -202,7 +202,7 @@ class Model:
         """The PDUs of a write for one controller after the other. Raises `Misuse` for values that a register does not accept."""
         found: list[tuple[str, Sequence[bytes]]] = []
         for name, group in groupby(step.values, key=itemgetter(0)):
-            registers, controller = self.registers(name), self.parts.controllers[name]
+            registers, controller = self.registers(name), self.objects.controllers[name]
             values = tuple(map(itemgetter(1, 2), group))
             key = (name, registers.dialect(controller), values)
             if key not in self._encoded:
@@ -221,9 +221,9 @@ class Model:
 
     def button(self, name: str) -> tuple[Button, Scheduler]:
         """The button called ``name`` and its scheduler. Raises `Misuse` with the existing buttons."""
-        found = self.parts.built(BUTTON).get(name)
+        found = self.objects.built(BUTTON).get(name)
         if found is None:
-            raise self.unknown(A_BUTTON(), name, self.parts.built(BUTTON))
+            raise self.unknown(A_BUTTON(), name, self.objects.built(BUTTON))
         return found
 
     def line_called(self, name: str) -> Line:
@@ -236,7 +236,7 @@ class Model:
     def put_fault(self, fault: Fault) -> None:
         """Set a fault now. Raises `Misuse` for one that cannot occur in this world."""
         self.sync_all()
-        self.rigging.put(fault, self.now)
+        self.fault_setup.put(fault, self.now)
 
     # ------------------------------------------------------------------ reports
 

@@ -24,7 +24,7 @@ def ordered(model: Model, command: ControllerCommand | Seek) -> Step | Halt:
     kind, controller = model.kind(name), model.controller(name)
     model.sync(name)
     controller.advance(model.now)
-    on = model.parts.line_of.get(name)
+    on = model.objects.line_of.get(name)
     return kind.step_of(controller, None if on is None else on[0].name, command)
 
 
@@ -37,5 +37,5 @@ def motion_ends(model: Model, name: str, axis: int, seek: Seek | None = None) ->
     axes = len(model.controller(name).axes)
     if not 1 <= axis <= axes:
         raise Misuse(f"{name}.M{axis}: {name} has {', '.join(f'M{number}' for number in range(1, axes + 1))}")
-    on = model.parts.line_of.get(name)
+    on = model.objects.line_of.get(name)
     return kind.motion_ends(name, axis, None if on is None else on[0].name, seek)

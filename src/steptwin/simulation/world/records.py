@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from steptwin.controller import SECOND, Fact
 from steptwin.errors import Misuse
 from steptwin.nearmiss import NearMiss
-from steptwin.simulation.components.parts import WorldParts
+from steptwin.simulation.components.builtobjects import BuiltObjects
 from steptwin.simulation.scheduler.trace import TraceRecord
 
 _NAMED = ("note", "expectation", "overdue")
@@ -88,9 +88,9 @@ def _chosen(option: str, texts: Sequence[str], known: Sequence[str]) -> frozense
     return frozenset(wanted) or None
 
 
-def named_in(parts: WorldParts) -> Iterable[str]:
+def named_in(objects: BuiltObjects) -> Iterable[str]:
     """The names of what reports anything in a world."""
-    return (*parts.controllers, *parts.lines, *parts.element_names)
+    return (*objects.controllers, *objects.lines, *objects.element_names)
 
 
 def owner_of(controller: str, facts: Iterable[Fact]) -> str:

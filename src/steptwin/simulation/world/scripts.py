@@ -336,14 +336,14 @@ class Scripts:
 
     def _clear_fault(self, step: do.ClearFault, script: Script) -> StepResult:
         """A script of a description may clear a fault that is not set yet, or was cleared already."""
-        if script.is_external or step.name in (active.name for active in self._model.parts.faults.active):
+        if script.is_external or step.name in (active.name for active in self._model.objects.faults.active):
             self._do(script, step)
         return None, None
 
     def _write(self, step: do.Write, script: Script) -> StepResult:
         """Write as a Modbus master: wait for the answers before the next step."""
         model = self._model
-        lines = dict.fromkeys(model.parts.line_of[name][0].name for name, *_ in step.values if name in model.parts.line_of)
+        lines = dict.fromkeys(model.objects.line_of[name][0].name for name, *_ in step.values if name in model.objects.line_of)
         before = {name: self._master(name).asked for name in lines}
         self._do(script, step)
         asked = tuple(PendingRequests(name, before[name] + 1, self._master(name).asked) for name in lines)

@@ -213,9 +213,9 @@ class Simulation(Model):
             self._description(),
             self.now,
             tuple(scheduler.snapshot() for scheduler in self.schedulers),
-            tuple((active.fault, active.name, active.since) for active in self.parts.faults.active),
-            tuple(self.parts.faults.controllers),
-            self.parts.faults.copy_state(),
+            tuple((active.fault, active.name, active.since) for active in self.objects.faults.active),
+            tuple(self.objects.faults.controllers),
+            self.objects.faults.copy_state(),
             self._scripts.state(),
             tuple(self.inputs) if with_inputs else (),
             self.is_settled,
@@ -240,7 +240,7 @@ class Simulation(Model):
         self.now = snapshot.now
         self.stopped = None
         self.trace.rewind(snapshot.trace)
-        self.rigging.put_back(snapshot.faults, snapshot.rigged, snapshot.faults_state)
+        self.fault_setup.put_back(snapshot.faults, snapshot.prepared, snapshot.faults_state)
         for scheduler, state in zip(self.schedulers, snapshot.schedulers, strict=True):
             scheduler.restore(state)
         self.inputs, self.is_settled = list(snapshot.inputs), snapshot.is_settled

@@ -34,7 +34,7 @@ class SimulationSnapshot:
     schedulers: tuple[SchedulerState, ...]
     faults: tuple[tuple[Fault, str, Nanos], ...]
     """The faults that were set, with their names and moments."""
-    rigged: tuple[str, ...]
+    prepared: tuple[str, ...]
     """The controllers that were prepared for faults."""
     faults_state: Any
     scripts: ScriptsState

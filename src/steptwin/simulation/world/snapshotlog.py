@@ -202,10 +202,10 @@ class _ChangedPoints:
         self._world, self._owner, self._note = world, owner, note
         found = {path: point for path, point in points_of(world, owner) if point is not None and not point.is_kept}
         self._points = EventPoints(world, owner, {path: point for path, point in found.items() if stays_between_events(point)})
-        world.parts.scheduler_of[owner].follow(self, (owner,))
+        world.objects.scheduler_of[owner].follow(self, (owner,))
 
     def close(self) -> None:
-        self._world.parts.scheduler_of[self._owner].unfollow(self)
+        self._world.objects.scheduler_of[self._owner].unfollow(self)
 
     def read(self) -> None:
         """The present values, whatever they were before."""

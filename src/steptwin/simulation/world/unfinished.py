@@ -66,23 +66,23 @@ def _level(
     level = simulation.read(pin)
     terminals = simulation.kind(controller).terminals
     if pin in held:
-        yield f"{pin} is {held[pin].words()}"
+        yield f"{pin} is {held[pin].description()}"
     elif name not in (*terminals.digital_inputs, *terminals.analog_inputs):
         yield f"{pin} is {level:g}"
     else:
         sources = (one.source for one in drivers.get(pin, ()))
-        by = " and ".join(f"{one} ({held[one].words()})" if one in held else one for one in sources) or "nothing"
+        by = " and ".join(f"{one} ({held[one].description()})" if one in held else one for one in sources) or "nothing"
         yield f"{pin} is {level:g}, driven by {by}"
 
 
 def _held(simulation: Simulation) -> dict[str, HeldLevel]:
-    faults = simulation.parts.faults
+    faults = simulation.objects.faults
     return {signal: held for owner in (*faults.controllers, *faults.elements) for signal, held in faults.held(owner).items()}
 
 
 def _drivers(simulation: Simulation) -> dict[str, list[Connection]]:
     found: dict[str, list[Connection]] = {}
-    for one in connections(simulation.parts):
+    for one in connections(simulation.objects):
         found.setdefault(str(one.target), []).append(one)
     return found
 
@@ -90,5 +90,7 @@ def _drivers(simulation: Simulation) -> dict[str, list[Connection]]:
 def unchanged_inputs(simulation: Simulation, since: Nanos) -> list[str]:
     """The inputs of controllers that something drives and that have had one level since a moment, as far as the trace is kept."""
     changed = {(record.controller, record.subject) for record in simulation.trace.edges() if record.time > since}
-    driven = dict.fromkeys(one.target for one in connections(simulation.parts) if one.target.controller in simulation.controllers)
+    driven = dict.fromkeys(
+        one.target for one in connections(simulation.objects) if one.target.controller in simulation.controllers
+    )
     return [str(pin) for pin in driven if (pin.controller, pin.pin) not in changed]

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from steptwin.controller import Nanos
+from steptwin.simulation.components.builtobjects import BuiltObjects
 from steptwin.simulation.components.elementspec import NamedSpec
-from steptwin.simulation.components.parts import WorldParts
 from steptwin.simulation.scheduler.wires import PinName
 
 
@@ -25,23 +25,23 @@ class Connection:
     """``parallel`` or ``series`` where several contacts share the input."""
 
 
-def connections(parts: WorldParts) -> Iterator[Connection]:
+def connections(objects: BuiltObjects) -> Iterator[Connection]:
     """The connections in the order in which the description has them."""
-    wires = {wire.target: wire for scheduler in parts.schedulers for wire in scheduler.wires}
-    for target, path in parts.driven.items():
-        circuit, wire = parts.circuits.get(target), wires.get(target)
+    wires = {wire.target: wire for scheduler in objects.schedulers for wire in scheduler.wires}
+    for target, path in objects.driven.items():
+        circuit, wire = objects.circuits.get(target), wires.get(target)
         if wire is not None:
-            yield Connection(terminal_name(parts, wire.source), target, wire.inverted, wire.delay)
+            yield Connection(terminal_name(objects, wire.source), target, wire.inverted, wire.delay)
         elif circuit is not None:
             join = None if len(circuit.contacts) < 2 else "series" if circuit.in_series else "parallel"
             for contact in circuit.contacts:
                 yield Connection(contact.channel, target, contact.normally_closed, join=join)
         else:
             kind, number = str(path[0]), path[1]
-            spec = parts.described[kind][int(number)]
+            spec = objects.described[kind][int(number)]
             yield Connection((spec.name if isinstance(spec, NamedSpec) else "") or kind, target)
 
 
-def terminal_name(parts: WorldParts, pin: PinName) -> str:
+def terminal_name(objects: BuiltObjects, pin: PinName) -> str:
     """A pin as conditions name it: terminals of elements in small letters."""
-    return f"{pin.controller}.{pin.pin.lower()}" if pin.controller in parts.terminals else str(pin)
+    return f"{pin.controller}.{pin.pin.lower()}" if pin.controller in objects.terminals else str(pin)

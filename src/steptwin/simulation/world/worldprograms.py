@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from steptwin.diagnostics import SourceText, to_json
+from steptwin.diagnostics import SourceText, diagnostics_to_json
 from steptwin.errors import Misuse
 from steptwin.messages import NONE, Message
 from steptwin.simulation.kinds.kind import ControllerSpec
@@ -14,7 +14,7 @@ from steptwin.simulation.kinds.programtexts import ProgramText, TextLanguage
 from steptwin.simulation.world.model import Model
 
 FINDING = ("line", "column", "end_line", "end_column", "severity", "code", "message", "hint")
-"""Fields of a diagnostic as plain values (`steptwin.diagnostics.to_json`)."""
+"""Fields of a diagnostic as plain values (`steptwin.diagnostics.diagnostics_to_json`)."""
 
 
 def address_of(controller: str, place: str, language: TextLanguage) -> str:
@@ -68,13 +68,13 @@ class WorldPrograms:
 
     def list(self) -> Sequence[Mapping[str, object]]:
         """The texts of all controllers."""
-        return [_plain(name, text) for name in self._model.controllers for text in program_texts(self._model, name)]
+        return [_to_json(name, text) for name in self._model.controllers for text in program_texts(self._model, name)]
 
     def text(self, controller: str, place: str) -> Mapping[str, object]:
         """One of them, with what its checker finds. Raises `Misuse`."""
         text = text_at(self._model, controller, place)
-        findings = [{key: row[key] for key in FINDING} for row in to_json(text.source, text.check())]
-        return {**_plain(controller, text), "text": text.source.text, "diagnostics": findings}
+        findings = [{key: row[key] for key in FINDING} for row in diagnostics_to_json(text.source, text.check())]
+        return {**_to_json(controller, text), "text": text.source.text, "diagnostics": findings}
 
     def memory(self, controller: str, place: str, text: str) -> Sequence[Mapping[str, object]]:
         """Use of the memory at a place by a text; empty for one with errors. Raises `Misuse`."""
@@ -123,7 +123,7 @@ def _name(controller: str, text: ProgramText) -> str:
     return address_of(controller, text.place, text.language).removeprefix("steptwin:///")
 
 
-def _plain(controller: str, text: ProgramText) -> Mapping[str, object]:
+def _to_json(controller: str, text: ProgramText) -> Mapping[str, object]:
     return {
         "controller": controller,
         "place": text.place,

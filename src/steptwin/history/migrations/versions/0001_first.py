@@ -63,7 +63,7 @@ def upgrade() -> None:
         (
             "plan",
             (
-                "A motion, from which positions follow (steptwin.motion.plain): (pulses + origin) / scale, between "
+                "A motion, from which positions follow (steptwin.motion.planjson): (pulses + origin) / scale, between "
                 "-round_p/2 and round_p/2 pulses where there is a round_p. It holds as a sample does."
             ),
             sa.Column("plan", sa.Text, nullable=False),

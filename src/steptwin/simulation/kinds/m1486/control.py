@@ -8,7 +8,7 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.lines import LINES
 from steptwin.m1486.memory import FileState
-from steptwin.m1486.present import program_words
+from steptwin.m1486.present import describe_program
 from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import ChipCommand
 from steptwin.messages import Message, text_of
@@ -54,7 +54,7 @@ IS_NOT_AT_REST = Message("simulation.m1486.is-not-at-rest", "{name} is not at re
 def refuse_busy(chip: M1486Chip, name: str) -> None:
     """Refuse a command: what is typed now would be done at a moment, and from a place, that are not known."""
     if not chip.is_idle():
-        raise Refusal(IS_NOT_AT_REST(name=name, words=text_of(program_words(chip, chip.now))))
+        raise Refusal(IS_NOT_AT_REST(name=name, words=text_of(describe_program(chip, chip.now))))
 
 
 WHOLE_NUMBER_IS_NEEDED = Message("simulation.m1486.whole-number-is-needed", "{what}: a whole number is needed")

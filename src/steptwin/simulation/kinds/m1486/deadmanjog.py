@@ -10,7 +10,7 @@ from steptwin.errors import Misuse, Refusal
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.drive import speed_curve
 from steptwin.m1486.microsteps import FULL_STEP, UNIT
-from steptwin.m1486.present import program_words
+from steptwin.m1486.present import describe_program
 from steptwin.m1486.ranges import out_of_range
 from steptwin.m1486.syntax import ChipCommand
 from steptwin.m1486.variants import SLOWEST_JOG, Store
@@ -52,7 +52,7 @@ class M1486DeadManJog:
         if chip.is_timed and chip.uart.baud < SLOWEST_JOG:
             raise Refusal(LINE_IS_TOO_SLOW_TO_JOG(name=name, least=SLOWEST_JOG, baud=chip.uart.baud))
         if not chip.is_idle():
-            raise Refusal(IS_NOT_AT_REST(name=name, words=text_of(program_words(chip, chip.now))))
+            raise Refusal(IS_NOT_AT_REST(name=name, words=text_of(describe_program(chip, chip.now))))
         self.lasts_ns: Nanos = min(STOP_NS, REST_NS - TYPED * chip.uart.character_ns) - LINK_NS
         self._chip = chip
         self._line = line
@@ -104,7 +104,7 @@ class M1486DeadManJog:
             return ()
         if not self._chip.is_idle():
             if now - self._begun > PATIENCE_NS:
-                self.over, self._due = self.over or f"the chip {program_words(self._chip, now)}", None
+                self.over, self._due = self.over or f"the chip {describe_program(self._chip, now)}", None
             else:
                 self._due = max(self._chip.drive.deadline() or 0, now + LOOK_NS)
             return ()

@@ -16,7 +16,7 @@ from steptwin.m1486.eeprom import image_of, unpack
 from steptwin.m1486.lines import SEEK_ENDS_LOW, STEP_DIRECTION, interface
 from steptwin.m1486.microsteps import FULL_STEP, UNIT
 from steptwin.m1486.pins import CONTROL_PINS, LINE_PINS, OUTPUT_PINS, WAVEFORM, refuse_taken, settable_pin
-from steptwin.m1486.present import program_words, state_of
+from steptwin.m1486.present import describe_program, state_of
 from steptwin.m1486.signals import STEP_PULSE_NS
 from steptwin.m1486.variants import Store, variant
 from steptwin.messages import Message, MessageText
@@ -270,7 +270,7 @@ class M1486Kind(ControllerKind[M1486Spec, M1486Chip, M1486View]):
         if to.line is None:
             raise Refusal(CANNOT_BE_TYPED_TO(controller=to.controller))
         if chip.is_shut_down:
-            raise Refusal(RECEIVES_NOTHING(controller=to.controller, words=MessageText(program_words(chip, chip.now))))
+            raise Refusal(RECEIVES_NOTHING(controller=to.controller, words=MessageText(describe_program(chip, chip.now))))
         return Downloading(typed=tuple(memory.typed_program(chip, to.controller, to.line, program)))
 
 

@@ -13,7 +13,7 @@ from steptwin.simulation.kinds.kind import LineKind, LinkKind, Member
 from steptwin.simulation.kinds.lines import LineWrite
 from steptwin.simulation.kinds.links import LineSpec
 from steptwin.simulation.kinds.m1486.line import ChipLine
-from steptwin.simulation.kinds.m1486.words import ChipLineWords
+from steptwin.simulation.kinds.m1486.trafficlog import ChipTrafficLog
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import RecordSink
 from steptwin.wire.frameline import FrameLine
@@ -38,8 +38,8 @@ class CharacterLines(LineKind[M1486Chip, ChipLine]):
             raise Misuse("timing = 'strict' is for lines of kind modbus: an M1486 has no time-out between characters")
         return ChipLine(scheduler, spec.name, record, faults, [member.controller for member in members])
 
-    def words(self, line: ChipLine, prefix: str, sink: Callable[[FrameLine], None]) -> ChipLineWords:
-        return ChipLineWords(line, prefix, sink)
+    def traffic_log(self, line: ChipLine, prefix: str, sink: Callable[[FrameLine], None]) -> ChipTrafficLog:
+        return ChipTrafficLog(line, prefix, sink)
 
     def writes(self, line: ChipLine, take: Callable[[LineWrite], None]) -> Callable[[], None]:
         """As `LineKind.writes`. Every chip receives what a host sends, and none answers."""
@@ -48,6 +48,6 @@ class CharacterLines(LineKind[M1486Chip, ChipLine]):
             if shown.direction is FrameDirection.IN and not changes_nothing(shown.raw):
                 take(LineWrite(shown.time, shown.link, (), shown.meaning, ""))
 
-        words = ChipLineWords(line, "", sent)
-        line.follow_frames(words)
-        return partial(line.unfollow_frames, words)
+        log = ChipTrafficLog(line, "", sent)
+        line.follow_frames(log)
+        return partial(line.unfollow_frames, log)

@@ -17,7 +17,7 @@ from steptwin.simulation.kinds.programtexts import TextLanguage
 from steptwin.simulation.script import steps as do
 
 if TYPE_CHECKING:
-    from steptwin.explain.model import MemoryPart
+    from steptwin.explain.model import MemoryUse
 
 PLACE = "program"
 COMMANDS = TextLanguage("m1486", ".m1486", "program", has_statements=True, is_typed=True)
@@ -28,9 +28,9 @@ def given_text(spec: M1486Spec, context: TextContext) -> SourceText | None:
     return None if spec.program is None else SourceText(spec.program, text_of(context, spec.program))
 
 
-def parts(chip: M1486Chip, text: str) -> Sequence[MemoryPart]:
+def parts(chip: M1486Chip, text: str) -> Sequence[MemoryUse]:
     """In whole bytes. What stands in no file is downloaded as one."""
-    from steptwin.explain.model import MemoryPart  # only on request
+    from steptwin.explain.model import MemoryUse  # only on request
 
     program, errors = parse(text)
     stream = next((one for one in streams(program) if one.address in (None, chip.address)), None)
@@ -38,7 +38,7 @@ def parts(chip: M1486Chip, text: str) -> Sequence[MemoryPart]:
         return []
     bits = max((file.bits for file in stream.files), default=stream.bits)
     store = "EEPROM" if chip.variant.store is Store.EEPROM else "command memory"
-    return [MemoryPart(store, -(-bits // 8), chip.variant.memory_bits // 8, "bytes")]
+    return [MemoryUse(store, -(-bits // 8), chip.variant.memory_bits // 8, "bytes")]
 
 
 def is_in(chip: M1486Chip, file: StoredFile | None) -> bool:

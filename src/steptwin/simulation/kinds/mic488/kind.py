@@ -78,7 +78,7 @@ class Mic488Encoders(EncoderInputs[Mic488Device]):
     def index_input(self, axis: int) -> str:
         return f"IN{index_input(axis - 1) + 1}"
 
-    def shown(self, device: Mic488Device, now: Nanos) -> list[dict[str, object]]:
+    def to_json(self, device: Mic488Device, now: Nanos) -> list[dict[str, object]]:
         return [{"axis": a.number, "counts": a.encoder_counts(now), "turned_by": a.encoder.coupling.value} for a in device.axes]
 
     def couple(self, device: Mic488Device, axis: int, coupling: str, now: Nanos) -> None:

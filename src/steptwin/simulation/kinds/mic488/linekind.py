@@ -15,7 +15,7 @@ from steptwin.simulation.kinds.kind import LineKind, LinkKind, Member
 from steptwin.simulation.kinds.lines import LineWrite
 from steptwin.simulation.kinds.links import LineSpec
 from steptwin.simulation.kinds.mic488.line import ModbusBus, timing_of
-from steptwin.simulation.kinds.mic488.words import ModbusWords
+from steptwin.simulation.kinds.mic488.trafficlog import ModbusTrafficLog
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import RecordSink
 from steptwin.wire.frameline import FrameLine
@@ -52,8 +52,8 @@ class ModbusLines(LineKind[Mic488Device, ModbusBus]):
         timing = None if spec.timing == "off" else timing_of(baud, strict=spec.timing == "strict")
         return ModbusBus(scheduler, spec.name, record, faults, devices=devices, timing=timing, baud=baud, gap=spec.gap)
 
-    def words(self, line: ModbusBus, prefix: str, sink: Callable[[FrameLine], None]) -> ModbusWords:
-        return ModbusWords(line, prefix, sink)
+    def traffic_log(self, line: ModbusBus, prefix: str, sink: Callable[[FrameLine], None]) -> ModbusTrafficLog:
+        return ModbusTrafficLog(line, prefix, sink)
 
     def writes(self, line: ModbusBus, take: Callable[[LineWrite], None]) -> Callable[[], None]:
         log = FrameLog(line.devices)

@@ -18,7 +18,7 @@ from steptwin.wbc.check import CheckedProgram, check
 from steptwin.wbc.positions import PositionTable, parse_positions
 
 if TYPE_CHECKING:
-    from steptwin.explain.model import MemoryPart
+    from steptwin.explain.model import MemoryUse
 
 WBC = TextLanguage("wbc", ".prg", "programs", in_banks=True, has_statements=True)
 TABLES = TextLanguage("csv", ".csv", "positions", in_banks=True, is_shared=True)
@@ -63,14 +63,14 @@ def checked(device: Mic488Device, bank: int, text: str) -> CheckedProgram:
     return check(text, table_for(bank, control.banks.positions), setup_of(device.config), control.dialect)
 
 
-def _program_memory(device: Mic488Device, bank: int, text: str) -> Sequence[MemoryPart]:
+def _program_memory(device: Mic488Device, bank: int, text: str) -> Sequence[MemoryUse]:
     from steptwin.explain.mic488 import memory_of  # only on request
 
     found = checked(device, bank, text)
     return [] if found.executable is None else memory_of(found.executable, found.positions, device.program.dialect)
 
 
-def _position_memory(device: Mic488Device, text: str) -> Sequence[MemoryPart]:
+def _position_memory(device: Mic488Device, text: str) -> Sequence[MemoryUse]:
     from steptwin.explain.mic488 import position_memory
 
     table, findings = parse_positions(text)

@@ -178,7 +178,7 @@ class ProgramWatch:
         moves = effect.on_drives and not effect.everything
         if axis.status is not before or moves or (axis.status is AxisStatus.VELOCITY and axis.velocity_p != velocity_p):
             caused = effect.on_drives or isinstance(kind, s.SetStep)
-            self._emit(now, "axis", _words(axis, before, now), step if caused else None)
+            self._emit(now, "axis", _describe(axis, before, now), step if caused else None)
 
     def copy_state(self) -> Plain:
         return ()
@@ -187,7 +187,7 @@ class ProgramWatch:
         """It has none."""
 
 
-def _words(axis: Axis, before: AxisStatus, now: Nanos) -> str:
+def _describe(axis: Axis, before: AxisStatus, now: Nanos) -> str:
     """The present motion of an axis as text."""
     name, unit, gear = f"M{axis.number}", axis.config.unit_name, axis.gear
     place = f"{real_text(axis.coordinate_p(now) / gear)} {unit}"

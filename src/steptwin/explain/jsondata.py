@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from steptwin.explain.model import Explanation, FlowBlock, Piece
+from steptwin.explain.model import Explanation, FlowBlock, StraightPiece
 
 
-def plain(explained: Explanation) -> dict[str, Any]:
+def to_json(explained: Explanation) -> dict[str, Any]:
     return {
         "language": explained.language,
         "title": explained.title,
@@ -42,6 +42,6 @@ def _block(explained: Explanation, block: FlowBlock) -> dict[str, Any]:
     }
 
 
-def _piece(explained: Explanation, piece: Piece) -> dict[str, Any]:
+def _piece(explained: Explanation, piece: StraightPiece) -> dict[str, Any]:
     first, last = (explained.statements[number].line for number in (piece.first, piece.last))
     return {"first_line": first, "last_line": last, "duration_ns": piece.duration, "then_waits_for": piece.wait}

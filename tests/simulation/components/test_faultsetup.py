@@ -236,11 +236,11 @@ def test_a_fault_that_cannot_happen_is_refused_from_files_and_from_python(world:
 
 def test_who_is_connected_counts_as_well() -> None:
     world = World.from_toml(NETWORK.replace('tcp = "127.0.0.1:0"', ""))
-    world.rigging.check(read("crc"))
+    world.fault_setup.check(read("crc"))
     world.lines["bus"].connect("test-1", "tcp")
-    world.rigging.check(read("delay link=test-1"))
+    world.fault_setup.check(read("delay link=test-1"))
     with pytest.raises(Misuse, match="line 'bus' carries Modbus TCP"):
-        world.rigging.check(read("crc"))
+        world.fault_setup.check(read("crc"))
 
 
 @pytest.mark.parametrize(
@@ -260,7 +260,7 @@ def test_who_is_connected_counts_as_well() -> None:
 def test_a_fault_that_can_happen_is_taken(world: str, fault: str) -> None:
     found = World.from_toml(world)
     found.put_fault(read(fault))
-    assert [str(active.fault) for active in found.parts.faults.active] == [fault]
+    assert [str(active.fault) for active in found.objects.faults.active] == [fault]
 
 
 # ---------------------------------------------------------------------- faults of one line alone
@@ -387,7 +387,7 @@ def test_what_steps_set_and_the_file_sets_can_be_cleared_by_name_or_kind_and_aga
     """
     world = World.from_toml(STEPS.replace("{steps}", steps))
     world.run(for_=2)
-    assert [active.name for active in world.parts.faults.active] == ["lost-steps", "stall"]
+    assert [active.name for active in world.objects.faults.active] == ["lost-steps", "stall"]
     assert [record.value for record in world.trace if record.subject == "note"] == ["done"]
     with pytest.raises(Misuse, match=r"no fault 'mine': set are lost-steps, stall"):
         world.apply_input(ClearFault("mine"))

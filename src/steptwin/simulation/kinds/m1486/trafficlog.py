@@ -12,8 +12,8 @@ from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
 
 
-class ChipLineWords:
-    """The characters of a line in words. As `steptwin.simulation.kinds.lines.LineWords`."""
+class ChipTrafficLog:
+    """Log of the characters of a line. As `steptwin.simulation.kinds.lines.TrafficLog`."""
 
     def __init__(self, line: ChipLine, prefix: str, sink: Callable[[FrameLine], None]) -> None:
         self._line = line

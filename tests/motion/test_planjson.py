@@ -10,14 +10,14 @@ from typing import Any
 import pytest
 
 from steptwin.motion.divisions import StepTrain, profile_of
-from steptwin.motion.plain import plain_plan, read_plan
+from steptwin.motion.planjson import plan_to_json, read_plan
 
 VECTORS: list[dict[str, Any]] = json.loads((Path(__file__).parent / "plan_vectors.json").read_text("utf-8"))["plans"]
 NAMES = [one["name"] for one in VECTORS]
 
 
 def computed(plan: dict[str, Any], time_ns: int) -> tuple[float, float]:
-    """Position (pulses) and velocity (pulses/s), as `steptwin.motion.plain` says, without anything of this package."""
+    """Position (pulses) and velocity (pulses/s), as `steptwin.motion.planjson` says, without anything of this package."""
     t = (time_ns - int(plan["start_ns"])) / 1e9
     for segment in plan["segments"]:
         is_arc = isinstance(segment, dict)
@@ -55,8 +55,8 @@ def test_the_plan_read_from_a_vector_is_where_the_vector_says(vector: dict[str, 
 @pytest.mark.parametrize("vector", VECTORS, ids=NAMES)
 def test_there_and_back_through_json_nothing_changes(vector: dict[str, Any]) -> None:
     plan = read_plan(vector["plan"])
-    assert json.loads(json.dumps(plain_plan(plan))) == vector["plan"]
-    assert read_plan(json.loads(json.dumps(plain_plan(plan)))) == plan
+    assert json.loads(json.dumps(plan_to_json(plan))) == vector["plan"]
+    assert read_plan(json.loads(json.dumps(plan_to_json(plan)))) == plan
 
 
 def test_the_vectors_have_every_form_there_is() -> None:

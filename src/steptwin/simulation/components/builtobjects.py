@@ -1,4 +1,4 @@
-"""The built parts of a world, by name."""
+"""The objects that are built from a description, by name."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from steptwin.simulation.toml.tomlplaces import Path
 
 
 @dataclass(slots=True)
-class WorldParts:
+class BuiltObjects:
     """The objects built from a description."""
 
     line_specs: Sequence[LineSpec]

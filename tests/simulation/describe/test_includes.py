@@ -13,9 +13,9 @@ import pytest
 from steptwin.errors import Misuse
 from steptwin.files import recording as recordings
 from steptwin.files.world import World
-from steptwin.simulation.describe import pieces
+from steptwin.simulation.describe import includes
 from steptwin.simulation.describe.description import describe
-from steptwin.simulation.describe.pieces import FILE_KEYS, MOST_NESTED, Pieces, beside, given_files, no_files, normal
+from steptwin.simulation.describe.includes import FILE_KEYS, MOST_NESTED, Includes, beside, given_files, no_files, normal
 from steptwin.simulation.describe.tables import tables
 from steptwin.simulation.kinds.registry import KINDS
 from steptwin.simulation.toml.reader import TomlText, WorldError
@@ -376,7 +376,7 @@ to = "u_b.IN1"
 def put_in(text: str, files: Mapping[str, str]) -> TomlText:
     found = TomlText("m.toml", text)
     read = given_files({name: content.encode() for name, content in files.items()})
-    Pieces(read, tables(), ("mic488",), ()).put_into(found)
+    Includes(read, tables(), ("mic488",), ()).put_into(found)
     return found
 
 
@@ -388,7 +388,7 @@ def test_a_use_is_what_it_stands_for_written_out() -> None:
 
 
 def test_as_many_uses_as_are_permitted(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pieces, "MOST_PIECES", 3)
+    monkeypatch.setattr(includes, "MOST_INCLUDES", 3)
     one = '[[use]]\nname = "u{n}"\nfile = "p.toml"\n'
     for number, findings in ((3, 0), (4, 1)):
         text = "".join(one.replace("{n}", str(n)) for n in range(number))
@@ -457,7 +457,7 @@ def test_a_file_that_is_no_text_is_refused() -> None:
 
 
 def test_editors_see_errors_of_a_controllers_file_at_the_use() -> None:
-    """They have places of their own in that file, not in the piece that names it."""
+    """They have places of their own in that file, not in the include that names it."""
     main = '# two chips\n[[use]]\nname = "left"\nfile = "parts/chip.toml"\n[[mic488]]\nname = "a"\n'
     files = {"parts/chip.toml": b'[[m1486]]\nname = "chip"\nprogram = "p.txt"\n', "parts/p.txt": b"xx\n"}
     (found,) = diagnose("m.toml", main, given_files(files)).findings

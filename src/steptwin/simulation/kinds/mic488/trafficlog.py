@@ -13,8 +13,8 @@ from steptwin.wire.pdu import WRITES
 from steptwin.wire.slave import FrameDirection, FrameObserver
 
 
-class ModbusWords:
-    """The frames of a line in words. As `steptwin.simulation.kinds.lines.LineWords`."""
+class ModbusTrafficLog:
+    """The frames of a line in words. As `steptwin.simulation.kinds.lines.TrafficLog`."""
 
     def __init__(self, line: ModbusBus, prefix: str, sink: Callable[[FrameLine], None]) -> None:
         self._line = line

@@ -22,10 +22,10 @@ ReadFile: TypeAlias = Callable[[str], bytes]
 """Gives the content of a file that a description names. Raises `Misuse`."""
 
 USE, WITH, PARAMETERS = "use", "with", "parameters"
-MOST_PIECES = 1000
-"""Limit of uses in a description, those in its pieces too: each level of pieces could double them."""
+MOST_INCLUDES = 1000
+"""Limit of uses in a description, those in its includes too: each level of includes could double them."""
 MOST_NESTED = 8
-"""Limit of pieces in one another."""
+"""Limit of includes in one another."""
 FILE_KEYS = frozenset({"config", "program", "programs", "positions"})
 """Keys of controllers whose values are names of files."""
 
@@ -64,12 +64,12 @@ def no_files(name: str) -> bytes:
     return given_files({})(name)
 
 
-def is_piece(text: TomlText) -> bool:
+def is_include(text: TomlText) -> bool:
     """Whether a text is for `USE` of another."""
     return PARAMETERS in text.data
 
 
-class Pieces:
+class Includes:
     """Puts what a description uses into its data. ``files``: what has been read, with the first place that names it."""
 
     def __init__(
@@ -98,7 +98,7 @@ class Pieces:
     def _use(self, text: TomlText, path: Path, name: str, file: str, given: object, above: tuple[str, ...]) -> None:
         where = normal(beside(above[-1], file) if above else file)
         try:
-            piece = self._piece(where, above)
+            include = self._include(where, above)
         except WorldError as error:
             text.wrong_file((*path, "file"), error)
             text.leave_out_use(name)
@@ -108,20 +108,20 @@ class Pieces:
             text.leave_out_use(name)
             return
         self.files.setdefault(where, (*path, "file"))
-        text.use(piece, path)
-        parameters = self._parameters(text, path, piece, given)
-        piece.data = _Instance(piece, name, where, parameters, referring_keys(self._rows)).data()
-        self.put_into(piece, (*above, where))
-        for kind, tables in piece.data.items():
-            self._adopt(text, path, piece, kind, tables)
+        text.use(include, path)
+        parameters = self._parameters(text, path, include, given)
+        include.data = _Instance(include, name, where, parameters, referring_keys(self._rows)).data()
+        self.put_into(include, (*above, where))
+        for kind, tables in include.data.items():
+            self._adopt(text, path, include, kind, tables)
 
-    def _piece(self, name: str, above: tuple[str, ...]) -> TomlText:
+    def _include(self, name: str, above: tuple[str, ...]) -> TomlText:
         """The text of a file. Raises `Misuse` for one that cannot be used, `WorldError` for one that is not TOML."""
         self._count += 1
         if name in above:
             raise Misuse(f"{' uses '.join((*above, name))}, itself")
-        if self._count > MOST_PIECES or len(above) >= MOST_NESTED:
-            raise Misuse(f"permitted are {MOST_PIECES} uses, and {MOST_NESTED} in one another")
+        if self._count > MOST_INCLUDES or len(above) >= MOST_NESTED:
+            raise Misuse(f"permitted are {MOST_INCLUDES} uses, and {MOST_NESTED} in one another")
         try:
             text = self._read(name).decode()
         except UnicodeDecodeError as error:
@@ -129,11 +129,11 @@ class Pieces:
         return TomlText(name, text, self._controllers, self._named)
 
     @staticmethod
-    def _parameters(text: TomlText, path: Path, piece: TomlText, given: object) -> dict[str, Any]:
+    def _parameters(text: TomlText, path: Path, include: TomlText, given: object) -> dict[str, Any]:
         """The values of parameters; `{}` in the place of a default is none."""
-        defaults = piece.data.pop(PARAMETERS, {})
+        defaults = include.data.pop(PARAMETERS, {})
         if not isinstance(defaults, Mapping):
-            piece.wrong((PARAMETERS,), "D002", f"{PARAMETERS} is {defaults!r}", "expected a table")
+            include.wrong((PARAMETERS,), "D002", f"{PARAMETERS} is {defaults!r}", "expected a table")
             defaults = {}
         if not isinstance(given, Mapping):
             text.wrong((*path, WITH), "D002", f"{WITH} is {given!r}", "expected a table")
@@ -142,45 +142,45 @@ class Pieces:
             if name not in defaults:
                 near = text.near(name, defaults)
                 there = f"parameters are {', '.join(defaults)}" if defaults else "it has no [parameters]"
-                text.wrong((*path, WITH, name), "D004", f"{piece.source.name} has no parameter {name!r}{near}", there)
+                text.wrong((*path, WITH, name), "D004", f"{include.source.name} has no parameter {name!r}{near}", there)
         values = {**defaults, **{name: value for name, value in given.items() if name in defaults}}
         if lacking := [name for name, value in values.items() if value == {}]:
-            text.wrong(path, "D005", f"{piece.source.name}: {', '.join(lacking)} is missing", f"expected in [{USE}.{WITH}]")
+            text.wrong(path, "D005", f"{include.source.name}: {', '.join(lacking)} is missing", f"expected in [{USE}.{WITH}]")
         return values
 
-    def _adopt(self, text: TomlText, path: Path, piece: TomlText, kind: str, tables: Any) -> None:
-        """Put the tables of a kind, of a piece, into a text."""
+    def _adopt(self, text: TomlText, path: Path, include: TomlText, kind: str, tables: Any) -> None:
+        """Put the tables of a kind, of an include, into a text."""
         if kind not in self._rows and kind != "fault":
             permitted = [key for key in self._rows if key != "world"]
-            piece.wrong((kind,), "D004", f"the file has no [{kind}]{piece.near(kind, permitted)}")
+            include.wrong((kind,), "D004", f"the file has no [{kind}]{include.near(kind, permitted)}")
         elif kind == "world":
-            piece.wrong((kind,), "D004", "[world] is for the description, not for a file that it uses")
+            include.wrong((kind,), "D004", "[world] is for the description, not for a file that it uses")
         elif not isinstance(tables, list):
-            piece.stands_once(kind)
+            include.stands_once(kind)
         else:
             there = text.data.setdefault(kind, [])
             if isinstance(there, list):
                 for number, table in enumerate(tables):
-                    text.adopt((kind, len(there)), piece, (kind, number), path)
+                    text.adopt((kind, len(there)), include, (kind, number), path)
                     there.append(table)
 
 
 class _Instance:
-    """The data of a piece, for one use of it: with its names, files and parameters."""
+    """The data of an include, for one use of it: with its names, files and parameters."""
 
     def __init__(
-        self, piece: TomlText, prefix: str, where: str, parameters: Mapping[str, Any], referring: frozenset[str]
+        self, include: TomlText, prefix: str, where: str, parameters: Mapping[str, Any], referring: frozenset[str]
     ) -> None:
-        self._piece = piece
+        self._include = include
         self._prefix = prefix
         self._where = where
         self._parameters = parameters
         self._referring = referring
-        self._names = set(_names(piece.data))
-        self._uses = tuple(f"{name}_" for name in _names({USE: piece.data.get(USE)}))
+        self._names = set(_names(include.data))
+        self._uses = tuple(f"{name}_" for name in _names({USE: include.data.get(USE)}))
 
     def data(self) -> dict[str, Any]:
-        return {kind: self._value((kind,), value) for kind, value in self._piece.data.items()}
+        return {kind: self._value((kind,), value) for kind, value in self._include.data.items()}
 
     def _value(self, path: Path, value: Any, *, refers: bool = False) -> Any:
         if isinstance(value, dict):
@@ -200,7 +200,7 @@ class _Instance:
         return self._text(path, value, refers=refers or self._gives_name(path))
 
     def _refers(self, path: Path, key: str) -> bool:
-        """Whether the value of a key names something in the piece."""
+        """Whether the value of a key names something in the include."""
         return key in self._referring or path[-1] == WITH or key == "clear_fault"
 
     @staticmethod
@@ -231,9 +231,9 @@ class _Instance:
     def _parameter(self, path: Path, name: str) -> Any:
         if name in self._parameters:
             return self._parameters[name]
-        near = self._piece.near(name, self._parameters)
+        near = self._include.near(name, self._parameters)
         there = f"parameters are {', '.join(self._parameters)}; {{{{ is a brace" if self._parameters else "it has no [parameters]"
-        self._piece.wrong(path, "D004", f"the file has no parameter {name!r}{near}", there)
+        self._include.wrong(path, "D004", f"the file has no parameter {name!r}{near}", there)
         return ""
 
 

@@ -36,7 +36,7 @@ def check_recording_target(path: Path) -> None:
     check_writable(path)
 
 
-def begin_world(
+def load_world(
     path: Path,
     warn: Callable[[str], object],
     *,

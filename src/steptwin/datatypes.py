@@ -27,7 +27,7 @@ def fits(value: Any, wanted: Any) -> bool:
 def fitting(name: str, value: Any, wanted: Any) -> Any:
     """The value, if it is of the type ``wanted``; else raises `TypeError`."""
     if not fits(value, wanted):
-        raise TypeError(f"{name} is {shown(value)}")
+        raise TypeError(f"{name} is {format_short(value)}")
     return value
 
 
@@ -36,7 +36,7 @@ def fields_fit(value: tuple[Any, ...]) -> bool:
     return all(map(fits, value, get_type_hints(type(value)).values()))
 
 
-def shown(value: object) -> str:
+def format_short(value: object) -> str:
     """A value in a message, no longer than half a line."""
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from steptwin.errors import Misuse
-from steptwin.files import loading
+from steptwin.files import blueprintcache
 from steptwin.files.world import World
 
 TEXT = '[[mic488]]\nname = "table"\nprogram = "loop.prg"\nstart = true\n'
@@ -65,6 +65,6 @@ def test_a_memory_that_lasts_is_read_each_time(cell: Path) -> None:
 
 
 def test_few_are_kept(cell: Path) -> None:
-    for seed in range(2 * loading.MOST_KNOWN):
+    for seed in range(2 * blueprintcache.MOST_KNOWN):
         World.load(cell, seed=seed)
-    assert len(loading._KNOWN) == loading.MOST_KNOWN
+    assert len(blueprintcache._KNOWN) == blueprintcache.MOST_KNOWN

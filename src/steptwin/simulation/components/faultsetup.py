@@ -7,8 +7,8 @@ from typing import Any
 
 from steptwin.controller import Nanos
 from steptwin.simulation.components.axis import AXIS
-from steptwin.simulation.components.parts import WorldParts
-from steptwin.simulation.faults import ActiveFault, Fault, RequestRoute, check_place, rig
+from steptwin.simulation.components.builtobjects import BuiltObjects
+from steptwin.simulation.faults import ActiveFault, Fault, RequestRoute, check_place, prepare_for_faults
 from steptwin.simulation.faults.controller import FaultyController
 from steptwin.simulation.faults.table import Layer, Occasion
 from steptwin.simulation.kinds.kind import LineUnit
@@ -16,10 +16,10 @@ from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.kinds.registry import line_kinds
 
 
-class Rigging:
+class FaultSetup:
     """Sets the faults of a world that was built from a description."""
 
-    def __init__(self, plan: WorldParts) -> None:
+    def __init__(self, plan: BuiltObjects) -> None:
         self._plan = plan
 
     def check(self, fault: Fault) -> None:
@@ -33,35 +33,35 @@ class Rigging:
         self.check(fault)
         self._plan.faults.add(fault, now)
 
-    def put_back(self, faults: Iterable[tuple[Fault, str, Nanos]], rigged: Iterable[str], state: Any) -> None:
+    def put_back(self, faults: Iterable[tuple[Fault, str, Nanos]], prepared: Iterable[str], state: Any) -> None:
         """Restore the faults of a snapshot, with name and moment, and prepare the controllers that it has prepared; others remain
         prepared for later ones."""
         kept, there = list(faults), self._plan.faults
-        for name in rigged:
-            self.rig(name)
+        for name in prepared:
+            self.prepare_for_faults(name)
         there.active = tuple(ActiveFault(fault, name, there.seed, since) for fault, name, since in kept)
         there.set_state(state)
 
     def _prepare(self, fault: Fault) -> None:
         if fault.kind.layer is Layer.PHYSICS or fault.kind.occasion is Occasion.REQUEST:
             for name in self._plan.controllers:
-                self.rig(name)
+                self.prepare_for_faults(name)
 
-    def rig(self, name: str) -> FaultyController:
+    def prepare_for_faults(self, name: str) -> FaultyController:
         """Prepare a controller for faults; if an axis has mechanics, its faults act on these instead of on the encoder."""
         plan = self._plan
         controller, scheduler = plan.controllers[name], plan.scheduler_of[name]
-        rigged = scheduler.controllers[name]
-        if isinstance(rigged, FaultyController):
-            return rigged
+        prepared = scheduler.controllers[name]
+        if isinstance(prepared, FaultyController):
+            return prepared
         mechanisms = {axis.mechanism.number: axis.mechanism for axis in plan.built(AXIS).values() if axis.spec.drive[0] == name}
         on = plan.line_of.get(name)
         service = LineUnit() if on is None else LineUnit(on[1], on[0].name)
         body = plan.kind_of[name].body(controller, service, mechanisms)
-        return rig(scheduler, name, plan.faults, body)
+        return prepare_for_faults(scheduler, name, plan.faults, body)
 
 
-def _wires(plan: WorldParts) -> Iterator[RequestRoute]:
+def _wires(plan: BuiltObjects) -> Iterator[RequestRoute]:
     """The routes of requests: external links of lines, described or present; scripts; None for a controller without a line."""
     for spec in plan.line_specs:
         line = plan.lines.get(spec.name)

@@ -22,26 +22,26 @@ from math import inf
 from typing import Any
 
 from steptwin.controller import Nanos
+from steptwin.datatypes import fitting, format_short
 from steptwin.motion.divisions import Division, Microstepping, Plan, StepTrain
 from steptwin.motion.paths import ArcProfile, ArcSegment, Circular
 from steptwin.motion.profile import Profile, Segment
-from steptwin.plaintypes import fitting, shown
 
 LONGEST_MOMENT = 19
 """Digits: moments have 63 bits."""
 
 
-def plain_plan(plan: Plan) -> dict[str, object]:
+def plan_to_json(plan: Plan) -> dict[str, object]:
     """A plan as plain data, exactly."""
     if isinstance(plan, StepTrain):
         fine, coarse, limit = plan.microstepping
         grids = [fine, coarse, None if limit == inf else limit]
-        return {**_plain_profile(plan.profile), "microstepping": grids, "divisions": [list(one) for one in plan.divisions]}
-    return _plain_profile(plan)
+        return {**_profile_to_json(plan.profile), "microstepping": grids, "divisions": [list(one) for one in plan.divisions]}
+    return _profile_to_json(plan)
 
 
 def read_plan(data: Mapping[str, Any]) -> Plan:
-    """The plan in plain data. Raises `TypeError`, `ValueError` or `LookupError` for what `plain_plan` does not give."""
+    """The plan in plain data. Raises `TypeError`, `ValueError` or `LookupError` for what `plan_to_json` does not give."""
     profile = _profile(data)
     if "divisions" in data:
         divisions = tuple(Division(*fitting("a division", tuple(one), tuple[int, int])) for one in data["divisions"])
@@ -50,18 +50,18 @@ def read_plan(data: Mapping[str, Any]) -> Plan:
     return profile
 
 
-def _plain_profile(profile: Profile) -> dict[str, object]:
-    segments = [_plain_segment(segment) for segment in profile.segments]
+def _profile_to_json(profile: Profile) -> dict[str, object]:
+    segments = [_segment_to_json(segment) for segment in profile.segments]
     return {"start_ns": str(profile.start), "base": profile.base, "final": profile.final_p, "segments": segments}
 
 
-def _plain_segment(s: Segment | ArcSegment) -> object:
+def _segment_to_json(s: Segment | ArcSegment) -> object:
     end_s = None if s.end_s == inf else s.end_s
     if isinstance(s, Segment):
         return [end_s, s.anchor_s, s.c0, s.c1, s.c2, s.c3, s.direction]
     c = s.curve
     curve = [c.centre_p, c.radius_p, c.angle_q, c.turn_q]
-    travel = _plain_segment(s.travel)
+    travel = _segment_to_json(s.travel)
     return {"end_s": end_s, "direction": s.direction, "way": travel, "course": curve, "half": s.half, "end_p": s.end_p}
 
 
@@ -76,7 +76,7 @@ def _profile(data: Mapping[str, Any]) -> Profile:
 
 def _moment(text: object) -> Nanos:
     if not (isinstance(text, str) and text.isascii() and text.isdigit() and len(text) <= LONGEST_MOMENT):
-        raise ValueError(f"start_ns is {shown(text)}: expected nanoseconds as decimal text")
+        raise ValueError(f"start_ns is {format_short(text)}: expected nanoseconds as decimal text")
     return int(text)
 
 

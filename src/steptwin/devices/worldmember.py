@@ -1,4 +1,4 @@
-"""A world as a part of a subject: its answers are there at once."""
+"""A world as a member of a composite subject: its answers are there at once."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from steptwin.subject.jogs import Jogs
 
 def present_of(world: PlannedSubject) -> dict[str, Any]:
     """``state`` by controller and ``faults``."""
-    states = {part.name: world.do(command.ReadState(part.name)).value for part in world.description.controllers}
+    states = {controller.name: world.do(command.ReadState(controller.name)).value for controller in world.description.controllers}
     return {"state": states, "faults": world.do(command.ListFaults()).value}
 
 
-class WorldPart:
-    """Satisfies `steptwin.devices.composite.SubjectPart`."""
+class WorldMember:
+    """Satisfies `steptwin.devices.composite.MemberSubject`."""
 
     lost = None
 
