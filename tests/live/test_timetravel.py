@@ -1,4 +1,4 @@
-"""Looking back while a world goes on, and taking it back, in the virtual time of the event loop."""
+"""Time travel while a world goes on, and taking it back, in the virtual time of the event loop."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A twin beside a device: a served twin plays the device, and a Modbus master beside the studio makes it behave otherwise."""
+"""The digital shadow of a device: a served twin plays the device, and another Modbus master makes it behave otherwise."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def test_a_jog_is_taken_over(rig: Rig) -> None:
     rig.ok("enable", controller="mic488", axis=1)
     rig.ok("digital_shadow", controller="mic488")
     rig.ok("release_control")
-    tell(do="hello")
+    tell(do="hello", version=2)
     lease = tell(do="jog", controller="mic488", axis=1, velocity=10)["ok"]["lease"]
     until(lambda: "ok" in tell(do="renew", lease=lease) and rig.master.sample(1).position > 2, "it is jogged")
     tell(do="let_go", lease=lease)
@@ -160,8 +160,8 @@ def test_the_difference_is_drawn(rig: Rig, browser: Browser, tmp_path: Path) -> 
         button(page, "Download settings of mic488").click()
     download.value.save_as(tmp_path / "settings.json")
     assert json.loads((tmp_path / "settings.json").read_text())["firmware"] == "1.70"
-    button(page, "Put a twin beside mic488").click()
-    region = page.get_by_role("region", name="Twin beside mic488")
+    button(page, "Start the digital shadow of mic488").click()
+    region = page.get_by_role("region", name="Digital shadow of mic488")
     expect(region.get_by_role("status")).to_contain_text("no difference so far")
     rig.ok("take_control", over=True)
     rig.ok("enable", controller="mic488", axis=1)
@@ -172,6 +172,6 @@ def test_the_difference_is_drawn(rig: Rig, browser: Browser, tmp_path: Path) -> 
     rig.until_at(20.0)
     expect(region.get_by_role("row", name="M1_VMAX 10 40")).to_be_visible()
     page.screenshot(path=PICTURES / "shadow.png")
-    button(page, "Remove the twin beside mic488").click()
+    button(page, "End the digital shadow of mic488").click()
     expect(region).to_have_count(0)
     page.close()

@@ -173,7 +173,7 @@ def test_every_panel_goes_to_a_moment_of_the_past(studio: Studio) -> None:
     expect(position).to_have_text("0.00")
     expect(button(page, "Enable M1")).to_have_attribute("aria-pressed", "false")
     expect(button(page, "Enable M1")).to_be_disabled()
-    expect(page.get_by_role("group", name="Virtual time")).to_contain_text("looking back")
+    expect(page.get_by_role("group", name="Virtual time")).to_contain_text("in the past")
     assert studio.at(1) == 20.0, "the world goes on meanwhile"
     page.locator("body").press(".")
     expect(position).to_have_text("20.00")

@@ -16,7 +16,7 @@ from tests.studio.conftest import Process
 OF_TWINS = re.compile(r"\b(twins?|virtual\w*|world\w*|simulat\w*|descriptions?)\b", re.IGNORECASE)
 ABOUT_TWINS = {
     "Devices": (
-        "Twin beside it",
+        "Digital shadow",
         "Does it behave as the twin does?",
         "no twin",
         "a twin needs the configuration of the controller",

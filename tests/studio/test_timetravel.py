@@ -1,4 +1,4 @@
-"""Viewers who look back, in memory: what they are shown, and what they cannot do meanwhile."""
+"""Time travel of viewers, in memory: what they are shown, and what they cannot do meanwhile."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ MOST_WAITING = 16
 PATIENCE_NS: Nanos = 5 * SECOND
 """A command that has waited longer for those before it is not sent."""
 REGISTERS_NS: Nanos = 5 * SECOND
-"""Settings of a device with a twin beside it are compared so often, at rest."""
+"""Settings of a device and of its digital shadow are compared so often, at rest."""
 JOG_WAIT_S = 2.0
 """For the jog before of the same axis to end."""
 LOOKS = (command.ReadPoints, command.ReadPins, command.Describe, command.Time, command.Encoders, command.ReadState)
@@ -263,7 +263,7 @@ class ConnectedDevice:
             self._turn.release()
 
     async def _execute(self, wanted: Command) -> Result:
-        """Also by the twin beside it."""
+        """Also by the digital shadow."""
         begun = self._around.clock()
         result = await self._subject.do(wanted)
         if self._shadow is not None:  # before anything else is awaited: that would be lag, and may be cancelled
@@ -320,10 +320,10 @@ class ConnectedDevice:
         """See `steptwin.drivers.subject.DevicePart.configuration`."""
         return self._device.configuration()
 
-    # ------------------------------------------------------------------ the twin beside it
+    # ------------------------------------------------------------------ the digital shadow
 
     async def begin_shadow(self) -> None:
-        """Put a twin beside it, in place of one that is there. Raises `Refusal`, `LineFailure`."""
+        """Begin a digital shadow, in place of one that is there. Raises `Refusal`, `LineFailure`."""
         async with self._turn:
             if self._jogs:
                 raise Refusal(AXIS_IS_JOGGED(name=self.name))

@@ -1,4 +1,4 @@
-"""A twin beside a device: fed with the same commands and inputs, and compared with it.
+"""The digital shadow of a device: a twin that gets the same commands and inputs, and is compared with it.
 
 Pure: moments are arguments. The twin goes on in a world of its own, whose time begins with the shadow.
 

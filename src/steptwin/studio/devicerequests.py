@@ -1,4 +1,4 @@
-"""Requests for one device that is connected: its settings, and a twin beside it."""
+"""Requests for one device that is connected: its settings, and its digital shadow."""
 
 from __future__ import annotations
 
@@ -56,8 +56,8 @@ class ReadSettings:
 @request(
     "digital_shadow",
     KEEP,
-    "Put a twin beside a device at rest, which is given the same commands from then on, or remove it. Of the device it only "
-    "reads.",
+    "Begin the digital shadow of a device at rest, a twin that gets the same commands from then on, or end it. It only "
+    "reads from the device.",
 )
 @dataclass(frozen=True, slots=True)
 class SetDigitalShadow:
@@ -65,7 +65,7 @@ class SetDigitalShadow:
     on: Annotated[bool, Meaning("Whether there is to be one.")] = True
 
 
-@request("digital_shadow_state", LOOK, "How a device and the twin beside it differ; null without one.", or_null(_SHADOW))
+@request("digital_shadow_state", LOOK, "How a device and its digital shadow differ; null without one.", or_null(_SHADOW))
 @dataclass(frozen=True, slots=True)
 class ReadDigitalShadow:
     controller: _Device

@@ -79,7 +79,7 @@ class Connections(Protocol):
         ...
 
     async def shadow(self, controller: str, *, on: bool) -> None:
-        """Put a twin beside a device, or remove it. Raises as `settings`."""
+        """Begin the digital shadow of a device, or end it. Raises as `settings`."""
         ...
 
     def shadow_of(self, controller: str, after: Nanos) -> Mapping[str, object] | None:

@@ -92,7 +92,7 @@ export const pl: Record<keyof typeof en, string> = {
   keyComma: "Patrz wstecz, na ostatnie zdarzenie",
   keySemicolon: "Patrz dalej; w teraźniejszości: krok do następnego zdarzenia",
   keyPause: "Zatrzymaj czas albo go wznów",
-  pastLooking: "wstecz",
+  pastLooking: "w przeszłości",
   pastBand: "Przeszłość",
   pastAgo: "{seconds} s przed teraz. Niczego nie można tu zmienić; „Zatrzymaj wszystko” nadal zatrzymuje maszynę.",
   pastMoment: "Oglądana chwila",
