@@ -210,7 +210,7 @@ async def websocket(rig: AnyRig) -> AsyncGenerator[Way]:
     hub, now = _hub(rig)
     one, other = ViewerSession(hub, "one"), ViewerSession(hub, "other")
     for session in (one, other):
-        assert "ok" in await result_of(session.receive('{"do": "hello"}', now()))
+        assert "ok" in await result_of(session.receive('{"do": "hello", "version": 2}', now()))
     viewers = Viewers(rig, lambda text: result_of(one.receive(text, now())), lambda text: result_of(other.receive(text, now())))
     yield viewers
     await viewers.close()

@@ -39,7 +39,11 @@ class Counter(asyncio.Protocol):
 
 async def view(url: str, until: float, counts: Counts) -> None:
     async with connect(url, max_size=None, compression=None, ping_interval=None) as socket:
-        for message in ({"do": "hello"}, {"do": "watch", "points": [*POINTS, "time"], "rate": 30}, {"do": "follow", "id": 1}):
+        for message in (
+            {"do": "hello", "version": 2},
+            {"do": "watch", "points": [*POINTS, "time"], "rate": 30},
+            {"do": "follow", "id": 1},
+        ):
             await socket.send(json.dumps(message))
         socket.transport.set_protocol(Counter(counts))
         await asyncio.sleep(until - time.monotonic())

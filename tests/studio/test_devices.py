@@ -86,7 +86,7 @@ class Viewer:
         self._socket = process.connect()
         self._id = 0
         self.pushed: list[dict[str, Any]] = []
-        self.ok("hello")
+        self.ok("hello", version=2)
         until(lambda: self._receive() and self.newest("hello") is not None, "the state has come")
 
     def _receive(self) -> bool:

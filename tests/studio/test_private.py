@@ -57,7 +57,7 @@ class Folder:
 
     def over_websocket(self, name: str, /, **fields: object) -> Any:
         socket = self.process.connect()
-        socket.send(json.dumps({"do": "hello", "token": self.process.token, "id": 0}))
+        socket.send(json.dumps({"do": "hello", "version": 2, "token": self.process.token, "id": 0}))
         socket.send(json.dumps({"do": name, "id": 1, **fields}))
         while (answer := json.loads(socket.recv(60))).get("id") != 1:
             pass
@@ -169,7 +169,7 @@ class Visitor:
         """Who is not let in is told why, and the connection is closed."""
         socket = self._process.connect(path)
         token = {} if self._token is None else {"token": self._token}
-        socket.send(json.dumps({"do": "hello", **token}))
+        socket.send(json.dumps({"do": "hello", "version": 2, **token}))
         if "error" not in json.loads(socket.recv(60)):
             socket.close()
             return True

@@ -31,6 +31,7 @@ from steptwin.controller import MILLISECOND
 from steptwin.files.recording import recording_of, save
 from steptwin.files.world import World
 from steptwin.simulation.script.steps import Set
+from steptwin.subject.commands import VERSION
 from steptwin.subject.dispatch import LONGEST_REQUEST
 
 Start = Callable[..., Process]
@@ -42,7 +43,7 @@ class Page:
     def __init__(self, socket: ClientConnection, **hello: object) -> None:
         self.socket = socket
         self.pushed: list[dict[str, Any]] = []
-        self.answer = self.ask("hello", **hello)
+        self.answer = self.ask("hello", version=VERSION, **hello)
 
     def ask(self, name: str, /, **fields: object) -> dict[str, Any]:
         self.socket.send(json.dumps({"do": name, "id": name, **fields}))
@@ -236,7 +237,7 @@ def test_where_tokens_are_asked_for_they_give_roles(start_studio: Start, tmp_pat
     assert post("stop_all", "viewer") == 200
     assert httpx.get(f"{studio.url}/api/describe").status_code == 401
     with contextlib.closing(studio.connect()) as socket:
-        socket.send('{"do": "hello", "token": "wrong"}')
+        socket.send('{"do": "hello", "version": 2, "token": "wrong"}')
         assert json.loads(socket.recv())["error"]["message"] == "wrong token"
         with pytest.raises(ConnectionClosed) as closed:
             socket.recv()
@@ -334,7 +335,7 @@ def test_who_reads_nothing_slows_nobody(shared: Process) -> None:
             "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode()
         )
         assert b"101" in silent.recv(4096)
-        for text in ('{"do":"hello"}', '{"do":"follow","id":1}', '{"do":"watch","points":["time"],"rate":30}'):
+        for text in ('{"do":"hello","version":2}', '{"do":"follow","id":1}', '{"do":"watch","points":["time"],"rate":30}'):
             data = text.encode()
             mask = b"\0\0\0\0"
             silent.sendall(bytes([0x81, 0x80 | len(data)]) + mask + data)
@@ -397,7 +398,7 @@ def jog():
     return ask(do="jog", controller="table", axis=1, velocity=20)
 
 
-ask(do="hello")
+ask(do="hello", version=2)
 ask(do="enable", controller="table", axis=1)
 lease = jog()
 import time

@@ -81,7 +81,7 @@ def test_a_socket_over_tls(start_studio: Start, certificate: tuple[Path, Path]) 
     assert b'"table"' in answer
     origin: Any = f"https://127.0.0.1:{port}"
     with connect(f"wss://127.0.0.1:{port}/ws", ssl=trust, origin=origin) as opened:
-        opened.send('{"do": "hello", "id": 1}')
+        opened.send('{"do": "hello", "version": 2, "id": 1}')
         assert json.loads(opened.recv(30))["ok"]["role"] == "engineer"
     other: Any = f"http://127.0.0.1:{port}"
     with pytest.raises(Exception, match="403"):
@@ -119,7 +119,7 @@ def test_the_loopback_address_of_ipv6(start_studio: Start, require_peer: Callabl
     assert curl(program, "-g", *body, f"{studio.url}/api/do/enable")[1].endswith("\n200")
     assert curl(program, "-g", "-H", "host: evil.example", f"{studio.url}/api/describe")[1].endswith("\n403")
     with studio.connect(origin=studio.url) as opened:
-        opened.send('{"do": "hello", "id": 1}')
+        opened.send('{"do": "hello", "version": 2, "id": 1}')
         assert json.loads(opened.recv(30))["ok"]["role"] == "engineer"
 
 

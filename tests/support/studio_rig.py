@@ -25,6 +25,7 @@ from steptwin.studio.schema import schema
 from steptwin.studio.surroundings import PresentMoment, Surroundings
 from steptwin.studio.timetravel import TimeTravel
 from steptwin.studio.viewersession import ViewerSession
+from steptwin.subject.commands import VERSION
 from steptwin.subject.jogs import WorldJogs
 from steptwin.subject.world import WorldSubject
 
@@ -203,7 +204,8 @@ class Tab:
 
     def ask(self, name: str, /, **fields: object) -> dict[str, Any]:
         self._id += 1
-        text = json.dumps({"do": name, "id": self._id, **fields})
+        version = {"version": VERSION} if name == "hello" else {}
+        text = json.dumps({"do": name, "id": self._id, **version, **fields})
         answer = json.loads(json.dumps(self.session.receive(text, self.studio.now).result()))
         check_answer(name, answer)
         assert answer["id"] == fields.get("id", self._id)

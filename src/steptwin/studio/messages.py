@@ -8,9 +8,7 @@ from dataclasses import dataclass, field
 from steptwin.access.roles import ROLES
 from steptwin.fields import Schema
 from steptwin.jsonvalues import FLAG, MOMENT, NUMBER, TEXT, WHOLE, list_of, members, or_null
-
-VERSION = 1
-"""Version of the messages; in the message hello."""
+from steptwin.subject.commands import VERSION
 
 _COUNT: Schema = {"type": "integer", "minimum": 0}
 SPEED: Schema = {

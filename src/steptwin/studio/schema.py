@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 
 from steptwin.fields import Field
-from steptwin.studio.messages import MESSAGES, VERSION
+from steptwin.studio.messages import MESSAGES
 from steptwin.studio.requests import LEASE, OF_CONNECTION, REQUESTS, permit_of
-from steptwin.subject.commands import COMMANDS
+from steptwin.subject.commands import COMMANDS, VERSION
 from steptwin.subject.schema import DIALECT, definitions, request_schema
 
 
@@ -37,6 +37,8 @@ def _request(name: str) -> dict[str, object]:
     meaning, fields = (row.meaning, row.fields) if row is not None else _of_subject(name)
     permit = permit_of(name)
     found = request_schema(name, meaning, fields)
+    if name == "hello":
+        found = {**found, "required": ["do", "version"]}
     return {**found, "x-role": permit.role.title, "x-control": permit.control, "x-rest": name not in OF_CONNECTION}
 
 

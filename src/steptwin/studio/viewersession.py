@@ -31,14 +31,13 @@ from steptwin.studio import toolrequests as tool
 from steptwin.studio import workrequests as work
 from steptwin.studio.calculations import gear
 from steptwin.studio.hub import Hub
-from steptwin.studio.messages import VERSION
 from steptwin.studio.programs import ProgramTexts
 from steptwin.studio.requests import IN_THE_PAST, OF_CONNECTION, REQUESTS, WITH_TOKEN, permit_of, request_called
 from steptwin.studio.streams import Batch, StreamPosition
 from steptwin.studio.timetravel import OF_A_MOMENT, ShownMoment
 from steptwin.studio.watches import Watched
 from steptwin.subject import commands as command
-from steptwin.subject.commands import Command
+from steptwin.subject.commands import VERSION, Command
 from steptwin.subject.contract import Result
 from steptwin.subject.dispatch import LONGEST_REQUEST, JsonObject, answer, code_of, failure, fields_of, id_of, read_message
 from steptwin.subject.following import Filter, filter_of
@@ -72,6 +71,10 @@ class Wanted(NamedTuple):
 
 TOO_MANY_REQUESTS = Message("studio.too-many-requests", "too many requests: permitted are {rate:g} a second")
 REQUEST_TOO_LONG = Message("studio.request-too-long", "a request has at most {most} bytes")
+HELLO_WITHOUT_VERSION = Message(
+    "studio.hello-without-version",
+    "hello: version is missing, as in version 1 of the protocol: this studio has version {own}",
+)
 HELLO_IS_FIRST_REQUEST = Message("studio.hello-is-first-request", "{request}: the first request is hello")
 NEEDS_A_TOKEN = Message("studio.needs-a-token", "{request} needs the token of this studio, which is in its file of tokens")
 ABOUT_A_CONNECTION = Message("studio.about-a-connection", "{request} is about a connection: ask it over the WebSocket")
@@ -175,6 +178,8 @@ class ViewerSession:
             raise Refusal(TOO_MANY_REQUESTS(rate=RATE))
         kind = request_called(name)
         fields = fields_of(message)
+        if name == "hello" and "version" not in message:
+            raise Misuse(HELLO_WITHOUT_VERSION(own=VERSION))
         return Wanted(name, fields, kind.read(fields))
 
     async def _act(self, wanted: Any, identity: Identity) -> Result:

@@ -23,8 +23,9 @@ from steptwin.simulation.world.inputs import Download, See
 from steptwin.subject.debugcommands import DebugCommand
 from steptwin.subject.payloads import KINDS
 
-VERSION = 1
-"""Version of the commands, their answers and the events; a request may name the one that it was written for."""
+VERSION = 2
+"""Version of the commands, their answers and the events, and of the messages of the studio. A request may name the version for
+which it was written; the hello of the studio must."""
 
 STEP_HAS_TWO_ENDS = Message("subject.step-has-two-ends", "step: for_ns and to_ns exclude each other")
 

@@ -75,7 +75,7 @@ beforeEach(() => {
 });
 
 test("the first request is hello, and the whole state opens the connection", () => {
-  expect(server.sent).toEqual([{ do: "hello", lang: "en", id: 1 }]);
+  expect(server.sent).toEqual([{ do: "hello", version: 2, lang: "en", id: 1 }]);
   server.greet();
   expect(hellos).toHaveLength(1);
   expect(states).toEqual(["open"]);

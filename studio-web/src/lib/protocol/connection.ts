@@ -7,6 +7,9 @@ import type { Answer, HelloMessage, Pushed, Requests, Sentence } from "./types";
 export type Hello = HelloMessage["hello"];
 export type RequestName = keyof Requests;
 export type Fields<N extends RequestName> = Omit<Requests[N]["request"], "do" | "id" | "version">;
+type Greeting = Omit<Requests["hello"]["request"], "do" | "id">;
+/** Version of the messages for which the page was written; a studio with another one refuses it. */
+const VERSION: Greeting["version"] = 2;
 export type ErrorCode = NonNullable<Answer["error"]>["code"] | "closed" | "timeout";
 
 /** A request that was not done. The message is the server's own, which names value, permitted range and place. */
@@ -145,7 +148,8 @@ export class Connection {
     this.seq = null;
     this.resyncs = false;
     this.watch();
-    this.request("hello", this.greeting()).catch((error: RequestError) => {
+    const greeting: Greeting = { version: VERSION, ...this.greeting() };
+    this.request("hello", greeting).catch((error: RequestError) => {
       if (error.code !== "closed") this.enter("refused", error.said);
     });
   }

@@ -45,6 +45,17 @@ def test_hello_is_answered_and_followed_by_the_whole_state() -> None:
     assert tab.read() == []
 
 
+def test_a_client_of_another_version_is_refused_with_both_versions() -> None:
+    tab = Tab(Studio())
+    old = "hello: version is missing, as in version 1 of the protocol: this studio has version 2"
+    error = rest(tab.session, tab.studio, "hello")["error"]
+    assert (error["code"], error["message"]) == ("misuse", old)
+    assert tab.error("hello", version=1) == ("misuse", "version = 1: this subject has version 2")
+    assert not tab.session.has_entered
+    tab.ok("hello")
+    assert tab.error("time", version=1) == ("misuse", "version = 1: this subject has version 2")
+
+
 def test_nothing_but_stops_is_done_before_hello() -> None:
     tab = Tab(Studio())
     assert tab.error("read", points=["time"]) == ("refusal", "read: the first request is hello")
@@ -378,7 +389,7 @@ FIELDS = st.sampled_from(["controller", "axis", "to", "points", "lease", "x"])
 @given(st.sampled_from([*ALL, "", "jogg"]), st.dictionaries(FIELDS, JSON))
 def test_whatever_the_fields_are_there_is_one_answer_and_nothing_breaks(name: str, fields: dict[str, Any]) -> None:
     entered = Tab(STUDIO)
-    entered.session.receive('{"do": "hello"}', STUDIO.now)
+    entered.session.receive('{"do": "hello", "version": 2}', STUDIO.now)
     for one in (Tab(STUDIO), entered):
         answer = one.session.receive(json.dumps({"do": name, **fields}), STUDIO.now).result()
         check_message(answer)
