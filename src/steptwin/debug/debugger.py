@@ -2,8 +2,8 @@
 
 It stands between two moments of the world. Before the world goes on, a second one, the look-ahead run, goes ahead and finds the
 moment at which the run is to stop (`steptwin.debug.lookahead`); then the world is run to the end of the moment before it. So the
-world itself is only run, as ever. The look-ahead run is also what is looked at in the past, to which it is brought by a state and
-the inputs since (`steptwin.simulation.world.snapshotlog`).
+world itself is only run, as ever. The second world also shows the past: a snapshot and the inputs since bring it there
+(`steptwin.simulation.world.snapshotlog`).
 """
 
 from __future__ import annotations

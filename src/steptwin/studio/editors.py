@@ -1,7 +1,7 @@
 """The editor server over WebSockets: help while typing, for the page and for any other client of its protocol.
 
 The first message is ``hello`` with a token, as at the other WebSocket; what follows are messages of the Language Server
-Protocol. Texts are looked at in a thread of its own: checking a long one takes longer than a master waits. Nothing but texts
+Protocol. Texts are analysed in a thread of its own: checking a long one takes longer than a master waits. Nothing but texts
 goes from one thread to the other.
 """
 

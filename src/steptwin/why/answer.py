@@ -36,7 +36,7 @@ class Answer(NamedTuple):
     is_complete: bool
     """Whether the chain has been followed to its end."""
     known_from: Nanos = 0
-    """The moment from which on the past was looked at."""
+    """The moment from which on the past was searched."""
     is_cut: bool = False
     """Whether the chain ends there, because of something before that moment."""
 

@@ -46,7 +46,7 @@ ENDED = Message("why.ended", "{statement} ended")
 DECIDED = Message("why.decided", "{statement} decided")
 PROGRAM_STARTED = Message("why.program-started", "the program started")
 MOST_LOOKED_BACK = 20_000
-"""Limit of what is looked at for one cause."""
+"""Limit of the records and statements that are searched for one cause."""
 MOST_UNDECIDED = 5000
 """Limit of the statements among which the one that decided is looked for."""
 
@@ -82,7 +82,7 @@ class Causes:
         built = log.world.objects.elements
         self._at_begin = nothing if log.is_whole else unknown
         self.is_far = False
-        """Whether the chain that was followed last ends because nothing older was looked at (`MOST_UNDECIDED`)."""
+        """Whether the chain that was followed last ends because nothing older was searched (`MOST_UNDECIDED`)."""
         self._parts: dict[str, TerminalComponent] = {
             name: part for kind, parts in built.items() if ELEMENTS[kind].terminals is not None for name, part in parts.items()
         }

@@ -1,4 +1,4 @@
-"""Questions about the past of a world, as far as that is kept (`steptwin.simulation.world.snapshotlog`).
+"""Questions about the past of a world, answered from its snapshots and inputs (`steptwin.simulation.world.snapshotlog`).
 
 What may be a cause is noted in a second world, which runs through the past: from the newest state that is old enough, and from
 older ones where the causes are older. It stays for further questions, which only need what happened since.
@@ -20,7 +20,7 @@ from steptwin.why.question import Asking, Why
 from steptwin.why.search import Asked, LastChanges, Snapshots
 
 FIRST_SPAN_NS: Nanos = 5 * SECOND
-"""So much of the past is looked at first, and `FURTHER` times as much where the causes are older."""
+"""So much of the past is searched first, and `FURTHER` times as much where the causes are older."""
 FIRST_STATEMENTS = 5500
 """Most statements of a program at first: some more than the last ones, among which the one that decided is looked for."""
 FURTHER = 8
@@ -123,7 +123,7 @@ class _Known:
         return (yield from self._why.asking(question, at))
 
     def older(self, at: Nanos) -> Nanos | None:
-        """From where to look at the past instead; None if nothing older is kept, or too much has happened since."""
+        """Where a longer search would begin; None if nothing older is kept, or too much has happened since."""
         snapshots, log, end = self._snapshots, self._why.log, self._why.end
         span = FURTHER * max(at - log.begin, 1)
         if log.noted:
@@ -144,7 +144,7 @@ def _joined(answer: Answer, before: Answer) -> Answer:
 
 
 def first_span(world: Simulation) -> Nanos:
-    """How much of the past of a world is looked at first: less where statements take less time."""
+    """How much of the past of a world is searched first: less where statements take less time."""
     times = [programs.statement_time for programs in world.programs.values() if programs.statement_time]
     return min([FIRST_SPAN_NS, *(FIRST_STATEMENTS * time for time in times)])
 

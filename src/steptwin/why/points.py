@@ -82,7 +82,7 @@ class _Reader:
         memory = next((row for row in rows if row is not None), None)
         self.cells = None if memory is None else _Cells(memory, now)
         self._keeping: Nanos | None = None
-        """The moment of a statement that may have changed what is kept, and has not been looked at."""
+        """Time of the last statement that may have changed a kept value and after which the values were not read."""
 
     def executes(self, now: Nanos, *, keeps: bool) -> None:
         if self._keeping is not None:

@@ -263,7 +263,7 @@ class _Follower:
         point = None if controller is None else world.kind(self._owner).point(controller, rest)
         self._is_kept = point is not None and point.is_kept
         self._keeping: Nanos | None = None
-        """The moment of a statement that may have changed it, and after which was not looked at it."""
+        """Time of the last statement that may have changed the signal; it was not read after that."""
 
     def follow(self, stack: ExitStack, *, is_replaced: bool) -> None:
         """``is_replaced``: whether programs may get other statements meanwhile."""

@@ -24,7 +24,7 @@ from steptwin.messages import NONE, Message
 
 TABLE = "campaign"
 MOST_FILES = 500
-"""Descriptions that are looked at."""
+"""Limit of the descriptions that are read."""
 MOST_CAUSES = 100
 PASSED, FAILED = 0, 1
 """Exit codes of a campaign that has ended."""
