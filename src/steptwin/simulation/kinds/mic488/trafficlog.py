@@ -14,7 +14,7 @@ from steptwin.wire.slave import FrameDirection, FrameObserver
 
 
 class ModbusTrafficLog:
-    """The frames of a line in words. As `steptwin.simulation.kinds.lines.TrafficLog`."""
+    """Log of the frames of a line. As `steptwin.simulation.kinds.lines.TrafficLog`."""
 
     def __init__(self, line: ModbusBus, prefix: str, sink: Callable[[FrameLine], None]) -> None:
         self._line = line
