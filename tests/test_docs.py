@@ -15,7 +15,7 @@ PREFIXES = ("MIC", "WBC", "M")
 
 
 def rows(prefix: str) -> list[str]:
-    page = (ROOT / "docs/interpretations.md").read_text()
+    page = (ROOT / "docs/assumptions.md").read_text()
     return [name for name in ROW.findall(page) if name.startswith(f"{prefix}-")]
 
 

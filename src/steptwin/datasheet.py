@@ -132,7 +132,7 @@ class Point:
     effect: PointEffect
     addresses: tuple[PointAddress, ...] = ()
     source: str
-    """Section of the manual, or id of an interpretation."""
+    """Section of the manual, or id of an assumption."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,7 +17,7 @@ def test_everybody_may_stop_without_control() -> None:
     assert PERMITS["stop"] == (Role.VIEWER, False)
 
 
-LOOKING = ["describe", "read", "pins", "state", "encoders", "faults", "time", "end_points", "follow", "unfollow"]
+LOOKING = ["describe", "read", "pins", "state", "encoders", "faults", "time", "end_points", "subscribe", "unsubscribe"]
 
 
 @pytest.mark.parametrize("name", LOOKING)

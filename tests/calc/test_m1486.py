@@ -1,4 +1,4 @@
-"""Moves of an M1486 against the formulas of its interpretations, worked out by hand, and against the chip itself."""
+"""Moves of an M1486 against the formulas of its assumptions, worked out by hand, and against the chip itself."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def test_json_takes_numbers_only(value: object) -> None:
         ("set", {"levels": {"table.AIN1": value}}),
         ("seek", {"controller": "table", "axis": 1, "velocity": value}),
         ("seek", {"controller": "table", "axis": value, "velocity": 1}),
-        ("follow", {"bound": value}),
+        ("subscribe", {"bound": value}),
     ):
         with pytest.raises(Misuse):
             read_command(name, fields)

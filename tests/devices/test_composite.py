@@ -15,7 +15,7 @@ from steptwin.m1486.variants import DEFAULT
 from steptwin.simulation.script import steps
 from steptwin.subject.contract import ControllerDescription, Description, LineDescription
 from steptwin.subject.events import Numbering
-from steptwin.subject.following import Followers
+from steptwin.subject.subscriptions import Subscriptions
 
 PLACE = "/dev/ttyUSB0"
 
@@ -27,7 +27,7 @@ class Chip:
         name = f"chip{unit}"
         controller = ControllerDescription(name, datasheet_of(DEFAULT), PLACE, unit, (), is_real=True)
         self.description = Description(name, (controller,), lines=(LineDescription(PLACE, "m1486", None),), commands=("send",))
-        self.followers = Followers()
+        self.subscribers = Subscriptions()
         self.sent: list[bytes] = []
 
     def selected(self, data: bytes) -> int | None:

@@ -15,7 +15,7 @@ from steptwin.drivers.subject import RawEffect
 from steptwin.errors import LineFailure, Refusal, SteptwinError
 from steptwin.simulation.script import steps
 from steptwin.subject import commands as command
-from steptwin.subject.following import Followers
+from steptwin.subject.subscriptions import Subscriptions
 
 
 class Device:
@@ -46,7 +46,7 @@ class Device:
 
 class Subject:
     name = "mic488"
-    followers = Followers()
+    subscribers = Subscriptions()
 
     def __init__(self) -> None:
         self.done: list[object] = []

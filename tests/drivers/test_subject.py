@@ -29,8 +29,8 @@ from steptwin.subject import commands as command
 from steptwin.subject.commands import type_of
 from steptwin.subject.contract import read_description
 from steptwin.subject.events import read_event
-from steptwin.subject.following import Following, filter_of
 from steptwin.subject.payloads import FramePayload, SamplePayload
+from steptwin.subject.subscriptions import Subscription, filter_of
 from steptwin.subject.world import WorldSubject
 
 
@@ -131,11 +131,11 @@ def test_a_line_that_fails_is_a_failure(table: DeviceSubject, rig: Rig) -> None:
 
 def framed(subject: DeviceSubject, act: Any) -> list[tuple[str, str, str]]:
     """Direction, bytes and meaning of the frames meanwhile."""
-    following = subject.follow(filter_of(["frame"]), 99)
-    following.take()
+    subscription = subject.subscribe(filter_of(["frame"]), 99)
+    subscription.take()
     act()
-    events = Following.take(following).events  # without a poll
-    following.close()
+    events = Subscription.take(subscription).events  # without a poll
+    subscription.close()
     assert {event.controller for event in events} <= {subject.description.lines[0].name}
     seen = [event.payload for event in events if isinstance(event.payload, FramePayload)]
     assert {one.client for one in seen} <= {"steptwin"}
@@ -185,23 +185,23 @@ def test_frames_of_an_m1486(drum: DeviceSubject) -> None:
 def test_frames_are_observed_only_while_they_are_followed(table: DeviceSubject, drum: DeviceSubject, rig: Rig) -> None:
     lines: list[Any] = [rig.mic._driver.line, rig.chip._driver.line]
     modbus, chips = (line._engine.discipline for line in lines)
-    followings = [subject.follow(filter_of(["frame"]), 9) for subject in (table, drum)]
+    subscriptions = [subject.subscribe(filter_of(["frame"]), 9) for subject in (table, drum)]
     assert None not in (modbus.on_frame, chips.on_bytes)
-    for following in followings:
-        following.close()
+    for subscription in subscriptions:
+        subscription.close()
     assert (modbus.on_frame, chips.on_bytes) == (None, None)
-    table.follow(filter_of(), 9)
+    table.subscribe(filter_of(), 9)
     assert modbus.on_frame is None
 
 
 def test_events_of_a_device_come_from_polling(table: DeviceSubject, rig: Rig) -> None:
-    following = table.follow(filter_of(), 99)
-    assert [(event.kind, event.payload.to_json()["position"]) for event in following.take().events] == [("sample", 0.0)] * 4
+    subscription = table.subscribe(filter_of(), 99)
+    assert [(event.kind, event.payload.to_json()["position"]) for event in subscription.take().events] == [("sample", 0.0)] * 4
     table.do(command.Enable("table", 1))
     table.do(command.Move("table", 1, to=10.0))
     rig.world.apply_input(do.Set((("table", "IN7", 1.0),)))
     rig.time.sleep(0.3)
-    events = following.take().events
+    events = subscription.take().events
     assert [(event.kind, event.axis) for event in events] == [("sample", "1"), ("edge", None), ("edge", None), ("status", "1")]
     assert [event.text for event in events][1:] == ["M1_EN: 1", "IN7: 1", "M1: moving to position"]
     sample = events[0].payload
@@ -212,18 +212,18 @@ def test_events_of_a_device_come_from_polling(table: DeviceSubject, rig: Rig) ->
     assert 0.0 < sample.velocity <= 40.0
     assert sample.unit == "mm"
     assert [read_event(json.loads(json.dumps(event.to_json()))) for event in events] == events
-    assert following.take().events == []  # not before the next period
-    following.close()
+    assert subscription.take().events == []  # not before the next period
+    subscription.close()
 
 
 def test_what_the_controller_and_its_program_do_is_told_in_words(table: DeviceSubject, rig: Rig) -> None:
-    following = table.follow(filter_of(["status"]), 99)
+    subscription = table.subscribe(filter_of(["status"]), 99)
     twin = rig.world.mic488["table"].device
     told = []
     for shown in (True, False):
         twin.set_master_error(shown, rig.time.now())
         rig.time.sleep(0.3)
-        told += following.take().events
+        told += subscription.take().events
     assert [(event.text, event.axis) for event in told] == [
         ("controller: Modbus master communication error", None),
         ("controller: ok", None),
@@ -233,11 +233,11 @@ def test_what_the_controller_and_its_program_do_is_told_in_words(table: DeviceSu
 
 
 def test_a_device_that_nobody_follows_is_not_polled(table: DeviceSubject, rig: Rig) -> None:
-    following = table.follow(filter_of(), 99)
-    following.close()
-    frames = WorldSubject(rig.world).follow(filter_of(["frame"]), 9)
+    subscription = table.subscribe(filter_of(), 99)
+    subscription.close()
+    frames = WorldSubject(rig.world).subscribe(filter_of(["frame"]), 9)
     rig.time.sleep(1.0)
-    following.take()
+    subscription.take()
     assert frames.take().events == []
     table.read("table.IN1")
     assert len(frames.take().events) > 1
@@ -247,13 +247,13 @@ def test_a_device_that_nobody_follows_is_not_polled(table: DeviceSubject, rig: R
 def test_a_device_is_polled_at_the_period_that_was_asked_for(rig: Rig, period_s: float) -> None:
     table = rig.mic.subject("table", period_s=period_s)
     begin = rig.time.now()
-    following = table.follow(filter_of(["edge"]), 9)
+    subscription = table.subscribe(filter_of(["edge"]), 9)
     rig.world.apply_input(do.Set((("table", "IN7", 1.0),)))
     due = begin + round(period_s * SECOND)
     rig.time.advance(due - 1)
-    assert following.take().events == []
+    assert subscription.take().events == []
     rig.time.advance(due)
-    assert [event.text for event in following.take().events] == ["IN7: 1"]
+    assert [event.text for event in subscription.take().events] == ["IN7: 1"]
 
 
 @pytest.mark.parametrize("period_s", [0.019, 60.5, float("nan")])
@@ -264,8 +264,8 @@ def test_periods_at_which_no_device_is_polled(rig: Rig, period_s: float) -> None
 
 
 def test_a_slow_follower_loses_the_oldest_and_is_told_how_many(table: DeviceSubject, rig: Rig) -> None:
-    following = table.follow(filter_of(["sample"]), 3)
-    missed, events = following.take()
+    subscription = table.subscribe(filter_of(["sample"]), 3)
+    missed, events = subscription.take()
     assert (missed, [event.axis for event in events]) == (1, ["2", "3", "4"])
 
 
@@ -278,13 +278,13 @@ def test_tasks_have_the_same() -> None:
     async def play() -> None:
         async with async_driver(task_line(wire), wire) as mic:
             subject = AsyncDeviceSubject("table", Mic488Part(mic))
-            following = subject.follow(filter_of(["status"]), 9)
+            subscription = subject.subscribe(filter_of(["status"]), 9)
             running = asyncio.create_task(subject.run())
             await asyncio.sleep(0.5)
             await subject.do(command.Enable("table", 1))
             await asyncio.sleep(1.0)
             running.cancel()
-            assert [event.text for event in following.take().events] == ["M1: on at rest"]
+            assert [event.text for event in subscription.take().events] == ["M1: on at rest"]
 
     run_virtual(wire, play())
 
@@ -311,19 +311,19 @@ def test_units_are_known_without_asking(table: DeviceSubject, drum: DeviceSubjec
 def test_a_device_that_was_lost_is_unknown_until_it_is_asked_again(table: DeviceSubject, drum: DeviceSubject, rig: Rig) -> None:
     """An unknown sample of each axis; then all axes anew, as at first."""
     for subject, axes in ((table._driver, 4), (drum._driver, 1)):
-        following = subject.follow(filter_of(["sample"]), 99)
+        subscription = subject.subscribe(filter_of(["sample"]), 99)
         finish(subject.poll())
-        assert len(following.take().events) == axes
+        assert len(subscription.take().events) == axes
         finish(subject.poll())
-        assert following.take().events == []
+        assert subscription.take().events == []
         newest = [event.payload.to_json() for event in subject.samples()]
         assert len(newest) == axes
         subject.forget()
-        unknown = [event.payload.to_json() for event in following.take().events]
+        unknown = [event.payload.to_json() for event in subscription.take().events]
         assert [event.payload.to_json() for event in subject.samples()] == unknown
         assert unknown == [{"axis": one["axis"], "position": None, "unit": one["unit"], "velocity": None} for one in newest]
         finish(subject.poll())
-        assert [event.payload.to_json() for event in following.take().events] == newest
+        assert [event.payload.to_json() for event in subscription.take().events] == newest
 
 
 def test_after_a_loss_the_same_device_is_there(rig: Rig) -> None:
@@ -396,17 +396,17 @@ def test_the_description_and_the_time_as_commands(table: DeviceSubject, rig: Rig
 
 def test_what_a_program_does_is_an_event(table: DeviceSubject, rig: Rig) -> None:
     rig.world.mic488["table"].device.load_program(0, loaded("WAIT IN5 = ON\n")[0])
-    following = table.follow(filter_of(["status"]), 99)
+    subscription = table.subscribe(filter_of(["status"]), 99)
     table.do(command.ControlProgram("table", "start"))
     rig.time.sleep(1.0)
-    (event,) = following.take().events
+    (event,) = subscription.take().events
     assert (event.text, event.payload.to_json()["facts"]) == ("program: running", {"state": 1})
     table.do(command.ControlProgram("table", "pause"))
     rig.time.sleep(1.0)
-    assert [event.text for event in following.take().events] == ["program: paused"]
+    assert [event.text for event in subscription.take().events] == ["program: paused"]
     table.do(command.ControlProgram("table", "stop"))
     rig.time.sleep(1.0)
-    assert [event.text for event in following.take().events] == ["program: stopped"]
+    assert [event.text for event in subscription.take().events] == ["program: stopped"]
 
 
 @pytest.mark.parametrize("request_", [b"", b"\x03", b"\x03\x00\x00\x00", b"\x10\x00\x00\x00\x01\x02\x00"])

@@ -36,7 +36,7 @@ def executed(text: str, happens: list[tuple[int, int, int]] = [], kind: str = "B
             place += len(encode(command))
     bench = Bench(kind)
     found: list[tuple[Nanos, int]] = []
-    bench.chip.program.hook(lambda now, place: found.append((now, places[place])) if place in places else None)
+    bench.chip.program.add_hook(lambda now, place: found.append((now, places[place])) if place in places else None)
     bench.raw(text.replace("\n", "\r").encode())
     for at, line, level in happens:
         bench.chip.advance(max(bench.now, at * MILLISECOND))

@@ -82,7 +82,7 @@ def executed(device: Mic488Device, happens: list[tuple[int, int, bool]] = []) ->
     """Moments and numbers of the statements that are executed from the start on."""
     found: list[tuple[Nanos, int]] = []
     device.program.interpreter.rests_in_loops = False
-    device.program.interpreter.hook(lambda now, number: found.append((now, number)))
+    device.program.interpreter.add_hook(lambda now, number: found.append((now, number)))
     device.command(partial(device.program.command, 1), 0)
     for ms, number, on in happens:
         device.advance(max(device.now, ms * MILLISECOND))

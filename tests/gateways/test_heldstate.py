@@ -21,7 +21,6 @@ from steptwin.simulation.script.steps import PowerCycle, Send, Write
 from steptwin.simulation.world.inputs import Bytes
 from steptwin.subject.commands import Advance, Enable, Move, ReadState
 from steptwin.subject.events import Event
-from steptwin.subject.following import Filter
 from steptwin.subject.payloads import (
     CoordinatePayload,
     EdgePayload,
@@ -33,6 +32,7 @@ from steptwin.subject.payloads import (
     StatusPayload,
     WritePayload,
 )
+from steptwin.subject.subscriptions import Filter
 from steptwin.subject.world import WorldSubject
 
 FEEDER = Path(__file__).parents[2] / "examples/worlds/feeder.toml"
@@ -168,7 +168,7 @@ class Holder:
 
     def __init__(self, world: World) -> None:
         self.subject = WorldSubject(world)
-        self.following = self.subject.follow(Filter(KINDS), 1 << 20)
+        self.subscription = self.subject.subscribe(Filter(KINDS), 1 << 20)
         self.held = {part.name: HeldState(part) for part in self.subject.description.controllers}
         self.parts = self.subject.description.controllers
         for name, held in self.held.items():
@@ -192,7 +192,7 @@ class Holder:
     def check(self) -> None:
         for name in self.held:
             self.subject.world.sync(name)  # as the timer of a running world does
-        for event in self.following.take().events:
+        for event in self.subscription.take().events:
             for part in self.parts:
                 if isinstance(event.payload, RestoredPayload):
                     self.held[part.name].put_all(*self._whole(part.name))

@@ -97,9 +97,9 @@ def test_events_beyond_the_bound_are_counted_as_missed() -> None:
 def test_after_the_end_nothing_is_followed() -> None:
     subject = GatewayWorld(TEXT)
     metrics = Metrics(subject)
-    assert subject.inner.followers
+    assert subject.inner.subscribers
     metrics.close()
-    assert not subject.inner.followers
+    assert not subject.inner.subscribers
 
 
 def answer(subject: GatewayWorld, path: str, method: str = "GET", accept: str = "*/*") -> tuple[int, str, str]:

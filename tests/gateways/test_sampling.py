@@ -249,9 +249,9 @@ def test_nothing_is_followed_after_the_end() -> None:
     world = GatewayWorld(TEXT)
     samplers = [Sampler(world.samples, {}) for _ in range(2)]
     samplers[0].close()
-    assert world.inner.followers
+    assert world.inner.subscribers
     samplers[1].close()
-    assert not world.inner.followers
+    assert not world.inner.subscribers
 
 
 def test_an_edge_brings_its_level() -> None:

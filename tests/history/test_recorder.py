@@ -161,7 +161,7 @@ def test_writes_are_not_observed_without_a_history() -> None:
 def test_commands_are_kept_with_who_gave_them() -> None:
     made = RecordedWorld(CELL)
     audit = Audit(lambda: "2026-03-01T12:00:00.000+00:00")
-    audit.watchers.append(made.recorder.log)
+    audit.subscribers.append(made.recorder.log)
     client = GatewayClient("anna", Role.OPERATOR, "OPC UA, 127.0.0.1:5000")
     audit.add(client, made.world.now, "move", {"controller": "table", "axis": 1, "to": 5.0}, "done")
     made.look()
@@ -191,12 +191,12 @@ def test_time_that_goes_back_begins_a_run() -> None:
 def test_events_that_were_missed_are_counted_and_all_values_are_taken_again() -> None:
     made = RecordedWorld(CELL)
     made.look()
-    following = made.recorder._following
-    following.miss(7)
+    subscription = made.recorder._subscription
+    subscription.miss(7)
     made.world.run(for_=1.0)
     moving(made)
-    following.take()
-    following.miss(7)
+    subscription.take()
+    subscription.miss(7)
     made.look()
     assert [event.kind for event in made.batches[-1].events] == ["gap"]
     assert made.batches[-1].events[0].text.startswith("7 events came too fast")
@@ -280,5 +280,5 @@ def test_the_end_is_the_last_batch() -> None:
     made.run(1.0)
     made.end()
     assert [batch.is_last for batch in made.batches] == [False, True]
-    assert not made.subject.inner.followers
+    assert not made.subject.inner.subscribers
     assert made.batches[-1].time == SECOND

@@ -138,9 +138,9 @@ async def until(holds: Callable[[], bool]) -> None:
             await asyncio.sleep(0.001)
 
 
-async def following(endpoint: ControlEndpoint, **fields: object) -> tuple[asyncio.StreamReader, asyncio.StreamWriter, Any]:
+async def subscription(endpoint: ControlEndpoint, **fields: object) -> tuple[asyncio.StreamReader, asyncio.StreamWriter, Any]:
     reader, writer = await asyncio.open_unix_connection(str(endpoint.path))
-    writer.write(json.dumps({"do": "follow", "id": "e", **fields}).encode() + b"\n")
+    writer.write(json.dumps({"do": "subscribe", "id": "e", **fields}).encode() + b"\n")
     return reader, writer, read_answer(await reader.readline())
 
 
@@ -150,7 +150,7 @@ async def next_of(reader: asyncio.StreamReader) -> Any:
 
 def test_events_come_after_the_answer_with_its_id_until_they_are_not_wanted_any_more() -> None:
     async def play(endpoint: ControlEndpoint, desk: Desk) -> None:
-        reader, writer, answer = await following(endpoint)
+        reader, writer, answer = await subscription(endpoint)
         assert answer["id"] == "e"
         (plan,) = answer["ok"]["plans"]
         assert (plan["kind"], plan["plan"]["base"]) == ("plan", 7)
@@ -158,10 +158,10 @@ def test_events_come_after_the_answer_with_its_id_until_they_are_not_wanted_any_
         found = [await next_of(reader) for _ in range(2)]
         assert [(one["id"], one["event"]["number"]) for one in found] == [("e", 0), ("e", 1)]
         assert "missed" not in found[0]
-        writer.write(b'{"do": "unfollow", "follow": "e", "id": 2}\n')
+        writer.write(b'{"do": "unsubscribe", "subscription": "e", "id": 2}\n')
         assert (await next_of(reader))["id"] == 2
-        assert not desk.followers
-        writer.write(b'{"do": "unfollow", "follow": "e"}\n')
+        assert not desk.subscribers
+        writer.write(b'{"do": "unsubscribe", "subscription": "e"}\n')
         assert await next_of(reader) == misuse("no subscription has the id 'e'")
         writer.close()
 
@@ -170,16 +170,16 @@ def test_events_come_after_the_answer_with_its_id_until_they_are_not_wanted_any_
 
 def test_what_one_follows_ends_with_the_connection() -> None:
     async def play(endpoint: ControlEndpoint, desk: Desk) -> None:
-        _, writer, _ = await following(endpoint)
-        assert desk.followers
+        _, writer, _ = await subscription(endpoint)
+        assert desk.subscribers
         writer.close()
-        await until(lambda: not desk.followers)
+        await until(lambda: not desk.subscribers)
 
     served(play)
 
 
 def test_follows_need_an_id_of_their_own_and_are_not_too_many() -> None:
-    lines = b'{"do": "follow"}\n' + b"".join(b'{"do": "follow", "id": %d}\n' % (n % 17) for n in range(18))
+    lines = b'{"do": "subscribe"}\n' + b"".join(b'{"do": "subscribe", "id": %d}\n' % (n % 17) for n in range(18))
 
     async def play(endpoint: ControlEndpoint) -> Any:
         reader, writer = await asyncio.open_unix_connection(str(endpoint.path))
@@ -189,15 +189,15 @@ def test_follows_need_an_id_of_their_own_and_are_not_too_many() -> None:
         return found
 
     found = served(play)
-    assert found[0]["error"]["message"] == "follow: an id is required; its events carry it"
+    assert found[0]["error"]["message"] == "subscribe: an id is required; its events carry it"
     assert all("ok" in one for one in found[1:17])
-    assert found[17]["error"]["message"] == "follow: there are 16 already, the most for a client"
-    assert found[18]["error"]["message"] == "follow: the id 0 is in use"
+    assert found[17]["error"]["message"] == "subscribe: there are 16 already, the most for a client"
+    assert found[18]["error"]["message"] == "subscribe: the id 0 is in use"
 
 
 def test_a_reader_that_is_slow_misses_events_and_is_told_how_many() -> None:
     async def play(endpoint: ControlEndpoint, desk: Desk) -> tuple[int, int, int]:
-        reader, writer, _ = await following(endpoint, bound=100)
+        reader, writer, _ = await subscription(endpoint, bound=100)
         happened = 0
         while happened < 40_000:  # more than socket and buffers hold
             desk.happen(1000)

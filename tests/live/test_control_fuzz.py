@@ -119,7 +119,9 @@ def requested(request: Mapping[str, Any]) -> bytes:
 @example(requests=[{"do": "fault", "fault": f"stuck pin=IN1 count={10**400}"}, {"do": "clear_fault", "name": "a"}])
 @example(requests=[{"do": "fault", "fault": "busy unit=1 name=a"}, {"do": "fault", "fault": "busy unit=1 name=a"}])
 @example(requests=[{"do": "save", "file": f"/tmp/{'x' * 3000}.json"}, {"do": "save", "file": "/tmp/\0.json"}])
-@example(requests=[{"do": "follow", "id": []}, {"do": "follow", "id": 1, "bound": 1}, {"do": "unfollow", "follow": 1}])
+@example(
+    requests=[{"do": "subscribe", "id": []}, {"do": "subscribe", "id": 1, "bound": 1}, {"do": "unsubscribe", "subscription": 1}]
+)
 @given(requests=st.lists(requests_of(), min_size=1, max_size=6))
 def test_every_request_has_one_answer(requests: list[dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))

@@ -21,7 +21,7 @@ from steptwin.live.world_control import WorldControl
 from steptwin.simulation.world import snapshotlog
 from steptwin.subject.commands import read_command
 from steptwin.subject.events import Event
-from steptwin.subject.following import filter_of
+from steptwin.subject.subscriptions import filter_of
 
 Run = Callable[..., Any]
 
@@ -65,7 +65,7 @@ class Rig:
         self.realtime = RealTimeDriver(self.live, Clock(wall_ns=lambda: round(loop.time() * SECOND)))
         self.pace = Pace(self.live, self.realtime, lambda _: None, has_clients=True)
         self.control = WorldControl(self.realtime, self.live, self.pace, lambda: ["here"])
-        self.following = self.control.follow(filter_of(["stopped", "log"]), 1000)
+        self.subscription = self.control.subscribe(filter_of(["stopped", "log"]), 1000)
         self.pace.begin(1.0)
 
     def do(self, what: str, /, **fields: object) -> Any:
@@ -77,10 +77,10 @@ class Rig:
     async def event(self) -> Event:
         """The next one."""
         came = asyncio.Event()
-        self.following.on_event = came.set
-        if not len(self.following):
+        self.subscription.on_event = came.set
+        if not len(self.subscription):
             await came.wait()
-        return self.following.take(1).events[0]
+        return self.subscription.take(1).events[0]
 
     async def stop(self) -> tuple[str, object]:
         payload: Any = (await self.event()).payload
@@ -95,7 +95,7 @@ def scene(run: Run, play: Callable[[Rig], Awaitable[None]]) -> None:
     async def played() -> None:
         rig = Rig()
         await play(rig)
-        rig.following.close()
+        rig.subscription.close()
         assert rig.live.run_control is None
         rig.pace.close()
         rig.realtime.close()
@@ -267,7 +267,7 @@ def test_a_client_that_was_connected_before_the_debugger_is_seen(run: Run) -> No
             ask("06 2713 0000")
             ask("06 0000 0000")
         await asyncio.sleep(0.2)
-        rig.following.close()
+        rig.subscription.close()
         rig.pace.close()
         rig.realtime.close()
 
@@ -279,7 +279,7 @@ def test_a_step_of_time_ends_at_a_breakpoint(run: Run) -> None:
         rig.do("pause")
         rig.line(line=3)
         await asyncio.sleep(0.1)
-        rig.following.take()
+        rig.subscription.take()
         answer = rig.do("step", for_ns="10000000000")
         assert not answer["came"]
         assert (await rig.stop()) == ("breakpoint", 3)
@@ -311,15 +311,15 @@ def test_whoever_does_not_follow_is_not_stopped_for(run: Run) -> None:
     async def play(rig: Rig) -> None:
         number = rig.line(line=3)["number"]
         await rig.stop()
-        rig.following.close()
+        rig.subscription.close()
         assert rig.notices == ["the debugger has disconnected and time is paused: 'steptwin resume' continues it"]
         rig.do("resume")
         await asyncio.sleep(3)
         assert not rig.pace.is_paused
-        with pytest.raises(Refusal, match="follow events of kind 'stopped'"):
+        with pytest.raises(Refusal, match="subscribe to events of kind 'stopped'"):
             rig.do("debug")
         assert [one["number"] for one in rig.do("breakpoints")["breakpoints"]] == [number]
-        rig.following = rig.control.follow(filter_of(["stopped"]), 10)
+        rig.subscription = rig.control.subscribe(filter_of(["stopped"]), 10)
         rig.do("debug")
         assert await rig.stop() == ("breakpoint", 3)
 
@@ -407,7 +407,7 @@ def test_a_world_without_programs_does_not_keep_its_past(run: Run) -> None:
             with pytest.raises(Misuse, match="no controller has a program"):
                 rig.do("debug")
         assert rig.live.snapshots is None
-        assert not rig.world.input_watchers
+        assert not rig.world.input_subscribers
         rig.pace.close()
         rig.realtime.close()
 
@@ -427,7 +427,7 @@ def test_a_breakpoint_of_two_clients_stays_until_both_have_removed_it(run: Run) 
 
 def test_followers_are_told_what_time_stops_at_where_that_changes(run: Run) -> None:
     async def play(rig: Rig) -> None:
-        told = rig.control.follow(filter_of(["breakpoints"]), 1000)
+        told = rig.control.subscribe(filter_of(["breakpoints"]), 1000)
         number = rig.line(line=9)["number"]
         rig.line(line=9)
         rig.do("stop_on", events=["limit"])

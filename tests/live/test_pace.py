@@ -178,7 +178,7 @@ def test_what_was_planned_before_a_pause_comes_after_it(run: Run) -> None:
         rig = Rig(World.from_toml(CLOCKLESS))
         ticks: list[tuple[float, Nanos]] = []
         loop = asyncio.get_running_loop()
-        rig.world.trace.watchers.append(lambda record: ticks.append((round(loop.time(), 6), record.time)))
+        rig.world.trace.subscribers.append(lambda record: ticks.append((round(loop.time(), 6), record.time)))
         await asyncio.sleep(0.5)
         rig.do("pause")
         await asyncio.sleep(5)

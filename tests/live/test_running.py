@@ -25,7 +25,7 @@ from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.running import LiveWorld, PlacePort, up
 from steptwin.live.world_control import WorldControl
 from steptwin.simulation.script import steps as do
-from steptwin.subject.following import filter_of
+from steptwin.subject.subscriptions import filter_of
 from steptwin.wire.crc import with_crc
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
@@ -129,7 +129,7 @@ STOPPING = """
 
 def test_in_a_studio_a_script_that_stops_is_reported_and_time_goes_on() -> None:
     live = LiveWorld(World.from_toml(STOPPING))
-    told = live.subject.follow(filter_of(["status"]), 9)
+    told = live.subject.subscribe(filter_of(["status"]), 9)
     live.advance(5 * SECOND)
     assert recording_of(live.world).replay().trace.digest() == live.world.trace.digest()
     assert (live.now, live.world.stopped) == (5 * SECOND, None)
@@ -220,7 +220,7 @@ def test_a_world_wakes_up_by_itself() -> None:
     async def run() -> None:
         live = LiveWorld(World.load(EXAMPLES / "lift.toml"))
         noted = asyncio.Event()
-        live.world.trace.watchers.append(lambda record: noted.set() if record.subject == "note" else None)
+        live.world.trace.subscribers.append(lambda record: noted.set() if record.subject == "note" else None)
         realtime = RealTimeDriver(live, Clock(1000.0))
         Pace(live, realtime, lambda _: None, has_clients=False).begin(1000.0)
         await asyncio.wait_for(noted.wait(), 60)

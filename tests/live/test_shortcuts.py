@@ -121,16 +121,16 @@ def join(name: str, world: World, found: Seen) -> Callable[[], None]:
             found.writes.append((given.time, what.place, what.data))
 
     if name == "inputs":
-        world.input_watchers.append(noted)
-        return lambda: world.input_watchers.remove(noted)
+        world.input_subscribers.append(noted)
+        return lambda: world.input_subscribers.remove(noted)
     if name == "frames":
         frames, line = Frames(found.frames), world.lines["bus"]
-        line.follow_frames(frames)
-        return lambda: line.unfollow_frames(frames)
+        line.subscribe_to_frames(frames)
+        return lambda: line.unsubscribe_from_frames(frames)
     if name == "records":
         seen: list[TraceRecord] = []
-        world.trace.watchers.append(seen.append)
-        return lambda: world.trace.watchers.remove(seen.append)
+        world.trace.subscribers.append(seen.append)
+        return lambda: world.trace.subscribers.remove(seen.append)
     world.holds(world.condition("a.USER_REGISTER[0] > 0 and b.IN1"))
     return lambda: None
 
@@ -151,7 +151,7 @@ def played(given_batches: list[Batch], *, shortcuts: bool, records: bool) -> See
         clients = [Client() for _ in KINDS]
         feeds = [Feed(realtime, port, client) for port, client in zip(ports, clients, strict=True)]
         realtime.start()
-        world.trace.watchers.append(
+        world.trace.subscribers.append(
             lambda one: found.edges.append((one.time, one.controller, one.subject, one.value)) if one.kind == "edge" else None
         )
         there: dict[str, Callable[[], None]] = {}

@@ -77,7 +77,7 @@ def test_every_moment_is_as_it_was_seen_while_the_world_goes_on(run: Run) -> Non
         view.close()
         await rig.end()
         assert rig.live.snapshots is None
-        assert not rig.world.input_watchers
+        assert not rig.world.input_subscribers
 
     run(scene())
 

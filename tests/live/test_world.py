@@ -20,7 +20,7 @@ from steptwin.live.links import Feed
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.sharedreads import share_reads
 from steptwin.live.world import LiveWorld, PlacePort, VisionPort
-from steptwin.live.world_frames import follow_frames
+from steptwin.live.world_frames import subscribe_to_frames
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.simulation.faults import Faults, FaultyPort
@@ -132,7 +132,7 @@ def test_without_a_recording_watchers_see_events_and_nothing_is_kept() -> None:
     world = World.from_toml(LINE + '[[event]]\nat = "1 ms"\nsteps = [{ note = "now" }]\n')
     world.stop_recording()
     seen: list[str] = []
-    world.trace.watchers.append(lambda record: seen.append(record.kind))
+    world.trace.subscribers.append(lambda record: seen.append(record.kind))
     live = LiveWorld(world)
     PlacePort(live, "bus", "tcp-1", "tcp").exchange(READ, live.now)
     live.advance(2 * MILLISECOND)
@@ -212,7 +212,7 @@ def test_frames_of_a_world_are_shown_in_words(timing: str) -> None:
     world.stop_recording()
     live = LiveWorld(world)
     shown: list[FrameLine] = []
-    follow_frames(live, shown.append)
+    subscribe_to_frames(live, shown.append)
     places = PlacePort(live, "bus", "tcp-1", "tcp"), PlacePort(live, "bus", "rtu-1", "rtu")
     for number, data in ((0, READ), (1, bytes.fromhex("01 03 27 24 00 02 8e b4")), (1, b"line noise"), (0, READ)):
         live.advance(live.now + 100 * MILLISECOND)
@@ -232,7 +232,7 @@ def test_characters_of_a_world_are_shown_with_the_line_where_there_are_several()
     world = World.from_toml(LINE + chips)
     live = LiveWorld(world)
     shown: list[str] = []
-    follow_frames(live, lambda line: shown.append(f"{line.link} {line.meaning}"))
+    subscribe_to_frames(live, lambda line: shown.append(f"{line.link} {line.meaning}"))
     PlacePort(live, "chips", "tcp-1", "raw").exchange(b"U1\r", live.now)
     live.advance(SECOND)
     PlacePort(live, "bus", "tcp-1", "tcp").exchange(READ, live.now)
@@ -273,7 +273,7 @@ def test_reads_that_change_nothing_are_not_recorded(kind: str) -> None:
     world = World.from_toml(LINE)
     live = LiveWorld(world)
     shown: list[FrameLine] = []
-    follow_frames(live, shown.append)
+    subscribe_to_frames(live, shown.append)
     port, writer = PlacePort(live, "bus", f"{kind}-1", kind), PlacePort(live, "bus", "tcp-2", "tcp")
     for step in range(20):
         live.advance(live.now + 10 * MILLISECOND)

@@ -21,7 +21,7 @@ from steptwin.live.world_control import WorldControl
 from steptwin.simulation.faults import read as read_fault
 from steptwin.simulation.script import steps as do
 from steptwin.subject import commands as command
-from steptwin.subject.following import filter_of
+from steptwin.subject.subscriptions import filter_of
 
 Run = Callable[..., Any]
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
@@ -86,12 +86,12 @@ def test_time_is_the_present_while_a_world_goes_on(run: Run) -> None:
 
 def test_who_follows_is_told_how_time_goes(run: Run) -> None:
     async def play(rig: Rig) -> None:
-        following = rig.control.follow(filter_of(["pace"]), 9)
+        subscription = rig.control.subscribe(filter_of(["pace"]), 9)
         await asyncio.sleep(1)
         rig.control.do(command.Resume(2.0))
         rig.control.do(command.Pause())
         rig.control.do(command.Resume())
-        events = following.take().events
+        events = subscription.take().events
         assert [event.text for event in events] == [
             "running, 2 virtual seconds per second",
             "paused",

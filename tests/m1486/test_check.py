@@ -164,7 +164,7 @@ def test_m_12_a_file_may_have_overwritten_a_label_before_it_unless_it_does_not_f
     assert codes("[\n@1\n" + "R\n" * 107 + "J1\n]", A) == codes("[\n" + "R\n" * 109 + "]", A)
 
 
-# ---------------------------------------------------------------------- interpretations
+# ---------------------------------------------------------------------- assumptions
 
 
 def test_m_4_a_large_acceleration_is_doubtful_only_at_a_move() -> None:

@@ -271,13 +271,13 @@ def test_a_hook_is_called_before_every_command_and_changes_nothing() -> None:
         found = decode(chip.memory.fetch(place))
         called.append((now, "" if found is None else str(found.command)))
 
-    chip.program.hook(hook)
+    chip.program.add_hook(hook)
     watched.file(*lines)
     watched.finish()
     assert [command for _, command in called] == [":58", "L3", *["+2", "I87H1", "E"] * 3, "U4", "F", "W5"]
     assert [now for now, _ in called] == [n * MILLISECOND for n in range(len(called))]
     assert chip.events == plain.chip.events
-    chip.program.unhook(hook)
+    chip.program.remove_hook(hook)
     assert chip.snapshot().state == plain.chip.snapshot().state
 
 
@@ -291,11 +291,11 @@ def test_several_hooks_are_called_in_their_order_until_they_are_taken_away() -> 
     def second(_now: int, place: int) -> None:
         called.append(f"second {place}")
 
-    bench.chip.program.hook(first)
-    bench.chip.program.hook(second)
+    bench.chip.program.add_hook(first)
+    bench.chip.program.add_hook(second)
     bench.file("+1")
     bench.finish()
-    bench.chip.program.unhook(first)
+    bench.chip.program.remove_hook(first)
     bench.send("+1")
     bench.finish()
     assert [name.split()[0] for name in called] == ["first", "second", "second"]

@@ -24,7 +24,7 @@ from mic488_rig import (
 from steptwin.controller import SECOND, PinEdge
 from steptwin.errors import Misuse
 from steptwin.mic488.config import AxisConfig, ControllerConfig, InputConfig, ProgramConfig
-from steptwin.mic488.device import Mic488Device, pause_observer
+from steptwin.mic488.device import Mic488Device, pause_callback
 from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.vision import VisionRecord
 
@@ -276,7 +276,7 @@ def test_an_idle_controller_is_small() -> None:
 @pytest.mark.parametrize(("unit", "told"), [(0, [3, 7]), (3, [3]), (7, [7])])
 def test_mic_15_a_pause_inside_a_request_is_an_event_of_those_it_was_for(unit: int, told: list[int]) -> None:
     devices = {3: Mic488Device(ControllerConfig()), 7: Mic488Device(ControllerConfig())}
-    pause_observer(devices)(unit, 1_250_000)
+    pause_callback(devices)(unit, 1_250_000)
     text = "a request had a pause of 1.2 ms inside: the controller drops a frame at 0.75 ms (MIC-15)"
     assert {n: [(e.code, e.text) for e in d.events] for n, d in devices.items()} == {
         n: [("frame-pause", text)] if n in told else [] for n in devices

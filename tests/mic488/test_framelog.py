@@ -21,8 +21,8 @@ def logged(*frames: str, units: tuple[int, ...] = (1,), tcp: bool = False) -> li
     log = FrameLog(devices)
     lines: list[FrameLine] = []
     log.sinks.append(lines.append)
-    observer = log.observer("tcp-1" if tcp else "pty", tcp=tcp)
-    port = TcpSlavePort(devices, on_frame=observer) if tcp else RtuSlavePort(devices, on_frame=observer)
+    callback = log.callback("tcp-1" if tcp else "pty", tcp=tcp)
+    port = TcpSlavePort(devices, on_frame=callback) if tcp else RtuSlavePort(devices, on_frame=callback)
     for number, frame in enumerate(frames):
         port.exchange(bytes.fromhex(frame), NOW + number * MILLISECOND)
     return [str(line) for line in lines]
@@ -104,5 +104,5 @@ def test_what_makes_no_sense_is_said_to(direction: FrameDirection) -> None:
     log = FrameLog({1: Mic488Device(IN_MM)})
     lines: list[FrameLine] = []
     log.sinks.append(lines.append)
-    log.observer("pty", tcp=False)(NOW, direction, bytes.fromhex("01 03 00"))
+    log.callback("pty", tcp=False)(NOW, direction, bytes.fromhex("01 03 00"))
     assert len(lines) == 1

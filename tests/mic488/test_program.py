@@ -322,7 +322,7 @@ def test_outputs_of_programs_travel_over_wires_and_back_in_one_world() -> None:
     scheduler.connect(Wire(PinName("one", "OUT1"), PinName("other", "IN1")))
     scheduler.connect(Wire(PinName("other", "OUT1"), PinName("one", "IN1")))
     seen: list[PinEdge] = []
-    scheduler.observers.append(lambda name, edge: seen.append(edge))
+    scheduler.edge_subscribers.append(lambda name, edge: seen.append(edge))
     for device in (one, other):
         device.command(partial(device.program.command, 1), 0)
     scheduler.advance(SECOND)

@@ -161,7 +161,7 @@ def test_the_words_of_control_registers_that_can_be_read_are_those_of_the_manual
     assert {address for r in control for address in range(r.address, r.last + 1)} == listed
 
 
-# ---------------------------------------------------------------------- facts behind the interpretations
+# ---------------------------------------------------------------------- facts behind the assumptions
 
 
 def test_mic_4_function_16_writes_words_too() -> None:

@@ -57,7 +57,7 @@ def test_what_happens_meanwhile_is_told_at_its_moment() -> None:
     world = made(ALONE, program)
     (scheduler,) = world.schedulers
     told: dict[str, list[Nanos]] = {}
-    scheduler.observers.append(lambda name, edge: told.setdefault(edge.pin, []).append(scheduler.now - edge.time))
+    scheduler.edge_subscribers.append(lambda name, edge: told.setdefault(edge.pin, []).append(scheduler.now - edge.time))
     world.run_to(END)
     assert set(told) >= {"OUT1", "OUT3", "M1_EN"}
     assert {late for lates in told.values() for late in lates} == {0}

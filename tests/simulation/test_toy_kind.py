@@ -26,7 +26,7 @@ from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.running import up
 from steptwin.live.view import LiveView
 from steptwin.live.world import LiveWorld, PlacePort, announced
-from steptwin.live.world_frames import follow_frames
+from steptwin.live.world_frames import subscribe_to_frames
 from steptwin.simulation.script.steps import Turn
 from steptwin.simulation.toml.reader import WorldError
 from steptwin.simulation.world.inputs import Download, ExternalInput, See, SetVariable
@@ -166,7 +166,7 @@ def test_its_data_sheet_is_json() -> None:
 def test_what_goes_over_its_line_is_put_into_words() -> None:
     world = World.from_toml(TEXT)
     shown: list[FrameLine] = []
-    follow_frames(LiveWorld(world), shown.append)
+    subscribe_to_frames(LiveWorld(world), shown.append)
     world.run(for_=0.1)
     assert [(line.link, line.meaning) for line in shown] == [("script", "M 10"), ("script", "M 10")]
 

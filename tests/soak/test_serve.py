@@ -17,7 +17,7 @@ from steptwin.files.world import World
 from steptwin.live.links import Feed
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.world import LiveWorld, PlacePort
-from steptwin.live.world_frames import follow_frames
+from steptwin.live.world_frames import subscribe_to_frames
 from steptwin.m1486.events import EVENTS_KEPT
 from steptwin.simulation.describe.generated import LINE, Whole
 from steptwin.simulation.describe.generated_m1486 import m1486_world
@@ -57,7 +57,7 @@ def small(text: str, files: dict[str, bytes] | None = None, *, watched: bool) ->
     live = LiveWorld(World.from_toml(text, files, keep_trace=False, keep_inputs=False))
     live.world.stop_recording()
     if watched:
-        follow_frames(live, lambda frame: None)
+        subscribe_to_frames(live, lambda frame: None)
     return live
 
 
@@ -65,7 +65,7 @@ async def _grown(live: LiveWorld, begin: Begin, sent: Iterator[bytes], requests:
     """What is held after the first requests and after many more, each time when all work is done."""
     loop: Any = asyncio.get_running_loop()
     realtime = RealTimeDriver(live, loop.clock())
-    live.world.trace.watchers.append(lambda record: None)
+    live.world.trace.subscribers.append(lambda record: None)
     send = begin(live, realtime)
     realtime.start()
 

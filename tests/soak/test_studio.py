@@ -57,7 +57,7 @@ def resident(pid: int) -> int:
 
 def look(tab: Tab) -> None:
     """What a page asks for when it is opened."""
-    tab.ok("follow", kinds=["plan", "edge", "status"], id="events")
+    tab.ok("subscribe", kinds=["plan", "edge", "status"], id="events")
     tab.ok("watch", points=["table.M1.position", "table.M1.status", "time"], rate=10)
 
 
@@ -94,7 +94,7 @@ def test_a_long_session_takes_no_more_memory_than_a_short_one() -> None:
     studio = Studio()
     tab, silent = studio.open(), studio.open()
     for one in (tab, silent):
-        one.ok("follow", id=1, bound=100)
+        one.ok("subscribe", id=1, bound=100)
         one.ok("watch", points=["table.M1.position", "time"], rate=30)
     tab.ok("enable", controller="table", axis=1)
 
@@ -102,14 +102,14 @@ def test_a_long_session_takes_no_more_memory_than_a_short_one() -> None:
         for n in range(times):
             tab.ok("move", controller="table", axis=1, to=n % 50)
             watch = tab.ok("watch", points=[f"table.M{n % 4 + 1}.position"])["watch"]
-            tab.ok("follow", id="x", kinds=["edge"])
+            tab.ok("subscribe", id="x", kinds=["edge"])
             studio.run(40)  # fewer requests than are permitted
             tab.read()
             tab.messages.clear()
-            tab.ok("unfollow", follow="x")
+            tab.ok("unsubscribe", subscribe="x")
             tab.ok("unwatch", watch=watch)
             visitor = studio.open()
-            visitor.ok("follow", id=n, kinds=["plan"])
+            visitor.ok("subscribe", id=n, kinds=["plan"])
             visitor.close()
 
     studio.world.stop_recording()

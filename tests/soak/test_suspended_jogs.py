@@ -21,7 +21,7 @@ from soak import scaled
 from tests.conftest import STEPTWIN
 
 from steptwin.live.remote import RemoteSubject
-from steptwin.subject.following import filter_of
+from steptwin.subject.subscriptions import filter_of
 
 JOGGING = Path(__file__).parents[1] / "support/jogging.py"
 LINES = (("mic488", 9600, "threads"), ("mic488", 9600, "tasks"), ("B", 1200, "threads"), ("B", 1200, "tasks"),
@@ -67,7 +67,7 @@ class Trials:
         self._program = program
         self._point = point
         self._chance = random.Random(seed)
-        self._plans, _ = twin.follow_from_now(filter_of(["plan"]), 10_000)
+        self._plans, _ = twin.subscribe_from_now(filter_of(["plan"]), 10_000)
 
     def _position(self) -> float | None:
         (reading,) = self._twin.read(self._point)

@@ -42,7 +42,7 @@ async def view(url: str, until: float, counts: Counts) -> None:
         for message in (
             {"do": "hello", "version": 2},
             {"do": "watch", "points": [*POINTS, "time"], "rate": 30},
-            {"do": "follow", "id": 1},
+            {"do": "subscribe", "id": 1},
         ):
             await socket.send(json.dumps(message))
         socket.transport.set_protocol(Counter(counts))

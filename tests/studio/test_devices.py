@@ -146,7 +146,7 @@ def test_devices_are_described_sampled_and_moved(twin: Twin, master: Master, sta
     assert [(one["name"], one["real"]) for one in hello["description"]["controllers"]] == [("mic488", True), ("m1486-7", True)]
     assert hello["virtual"] is False
     assert not {"pause", "fault", "set"} & set(hello["description"]["commands"])
-    viewer.ok("follow", kinds=["sample"])
+    viewer.ok("subscribe", kinds=["sample"])
     viewer.ok("watch", points=["mic488.M1.position"], rate=10)
     viewer.ok("enable", controller="mic488", axis=1)
     viewer.ok("move", controller="mic488", axis=1, to=20)
@@ -191,7 +191,7 @@ def test_a_jog_ends_with_its_lease_and_with_the_studio(twin: Twin, master: Maste
 
 def test_a_chip_is_jogged_by_short_moves(twin: Twin, start_studio: Callable[..., Process]) -> None:
     viewer = Viewer(start_studio("--itself", "--device", twin.chips))
-    viewer.ok("follow", kinds=["sample"])
+    viewer.ok("subscribe", kinds=["sample"])
     lease = viewer.ok("jog", controller="m1486-7", axis=1, velocity=600.0)["lease"]
     for _ in range(10):
         viewer.ok("renew", lease=lease)
@@ -205,7 +205,7 @@ def test_a_chip_is_jogged_by_short_moves(twin: Twin, start_studio: Callable[...,
 
 def test_a_line_that_was_lost_is_connected_again_and_nothing_moves(twin: Twin, start_studio: Callable[..., Process]) -> None:
     viewer = Viewer(start_studio("--itself", "--device", twin.bus))
-    viewer.ok("follow", kinds=["sample", "status"])
+    viewer.ok("subscribe", kinds=["sample", "status"])
     viewer.ok("enable", controller="mic488", axis=1)
     viewer.wait_for(lambda one: one.place() == 0.0, "the axis is seen")
     twin.end()
@@ -224,7 +224,7 @@ def test_settings_are_kept_before_the_first_write(
 ) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     viewer = Viewer(start_studio("--itself", "--device", twin.bus))
-    viewer.ok("follow", kinds=["status"])
+    viewer.ok("subscribe", kinds=["status"])
     viewer.ok("write", values={"mic488.M1_ACC": 300})
     viewer.ok("write", values={"mic488.M1_ACC": 200})
     (kept,) = (tmp_path / "state/steptwin/settings").iterdir()

@@ -89,7 +89,7 @@ def test_a_page_says_hello_watches_follows_and_moves(start_studio: Start) -> Non
     whole = viewer.wait_for("hello")
     assert (whole["description"]["name"], whole["viewers"], whole["role"]) == ("hall", 2, "engineer")
     viewer.ok("watch", points=["table.M1.position"], rate=30)
-    viewer.ok("follow", id=1, kinds=["plan"])
+    viewer.ok("subscribe", id=1, kinds=["plan"])
     viewer.ok("enable", controller="table", axis=1)
     viewer.ok("move", controller="table", axis=1, to=3)
     assert viewer.wait_for("control") == {"viewer": whole["viewer"], "name": "Piotr"}
@@ -151,7 +151,7 @@ def test_there_is_no_request_about_a_connection_over_rest(shared: Process) -> No
     assert described["/api/do/move"]["post"]["description"].endswith(" Role operator, and control.")
     lease = described["/api/do/jog"]["post"]["responses"]["200"]["content"]["application/json"]["schema"]["properties"]["ok"]
     assert lease["required"] == ["lease", "lasts_ms"]
-    for name in ("follow", "unfollow", "watch", "unwatch", "hello", "resync"):
+    for name in ("subscribe", "unsubscribe", "watch", "unwatch", "hello", "resync"):
         assert f"/api/do/{name}" not in described
         assert httpx.post(f"{shared.url}/api/do/{name}", json={}).status_code in (404, 405)
 
@@ -335,7 +335,7 @@ def test_who_reads_nothing_slows_nobody(shared: Process) -> None:
             "Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n".encode()
         )
         assert b"101" in silent.recv(4096)
-        for text in ('{"do":"hello","version":2}', '{"do":"follow","id":1}', '{"do":"watch","points":["time"],"rate":30}'):
+        for text in ('{"do":"hello","version":2}', '{"do":"subscribe","id":1}', '{"do":"watch","points":["time"],"rate":30}'):
             data = text.encode()
             mask = b"\0\0\0\0"
             silent.sendall(bytes([0x81, 0x80 | len(data)]) + mask + data)
@@ -413,7 +413,7 @@ while True:
 def test_an_axis_stands_in_time_when_the_page_is_gone(start_studio: Start, fate: str) -> None:
     studio = start_studio()
     watcher = page(studio)
-    watcher.ok("follow", id="plans", kinds=["plan"], controllers=["table"], axes=["1"])
+    watcher.ok("subscribe", id="plans", kinds=["plan"], controllers=["table"], axes=["1"])
     cable = Cable(studio.end_points["http"]["port"])
     url = f"{studio.url.replace('http', 'ws', 1)}/ws"
     jogging = subprocess.Popen(

@@ -25,7 +25,7 @@ from steptwin.subject.debugcommands import (
     StepProgram,
     StopOn,
 )
-from steptwin.subject.following import EventBatch, Filter
+from steptwin.subject.subscriptions import EventBatch, Filter
 from steptwin.subject.world import WorldSubject
 
 T = TypeVar("T")
@@ -57,11 +57,11 @@ class Kept:
             pass
         subject = WorldSubject(past.world)
         found = at_begin(subject)
-        following = subject.follow(what, bound)
+        subscription = subject.subscribe(what, bound)
         for _ in past.go_on(end):
             pass
         later = Later[tuple[T, EventBatch]]()
-        later.put((found, following.take()))
+        later.put((found, subscription.take()))
         return later
 
 
@@ -129,7 +129,7 @@ def test_the_past_is_shown_while_the_world_goes_on(studio: Studio) -> None:
     assert message["values"] == {"2": [[0, 1.2]]}
     # Others see the present, events go on, and what is shown stands.
     assert other.ok("read", points=["time"])[0]["value"] == 5.0
-    tab.ok("follow", kinds=["note"], id=70)
+    tab.ok("subscribe", kinds=["note"], id=70)
     other.ok("note", text="later")
     studio.run(1000)
     messages = tab.read()
@@ -228,7 +228,7 @@ def test_moments_that_are_not_kept_are_refused(studio: Studio) -> None:
 def test_the_world_goes_back_for_all(studio: Studio) -> None:
     tab, other = studio.open(), studio.open()
     other.ok("watch", points=["table.M1.position"])
-    other.ok("follow", kinds=["restored"], id=71)
+    other.ok("subscribe", kinds=["restored"], id=71)
     other.read()
     tab.ok("show_moment", to_ns=str(1200 * MILLISECOND))
     seen = tab.ok("read", points=["table.M1.position"])[0]["value"]

@@ -29,7 +29,7 @@ class Viewer:
         self.tab = studio.open()
         self.connection = ViewerConnection(self.tab.session, lambda: studio.now, studio.errors.append)
         self.tab.ok("watch", points=["time"], rate=30)
-        self.tab.ok("follow", id=1)
+        self.tab.ok("subscribe", id=1)
         self.serving = asyncio.create_task(self.connection.serve(self.requests.get, self._send))
 
     async def _send(self, message: Any) -> None:

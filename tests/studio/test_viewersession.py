@@ -221,7 +221,7 @@ def test_at_the_highest_rate_values_and_events_come_with_every_tick_although_the
     studio = Studio()
     tab = studio.open()
     tab.ok("watch", points=["time"], rate=30)
-    tab.ok("follow", id="all")
+    tab.ok("subscribe", id="all")
     tab.read()
     found = []
     for _ in range(30):
@@ -280,8 +280,8 @@ def test_an_interval_of_the_history_goes_from_its_beginning_to_its_end(name: str
 def test_events_come_once_however_many_follows_want_them() -> None:
     studio = Studio()
     tab = studio.open()
-    assert len(tab.ok("follow", id="a", kinds=["plan"])["plans"]) == 5
-    tab.ok("follow", id="b", kinds=["plan", "edge"], controllers=["table"])
+    assert len(tab.ok("subscribe", id="a", kinds=["plan"])["plans"]) == 5
+    tab.ok("subscribe", id="b", kinds=["plan", "edge"], controllers=["table"])
     tab.ok("enable", controller="table", axis=1)
     tab.ok("move", controller="table", axis=1, to=1)
     studio.run(100)
@@ -290,21 +290,21 @@ def test_events_come_once_however_many_follows_want_them() -> None:
     numbers = [event["number"] for event in batch["events"]]
     assert numbers == sorted(set(numbers))
     assert {event["kind"] for event in batch["events"]} == {"plan", "edge"}
-    tab.ok("unfollow", follow="b")
+    tab.ok("unsubscribe", subscribe="b")
     tab.ok("set", levels={"table.IN3": 1})
-    tab.ok("unfollow", follow="a")
+    tab.ok("unsubscribe", subscribe="a")
     tab.ok("move", controller="table", axis=1, to=0)
     studio.run(100)
     assert "events" not in kinds(tab.read())
-    assert tab.error("unfollow", follow="a")[0] == "misuse"
+    assert tab.error("unsubscribe", subscribe="a")[0] == "misuse"
 
 
 def test_what_waits_is_not_lost_when_another_follow_begins() -> None:
     studio = Studio()
     tab = studio.open()
-    tab.ok("follow", id="a", kinds=["edge"])
+    tab.ok("subscribe", id="a", kinds=["edge"])
     tab.ok("set", levels={"table.IN3": 1})
-    tab.ok("follow", id="b", kinds=["note"])
+    tab.ok("subscribe", id="b", kinds=["note"])
     tab.ok("note", text="now")
     studio.run(100)
     (batch,) = [one for one in tab.read() if "events" in one]
@@ -315,7 +315,7 @@ def test_a_slow_reader_loses_the_oldest_events_and_is_told_how_many() -> None:
     studio = Studio()
     slow, quick = studio.open(), studio.open()
     for tab in (slow, quick):
-        tab.ok("follow", id="a", kinds=["note"], bound=100)
+        tab.ok("subscribe", id="a", kinds=["note"], bound=100)
     seen: list[str] = []
     for n in range(1000):
         studio.world.apply_input(note_input(n))
@@ -339,8 +339,8 @@ def note_input(n: int) -> Any:
 def test_two_streams_of_frames_and_plans_do_not_mix() -> None:
     studio = Studio()
     frames, plans = studio.open(), studio.open()
-    frames.ok("follow", id=1, kinds=["frame"])
-    plans.ok("follow", id=1, kinds=["plan"])
+    frames.ok("subscribe", id=1, kinds=["frame"])
+    plans.ok("subscribe", id=1, kinds=["plan"])
     plans.ok("enable", controller="table", axis=1)
     plans.ok("move", controller="table", axis=1, to=1)
     studio.run(100)

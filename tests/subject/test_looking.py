@@ -6,7 +6,7 @@ from steptwin import World
 from steptwin.controller import SECOND
 from steptwin.simulation.script.steps import Note
 from steptwin.subject import commands as command
-from steptwin.subject.following import filter_of
+from steptwin.subject.subscriptions import filter_of
 from steptwin.subject.world import WorldSubject
 
 
@@ -16,7 +16,7 @@ def subject_of(count: int) -> WorldSubject:
 
 def test_only_what_is_looked_at_comes_to_the_present() -> None:
     subject = subject_of(3)
-    subject.follow(filter_of(None), 100)
+    subject.subscribe(filter_of(None), 100)
     world = subject.world
     world.now = SECOND
     subject.do(command.ReadState("t1"))
@@ -29,9 +29,9 @@ def test_only_what_is_looked_at_comes_to_the_present() -> None:
 
 def test_a_look_has_a_number_and_is_no_cause() -> None:
     subject = subject_of(1)
-    following = subject.follow(filter_of(["note"]), 100)
+    subscription = subject.subscribe(filter_of(["note"]), 100)
     first = subject.do(command.ReadState("t0"))
     second = subject.do(Note("shift begins"))
     assert second.number == first.number + 1
-    (event,) = following.take().events
+    (event,) = subscription.take().events
     assert event.cause == second.number

@@ -11,8 +11,8 @@ from steptwin.files.world import World
 from steptwin.simulation.script.steps import Write
 from steptwin.subject.commands import Enable, Move
 from steptwin.subject.events import read_event
-from steptwin.subject.following import filter_of
 from steptwin.subject.motion import Motions
+from steptwin.subject.subscriptions import filter_of
 from steptwin.subject.world import WorldSubject
 
 FEEDER = Path(__file__).parents[2] / "examples" / "worlds" / "feeder.toml"
@@ -25,11 +25,11 @@ def test_they_are_those_of_the_world(controller: str, axis: str) -> None:
     part = next(part for part in subject.description.controllers if part.name == controller)
     what = filter_of(["plan", "coordinate"])
     motions = Motions(part, subject.plans(what))
-    following = subject.follow(what, 10_000)
+    subscription = subject.subscribe(what, 10_000)
     moved = 0
     for _ in range(300):
         world.run(for_=0.05)
-        for event in following.take().events:
+        for event in subscription.take().events:
             motions.take(read_event(json.loads(json.dumps(event.to_json()))))
         assert motions.position("1", world.now) == pytest.approx(world.read(f"{controller}.{axis}position"), abs=1e-9)
         assert motions.velocity("1", world.now) == pytest.approx(world.read(f"{controller}.{axis}velocity"), abs=1e-9)
@@ -44,14 +44,14 @@ def test_a_coordinate_begins_anew_as_that_of_the_controller() -> None:
     subject = WorldSubject(world)
     what = filter_of(["plan", "coordinate"])
     motions = Motions(subject.description.controllers[0], subject.plans(what))
-    following = subject.follow(what, 100)
+    subscription = subject.subscribe(what, 100)
     subject.do(Enable("m", 1))
     subject.do(Write((("m", "M1_POS_ACT", 21_474_835.0),)))
     subject.do(Move("m", 1, by=10.0))
     shown = set()
     for _ in range(20):
         world.run(for_=0.02)
-        for event in following.take().events:
+        for event in subscription.take().events:
             motions.take(event)
         assert motions.position("1", world.now) == world.read("m.M1.position")
         shown.add(world.read("m.M1.position") > 0)

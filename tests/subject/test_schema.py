@@ -11,9 +11,9 @@ import pytest
 
 from steptwin import World
 from steptwin.jsonvalues import shape
-from steptwin.subject.following import filter_of
 from steptwin.subject.payloads import KINDS
 from steptwin.subject.schema import definitions
+from steptwin.subject.subscriptions import filter_of
 from steptwin.subject.world import WorldSubject
 
 WORLDS = sorted((Path(__file__).parents[2] / "examples/worlds").glob("*.toml"))
@@ -31,10 +31,10 @@ def test_what_worlds_give_is_as_the_schema_says(path: Path) -> None:
         subject = WorldSubject(world)
         plain = json.loads(json.dumps(subject.description.to_json()))
         assert list(validator("(description)").iter_errors(plain)) == []
-        following = subject.follow(filter_of(KINDS), 100_000)
+        subscription = subject.subscribe(filter_of(KINDS), 100_000)
         plans = subject.plans(filter_of())
         world.run(for_=20)
-        events = [*plans, *following.take().events]
+        events = [*plans, *subscription.take().events]
     assert {"plan", "edge"} <= {one.kind for one in events}
     for one in events[:5000]:
         assert list(event.iter_errors(json.loads(json.dumps(one.to_json())))) == [], one

@@ -19,10 +19,10 @@ from steptwin.subject.commands import (
     RestoreSnapshot,
     TakeSnapshot,
 )
-from steptwin.subject.following import filter_of
 from steptwin.subject.motion import Motions
 from steptwin.subject.payloads import PlanPayload, RestoredPayload
 from steptwin.subject.snapshots import MOST_SNAPSHOTS
+from steptwin.subject.subscriptions import filter_of
 from steptwin.subject.world import WorldSubject
 
 TEXT = '[[mic488]]\nname = "m"\n[mic488.M1]\nunit = "mm"\ngear = 100.0\nacc = 100.0\ndec = 100.0\nvel = 40.0\n'
@@ -63,11 +63,11 @@ def test_followers_are_told_and_get_the_plans() -> None:
     part = subject.description.controllers[0]
     subject.do(TakeSnapshot("start"))
     subject.do(Advance(duration=100 * SECOND))
-    following = subject.follow(filter_of(["restored", "plan"]), 100)
+    subscription = subject.subscribe(filter_of(["restored", "plan"]), 100)
     motions = Motions(part, subject.plans(filter_of(["plan"])))
     assert motions.position("1", subject.world.now) == 500.0
     number = subject.do(RestoreSnapshot("start")).number
-    restored, *plans = following.take().events
+    restored, *plans = subscription.take().events
     assert (restored.payload, restored.time, restored.cause) == (RestoredPayload("start"), SECOND, number)
     assert {plan.cause for plan in plans} == {number}
     assert [plan.payload.axis for plan in plans if isinstance(plan.payload, PlanPayload)] == ["1", "2", "3", "4"]
@@ -78,7 +78,7 @@ def test_followers_are_told_and_get_the_plans() -> None:
     assert position == subject.read("m.M1.position")[0].value
     assert 0.0 < position < 500.0
     subject.do(Move("m", 1, to=0.0))
-    (plan,) = following.take().events
+    (plan,) = subscription.take().events
     assert (plan.kind, plan.time) == ("plan", 2 * SECOND)
     assert plan.number > plans[-1].number > number
 
@@ -86,11 +86,11 @@ def test_followers_are_told_and_get_the_plans() -> None:
 def test_a_cause_of_the_time_that_was_undone_is_none_any_more() -> None:
     subject = WorldSubject(World.from_toml(TEXT))
     subject.do(TakeSnapshot("a"))
-    following = subject.follow(filter_of(["input", "note", "edge"]), 100)
+    subscription = subject.subscribe(filter_of(["input", "note", "edge"]), 100)
     subject.do(Set((("m", "IN1", 1.0),)))
     subject.do(RestoreSnapshot("a"))
     number = subject.do(Note("again")).number
-    events = following.take().events
+    events = subscription.take().events
     assert events[-1].cause == number
     assert subject.read("m.IN1")[0].value == 0.0
 

@@ -19,8 +19,8 @@ from steptwin.simulation.faults import read as read_fault
 from steptwin.simulation.script.steps import Request, SetFault
 from steptwin.simulation.world.inputs import Bytes
 from steptwin.subject import commands as command
-from steptwin.subject.following import filter_of
 from steptwin.subject.jogs import WorldJogs
+from steptwin.subject.subscriptions import filter_of
 from steptwin.subject.world import WorldSubject
 from steptwin.wire.pdu import encode_request
 
@@ -177,7 +177,7 @@ def test_a_line_that_carries_nothing_does_not_keep_a_controller_from_stopping() 
 def test_scripts_end_and_held_buttons_are_released(tmp_path: Path) -> None:
     world = World.from_toml(TIMED)
     subject = WorldSubject(world)
-    following = subject.follow(filter_of(["status", "input", "button"]), 99)
+    subscription = subject.subscribe(filter_of(["status", "input", "button"]), 99)
     subject.do(command.Enable("a", 2))
     world.run(until=1.2)
     assert subject.do(command.StopAll()).value == {"controllers": ["a"], "scripts": ["operator", "walk"]}
@@ -186,7 +186,7 @@ def test_scripts_end_and_held_buttons_are_released(tmp_path: Path) -> None:
     world.run(until=5.0)
     assert world.read("a.M2.position") == pytest.approx(there, abs=0.5)
     assert world.read("a.IN4") == 0.0
-    said = [event.text for event in following.take().events]
+    said = [event.text for event in subscription.take().events]
     assert "script walk was ended" in said
     assert "go: released" in said or "released" in said[-1]
     # A recording replays the stop.
@@ -198,11 +198,11 @@ def test_a_raw_stop_is_an_input_of_each_controller_that_has_its_address() -> Non
     cells = "".join(f'[[mic488]]\nname = "{name}"\nline = "bus"\nunit = {unit}\n' for name, unit in (("a", 1), ("b", 2)))
     apart = '[[mic488]]\nname = "c"\n'
     subject = WorldSubject(World.from_toml(f'{cells}{apart}[[line]]\nname = "bus"\nkind = "modbus"\ntiming = "off"\n'))
-    following = subject.follow(filter_of(["input"]), 99)
+    subscription = subject.subscribe(filter_of(["input"]), 99)
     stop = encode_request(encoded(named(register_map("1.70"), "M1_STOP"), 1.0, DataType.REAL))
     for unit, stopped in ((1, ["a"]), (0, ["a", "b"]), (3, [])):
         subject.do(Request("bus", unit, stop, SECOND))
-        assert [event.controller for event in following.take().events if event.payload.text.startswith("stop")] == stopped
+        assert [event.controller for event in subscription.take().events if event.payload.text.startswith("stop")] == stopped
 
 
 def test_a_snapshot_before_a_stop_is_whole() -> None:

@@ -34,8 +34,8 @@ from steptwin.subject.contract import (
 from steptwin.subject.describe import describe
 from steptwin.subject.dispatch import respond
 from steptwin.subject.events import Event
-from steptwin.subject.following import filter_of
 from steptwin.subject.payloads import FramePayload, InputPayload
+from steptwin.subject.subscriptions import filter_of
 from steptwin.subject.world import WorldSubject
 from steptwin.wire.crc import with_crc
 
@@ -78,7 +78,7 @@ def test_a_command_moves_an_axis_and_its_answer_says_when() -> None:
 
 def test_what_each_command_of_a_controller_writes() -> None:
     subject = of(small())
-    following = subject.follow(filter_of(["input"]), 99)
+    subscription = subject.subscribe(filter_of(["input"]), 99)
     subject.do(command.Enable("a", 1))
     subject.do(command.Jog("a", 1, 5.0))
     subject.do(command.StopAxes("a", 1))
@@ -86,7 +86,7 @@ def test_what_each_command_of_a_controller_writes() -> None:
     subject.do(command.Home("a", 1, -20.0))
     subject.do(command.Move("a", 1, by=1.5))
     subject.do(command.ControlProgram("a", "stop"))
-    values = [event.payload.value for event in following.take().events if isinstance(event.payload, InputPayload)]
+    values = [event.payload.value for event in subscription.take().events if isinstance(event.payload, InputPayload)]
     found = [value.hex() if isinstance(value, bytes) else str(value) for value in values]
     # M1_EN is coil 2000; a REAL has its low word first.
     assert found[0] == "0507d0ff00"
@@ -190,10 +190,10 @@ def test_an_answer_that_comes_at_once_is_in_the_result_of_a_request() -> None:
     )
     assert at_once.do(do.Request("bus", 1, READ_POSITION[1:-2], SECOND)).value == {"pdu": "030400000000"}
     later = of(feeder())
-    following = later.follow(filter_of(["frame"]), 9)
+    subscription = later.subscribe(filter_of(["frame"]), 9)
     assert later.do(do.Request("bus", 1, READ_POSITION[1:-2], SECOND)).value == {"pdu": None}
     later.do(command.Advance(duration=SECOND))
-    frames = [event.payload.to_json() for event in following.take().events]
+    frames = [event.payload.to_json() for event in subscription.take().events]
     assert frames[:2] == [
         {"client": "script", "direction": "in", "data": READ_POSITION.hex(), "words": "read M1_POS_ACT"},
         {
@@ -276,7 +276,7 @@ DEEDS = st.one_of(
 def test_any_interleaving_of_commands_bytes_and_scripts_replays_to_the_same_digest(deeds: list[Any], follows: bool) -> None:
     world = feeder()
     subject = of(world)
-    following = subject.follow(filter_of(["plan", "frame", "edge"]), 5) if follows else None
+    subscription = subject.subscribe(filter_of(["plan", "frame", "edge"]), 5) if follows else None
     for deed in deeds:
         if isinstance(deed, tuple) and len(deed) == 2 and deed[0] in ("bus", "chips"):
             line, data = deed
@@ -286,8 +286,8 @@ def test_any_interleaving_of_commands_bytes_and_scripts_replays_to_the_same_dige
             subject.do(deed)
         except (Misuse, Refusal):
             continue
-        if following is not None:
-            following.take()
+        if subscription is not None:
+            subscription.take()
     recording = recording_of(world)
     again = recording.replay()
     assert again.trace.digest() == recording.digest
@@ -297,10 +297,10 @@ def test_any_interleaving_of_commands_bytes_and_scripts_replays_to_the_same_dige
 def test_events_of_the_same_run_are_the_same() -> None:
     def run() -> list[Event]:
         subject = of(feeder())
-        following = subject.follow(filter_of(), 100_000)
+        subscription = subject.subscribe(filter_of(), 100_000)
         subject.do(do.Press("start", 300 * MILLISECOND))
         subject.do(command.Advance(duration=20 * SECOND))
-        return following.take().events
+        return subscription.take().events
 
     events = run()
     assert events == run()
@@ -326,10 +326,10 @@ address = 4
 def test_an_m1486_is_commanded_by_what_its_host_types() -> None:
     """Manual chapter VII.2: F sets a distance, V the speed in full steps/s, R makes the move; a step is 64 minimum microsteps."""
     subject = of(World.from_toml(CHIPS))
-    following = subject.follow(filter_of(["frame"]), 999)
+    subscription = subject.subscribe(filter_of(["frame"]), 999)
 
     def typed() -> str:
-        frames = [event.payload for event in following.take().events]
+        frames = [event.payload for event in subscription.take().events]
         return "".join(frame.data.decode() for frame in frames if isinstance(frame, FramePayload) and frame.direction == "in")
 
     subject.do(command.Move("lift", 1, by=6400.0))

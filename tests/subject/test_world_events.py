@@ -15,8 +15,8 @@ from steptwin.motion.planjson import read_plan
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.inputs import Bytes
 from steptwin.subject import commands as command
-from steptwin.subject.following import filter_of
 from steptwin.subject.payloads import PlanPayload
+from steptwin.subject.subscriptions import filter_of
 from steptwin.subject.world import WorldSubject
 from steptwin.wire.crc import with_crc
 
@@ -37,9 +37,9 @@ def feeder() -> World:
 def test_events_name_what_led_to_them() -> None:
     subject = of(small())
     subject.world.sync_all()
-    following = subject.follow(filter_of(), 99)
+    subscription = subject.subscribe(filter_of(), 99)
     number = subject.do(do.Press("go")).number
-    pressed, *edges = following.take().events
+    pressed, *edges = subscription.take().events
     assert (pressed.kind, pressed.cause) == ("button", number)
     assert {edge.cause for edge in edges} == {pressed.number}
     assert [edge.text for edge in edges] == ["go: 1", "IN4: 1"]
@@ -47,21 +47,21 @@ def test_events_name_what_led_to_them() -> None:
 
 def test_what_was_due_before_a_command_has_no_cause_in_it() -> None:
     subject = of(small("[[script]]\nname = 's'\nsteps = [{ wait = '1 s' }, { set = { 'a.IN2' = 1 } }]\n"))
-    following = subject.follow(filter_of(["edge"]), 99)
+    subscription = subject.subscribe(filter_of(["edge"]), 99)
     subject.do(command.Advance(duration=SECOND))
     subject.do(do.Set((("b", "IN2", 1.0),)))
-    first, second = (event for event in following.take().events if event.text == "IN2: 1")
+    first, second = (event for event in subscription.take().events if event.text == "IN2: 1")
     assert first.cause is None
     assert second.cause is not None
 
 
 def test_nobody_who_follows_costs_nothing() -> None:
     subject = of(small())
-    assert subject.world.trace.watchers == []
-    following = subject.follow(filter_of(["frame"]), 9)
-    assert len(subject.world.trace.watchers) == 1
-    following.close()
-    assert subject.world.trace.watchers == []
+    assert subject.world.trace.subscribers == []
+    subscription = subject.subscribe(filter_of(["frame"]), 9)
+    assert len(subject.world.trace.subscribers) == 1
+    subscription.close()
+    assert subject.world.trace.subscribers == []
 
 
 def test_frames_are_followed_on_connections_that_are_there_and_where_nothing_is_recorded() -> None:
@@ -70,25 +70,25 @@ def test_frames_are_followed_on_connections_that_are_there_and_where_nothing_is_
     world.apply_input(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
     world.run(for_=0.5)
     world.stop_recording()
-    following = subject.follow(filter_of(["frame"], ["bus"]), 99)
+    subscription = subject.subscribe(filter_of(["frame"], ["bus"]), 99)
     world.apply_input(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
     world.run(for_=0.5)
-    frames = [plain for event in following.take().events if (plain := event.payload.to_json())["client"] == "tcp-1"]
+    frames = [plain for event in subscription.take().events if (plain := event.payload.to_json())["client"] == "tcp-1"]
     assert frames[0] == {"client": "tcp-1", "direction": "in", "data": READ_POSITION.hex(), "words": "read M1_POS_ACT"}
     assert [frame["direction"] for frame in frames] == ["in", "out"]
-    following.close()
+    subscription.close()
     world.apply_input(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
-    assert following.take().events == []
+    assert subscription.take().events == []
 
 
 def test_bytes_that_belong_to_no_frame_are_counted_among_the_frames() -> None:
     world = feeder()
-    following = of(world).follow(filter_of(["frame"], ["bus"]), 99)
+    subscription = of(world).subscribe(filter_of(["frame"], ["bus"]), 99)
     world.apply_input(Bytes("bus", "tcp-1", "rtu", b"\x55\x55\x55"))
     world.run(for_=5)
     world.apply_input(Bytes("bus", "tcp-1", "rtu", READ_POSITION))
     world.run(for_=0.5)
-    frames = [event.payload.to_json() for event in following.take().events]
+    frames = [event.payload.to_json() for event in subscription.take().events]
     noise = [str(frame["words"]).split(maxsplit=1) for frame in frames if not frame["data"]]
     assert sum(int(count) for count, _ in noise) == 3
     assert {what for _, what in noise} <= {"byte that belongs to no frame", "bytes that belong to no frame"}
@@ -97,10 +97,10 @@ def test_bytes_that_belong_to_no_frame_are_counted_among_the_frames() -> None:
 def test_frames_of_chips_are_lines_and_characters() -> None:
     text = "[[m1486]]\nname = 'drum'\nline = 'bus'\naddress = 7\n[[line]]\nname = 'bus'\nkind = 'm1486'\n"
     world = World.from_toml(text)
-    following = of(world).follow(filter_of(["frame"]), 99)
+    subscription = of(world).subscribe(filter_of(["frame"]), 99)
     world.apply_input(Bytes("bus", "tcp-1", "raw", b"X7\rU3\r"))
     world.run(for_=1)
-    assert [event.payload.to_json() for event in following.take().events] == [
+    assert [event.payload.to_json() for event in subscription.take().events] == [
         {"client": "tcp-1", "direction": "in", "data": b"X7\r".hex(), "words": "X7  indeX 7"},
         {"client": "tcp-1", "direction": "in", "data": b"U3\r".hex(), "words": "U3  Upload 3"},
         {"client": "line", "direction": "out", "data": "00", "words": "U3 position, high byte = 0"},
@@ -112,13 +112,13 @@ def test_the_plans_of_a_run_give_every_position_the_controller_shows() -> None:
     world = feeder()
     subject = of(world)
     plans = {(e.controller, e.axis): e for e in subject.plans(filter_of())}
-    following = subject.follow(filter_of(["plan", "coordinate"]), 10_000)
+    subscription = subject.subscribe(filter_of(["plan", "coordinate"]), 10_000)
     axes = [(m.name, a) for m in subject.description.controllers for a in m.datasheet.axes]
     scales = {(name, str(a.number)): a.pulses_per_unit for name, a in axes if a.pulses_per_unit is not None}
     origins: dict[tuple[str, str | None], int] = {}
     for _ in range(200):
         world.run(for_=0.05)
-        for event in following.take().events:
+        for event in subscription.take().events:
             plain = json.loads(json.dumps(event.to_json()))
             key = event.controller, event.axis
             origins[key] = plain["origin"]
@@ -138,7 +138,7 @@ def test_the_plans_of_a_run_give_every_position_the_controller_shows() -> None:
 def test_words_of_a_note_are_a_value_of_its_message() -> None:
     words = "the chip shop waits 5 ms"
     subject = of(small(f"[[script]]\nname = 's'\nsteps = [{{ note = '{words}' }}]\n"))
-    following = subject.follow(filter_of(["note"]), 99)
+    subscription = subject.subscribe(filter_of(["note"]), 99)
     subject.do(command.Advance(duration=SECOND))
-    (note,) = following.take().events
+    (note,) = subscription.take().events
     assert note.to_json()["messages"] == {"text": {"id": "subject.note", "values": {"note": words}}}

@@ -19,8 +19,8 @@ from steptwin.simulation.script.control import Seek
 from steptwin.simulation.world.inputs import Download
 from steptwin.simulation.world.motions import ordered
 from steptwin.subject import commands as command
-from steptwin.subject.following import filter_of
 from steptwin.subject.payloads import StatusPayload
+from steptwin.subject.subscriptions import filter_of
 from steptwin.subject.world import WorldSubject
 
 FAMILIES = ("A", "B", "C", "E1", "E2")
@@ -104,7 +104,7 @@ def _by_command(family: str, asked: str, way: str, delay_s: float) -> tuple[Nano
     timing = 'timing = "real"\nbaud = 300' if way == "control over a slow line" else ""
     world = World.from_toml(WORLD.format(family=family, timing=timing))
     subject = WorldSubject(world)
-    followed = subject.follow(filter_of(["status"]), 100_000)
+    followed = subject.subscribe(filter_of(["status"]), 100_000)
     match asked:
         case "move":
             subject.do(command.Move("drum", 1, by=128_000.0))

@@ -299,12 +299,12 @@ def _debugger(world: World) -> Callable[[], None]:
 
 def _recorder(world: World) -> Callable[[], None]:
     snapshots, seen = SnapshotLog(world), list[TraceRecord]()
-    world.trace.watchers.append(seen.append)
+    world.trace.subscribers.append(seen.append)
 
     def leave() -> None:
         snapshots.take()
         snapshots.close()
-        world.trace.watchers.remove(seen.append)
+        world.trace.subscribers.remove(seen.append)
 
     return leave
 

@@ -17,8 +17,8 @@ from steptwin.simulation.toml.addresses import Address
 from steptwin.subject import commands as command
 from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
 from steptwin.subject.events import Event
-from steptwin.subject.following import Filter, Followers, Following
 from steptwin.subject.payloads import EdgePayload, PlanPayload
+from steptwin.subject.subscriptions import Filter, Subscription, Subscriptions
 
 
 class Desk:
@@ -27,7 +27,7 @@ class Desk:
     def __init__(self) -> None:
         self.description = Description("desk", ())
         self.later = Later[None]()
-        self.followers = Followers()
+        self.subscribers = Subscriptions()
         self.done = 0
 
     def do(self, wanted: command.Command) -> Result:
@@ -54,15 +54,15 @@ class Desk:
             await self.later
         return self.do(wanted)
 
-    def follow(self, what: Filter, bound: int) -> Following:
-        return self.followers.follow(what, bound)
+    def subscribe(self, what: Filter, bound: int) -> Subscription:
+        return self.subscribers.subscribe(what, bound)
 
     def plans(self, what: Filter) -> list[Event]:
         return [Event(0, 5, "a", PlanPayload("1", at_rest(0, 7), 0))]
 
     def happen(self, count: int = 1) -> None:
         for number in range(count):
-            self.followers.publish(Event(number, number, "a", EdgePayload("IN1", 1.0)))
+            self.subscribers.publish(Event(number, number, "a", EdgePayload("IN1", 1.0)))
 
 
 def ok(text: str, number: int = 1) -> dict[str, object]:

@@ -9,9 +9,9 @@ from steptwin.files.world import World
 from steptwin.later import start
 from steptwin.motion.divisions import profile_of
 from steptwin.subject.commands import Enable, Jog
-from steptwin.subject.following import filter_of
 from steptwin.subject.jogs import ExtendableJog, WorldJogs
 from steptwin.subject.payloads import FramePayload, PlanPayload
+from steptwin.subject.subscriptions import filter_of
 from steptwin.subject.world import WorldSubject
 
 MIC = """
@@ -50,7 +50,7 @@ class Rig:
         self.world = World.from_toml(dedent(text))
         self.subject = WorldSubject(self.world)
         self.jogs = WorldJogs(self.subject)
-        self.followed = self.subject.follow(filter_of(["plan", "frame"]), 100_000)
+        self.followed = self.subject.subscribe(filter_of(["plan", "frame"]), 100_000)
 
     def begin(self, wanted: Jog) -> ExtendableJog:
         return start(self.jogs.begin_jog(wanted)).result()

@@ -22,8 +22,8 @@ from steptwin.simulation.kinds.lines import LineTraffic
 from steptwin.subject import commands as command
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event
-from steptwin.subject.following import Filter, Following
 from steptwin.subject.jogs import ExtendableJog, WorldJogs
+from steptwin.subject.subscriptions import Filter, Subscription
 from steptwin.subject.world import WorldSubject
 
 
@@ -57,8 +57,8 @@ class GatewayWorld:
     async def begin_jog(self, wanted: command.Jog, /) -> ExtendableJog:
         return await self.jogs.begin_jog(wanted)
 
-    def follow(self, what: Filter, bound: int) -> Following:
-        return self.inner.follow(what, bound)
+    def subscribe(self, what: Filter, bound: int) -> Subscription:
+        return self.inner.subscribe(what, bound)
 
     def traffic(self) -> Mapping[str, LineTraffic]:
         return {name: line.traffic for name, line in self.world.lines.items()}

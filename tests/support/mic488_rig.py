@@ -95,7 +95,7 @@ class Rig:
         self.scheduler = Scheduler()
         self.scheduler.add("m", self.device)
         self.edges: list[PinEdge] = []
-        self.scheduler.observers.append(lambda name, edge: self.edges.append(edge))
+        self.scheduler.edge_subscribers.append(lambda name, edge: self.edges.append(edge))
         self.now = 0
         self.dint = False
 

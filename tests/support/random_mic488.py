@@ -121,7 +121,7 @@ class RandomMic488:
         device.store = self._store
         log = FrameLog({1: device})
         log.sinks.append(lambda line: self.found["words"].append(line.meaning))
-        self.observe = log.observer("line", tcp=False)
+        self.observe = log.callback("line", tcp=False)
 
     def _store(self, memory: bytes) -> bytes | None:
         if self.chance.below(5) == 0:

@@ -152,7 +152,7 @@ class Studio:
             work=NoWork(),
             on_internal=self.errors.append,
         )
-        world = WorldMember(self.subject, self.subject.followers, self.jogs)
+        world = WorldMember(self.subject, self.subject.subscribers, self.jogs)
         shown = CompositeSubject(world, lambda: self.world.now, self.subject.numbering)
         self.hub = Hub(shown, shown, around)
         self.now: Nanos = 5 * SECOND

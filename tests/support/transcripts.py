@@ -32,7 +32,7 @@ from steptwin.drivers.blocking import finish
 from steptwin.errors import SteptwinError
 from steptwin.simulation.script import steps as script
 from steptwin.subject import commands
-from steptwin.subject.following import filter_of
+from steptwin.subject.subscriptions import filter_of
 
 CASE, RESULT = "=== ", "---"
 PAUSE_NS = 20 * MILLISECOND

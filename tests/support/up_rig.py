@@ -16,9 +16,9 @@ from steptwin.live.world import LiveWorld
 from steptwin.live.world_control import WorldControl
 from steptwin.motion.profile import Profile
 from steptwin.simulation.world.inputs import Download
-from steptwin.subject.following import filter_of
 from steptwin.subject.jogs import WorldJogs
 from steptwin.subject.payloads import PlanPayload, StatusPayload
+from steptwin.subject.subscriptions import filter_of
 
 LOOPING = "M1 = ON\nA:\nPREL M1 40\nWAITPOS\nPREL M1 -40\nWAITPOS\nJUMP A\n"
 MIC488 = """
@@ -68,13 +68,13 @@ class UpRig:
         self.subject = LiveWorldSubject(self.control, self.live)
         jogs = WorldJogs(self.live.subject, self.control.at_present)
         self.live.external_actor = jogs
-        world = WorldMember(self.control, self.live.subject.followers, jogs)
+        world = WorldMember(self.control, self.live.subject.subscribers, jogs)
         self.composite = CompositeSubject(world, lambda: self.live.now, self.live.subject.numbering)
 
     async def open(self) -> None:
         self.realtime.start()
         self.realtime.clock.run(1.0)
-        self._followed = self.subject.follow(filter_of(["plan", "status"]), 100_000)
+        self._followed = self.subject.subscribe(filter_of(["plan", "status"]), 100_000)
         self._begun: list[Nanos] = []
 
     async def close(self) -> None:

@@ -1,4 +1,4 @@
-"""The checker beyond its messages: interpretations, time, what it gives to those who run the program."""
+"""The checker beyond its messages: assumptions, time, what it gives to those who run the program."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ def hooked(rig: Rig, *numbers: int) -> tuple[Told, Callable[[int, int], None]]:
     def hook(now: int, number: int) -> None:
         told.append((now // MILLISECOND, number))
 
-    rig.device.program.interpreter.hook(hook, numbers or None)
+    rig.device.program.interpreter.add_hook(hook, numbers or None)
     return told, hook
 
 
@@ -100,22 +100,22 @@ def test_several_hooks_are_called_in_order_until_each_is_taken_away() -> None:
 
     interpreter = rig.device.program.interpreter
     interpreter.rests_in_loops = False
-    interpreter.hook(first)
-    interpreter.hook(second)
+    interpreter.add_hook(first)
+    interpreter.add_hook(second)
     rig.start()
     rig.wait_ns(MILLISECOND + MICROSECOND)
     assert order == ["first 0", "second 0"]
-    interpreter.unhook(first)
+    interpreter.remove_hook(first)
     rig.wait(0.0115)
     assert order[2:] == ["second 1", "second 0"]
-    interpreter.unhook(second)
+    interpreter.remove_hook(second)
     rig.wait(1)
     assert len(order) == 4
-    interpreter.hook(second)
+    interpreter.add_hook(second)
     rig.wait(0.0115)
     alone = order[4:]
     assert set(alone) == {"second 0", "second 1"}
-    interpreter.hook(first)
+    interpreter.add_hook(first)
     rig.wait(0.0115)
     assert order[4 + len(alone) :] == ["second 1", "first 1", "second 0", "first 0"]
 

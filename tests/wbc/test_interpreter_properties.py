@@ -245,8 +245,8 @@ def test_calculations_at_once_are_calculations_one_by_one(lines: list[str], look
             device.program.interpreter.rests_in_loops = False
         told: list[tuple[Nanos, int]] = []
         every: list[tuple[Nanos, int]] = []
-        at_once.program.interpreter.hook(lambda now, number: told.append((now, number)), hooked)
-        one_by_one.program.interpreter.hook(lambda now, number: every.append((now, number)))
+        at_once.program.interpreter.add_hook(lambda now, number: told.append((now, number)), hooked)
+        one_by_one.program.interpreter.add_hook(lambda now, number: every.append((now, number)))
         for moment in sorted({*looks, 300}):
             at_once.advance(moment * MILLISECOND)
             one_by_one.advance(moment * MILLISECOND)

@@ -61,12 +61,12 @@ def _short(value: object) -> object:
 
 
 class Audit:
-    """``clock`` gives the wall clock as text; ``sink`` is the first of `watchers`, to keep entries elsewhere."""
+    """``clock`` gives the wall clock as text; ``sink`` is the first of `subscribers`, to keep entries elsewhere."""
 
     def __init__(self, clock: Callable[[], str], sink: Callable[[Entry], None] = lambda _: None) -> None:
         self._entries: deque[Entry] = deque(maxlen=MOST_ENTRIES)
         self._clock = clock
-        self.watchers = [sink]
+        self.subscribers = [sink]
         """Called with every entry."""
 
     def add(self, viewer: Acting, time: Nanos, do: str, fields: Mapping[str, object], outcome: str) -> None:
@@ -74,8 +74,8 @@ class Audit:
         role = "none" if viewer.role is None else viewer.role.title
         entry = Entry(self._clock(), time, str(viewer), role, do, kept, outcome)
         self._entries.append(entry)
-        for watch in self.watchers:
-            watch(entry)
+        for subscriber in self.subscribers:
+            subscriber(entry)
 
     def last(self, most: int) -> list[Entry]:
         """The newest last."""

@@ -42,7 +42,7 @@ class MoveQuantity:
     detail: str = ""
     """The fact of the controller's state that it is (`steptwin.controllerstate`)."""
     source: str
-    """Section of the manual, or id of an interpretation."""
+    """Section of the manual, or id of an assumption."""
 
 
 class Formula(NamedTuple):

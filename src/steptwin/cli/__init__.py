@@ -81,7 +81,7 @@ COMMANDS: Mapping[str, Mapping[str, str]] = {
         "send": "Download a program into an M1486.",
         "terminal": "Talk to a controller line by line: names read, NAME=VALUE writes.",
         "sniff": "Log the traffic between a master and a device in words.",
-        "verify": "Check whether a controller behaves as the numbered interpretations say.",
+        "verify": "Check whether a controller behaves as the numbered assumptions say.",
         "bridge": "Serve real devices to programs of a plant, by the gateways of a file, until Ctrl-C.",
         "history": "Show, export and compare what a database has kept of twins and devices.",
         "record": "Run a list of requests on a controller and record the answers.",

@@ -1,4 +1,4 @@
-"""``steptwin verify``: whether a controller behaves as the interpretations say.
+"""``steptwin verify``: whether a controller behaves as the assumptions say.
 
 From Python: `steptwin.verify.run.verify`.
 """
@@ -29,14 +29,14 @@ def command(
     ] = None,
     json: Annotated[Path | None, written("--json", metavar="FILE", help="Also write the report as JSON.")] = None,
 ) -> None:
-    """Check whether a controller behaves as the numbered interpretations say. By default nothing moves and no setting changes.
+    """Check whether a controller behaves as the numbered assumptions say. By default nothing moves and no setting changes.
 
     The checks read, send requests that a controller is to refuse, and wrong frames. They take half a minute on a serial line,
     and other masters must leave it alone meanwhile. Wrong data end a program of an M1486; a chip that runs one does not
     respond, and is not checked. Commands of the checks take command memory: they can overwrite what was sent to an M1486
     before, and registers 1 to 8 of a type A or C.
 
-    Exit code 1 when an interpretation is refuted. The report can be sent to the project.
+    Exit code 1 when an assumption is refuted. The report can be sent to the project.
     """
     from steptwin import __version__
     from steptwin.files.textfiles import check_writable, write_bytes

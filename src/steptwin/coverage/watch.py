@@ -64,10 +64,10 @@ class _Counter:
         self._know_all()
         for number in programs.begun(now):
             self._begins(now, number)
-        programs.hook(self._begins)
+        programs.add_hook(self._begins)
 
     def close(self, now: Nanos) -> None:
-        self._programs.unhook(self._begins)
+        self._programs.remove_hook(self._begins)
         self._know_all()
         if self._branch is not None:
             stack = self._programs.stack(now)

@@ -29,8 +29,8 @@ from steptwin.live.twins import find_controller
 from steptwin.subject import debugcommands as command
 from steptwin.subject.commands import Command, EndPoints, Pause, Resume, Time
 from steptwin.subject.events import Event
-from steptwin.subject.following import filter_of
 from steptwin.subject.payloads import LogPayload, PacePayload, StoppedPayload
+from steptwin.subject.subscriptions import filter_of
 from steptwin.why.answer import Answer, read_answer
 
 PART_S = 0.05
@@ -54,7 +54,7 @@ class AttachedTwin:
         self._set: dict[AnyPoint, SetPoint] = {}
         self._has_set_events = False
         try:
-            self._following = self._subject.follow(filter_of(["stopped", "log", "pace"]), MOST_EVENTS)
+            self._subscription = self._subject.subscribe(filter_of(["stopped", "log", "pace"]), MOST_EVENTS)
             self._found = self._ask(command.Debug())
             self._events_before: list[str] = self._ask(command.ListBreakpoints())["stop_on"]
             self._texts = {one["name"]: self._sources(one) for one in self._found["controllers"]}
@@ -257,10 +257,10 @@ class AttachedTwin:
                 yield self._stop(event, event.payload)
 
     def _events(self, timeout_s: float) -> Iterator[Event]:
-        if not len(self._following):
+        if not len(self._subscription):
             self._subject.pump(timeout_s)
-        while len(self._following):
-            (event,) = self._following.take(1).events
+        while len(self._subscription):
+            (event,) = self._subscription.take(1).events
             if isinstance(event.payload, LogPayload):
                 said = event.payload
                 self._log(event.time, event.controller, said.words, said.program, said.line)

@@ -68,7 +68,7 @@ class Observer:
         self._hooks = {controller: self._hook(controller, programs) for controller, programs in world.programs.items()}
         self._hooked: dict[str, frozenset[Place] | None] = {}
         """The places before which hooks are called, by controller; None: all."""
-        world.trace.watchers.append(self._recorded)
+        world.trace.subscribers.append(self._recorded)
 
     def clear(self) -> None:
         self.begun.clear()
@@ -86,10 +86,10 @@ class Observer:
             if places == self._hooked.get(controller, frozenset()):
                 continue
             if controller in self._hooked:
-                programs.unhook(self._hooks[controller])
+                programs.remove_hook(self._hooks[controller])
                 del self._hooked[controller]
             if places != frozenset():
-                programs.hook(self._hooks[controller], places)
+                programs.add_hook(self._hooks[controller], places)
                 self._hooked[controller] = places
         scheduler_of = self.world.objects.scheduler_of
         self.world.synced_first = [scheduler_of[controller] for controller in self.points.reading_others()]
@@ -97,7 +97,7 @@ class Observer:
     def release(self) -> None:
         """Have no hooks: breakpoints or texts may be others by the next `observe`."""
         for controller in self._hooked:
-            self.world.programs[controller].unhook(self._hooks[controller])
+            self.world.programs[controller].remove_hook(self._hooks[controller])
         self._hooked.clear()
 
     def _hook(self, controller: str, programs: Programs) -> StatementHook:

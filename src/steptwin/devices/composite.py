@@ -18,8 +18,8 @@ from steptwin.subject import commands as command
 from steptwin.subject.commands import COMMANDS, Command, type_of
 from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
 from steptwin.subject.events import Event, Numbering
-from steptwin.subject.following import Filter, Followers, Following
 from steptwin.subject.jogs import ExtendableJog
+from steptwin.subject.subscriptions import Filter, Subscription, Subscriptions
 
 TIME = "time"
 
@@ -30,7 +30,7 @@ class MemberSubject(Protocol):
     @property
     def description(self) -> Description: ...
     @property
-    def followers(self) -> Followers: ...
+    def subscribers(self) -> Subscriptions: ...
     @property
     def lost(self) -> str | None:
         """Why nothing is known of it; None while it answers."""
@@ -75,7 +75,7 @@ class CompositeSubject:
         self._members: list[MemberSubject] = [] if world is None else [world]
         self.now = clock
         self.numbering = numbering
-        self._followings: list[Following] = []
+        self._subscriptions: list[Subscription] = []
         self._gone: set[str] = set()
         """Controllers that were removed: values of them are unknown to viewers that still watch them."""
         self._describe()
@@ -84,14 +84,14 @@ class CompositeSubject:
 
     def add(self, member: MemberSubject) -> None:
         self._members.append(member)
-        for following in self._followings:
-            member.followers.add(following)
+        for subscription in self._subscriptions:
+            member.subscribers.add(subscription)
         self._describe()
 
     def remove(self, member: MemberSubject) -> None:
         self._members.remove(member)
-        for following in self._followings:
-            member.followers.remove(following)
+        for subscription in self._subscriptions:
+            member.subscribers.remove(subscription)
         self._gone |= {controller.name for controller in member.description.controllers}
         self._describe()
 
@@ -252,17 +252,17 @@ class CompositeSubject:
     def present(self) -> dict[str, Any]:
         return {"state": {}, "faults": []} if self._world is None else dict(self._world.present())
 
-    def follow(self, what: Filter, bound: int) -> Following:
-        following = Following(what, bound, self._unfollow)
-        self._followings.append(following)
+    def subscribe(self, what: Filter, bound: int) -> Subscription:
+        subscription = Subscription(what, bound, self._unsubscribe)
+        self._subscriptions.append(subscription)
         for member in self._members:
-            member.followers.add(following)
-        return following
+            member.subscribers.add(subscription)
+        return subscription
 
-    def _unfollow(self, following: Following) -> None:
-        self._followings.remove(following)
+    def _unsubscribe(self, subscription: Subscription) -> None:
+        self._subscriptions.remove(subscription)
         for member in self._members:
-            member.followers.remove(following)
+            member.subscribers.remove(subscription)
 
     def plans(self, what: Filter) -> list[Event]:
         return [event for member in self._members for event in member.plans(what)]

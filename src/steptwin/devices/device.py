@@ -26,9 +26,9 @@ from steptwin.subject import commands as command
 from steptwin.subject.commands import Command, type_of
 from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
 from steptwin.subject.events import Event
-from steptwin.subject.following import Filter, Followers
 from steptwin.subject.jogs import ExtendableJog
 from steptwin.subject.payloads import NOT_ENABLED, InputPayload, StatusPayload
+from steptwin.subject.subscriptions import Filter, Subscriptions
 from steptwin.tracing import span
 
 POLL_S = 0.1
@@ -108,8 +108,8 @@ class ConnectedDevice:
         return self._subject.description
 
     @property
-    def followers(self) -> Followers:
-        return self._subject.followers
+    def subscribers(self) -> Subscriptions:
+        return self._subject.subscribers
 
     def selected(self, data: bytes) -> int | None:
         """See `steptwin.drivers.subject.DevicePart.selected`."""

@@ -6,8 +6,8 @@ from typing import Any
 
 from steptwin.subject import commands as command
 from steptwin.subject.contract import Description, PlannedSubject, Reading, Result
-from steptwin.subject.following import Followers
 from steptwin.subject.jogs import Jogs
+from steptwin.subject.subscriptions import Subscriptions
 
 
 def present_of(world: PlannedSubject) -> dict[str, Any]:
@@ -21,9 +21,9 @@ class WorldMember:
 
     lost = None
 
-    def __init__(self, world: PlannedSubject, followers: Followers, jogs: Jogs) -> None:
+    def __init__(self, world: PlannedSubject, subscribers: Subscriptions, jogs: Jogs) -> None:
         self._world = world
-        self.followers = followers
+        self.subscribers = subscribers
         self.do, self.plans, self.begin_jog = world.answer, world.plans, jogs.begin_jog
 
     @property

@@ -1,4 +1,4 @@
-"""The frames of a line of a driver, for those who follow them."""
+"""The frames of a line of a driver, for those who subscribe to them."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class SeenFrame(NamedTuple):
 
 
 class LineFrames:
-    """The frames of a line. While nobody follows them, nothing is observed or put into words.
+    """The frames of a line. While nobody subscribes to them, nothing is observed or put into words.
 
-    ``observe`` is called with whether somebody follows; the protocol then calls `take`.
+    ``observe`` is called with whether somebody subscribes; the protocol then calls `take`.
     """
 
     def __init__(self, exchanger: Exchanger[Any, Any], observe: Callable[[bool], object]) -> None:
@@ -34,7 +34,7 @@ class LineFrames:
         self._observe = observe
         self._sinks: list[Callable[[SeenFrame], object]] = []
 
-    def follow(self, sink: Callable[[SeenFrame], object]) -> Callable[[], None]:
+    def subscribe(self, sink: Callable[[SeenFrame], object]) -> Callable[[], None]:
         """Give each frame to ``sink``; the result ends that."""
         self._sinks.append(sink)
         if len(self._sinks) == 1:

@@ -13,7 +13,7 @@ from steptwin.messages import Message
 from steptwin.wire import mbap, pdu, rtu
 from steptwin.wire.crc import crc16
 from steptwin.wire.line import SerialLine
-from steptwin.wire.slave import FrameDirection, FrameObserver
+from steptwin.wire.slave import FrameCallback, FrameDirection
 
 QUIET_NS: Nanos = rtu.BURSTY_GAP_NS
 """Silence after a failed exchange before the line is used again, ns."""
@@ -105,7 +105,7 @@ class RtuMaster:
         "_asked", "_busy_until", "_gap_ns", "_held", "_late_answers", "_serial", "_then", "echo", "free_ns", "on_frame",
     )  # fmt: skip
 
-    def __init__(self, serial: SerialLine | None = None, *, on_frame: FrameObserver | None = None) -> None:
+    def __init__(self, serial: SerialLine | None = None, *, on_frame: FrameCallback | None = None) -> None:
         self._serial = serial
         self._gap_ns = 0 if serial is None else max(LEAST_GAP_NS, serial.duration(7) // 2)
         self.on_frame = on_frame
@@ -267,7 +267,7 @@ class TcpMaster:
     free_ns: Nanos = 0
     wary = False
 
-    def __init__(self, place: str = "the connection", *, on_frame: FrameObserver | None = None) -> None:
+    def __init__(self, place: str = "the connection", *, on_frame: FrameCallback | None = None) -> None:
         self.on_frame = on_frame
         self._place = place
         self._number = 0

@@ -6,7 +6,7 @@ with Mic488("/dev/ttyUSB0", config="machine.cfg") as mic:
 
 Drivers execute the commands, with their own safety (ADR 12). Values that no register or command shows have the quality
 `UNKNOWN`. Commands for twins only (pins, faults, time, power) raise `Refusal`. Events come from polling, and only while there
-are followers.
+are subscribers.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ from steptwin.subject.contract import GOOD, UNKNOWN, ControllerDescription, Desc
 from steptwin.subject.controls import controls_of
 from steptwin.subject.devicetwin import DeviceTwin
 from steptwin.subject.events import Event, Numbering
-from steptwin.subject.following import EventBatch, Filter, Followers, Following
 from steptwin.subject.payloads import FramePayload, Payload, SamplePayload
+from steptwin.subject.subscriptions import EventBatch, Filter, Subscription, Subscriptions
 
 PERIOD_S = 0.2
 PERIODS_S = (0.02, 60.0)
@@ -213,7 +213,7 @@ class AsyncDeviceSubject:
         }
         self.description = self._described()
         self._end_frames: Callable[[], None] | None = None
-        self.followers = Followers(self._follow_frames)
+        self.subscribers = Subscriptions(self._subscribe_to_frames)
         self._numbering = Numbering({}) if numbering is None else numbering
         self._samples: dict[str, Event] = {}
 
@@ -264,28 +264,28 @@ class AsyncDeviceSubject:
             self._numbering.done()
         return Result(value, self.now(), number)
 
-    def follow(self, what: Filter, bound: int) -> Following:
-        return self.followers.follow(what, bound)
+    def subscribe(self, what: Filter, bound: int) -> Subscription:
+        return self.subscribers.subscribe(what, bound)
 
     async def poll(self) -> None:
-        """Poll once, if there are followers, and make events of the changes. Raises `LineFailure`."""
-        if self.followers:
-            for payload in await self._device.look(self.followers.kinds):
+        """Poll once, if there are subscribers, and make events of the changes. Raises `LineFailure`."""
+        if self.subscribers:
+            for payload in await self._device.look(self.subscribers.kinds):
                 self.publish(payload)
 
     def publish(self, payload: Payload) -> None:
-        """Send followers an event of now."""
+        """Send subscribers an event of now."""
         event = self._numbering.event(self.now(), self.name, payload)
         if type(payload) is SamplePayload:
             self._samples[payload.axis] = event
-        self.followers.publish(event)
+        self.subscribers.publish(event)
 
-    def _follow_frames(self) -> None:
-        """Observe the frames of the device while somebody follows them."""
+    def _subscribe_to_frames(self) -> None:
+        """Observe the frames of the device while somebody subscribes to them."""
         frames: LineFrames | None = self._line.shared.get(FRAMES)
-        is_wanted = "frame" in self.followers.kinds
+        is_wanted = "frame" in self.subscribers.kinds
         if is_wanted and self._end_frames is None and frames is not None:
-            self._end_frames = frames.follow(self._framed)
+            self._end_frames = frames.subscribe(self._framed)
         elif not is_wanted and self._end_frames is not None:
             self._end_frames()
             self._end_frames = None
@@ -293,7 +293,7 @@ class AsyncDeviceSubject:
     def _framed(self, seen: SeenFrame) -> None:
         if seen.device == self._device.address:
             payload = FramePayload(CLIENT, seen.direction.value, seen.raw, seen.meaning)
-            self.followers.publish(self._numbering.event(self.now(), self._line.place, payload))
+            self.subscribers.publish(self._numbering.event(self.now(), self._line.place, payload))
 
     def samples(self) -> list[Event]:
         """The newest sample of each axis that there is one of."""
@@ -360,22 +360,22 @@ class DeviceSubject(Blocking):
     read = blocking(AsyncDeviceSubject.read)
     do = blocking(AsyncDeviceSubject.do)
 
-    def follow(self, what: Filter, bound: int) -> Following:
-        following = _Polled(self._driver, what, bound)
+    def subscribe(self, what: Filter, bound: int) -> Subscription:
+        subscription = _Polled(self._driver, what, bound)
         finish(self._driver.poll())  # changes are changes from now on
-        return following
+        return subscription
 
 
-class _Polled(Following):
+class _Polled(Subscription):
     """Events of a device, which is polled when they are taken."""
 
     __slots__ = ("_due", "_subject")
 
     def __init__(self, subject: AsyncDeviceSubject, what: Filter, bound: int) -> None:
-        super().__init__(what, bound, subject.followers.remove)
+        super().__init__(what, bound, subject.subscribers.remove)
         self._subject = subject
         self._due = subject.now() + subject.period_ns
-        subject.followers.add(self)
+        subject.subscribers.add(self)
 
     def take(self, most: int | None = None) -> EventBatch:
         now = self._subject.now()

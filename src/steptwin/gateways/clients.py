@@ -18,8 +18,8 @@ from steptwin.subject.commands import Command, Home, Move, ReadState, StopAxes, 
 from steptwin.subject.contract import ControllerDescription, Result
 from steptwin.subject.dispatch import code_of
 from steptwin.subject.events import Event
-from steptwin.subject.following import Filter, Following
 from steptwin.subject.payloads import NOT_ENABLED, InputPayload, StatusPayload
+from steptwin.subject.subscriptions import Filter, Subscription
 from steptwin.tracing import span
 from steptwin.wire.rtu import BROADCAST
 
@@ -113,19 +113,19 @@ async def _done(subject: GatewaySubject, wanted: Command) -> Result:
     if not isinstance(wanted, MOVING):
         return await subject.do(wanted)
     axes = frozenset({str(wanted.axis)}) if isinstance(wanted, Move | Home) else None
-    following = subject.follow(Filter(frozenset({"status", "input"}), _controllers(subject, wanted), axes), MOST_EVENTS)
+    subscription = subject.subscribe(Filter(frozenset({"status", "input"}), _controllers(subject, wanted), axes), MOST_EVENTS)
     try:
         if isinstance(wanted, Move | Home):
-            await _check_drive(subject, wanted, following)
+            await _check_drive(subject, wanted, subscription)
         result = await subject.do(wanted)
-        event = await _drive_off(subject, wanted, following, result.number)
+        event = await _drive_off(subject, wanted, subscription, result.number)
         if event is not None:
             ignored = Ignored(f"{event.controller}: {event.text}: switch its drive on first")
             ignored.result = result
             raise ignored
         return result
     finally:
-        following.close()
+        subscription.close()
 
 
 def _controllers(subject: GatewaySubject, wanted: Move | Home | Write | Request) -> frozenset[str]:
@@ -139,12 +139,12 @@ def _controllers(subject: GatewaySubject, wanted: Move | Home | Write | Request)
             return frozenset({wanted.controller})
 
 
-async def _drive_off(subject: GatewaySubject, wanted: Command, following: Following, number: int) -> Event | None:
+async def _drive_off(subject: GatewaySubject, wanted: Command, subscription: Subscription, number: int) -> Event | None:
     """The event of a controller that has ignored a motion of the command with this number, None if there is none."""
     loop = asyncio.get_running_loop()
     end = loop.time() + UNDER_WAY_S
     while True:
-        for event in following.take().events:
+        for event in subscription.take().events:
             # What was due before has happened before it; a world does it at once.
             if event.number > number and isinstance(event.payload, StatusPayload) and event.payload.code == NOT_ENABLED:
                 return event
@@ -175,7 +175,7 @@ def _moved(part: ControllerDescription, wanted: Write) -> set[int]:
     return found
 
 
-async def _check_drive(subject: GatewaySubject, wanted: Move | Home, following: Following) -> None:
+async def _check_drive(subject: GatewaySubject, wanted: Move | Home, subscription: Subscription) -> None:
     """Raises `Ignored` for a twin on a line whose drive is off, because its answer may come later, and `Refusal` after a stop."""
     part = next((one for one in subject.description.controllers if one.name == wanted.controller), None)
     if part is None or part.is_real or part.line is None:
@@ -188,7 +188,7 @@ async def _check_drive(subject: GatewaySubject, wanted: Move | Home, following: 
         if drive["enabled"] is not False:
             return
         await asyncio.sleep(BETWEEN_LOOKS_S)
-        missed, events = following.take()
+        missed, events = subscription.take()
         if missed or any(isinstance(one.payload, InputPayload) and one.payload.what == "stop" for one in events):
             raise Refusal(f"{type_of(wanted).name} was not sent: a stop was requested meanwhile")
     raise Ignored(f"{part.name}: M{wanted.axis} is not enabled: switch its drive on first")

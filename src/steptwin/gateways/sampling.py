@@ -24,8 +24,8 @@ from steptwin.gateways.points import CLOCK, State
 from steptwin.subject import commands as command
 from steptwin.subject.contract import AsyncSubject
 from steptwin.subject.events import Event
-from steptwin.subject.following import USUAL, Filter, Following
 from steptwin.subject.payloads import RestoredPayload
+from steptwin.subject.subscriptions import USUAL, Filter, Subscription
 
 KINDS = USUAL | {"write"}
 """Kinds of events; a write of a program on a line may change what no other event tells."""
@@ -63,7 +63,7 @@ class SharedSamples:
     def __init__(self, subject: AsyncSubject) -> None:
         self.subject = subject
         self._samplers: list[Sampler] = []
-        self._following: Following | None = None
+        self._subscription: Subscription | None = None
         self._latest: dict[str, tuple[float, Sample]] = {}
         """The last sample of each controller, and when it was taken by the clock of the event loop."""
         self._past: set[str] = set()
@@ -77,9 +77,9 @@ class SharedSamples:
         self._registers: dict[str, tuple[str, ...]] = {}
 
     def join(self, sampler: Sampler) -> None:
-        if self._following is None:
-            self._following = self.subject.follow(Filter(KINDS), MOST_EVENTS)
-            self._following.on_event = self._wake
+        if self._subscription is None:
+            self._subscription = self.subject.subscribe(Filter(KINDS), MOST_EVENTS)
+            self._subscription.on_event = self._wake
             for part in self.subject.description.controllers:
                 if not part.is_real:
                     self._held[part.name] = HeldState(part)
@@ -92,9 +92,9 @@ class SharedSamples:
         if sampler in self._samplers:
             self._samplers.remove(sampler)
             self._collect_registers()
-        if self._following is not None and not self._samplers:
-            self._following.close()
-            self._following = None
+        if self._subscription is not None and not self._samplers:
+            self._subscription.close()
+            self._subscription = None
             for known in (self._latest, self._held, self._whole, self._on_line):
                 known.clear()
 
@@ -115,9 +115,9 @@ class SharedSamples:
 
     def see_events(self) -> None:
         """Tell all samplers what has happened."""
-        if self._following is None or not len(self._following):
+        if self._subscription is None or not len(self._subscription):
             return
-        missed, events = self._following.take()
+        missed, events = self._subscription.take()
         if missed or any(isinstance(event.payload, RestoredPayload) for event in events):
             self._past.update(self._latest)
             for sampler in self._samplers:

@@ -19,8 +19,8 @@ from steptwin.history.rows import EventRow, KeptValue, PlanRow, PointRow, RowBat
 from steptwin.motion.planjson import plan_to_json
 from steptwin.subject.contract import ControllerDescription
 from steptwin.subject.events import Event
-from steptwin.subject.following import filter_of
 from steptwin.subject.payloads import SHOWN_KINDS, CoordinatePayload, EdgePayload, PlanPayload, RestoredPayload
+from steptwin.subject.subscriptions import filter_of
 
 MOST_EVENTS = 100_000
 """Between two looks."""
@@ -95,7 +95,7 @@ class Recorder:
         self._controllers = {part.name: part for part in subject.description.controllers}
         self._has_devices = any(part.is_real for part in self._controllers.values())
         kinds = SHOWN_KINDS if self._has_devices else TWIN_KINDS
-        self._following = subject.follow(filter_of(kinds), MOST_EVENTS)
+        self._subscription = subject.subscribe(filter_of(kinds), MOST_EVENTS)
         self._points: list[PointRow] = []
         self._sampled: dict[str, list[tuple[int, GatewayPoint]]] = {CLOCK: self._add(CLOCK, SHARED_CLOCK_POINTS)}
         self._axes: dict[tuple[str, str], _Axis] = {}
@@ -139,7 +139,7 @@ class Recorder:
 
     def close(self) -> None:
         self._sampler.close()
-        self._following.close()
+        self._subscription.close()
 
     # ------------------------------------------------------------------ runs
 
@@ -151,7 +151,7 @@ class Recorder:
         now, wall = _time(clock), self._clock.wall_us()
         self._steady = self._clock.steady_us()
         head = self._begin_run(now, wall)
-        self._following.take()
+        self._subscription.take()
         self._take_plans(wall)
         self._take_sample(clock, now, wall)
         await self._take_all(now, wall)
@@ -200,7 +200,7 @@ class Recorder:
         if clock.state is not None:
             speed = clock.state["speed"]
             self._speed = speed if isinstance(speed, int | float) and speed and not clock.state["paused"] else 0.0
-        missed, events = self._following.take()
+        missed, events = self._subscription.take()
         found: list[RunHead | RowBatch] = []
         while (place := _restored(events)) is not None:
             for event in events[:place]:

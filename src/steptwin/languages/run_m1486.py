@@ -51,7 +51,7 @@ from steptwin.simulation.describe.generated import InputChange, Whole
 from steptwin.simulation.describe.generated_m1486 import chip_name, m1486_world
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.kinds.m1486.memory import PLACE
-from steptwin.simulation.kinds.programs import StatementFollower
+from steptwin.simulation.kinds.programs import StatementSubscription
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.wire.slave import FrameDirection
 
@@ -112,7 +112,7 @@ def run(options: M1486Run, out: Print, warn: Print) -> bool:
                 world.downloaded[name, PLACE] = source  # what the host is about to type
         reports.observe(world, Path())
         if options.trace is not None:
-            StatementFollower(world.programs, world.trace.add)
+            StatementSubscription(world.programs, world.trace.add)
         chips = Chips(world, len(typed), changes)
         limit = options.longest
         begin = time.perf_counter()
@@ -155,7 +155,7 @@ class Chips:
         for name, chip in self.chips.items():
             for event in chip.events:
                 self._happens(name, event)
-        world.trace.watchers.append(self._recorded)
+        world.trace.subscribers.append(self._recorded)
 
     def _recorded(self, record: TraceRecord) -> None:
         if record.kind == "event" and record.controller in self.chips:

@@ -50,7 +50,7 @@ from steptwin.simulation.describe.generated import Whole
 from steptwin.simulation.describe.generated_mic488 import mic488_world
 from steptwin.simulation.describe.overrides import NO_OVERRIDES
 from steptwin.simulation.kinds.mic488.program_watch import ProgramEvent, ProgramWatch
-from steptwin.simulation.kinds.programs import StatementFollower
+from steptwin.simulation.kinds.programs import StatementSubscription
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.wbc.dialect import DEFAULT, dialect_for
 from steptwin.wbc.interpreter import STATEMENT_TIME
@@ -96,7 +96,7 @@ def run(options: WbcRun, out: Print, warn: Print) -> bool:
         watch = RunWatch(world)
         reports.observe(world, Path())
         if keep_trace:
-            StatementFollower(world.programs, world.trace.add)
+            StatementSubscription(world.programs, world.trace.add)
         if is_late:
             given.start(watch.device)
         limit = options.longest
@@ -193,7 +193,7 @@ class RunWatch(ProgramWatch):
         super().__init__(device, world.objects.scheduler_of[NAME], NAME)
         for event in device.events:  # those of power-on
             self._emit(event.time, event.code, event.text)
-        world.trace.watchers.append(self._recorded)
+        world.trace.subscribers.append(self._recorded)
 
     def _recorded(self, record: TraceRecord) -> None:
         if record.kind == "event" and record.controller == NAME:

@@ -32,8 +32,8 @@ from steptwin.simulation.toml.addresses import check_addresses
 from steptwin.subject.commands import Command, Jog
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event, Numbering
-from steptwin.subject.following import Filter, Following
 from steptwin.subject.jogs import ExtendableJog
+from steptwin.subject.subscriptions import Filter, Subscription
 from steptwin.textcodec import decode
 
 
@@ -124,8 +124,8 @@ class _Devices:
     async def begin_jog(self, wanted: Jog, /) -> ExtendableJog:
         return await result_of(start(self._subject.begin_jog(wanted)))
 
-    def follow(self, what: Filter, bound: int) -> Following:
-        return self._subject.follow(what, bound)
+    def subscribe(self, what: Filter, bound: int) -> Subscription:
+        return self._subject.subscribe(what, bound)
 
     def traffic(self) -> Mapping[str, LineTraffic]:
         return {f"{name}.line": LineTraffic(*counts) for name, counts in self._connections.traffic().items()}

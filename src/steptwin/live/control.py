@@ -1,7 +1,7 @@
 """The control endpoint of a running twin: a shell around its dispatcher, over a local socket or over TCP on this computer.
 
 Messages are lines of JSON, as ``docs/control.md`` describes them. Every request has exactly one answer, in order; events of
-a ``follow`` come after its answer, with its id. Only the user who started the twin can open the local socket; over TCP the
+a ``subscribe`` come after its answer, with its id. Only the user who started the twin can open the local socket; over TCP the
 first line is a token that only this user can read. Requests, waiting events and clients are bounded.
 """
 
@@ -23,17 +23,17 @@ from steptwin.later import start
 from steptwin.live.directory import private_directory, runtime_directory
 from steptwin.messages import Message
 from steptwin.simulation.toml.addresses import Address
-from steptwin.subject.commands import Command, Follow, Time, Unfollow
+from steptwin.subject.commands import Command, Subscribe, Time, Unsubscribe
 from steptwin.subject.contract import PlannedSubject, Result
 from steptwin.subject.dispatch import FORM, LONGEST_REQUEST, JsonObject, failure, read_message, respond
-from steptwin.subject.following import Following, filter_of
+from steptwin.subject.subscriptions import Subscription, filter_of
 from steptwin.system import reason
 
 HAS_LOCAL_SOCKETS = hasattr(socket, "AF_UNIX")
 TIMEOUT_S = 10.0
 """Time-out of a request, of a client without requests, and of a client that does not read, s."""
 MOST_CLIENTS = 64
-MOST_FOLLOWED = 16
+MOST_SUBSCRIPTIONS = 16
 """Follows of one client."""
 MOST_WAITING_BYTES = 1 << 18
 """Unread answers and events of a client above which nothing more is written, bytes."""
@@ -125,9 +125,9 @@ TOKEN_COMES_FIRST = Message(
     "live.token-comes-first", 'the first line of a connection is {{"token": TOKEN}}, with the token of this twin'
 )
 UNKNOWN_SUBSCRIPTION = Message("live.unknown-subscription", "no subscription has the id {name!r}")
-NO_ID_TO_FOLLOW = Message("live.no-id-to-follow", "follow: an id is required; its events carry it")
-FOLLOWED_ALREADY = Message("live.followed-already", "follow: the id {name!r} is in use")
-TOO_MANY_FOLLOWED = Message("live.too-many-followed", "follow: there are {most} already, the most for a client")
+SUBSCRIPTION_WITHOUT_ID = Message("live.subscription-without-id", "subscribe: an id is required; its events carry it")
+SUBSCRIPTION_ID_IN_USE = Message("live.subscription-id-in-use", "subscribe: the id {name!r} is in use")
+TOO_MANY_SUBSCRIPTIONS = Message("live.too-many-subscriptions", "subscribe: there are {most} already, the most for a client")
 
 
 class _Conversation(asyncio.Protocol):
@@ -146,7 +146,7 @@ class _Conversation(asyncio.Protocol):
         """Whether writing waits for the client to read."""
         self._is_asked = False
         """Whether the answer to a request is still to come; the next one is read after it."""
-        self._following: dict[object, Following] = {}
+        self._subscriptions: dict[object, Subscription] = {}
         self._timer: asyncio.TimerHandle | None = None
         self._is_due = False
 
@@ -180,12 +180,12 @@ class _Conversation(asyncio.Protocol):
     def connection_lost(self, exc: Exception | None) -> None:
         self._calm()
         self._clients.discard(self)
-        self._unfollow_all()
+        self._unsubscribe_all()
 
-    def _unfollow_all(self) -> None:
-        for following in self._following.values():
-            following.close()
-        self._following.clear()
+    def _unsubscribe_all(self) -> None:
+        for subscription in self._subscriptions.values():
+            subscription.close()
+        self._subscriptions.clear()
 
     def abort(self) -> None:
         self._calm()
@@ -194,7 +194,7 @@ class _Conversation(asyncio.Protocol):
     def eof_received(self) -> bool:
         """Answer the remaining requests after the client has closed its sending side, and end its subscriptions."""
         self._has_ended = True
-        self._unfollow_all()
+        self._unsubscribe_all()
         if self._received and not self._is_full:
             self._end(failure(Misuse(REQUEST_WITHOUT_END(form=FORM()))))
         return self._is_full or self._is_asked
@@ -276,27 +276,27 @@ class _Conversation(asyncio.Protocol):
         self._write({"ok": None})
 
     async def _do(self, wanted: Command, identity: object) -> Result:
-        if isinstance(wanted, Follow):
-            return self._subject.do(Time())._replace(value=self._follow(wanted, identity))
-        if isinstance(wanted, Unfollow):
-            following = self._following.pop(wanted.id, None)
-            if following is None:
+        if isinstance(wanted, Subscribe):
+            return self._subject.do(Time())._replace(value=self._subscribe(wanted, identity))
+        if isinstance(wanted, Unsubscribe):
+            subscription = self._subscriptions.pop(wanted.id, None)
+            if subscription is None:
                 raise Misuse(UNKNOWN_SUBSCRIPTION(name=wanted.id))
-            following.close()
+            subscription.close()
             return self._subject.do(Time())._replace(value=None)
         return await self._subject.answer(wanted)
 
-    def _follow(self, wanted: Follow, identity: object) -> object:
+    def _subscribe(self, wanted: Subscribe, identity: object) -> object:
         if identity is None:
-            raise Misuse(NO_ID_TO_FOLLOW())
-        if identity in self._following:
-            raise Misuse(FOLLOWED_ALREADY(name=identity))
-        if len(self._following) >= MOST_FOLLOWED:
-            raise Misuse(TOO_MANY_FOLLOWED(most=MOST_FOLLOWED))
+            raise Misuse(SUBSCRIPTION_WITHOUT_ID())
+        if identity in self._subscriptions:
+            raise Misuse(SUBSCRIPTION_ID_IN_USE(name=identity))
+        if len(self._subscriptions) >= MOST_SUBSCRIPTIONS:
+            raise Misuse(TOO_MANY_SUBSCRIPTIONS(most=MOST_SUBSCRIPTIONS))
         what = filter_of(wanted.kinds, wanted.controllers, wanted.axes)
         plans = [plan.to_json() for plan in self._subject.plans(what)]
-        following = self._following[identity] = self._subject.follow(what, wanted.bound)
-        following.on_event = self._events_came
+        subscription = self._subscriptions[identity] = self._subject.subscribe(what, wanted.bound)
+        subscription.on_event = self._events_came
         return {"plans": plans}
 
     # ------------------------------------------------------------------ what is sent
@@ -319,15 +319,15 @@ class _Conversation(asyncio.Protocol):
     def _send_events(self) -> None:
         """Write events until the client has to read first; the bound of each subscription limits the rest."""
         self._is_due = False
-        for identity, following in self._following.items():
+        for identity, subscription in self._subscriptions.items():
             if self._is_full or self._transport.is_closing():
                 return
-            missed, events = following.take(EVENTS_AT_ONCE)
+            missed, events = subscription.take(EVENTS_AT_ONCE)
             for event in events:
                 lost: JsonObject = {"missed": missed} if missed else {}
                 self._write({"id": identity, "event": event.to_json(), **lost})
                 missed = 0
-            if len(following):
+            if len(subscription):
                 self._events_came()
 
 

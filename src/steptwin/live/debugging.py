@@ -1,8 +1,8 @@
 """The debugger of a world that runs in real time (`steptwin.subject.debugcommands`).
 
-It exists while its events are followed. Before the world goes on, the debugger looks ahead (`Debugger.look_ahead`) and limits
-it; so time stops at a breakpoint, and `Pause` and `Resume` do what they always do. While time stands it can look at the past, as
-far as that is kept.
+It exists while somebody subscribes to its events. Before the world goes on, the debugger looks ahead (`Debugger.look_ahead`) and
+limits it; so time stops at a breakpoint, and `Pause` and `Resume` do what they always do. While time stands it can look at the
+past, as far as that is kept.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ class _Requested(NamedTuple):
     """How often it was set and not removed: it stays until each of its clients has removed it."""
 
 
-STOPS_NEED_A_FOLLOWER = Message(
-    "live.stops-need-a-follower", "without a follower a stop is not reported: follow events of kind {kind!r} first"
+STOPS_NEED_A_SUBSCRIBER = Message(
+    "live.stops-need-a-subscriber", "without a subscriber a stop is not reported: subscribe to events of kind {kind!r} first"
 )
 TOO_MANY_BREAKPOINTS = Message("live.too-many-breakpoints", "{most} breakpoints are set, as many as may be")
 WRONG_BREAKPOINT = Message("live.wrong-breakpoint", "breakpoint: {problem}")
@@ -60,17 +60,17 @@ class Debugging:
         self._realtime = realtime
         self._pace = pace
         self._breakpoints: dict[int, _Requested] = {}
-        """They stay without a follower; time does not stop at them then."""
+        """They stay without a subscriber; time does not stop at them then."""
         self._set: dict[int, SetPoint] = {}
         """Results of setting them."""
         self._next = 1
         self._events: tuple[str, ...] = ()
         self._said = BreakpointsPayload((), ())
         self._open: _OpenDebugger | None = None
-        live.subject.on_followed = self._followed
+        live.subject.on_subscribed = self._subscribed
 
-    def _followed(self) -> None:
-        if self._open is not None and not self._is_followed:
+    def _subscribed(self) -> None:
+        if self._open is not None and not self._has_subscribers:
             is_at_stop = self._open.is_at_stop
             self._open.close()
             self._open = None
@@ -78,14 +78,14 @@ class Debugging:
                 self._live.show("the debugger has disconnected and time is paused: 'steptwin resume' continues it")
 
     @property
-    def _is_followed(self) -> bool:
-        return StoppedPayload.kind in self._live.subject.followers.kinds
+    def _has_subscribers(self) -> bool:
+        return StoppedPayload.kind in self._live.subject.subscribers.kinds
 
     def _opened(self) -> _OpenDebugger:
-        """Raises `Refusal` without a follower of stops, and `Misuse` for a world that cannot be debugged."""
+        """Raises `Refusal` without a subscriber of stops, and `Misuse` for a world that cannot be debugged."""
         if self._open is None:
-            if not self._is_followed:
-                raise Refusal(STOPS_NEED_A_FOLLOWER(kind=StoppedPayload.kind))
+            if not self._has_subscribers:
+                raise Refusal(STOPS_NEED_A_SUBSCRIBER(kind=StoppedPayload.kind))
             self._open = _OpenDebugger(self._live, self._realtime, self._pace, self._renew, self._numbers)
             self._open.debugger.set_events([_EVENTS[name] for name in self._events])
             self._renew()
@@ -250,7 +250,7 @@ class _OpenDebugger:
         """The payload of the present stop; None while time goes on."""
         self._then: Goal | None = None
         """Goal of the search once it has come to the present."""
-        live.world.input_watchers.append(self._given)
+        live.world.input_subscribers.append(self._given)
         live.run_control = self
         if pace.is_paused:
             self.debugger.stand()
@@ -266,7 +266,7 @@ class _OpenDebugger:
         self._end_travel()
         self._realtime.enter()
         self._live.run_control = None
-        self._live.world.input_watchers.remove(self._given)
+        self._live.world.input_subscribers.remove(self._given)
         self.debugger.close()
         self._end_time_travel()
         self._live.is_dirty = True

@@ -9,7 +9,7 @@ from steptwin.files.world import World
 from steptwin.live.output import Output
 from steptwin.live.server import EndPoint, Server
 from steptwin.live.world import LiveWorld
-from steptwin.live.world_frames import follow_frames
+from steptwin.live.world_frames import subscribe_to_frames
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.world.records import ALL, Selection
 
@@ -38,7 +38,7 @@ class Lines:
         self._output = output
         self._selection = selection
         if frames:
-            follow_frames(live, output.frame)
+            subscribe_to_frames(live, output.frame)
 
     def notice(self, text: str) -> None:
         self._output.notice(text)
@@ -47,7 +47,7 @@ class Lines:
         self._output.begin(head, announcement)
         for record in filter(self._selection.shows, past):
             self._output.record(record)
-        self._live.world.trace.watchers.append(self._print)
+        self._live.world.trace.subscribers.append(self._print)
 
     async def show(self, server: Server) -> None:
         await server.until_ended()
@@ -63,7 +63,7 @@ class Notices:
     def __init__(self, live: LiveWorld, output: Output, *, frames: bool) -> None:
         self._output = output
         if frames:
-            follow_frames(live, output.frame)
+            subscribe_to_frames(live, output.frame)
 
     def notice(self, text: str) -> None:
         self._output.notice(text)

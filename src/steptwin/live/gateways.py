@@ -24,8 +24,8 @@ from steptwin.simulation.kinds.lines import LineTraffic
 from steptwin.subject.commands import Command, Jog, type_of
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event
-from steptwin.subject.following import Filter, Following
 from steptwin.subject.jogs import ExtendableJog, WorldJogs
+from steptwin.subject.subscriptions import Filter, Subscription
 from steptwin.tracing import span
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ async def open_gateways(
         opened.append(OpenGateway(HISTORY, str(details["url"]), keeper))
         subject.history = keeper.history
         if audit is not None:
-            audit.watchers.append(keeper.log)
+            audit.subscribers.append(keeper.log)
     with without_collections():
         for spec in services.gateways:
             gateway = make_gateway(spec, subject, folder)
@@ -129,8 +129,8 @@ class LiveWorldSubject:
             self._live.external_actor = WorldJogs(self._live.subject, self._control.at_present)
         return await self._live.external_actor.begin_jog(wanted)
 
-    def follow(self, what: Filter, bound: int) -> Following:
-        return self._control.follow(what, bound)
+    def subscribe(self, what: Filter, bound: int) -> Subscription:
+        return self._control.subscribe(what, bound)
 
     def traffic(self) -> Mapping[str, LineTraffic]:
         return {name: line.traffic for name, line in self._live.world.lines.items()}

@@ -28,8 +28,8 @@ from steptwin.simulation.world.snapshot import SimulationSnapshot
 from steptwin.subject import commands as command
 from steptwin.subject.dispatch import Action
 from steptwin.subject.events import line_of
-from steptwin.subject.following import Following
 from steptwin.subject.payloads import PacePayload
+from steptwin.subject.subscriptions import Subscription
 from steptwin.subject.time import MOST_SHOWN, end_of, happened, shown_of
 
 if TYPE_CHECKING:
@@ -143,7 +143,7 @@ class Pace:
         return PacePayload(paused=False, speed=None if self.speed == inf else self.speed)
 
     def _say(self, pace: PacePayload) -> None:
-        """Notify users and followers."""
+        """Notify users and subscribers."""
         self._show(line_of(self._live.now, WORLD, pace.text))
         self._live.subject.paced(pace)
 
@@ -192,11 +192,11 @@ class Pace:
 
     # ------------------------------------------------------------------ steps
 
-    def step(self, end: Nanos, condition: SignalCondition | None, following: Following) -> bool | None:
+    def step(self, end: Nanos, condition: SignalCondition | None, subscription: Subscription) -> bool | None:
         """Advance to the moment ``end``, or until a condition is true; returns whether the condition ended it, None if
         unfinished.
 
-        A part also ends when ``following`` is full.
+        A part also ends when ``subscription`` is full.
         """
         live = self._live
         world = live.world
@@ -210,7 +210,7 @@ class Pace:
                     return True
                 if live.now >= end or world.stopped is not None:
                     return False
-                if moves and (perf_counter() > until or len(following) >= MOST_SHOWN // 2):
+                if moves and (perf_counter() > until or len(subscription) >= MOST_SHOWN // 2):
                     return None
                 deadlines = [end, live.deadline(), None if condition is None else condition.due(live.now)]
                 live.advance(max(live.now, min(due for due in deadlines if due is not None)))
@@ -252,17 +252,17 @@ class Pace:
         condition = None if wanted.until is None else live.world.condition(wanted.until)
         self.pause()
         end = end_of(live.world, wanted, live.deadline())
-        following = live.subject.follow(shown_of(wanted), MOST_SHOWN)
+        subscription = live.subject.subscribe(shown_of(wanted), MOST_SHOWN)
         try:
-            came = False if end is None else self.step(end, condition, following)
+            came = False if end is None else self.step(end, condition, subscription)
         finally:
-            following.close()
+            subscription.close()
         if came is not None:
             self._report_pause()
         rest = {} if came is not None else {"to_ns": str(end)}
         return {
             **self.where(),
-            **happened(following),
+            **happened(subscription),
             "came": came is True,
             "idle": end is None,
             "statements": self._statements(),

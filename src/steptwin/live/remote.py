@@ -21,7 +21,7 @@ from steptwin.subject.commands import command_to_json
 from steptwin.subject.contract import Description, Reading, Result, read_description
 from steptwin.subject.dispatch import raised
 from steptwin.subject.events import Event, read_event
-from steptwin.subject.following import EventBatch, Filter, Following
+from steptwin.subject.subscriptions import EventBatch, Filter, Subscription
 from steptwin.system import reason
 
 LONGEST_ANSWER = 64 << 20
@@ -110,7 +110,7 @@ class RemoteSubject:
         self._timeout_s = timeout_s
         self._received = b""
         self._ids = count(1)
-        self._following: dict[object, _RemoteFollowing] = {}
+        self._subscriptions: dict[object, _RemoteSubscription] = {}
         self._description: Description | None = None
         try:
             self._socket = _connected(self.name, timeout_s)
@@ -138,15 +138,15 @@ class RemoteSubject:
     def do(self, wanted: command.Command) -> Result:
         return self._ask(wanted, next(self._ids))
 
-    def follow(self, what: Filter, bound: int) -> Following:
-        following, _ = self.follow_from_now(what, bound)
-        return following
+    def subscribe(self, what: Filter, bound: int) -> Subscription:
+        subscription, _ = self.subscribe_from_now(what, bound)
+        return subscription
 
-    def follow_from_now(self, what: Filter, bound: int) -> tuple[Following, list[Event]]:
-        """As `follow`, with the present plans of the axes that ``what`` wants."""
+    def subscribe_from_now(self, what: Filter, bound: int) -> tuple[Subscription, list[Event]]:
+        """As `subscribe`, with the present plans of the axes that ``what`` wants."""
         identity = next(self._ids)
-        following = self._following[identity] = _RemoteFollowing(self, identity, what, bound)
-        wanted = command.Follow(
+        subscription = self._subscriptions[identity] = _RemoteSubscription(self, identity, what, bound)
+        wanted = command.Subscribe(
             tuple(sorted(what.kinds)),
             None if what.controllers is None else tuple(sorted(what.controllers)),
             None if what.axes is None else tuple(sorted(what.axes)),
@@ -155,13 +155,13 @@ class RemoteSubject:
         try:
             answer = self._ask(wanted, identity)
         except BaseException:
-            del self._following[identity]
+            del self._subscriptions[identity]
             raise
-        return following, [read_event(plan) for plan in answer.value["plans"]]
+        return subscription, [read_event(plan) for plan in answer.value["plans"]]
 
-    def unfollow(self, identity: int) -> None:
-        if self._following.pop(identity, None) is not None:
-            self.do(command.Unfollow(identity))
+    def unsubscribe(self, identity: int) -> None:
+        if self._subscriptions.pop(identity, None) is not None:
+            self.do(command.Unsubscribe(identity))
 
     # ------------------------------------------------------------------ messages
 
@@ -217,10 +217,10 @@ class RemoteSubject:
             yield message
 
     def _take_event(self, message: Mapping[str, Any]) -> None:
-        following = self._following.get(message.get("id"))
-        if following is not None and "event" in message:
-            following.miss(message.get("missed", 0))
-            following.add(read_event(message["event"]))
+        subscription = self._subscriptions.get(message.get("id"))
+        if subscription is not None and "event" in message:
+            subscription.miss(message.get("missed", 0))
+            subscription.add(read_event(message["event"]))
 
     def _silent(self, why: object) -> LineFailure:
         text = reason(why) if isinstance(why, OSError) else why
@@ -233,13 +233,13 @@ def _result(message: Mapping[str, Any]) -> Result:
     return Result(message["ok"], int(message["time_ns"]), message["number"])
 
 
-class _RemoteFollowing(Following):
+class _RemoteSubscription(Subscription):
     """Events of a connection, which are fetched when they are taken."""
 
     __slots__ = ("_remote",)
 
     def __init__(self, remote: RemoteSubject, identity: int, what: Filter, bound: int) -> None:
-        super().__init__(what, bound, lambda _: remote.unfollow(identity))
+        super().__init__(what, bound, lambda _: remote.unsubscribe(identity))
         self._remote = remote
 
     def take(self, most: int | None = None) -> EventBatch:

@@ -19,7 +19,7 @@ from steptwin.messages import Message
 from steptwin.simulation.world.snapshot import SimulationSnapshot
 from steptwin.simulation.world.snapshotlog import PastWorld, SnapshotLog
 from steptwin.simulation.world.worldprograms import WorldPrograms
-from steptwin.subject.following import EventBatch, Filter
+from steptwin.subject.subscriptions import EventBatch, Filter
 from steptwin.subject.world import WorldSubject
 
 STATE_S = 1.0
@@ -128,7 +128,7 @@ class WorldPastView:
         self, begin: Nanos, end: Nanos, what: Filter, bound: int, at_begin: Callable[[WorldSubject], T]
     ) -> Later[tuple[T, EventBatch]]:
         """To ``end``; see `WorldTimeTravel.events`."""
-        return self._begin(self._follow(begin, end, what, bound, at_begin))
+        return self._begin(self._subscribe(begin, end, what, bound, at_begin))
 
     def state_at(self, moment: Nanos) -> Later[SimulationSnapshot]:
         """See `WorldTimeTravel.state_at`."""
@@ -138,17 +138,17 @@ class WorldPastView:
         yield from self._past.go(moment)
         return self._past.world.snapshot()
 
-    def _follow(
+    def _subscribe(
         self, begin: Nanos, end: Nanos, what: Filter, bound: int, at_begin: Callable[[WorldSubject], T]
     ) -> Generator[None, None, tuple[T, EventBatch]]:
         yield from self._past.go(begin)
         found = at_begin(self.subject)
-        following = self.subject.follow(what, bound)
+        subscription = self.subject.subscribe(what, bound)
         try:
             yield from self._past.go_on(end)
         finally:
-            following.close()
-        return found, following.take()
+            subscription.close()
+        return found, subscription.take()
 
     def _begin(self, parts: Iterator[None]) -> Later[Any]:
         if self._going is not None:

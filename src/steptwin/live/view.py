@@ -16,7 +16,7 @@ from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.server import Server
 from steptwin.live.view_controller import controller_lines
 from steptwin.live.world import LiveWorld
-from steptwin.live.world_frames import follow_frames
+from steptwin.live.world_frames import subscribe_to_frames
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.world.records import ALL, Selection, describe
 from steptwin.wire.frameline import FrameLine
@@ -42,8 +42,8 @@ class LiveView:
         self._events: deque[str] = deque(maxlen=EVENTS_SHOWN)
         self._head: list[Text] = []
         self._timer: asyncio.TimerHandle | None = None
-        follow_frames(live, self._frames.append)
-        live.world.trace.watchers.append(self._record)
+        subscribe_to_frames(live, self._frames.append)
+        live.world.trace.subscribers.append(self._record)
 
     def notice(self, text: str) -> None:
         self._events.append(f"{self._live.now / SECOND:12.6f} s  {text}")

@@ -17,9 +17,9 @@ from steptwin.simulation.world.model import WORLD
 from steptwin.subject import commands as command
 from steptwin.subject.contract import ControllerDescription
 from steptwin.subject.events import Event
-from steptwin.subject.following import USUAL, filter_of
 from steptwin.subject.motion import Motions
 from steptwin.subject.payloads import PacePayload
+from steptwin.subject.subscriptions import USUAL, filter_of
 
 BOUND = 10_000
 SETTLING_NS: Nanos = 100 * MILLISECOND
@@ -53,14 +53,14 @@ class TwinWatch:
         # What a master writes shows in the frames of the line alone.
         places = (self._part.name, WORLD, *(() if self._part.line is None else (self._part.line,)))
         what = filter_of(USUAL - {"load"} | {"frame"}, places)
-        self._following, plans = self._subject.follow_from_now(what, BOUND)
+        self._subscription, plans = self._subject.subscribe_from_now(what, BOUND)
         self._motions = Motions(self._part, plans)
         self._ask_time()
         self._due = self.now()
 
     def close(self) -> None:
         """Follow no more; ``subject`` stays open."""
-        self._following.close()
+        self._subscription.close()
 
     # ------------------------------------------------------------------ time
 
@@ -82,9 +82,9 @@ class TwinWatch:
         """Values and units, by path."""
         if not self._speed:
             self._ask_time()  # first, so that what has happened by then is among the events
-        missed, events = self._following.take()
+        missed, events = self._subscription.take()
         if missed:
-            self._following.close()
+            self._subscription.close()
             self._begin()
         for event in events:
             self._take(event)

@@ -112,7 +112,7 @@ class LiveWorld:
         self._next: Nanos | None = None
         """The deadline computed last, ns."""
         self._deadlines = _Deadlines(world.schedulers)
-        world.watch_schedulers(self._changed)
+        world.subscribe_to_schedulers(self._changed)
         self.ring: Ring | None = None
         """The ring of last records, if kept."""
         self.snapshots: SnapshotLog | None = None

@@ -14,7 +14,7 @@ from steptwin.subject import commands as command
 from steptwin.subject import debugcommands
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event
-from steptwin.subject.following import Filter, Following
+from steptwin.subject.subscriptions import Filter, Subscription
 
 T = TypeVar("T")
 
@@ -56,8 +56,8 @@ class WorldControl:
             return result._replace(value=await result.value)
         return result
 
-    def follow(self, what: Filter, bound: int) -> Following:
-        return self.subject.follow(what, bound)
+    def subscribe(self, what: Filter, bound: int) -> Subscription:
+        return self.subject.subscribe(what, bound)
 
     def plans(self, what: Filter) -> list[Event]:
         return self.at_present(lambda: self.subject.plans(what))

@@ -12,7 +12,7 @@ from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.wire.frameline import FrameLine
 
 
-def follow_frames(live: LiveWorld, sink: Callable[[FrameLine], None]) -> None:
+def subscribe_to_frames(live: LiveWorld, sink: Callable[[FrameLine], None]) -> None:
     """Decode the traffic of every line for ``sink``; ports opened from now on are included.
 
     With several lines, a link is shown with its line: ``bus/tcp-1``.
@@ -21,9 +21,9 @@ def follow_frames(live: LiveWorld, sink: Callable[[FrameLine], None]) -> None:
     for spec in world.spec.lines:
         line = world.lines[spec.name]
         log = line_kinds()[spec.kind].traffic_log(line, "" if len(world.lines) == 1 else f"{line.name}/", sink)
-        line.follow_frames(log)
+        line.subscribe_to_frames(log)
         members = {name for name, (on, _) in world.objects.line_of.items() if on is line}
-        world.trace.watchers.append(partial(_recorded, log, members))
+        world.trace.subscribers.append(partial(_recorded, log, members))
 
 
 def _recorded(log: TrafficLog, members: Collection[str], record: TraceRecord) -> None:

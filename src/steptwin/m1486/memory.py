@@ -36,7 +36,7 @@ class StoredFile(NamedTuple):
     labels: dict[int, int]
 
 
-class MemoryObserver(Protocol):
+class MemorySubscriber(Protocol):
     """The executor of the commands, which is notified of overwritten ones."""
 
     def bytes_changed(self, first: int, count: int) -> None: ...
@@ -49,7 +49,7 @@ class CommandMemory(Stateful):
     FIXED: ClassVar[tuple[str, ...]] = ("_reader", "_shared", "size", "span")
     __slots__ = (*FIXED, "_bytes", "_file_labels", "_own", "begin", "end", "file", "labels", "write")
 
-    def __init__(self, variant: Variant, reader: MemoryObserver) -> None:
+    def __init__(self, variant: Variant, reader: MemorySubscriber) -> None:
         self._reader = reader
         self.size = variant.memory_bits // 8
         self.span = 2 * self.size

@@ -277,11 +277,11 @@ class ProgramExecution(Stateful):
 
     # ------------------------------------------------------------------ hooks
 
-    def hook(self, hook: StatementHook, places: Collection[int] | None = None) -> None:
+    def add_hook(self, hook: StatementHook, places: Collection[int] | None = None) -> None:
         """Call ``hook`` before each command at these places from now on; None: before all."""
         self._set_hooks((*self._hooks, HookedStatements(hook, places)))
 
-    def unhook(self, hook: StatementHook) -> None:
+    def remove_hook(self, hook: StatementHook) -> None:
         self._set_hooks(without(self._hooks, hook))
 
     def _set_hooks(self, hooks: StatementHooks) -> None:

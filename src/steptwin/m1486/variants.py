@@ -32,7 +32,7 @@ class Variant:
     memory_bits: int
     store: Store
     type_letter: int
-    """Letter that U20 sends; that of C is interpretation M-15."""
+    """Letter that U20 sends; that of C is assumption M-15."""
     addresses: range = range(16)
     """Addresses the pins can give and ``X`` can name."""
     shared_bits: int = 0

@@ -37,15 +37,15 @@ PAUSE_INSIDE_A_REQUEST = Message(
 )
 
 
-def pause_observer(devices: Mapping[int, Mic488Device]) -> Callable[[int, Nanos], None]:
+def pause_callback(devices: Mapping[int, Mic488Device]) -> Callable[[int, Nanos], None]:
     """For ports that serve ``devices``: an event for a request with a pause inside (unit, 0 for all; pause in ns), see MIC-15."""
 
-    def observe(unit: int, pause: Nanos) -> None:
+    def callback(unit: int, pause: Nanos) -> None:
         text = PAUSE_INSIDE_A_REQUEST(pause=pause / MILLISECOND)
         for device in devices.values() if unit == 0 else (devices[unit],):
             device.event("frame-pause", text, device.now)
 
-    return observe
+    return callback
 
 
 class Serving(Protocol):

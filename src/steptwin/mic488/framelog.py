@@ -11,7 +11,7 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.registermap import DataType
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.rtu import BROADCAST
-from steptwin.wire.slave import FrameDirection, FrameObserver
+from steptwin.wire.slave import FrameCallback, FrameDirection
 
 UNFRAMED_BYTE = Message("mic488.unframed-byte", "1 byte that belongs to no frame")
 UNFRAMED_BYTES = Message("mic488.unframed-bytes", "{count} bytes that belong to no frame")
@@ -33,17 +33,17 @@ class FrameLog:
         }
         self.sinks: list[Callable[[FrameLine], None]] = []
 
-    def observer(self, link: str, *, tcp: bool) -> FrameObserver:
-        """An observer for the frames of one connection."""
+    def callback(self, link: str, *, tcp: bool) -> FrameCallback:
+        """The callback for the frames of one connection."""
         asked: dict[int, bytes] = {}
 
-        def observe(now: Nanos, direction: FrameDirection, raw: bytes) -> None:
+        def callback(now: Nanos, direction: FrameDirection, raw: bytes) -> None:
             unit, pdu = (raw[6], raw[7:]) if tcp else (raw[0], raw[1:-2])
             line = FrameLine(now, link, direction, raw, self._meaning(unit, pdu, direction, asked, tcp=tcp))
             for sink in self.sinks:
                 sink(line)
 
-        return observe
+        return callback
 
     def request(self, unit: int, pdu: bytes, *, tcp: bool) -> MessageText:
         """A request in words."""

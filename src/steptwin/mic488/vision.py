@@ -74,13 +74,13 @@ class Com1Port(Stateful):
         self.modbus = modbus
         self._frames: list[bytes] = []
         if modbus is not None:
-            observer = modbus.on_frame
+            callback = modbus.on_frame
 
             def note(now: Nanos, direction: FrameDirection, frame: bytes) -> None:
                 if direction is FrameDirection.IN:
                     self._frames.append(frame)
-                if observer is not None:
-                    observer(now, direction, frame)
+                if callback is not None:
+                    callback(now, direction, frame)
 
             modbus.on_frame = note
 

@@ -40,8 +40,8 @@ from steptwin.studio.watches import Watches
 from steptwin.subject import commands as command
 from steptwin.subject.commands import COMMANDS
 from steptwin.subject.contract import Description, Reading, Result
-from steptwin.subject.following import filter_of
 from steptwin.subject.jogs import ExtendableJog, Jogs
+from steptwin.subject.subscriptions import filter_of
 
 MOST_VIEWERS = 64
 MOST_LEASES = 32

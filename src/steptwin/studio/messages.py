@@ -101,7 +101,7 @@ _ROWS = (
     ),
     MessageRow(
         "events",
-        "What has happened, of what is followed; each event once.",
+        "What has happened, of what the viewer subscribes to; each event once.",
         EVENTS,
         {"time_ns": MOMENT, "missed": {**_COUNT, "description": "Events before these that were dropped."}},
     ),

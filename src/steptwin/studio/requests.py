@@ -180,7 +180,9 @@ class ShowMoment:
 class ReadPastEvents:
     begin: Annotated[Nanos, Meaning("The first moment, or the begin of the past that is kept.", TIME, unit="ns", name="from_ns")]
     end: Annotated[Nanos, Meaning("The last moment.", TIME, unit="ns", name="to_ns")]
-    kinds: Annotated[tuple[str, ...] | None, Meaning("Kinds of events, as for follow.", choices(KINDS, "kind of event"))] = None
+    kinds: Annotated[tuple[str, ...] | None, Meaning("Kinds of events, as for subscribe.", choices(KINDS, "kind of event"))] = (
+        None
+    )
 
 
 @request(
@@ -346,7 +348,7 @@ OF_CAMPAIGNS = _names(CampaignRequest)
 """Requests that need a world of a file."""
 WITH_TOKEN = _names(WorkRequest) | {"connect"}
 """Requests that reach devices, or describe them: they need a token also where nothing else does."""
-OF_CONNECTION = frozenset({"follow", "unfollow", *(one.name for one in REQUESTS.values() if one.is_of_connection)})
+OF_CONNECTION = frozenset({"subscribe", "unsubscribe", *(one.name for one in REQUESTS.values() if one.is_of_connection)})
 
 
 UNKNOWN_REQUEST = Message("studio.unknown-request", "no request {name}{hint}; requests are {names}")

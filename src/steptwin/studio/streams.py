@@ -13,7 +13,7 @@ from itertools import islice
 from typing import NamedTuple, Protocol, TypeAlias
 
 from steptwin.subject.events import Event
-from steptwin.subject.following import Filter, Following
+from steptwin.subject.subscriptions import Filter, Subscription
 
 MOST_WAITING = 10_000
 """Limit of pending events of a stream, and of events that are not distributed to streams yet."""
@@ -109,15 +109,15 @@ class StreamPosition:
 class Followed(Protocol):
     """The followed subject."""
 
-    def follow(self, what: Filter, bound: int) -> Following: ...
+    def subscribe(self, what: Filter, bound: int) -> Subscription: ...
 
 
 class Streams:
-    """All streams, over one subscription to ``subject`` with the kinds that viewers follow."""
+    """All streams, over one subscription to ``subject`` with the kinds that viewers subscribe to."""
 
     def __init__(self, subject: Followed) -> None:
         self._subject = subject
-        self._following: Following | None = None
+        self._subscription: Subscription | None = None
         self._kinds: frozenset[str] = frozenset()
         self._streams: dict[Filters, Stream] = {}
         self.on_event: Callable[[], None] | None = None
@@ -130,7 +130,7 @@ class Streams:
         stream = self._streams.get(wanted)
         if stream is None:
             stream = self._streams[wanted] = Stream(wanted)
-            self._follow()
+            self._subscribe()
         place = StreamPosition(stream, min(bound, MOST_WAITING))
         stream.places.add(place)
         return place
@@ -139,29 +139,29 @@ class Streams:
         stream = place.stream
         stream.places.discard(place)
         if not stream.places and self._streams.pop(stream.filters, None) is not None:
-            self._follow()
+            self._subscribe()
 
-    def _follow(self) -> None:
-        """Update the subscription to the kinds followed now."""
+    def _subscribe(self) -> None:
+        """Update the subscription to the kinds subscribed to now."""
         kinds = frozenset[str]().union(*(one.kinds for filters in self._streams for one in filters))
         if kinds == self._kinds:
             return
-        before, self._kinds = self._following, kinds
-        self._following = None
+        before, self._kinds = self._subscription, kinds
+        self._subscription = None
         if kinds:
-            self._following = self._subject.follow(Filter(kinds), MOST_WAITING)
-            self._following.on_event = self.on_event
+            self._subscription = self._subject.subscribe(Filter(kinds), MOST_WAITING)
+            self._subscription.on_event = self.on_event
         if before is not None:
             self._spread(before)
             before.close()
 
     def flush(self) -> None:
         """Distribute new events to the streams."""
-        if self._following is not None:
-            self._spread(self._following)
+        if self._subscription is not None:
+            self._spread(self._subscription)
 
-    def _spread(self, following: Following) -> None:
-        missed, events = following.take()
+    def _spread(self, subscription: Subscription) -> None:
+        missed, events = subscription.take()
         if not missed and not events:
             return
         streams: Sequence[Stream] = list(self._streams.values())

@@ -15,7 +15,7 @@ from steptwin.studio.programs import ProgramTexts
 from steptwin.studio.watches import Watched
 from steptwin.subject.commands import Command, Encoders, ListFaults, ReadPins, ReadPoints, ReadState
 from steptwin.subject.contract import PlannedSubject, Result
-from steptwin.subject.following import EventBatch, Filter, filter_of
+from steptwin.subject.subscriptions import EventBatch, Filter, filter_of
 
 T = TypeVar("T")
 MOST_PAST_EVENTS = 10_000

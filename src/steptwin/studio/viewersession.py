@@ -40,7 +40,7 @@ from steptwin.subject import commands as command
 from steptwin.subject.commands import VERSION, Command
 from steptwin.subject.contract import Result
 from steptwin.subject.dispatch import LONGEST_REQUEST, JsonObject, answer, code_of, failure, fields_of, id_of, read_message
-from steptwin.subject.following import Filter, filter_of
+from steptwin.subject.subscriptions import Filter, filter_of
 from steptwin.tables import complete
 from steptwin.wire.pcapng import capture
 
@@ -51,14 +51,14 @@ STOPS = frozenset({"stop", "stop_all"})
 MOST_WATCHES = 32
 MOST_WATCHED = 2000
 """Limit of watched points of a viewer."""
-MOST_FOLLOWS = 16
+MOST_SUBSCRIPTIONS = 16
 EVENTS_NS: Nanos = SECOND // 30
 """Events are sent at most this often."""
 LONGEST_NAME = 40
 
 Identity: TypeAlias = object
 MOST_LEFT_OVER = 4
-"""Limit of batches of events that were pending when the followed kinds changed."""
+"""Limit of batches of events that were pending when the subscribed kinds changed."""
 
 
 class Wanted(NamedTuple):
@@ -85,10 +85,10 @@ SECOND_HELLO = Message("studio.second-hello", "hello: this connection has said h
 TOO_MANY_WATCHES = Message("studio.too-many-watches", "watch: there are {most} already, which is the most")
 TOO_MANY_WATCHED_POINTS = Message("studio.too-many-watched-points", "watch: more than {most} points in all")
 UNKNOWN_WATCH = Message("studio.unknown-watch", "unwatch: no watch {number}; there are {names}")
-FOLLOW_WITHOUT_ID = Message("studio.follow-without-id", "follow: give an id, by which it is ended")
-FOLLOW_ID_IN_USE = Message("studio.follow-id-in-use", "follow: the id {id!r} is in use")
-TOO_MANY_FOLLOWS = Message("studio.too-many-follows", "follow: there are {most} already, which is the most")
-UNKNOWN_FOLLOW = Message("studio.unknown-follow", "no subscription has the id {id!r}")
+SUBSCRIPTION_WITHOUT_ID = Message("studio.subscription-without-id", "subscribe: give an id, by which it is ended")
+SUBSCRIPTION_ID_IN_USE = Message("studio.subscription-id-in-use", "subscribe: the id {id!r} is in use")
+TOO_MANY_SUBSCRIPTIONS = Message("studio.too-many-subscriptions", "subscribe: there are {most} already, which is the most")
+UNKNOWN_SUBSCRIPTION = Message("studio.unknown-subscription", "no subscription has the id {id!r}")
 
 
 class ViewerSession:
@@ -130,8 +130,8 @@ class ViewerSession:
             command.StopAxes: lambda wanted, _: hub.stop(wanted),
             command.StopAll: lambda _wanted, _: hub.stop_all(),
             command.Save: lambda wanted, _: hub.subject.do(command.Save(hub.recordings.place(wanted.file))),
-            command.Follow: self._follow,
-            command.Unfollow: lambda wanted, _: self._unfollow(wanted),
+            command.Subscribe: self._subscribe,
+            command.Unsubscribe: lambda wanted, _: self._unsubscribe(wanted),
         }
         """Commands of a subject that mean something else, or more, in the studio."""
 
@@ -331,27 +331,27 @@ class ViewerSession:
             raise Misuse(UNKNOWN_WATCH(number=wanted.watch, names=list(self._watches) or NONE()))
         self._hub.watches.remove(watched)
 
-    async def _follow(self, wanted: command.Follow, identity: Identity) -> Result:
+    async def _subscribe(self, wanted: command.Subscribe, identity: Identity) -> Result:
         if identity is None:
-            raise Misuse(FOLLOW_WITHOUT_ID())
+            raise Misuse(SUBSCRIPTION_WITHOUT_ID())
         if identity in self._follows:
-            raise Misuse(FOLLOW_ID_IN_USE(id=identity))
-        if len(self._follows) >= MOST_FOLLOWS:
-            raise Misuse(TOO_MANY_FOLLOWS(most=MOST_FOLLOWS))
+            raise Misuse(SUBSCRIPTION_ID_IN_USE(id=identity))
+        if len(self._follows) >= MOST_SUBSCRIPTIONS:
+            raise Misuse(TOO_MANY_SUBSCRIPTIONS(most=MOST_SUBSCRIPTIONS))
         what = filter_of(wanted.kinds, wanted.controllers, wanted.axes)
         plans = [plan.to_json() for plan in self._hub.subject.plans(what)]
         self._follows[identity] = what, wanted.bound
         self._move()
         return self._hub.subject.result_of({"plans": plans})
 
-    async def _unfollow(self, wanted: command.Unfollow) -> Result:
+    async def _unsubscribe(self, wanted: command.Unsubscribe) -> Result:
         if self._follows.pop(wanted.id, None) is None:
-            raise Misuse(UNKNOWN_FOLLOW(id=wanted.id))
+            raise Misuse(UNKNOWN_SUBSCRIPTION(id=wanted.id))
         self._move()
         return self._hub.subject.result_of(None)
 
     def _move(self) -> None:
-        """To the stream of what is followed now."""
+        """To the stream of what the viewer subscribes to now."""
         streams = self._hub.streams
         streams.flush()
         before, self._place = self._place, None

@@ -14,7 +14,7 @@ _FOUND = members({"device": {**TEXT, "description": "As connect takes it."}, "wh
 _PROBE = members({"what": TEXT, "expected": TEXT, "came": TEXT, "holds": FLAG})
 _RESULT = members(
     {
-        "id": {**TEXT, "description": "Of the interpretation."},
+        "id": {**TEXT, "description": "Of the assumption."},
         "outcome": {"enum": ["confirmed", "refuted", "not checked"]},
         "what": TEXT,
         "why": {**TEXT, "description": "It was not checked."},

@@ -104,12 +104,12 @@ class EndPoints:
 
 
 @command(
-    "follow",
+    "subscribe",
     "Events from now on, as messages with the id of this request.",
-    "plans: the present plan of every axis that is followed, as events",
+    "plans: the present plan of every axis that is subscribed to, as events",
 )
 @dataclass(frozen=True, slots=True)
-class Follow:
+class Subscribe:
     kinds: Annotated[
         tuple[str, ...] | None, Meaning("Kinds of events; all but frames without.", choices(KINDS, "kind of event"))
     ] = None
@@ -120,10 +120,10 @@ class Follow:
     ] = 1000
 
 
-@command("unfollow", "No more events.")
+@command("unsubscribe", "No more events.")
 @dataclass(frozen=True, slots=True)
-class Unfollow:
-    id: Annotated[object, Meaning("The id of the request.", ID, name="follow")]
+class Unsubscribe:
+    id: Annotated[object, Meaning("The id of the request.", ID, name="subscription")]
 
 
 @command(
@@ -211,8 +211,8 @@ Command: TypeAlias = (
     | ListFaultKinds
     | Time
     | EndPoints
-    | Follow
-    | Unfollow
+    | Subscribe
+    | Unsubscribe
     | do.Set
     | do.Press
     | do.Release

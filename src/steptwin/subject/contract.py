@@ -18,7 +18,7 @@ from steptwin.messages import read_message_text, with_messages
 from steptwin.subject.commands import VERSION, Command
 from steptwin.subject.controls import ControlDescription
 from steptwin.subject.events import Event
-from steptwin.subject.following import Filter, Following
+from steptwin.subject.subscriptions import Filter, Subscription
 
 GOOD, UNKNOWN = "good", "unknown"
 
@@ -244,7 +244,7 @@ class Subject(Protocol):
 
     def do(self, wanted: Command, /) -> Result: ...
 
-    def follow(self, what: Filter, bound: int) -> Following:
+    def subscribe(self, what: Filter, bound: int) -> Subscription:
         """Events from now on, at most ``bound`` of them waiting. `Following.close` ends it."""
         ...
 
@@ -277,7 +277,7 @@ class AsyncSubject(Protocol):
         """Execute a command. Raises `Misuse`, `Refusal`, `LineFailure`."""
         ...
 
-    def follow(self, what: Filter, bound: int) -> Following: ...
+    def subscribe(self, what: Filter, bound: int) -> Subscription: ...
 
     def plans(self, what: Filter) -> list[Event]:
         """The present plans of axes as events of now, and the newest samples of those that have none."""

@@ -1,7 +1,7 @@
 """Commands of the debugger of a running world (`steptwin.live.debugging`): breakpoints, steps, stack, values, the past; and the
 question why something is as it is (`steptwin.live.why`).
 
-Time goes on with `Resume` and stands with `Pause`, as without a debugger; where it stops, followers receive ``stopped``.
+Time goes on with `Resume` and stands with `Pause`, as without a debugger; where it stops, subscribers receive ``stopped``.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class SetBreakpoint:
     condition: Annotated[str | None, Meaning("An expression that must hold.")] = None
     hits: Annotated[str | None, Meaning("At which of the times that it holds: 5, >= 5, % 5.")] = None
     log: Annotated[
-        str | None, Meaning("Instead of a stop, followers receive this text, with the values of what is in braces.")
+        str | None, Meaning("Instead of a stop, subscribers receive this text, with the values of what is in braces.")
     ] = None
 
     def __post_init__(self) -> None:

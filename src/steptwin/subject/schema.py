@@ -107,7 +107,7 @@ def _event_of(kind: str, given: Mapping[str, object]) -> dict[str, object]:
 def _message() -> dict[str, object]:
     return {
         "type": "object",
-        "description": "An event, after the answer to follow, with its id.",
+        "description": "An event, after the answer to subscribe, with its id.",
         "properties": {"id": _ID, "event": {"$ref": "#/$defs/(event)"}, "missed": {"type": "integer", "minimum": 1}},
         "required": ["event"],
     }

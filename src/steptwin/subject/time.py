@@ -9,8 +9,8 @@ from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.subject.commands import Advance
-from steptwin.subject.following import Filter, Following, filter_of
 from steptwin.subject.payloads import SHOWN_KINDS, STEP_KINDS
+from steptwin.subject.subscriptions import Filter, Subscription, filter_of
 
 LONGEST_RUN_NS: Nanos = 3600 * SECOND
 """A condition that never comes true is given up after an hour, where no other limit is given."""
@@ -21,12 +21,12 @@ MOST_SHOWN = 1000
 TIME_HAS_PASSED = Message("subject.time-has-passed", "to_ns = {end}: this world is at {now} ns already")
 
 
-def advance(world: Simulation, follow: Callable[[Filter, int], Following], wanted: Advance) -> Mapping[str, object]:
-    """Execute a step in virtual time. ``follow``: `WorldSubject.follow`."""
+def advance(world: Simulation, subscribe: Callable[[Filter, int], Subscription], wanted: Advance) -> Mapping[str, object]:
+    """Execute a step in virtual time. ``subscribe``: `WorldSubject.subscribe`."""
     if wanted.until is not None:
         world.condition(wanted.until)  # raises `Misuse` here
     end = end_of(world, wanted, next_due(world))
-    following = follow(shown_of(wanted), MOST_SHOWN)
+    subscription = subscribe(shown_of(wanted), MOST_SHOWN)
     try:
         came = False
         if end is not None:
@@ -35,8 +35,8 @@ def advance(world: Simulation, follow: Callable[[Filter, int], Following], wante
             reason = world.run_to(end, wanted.until)
             came = reason is not None and reason == wanted.until
     finally:
-        following.close()
-    return {**happened(following), "came": came, "idle": end is None}
+        subscription.close()
+    return {**happened(subscription), "came": came, "idle": end is None}
 
 
 def shown_of(wanted: Advance) -> Filter:
@@ -45,9 +45,9 @@ def shown_of(wanted: Advance) -> Filter:
     return filter_of(STEP_KINDS if is_next else SHOWN_KINDS)
 
 
-def happened(following: Following) -> dict[str, object]:
+def happened(subscription: Subscription) -> dict[str, object]:
     """The events in the answer to a step."""
-    missed, events = following.take()
+    missed, events = subscription.take()
     return {"events": [event.to_json() for event in events if event.is_shown or event.kind not in SHOWN_KINDS], "missed": missed}
 
 

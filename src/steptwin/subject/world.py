@@ -14,7 +14,7 @@ from steptwin.messages import Message
 from steptwin.simulation.components.registry import failing
 from steptwin.simulation.faults.kinds import rows
 from steptwin.simulation.kinds.lines import LineWrite, TrafficLog
-from steptwin.simulation.kinds.programs import StatementFollower
+from steptwin.simulation.kinds.programs import StatementSubscription
 from steptwin.simulation.kinds.registry import line_kinds
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.script import steps
@@ -31,9 +31,9 @@ from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
 from steptwin.subject.describe import describe
 from steptwin.subject.dispatch import Action, Dispatcher
 from steptwin.subject.events import Event, Numbering, payload_of
-from steptwin.subject.following import Filter, Followers, Following, filter_of
 from steptwin.subject.payloads import FramePayload, InputPayload, PacePayload, Payload, PlanPayload, RestoredPayload, WritePayload
 from steptwin.subject.snapshots import Snapshots
+from steptwin.subject.subscriptions import Filter, Subscription, Subscriptions, filter_of
 from steptwin.subject.time import advance
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.rtu import BROADCAST
@@ -61,19 +61,19 @@ class WorldSubject:
         self._apply_input = apply_input or world.apply_input
         lines = {name: line.name for name, (line, _) in world.objects.line_of.items()}
         self.numbering = Numbering(lines)
-        self.followers = Followers(self._followed)
-        self.on_followed: Callable[[], None] = lambda: None
-        """Called when other kinds of events are followed than before."""
+        self.subscribers = Subscriptions(self._subscribed)
+        self.on_subscribed: Callable[[], None] = lambda: None
+        """Called when other kinds of events are subscribed to than before."""
         self.snapshots = Snapshots()
         self.dispatcher = Dispatcher(self._actions(), self._begin, self._end)
         self.sources: dict[tuple[str, str], str] = {}
         """Who is at a place of a line, for writes; a place that is not named here stands for itself."""
         self._traffic: dict[str, TrafficLog] = {}
         self._writes: list[Callable[[], None]] = []
-        """Functions that end the observation of writes; empty while they are not followed."""
+        """Functions that end the observation of writes; empty while nobody subscribes to them."""
         self._controller_of = {(line.name, unit): name for name, (line, unit) in world.objects.line_of.items()}
         self._is_watching = False
-        self._statements: StatementFollower | None = None
+        self._statements: StatementSubscription | None = None
         self._jogs: list[tuple[Jog, DeadManJog]] = []
         """Those that have not ended."""
 
@@ -129,20 +129,20 @@ class WorldSubject:
     async def answer(self, wanted: command.Command) -> Result:
         return self.do(wanted)
 
-    def follow(self, what: Filter, bound: int) -> Following:
-        return self.followers.follow(what, bound)
+    def subscribe(self, what: Filter, bound: int) -> Subscription:
+        return self.subscribers.subscribe(what, bound)
 
     # ------------------------------------------------------------------ commands
 
     def _begin(self) -> int:
         """Process all due events first, so that the command is not their cause."""
-        if self.followers:
+        if self.subscribers:
             self.world.sync_all()
         return self.numbering.command(self.world.now)
 
     def _end(self) -> Nanos:
         """Process its effects at the same moment, so that the command is their cause."""
-        if self.followers:
+        if self.subscribers:
             self.world.sync_all()
         self.numbering.done()
         return self.world.now
@@ -257,7 +257,7 @@ class WorldSubject:
         return encoders.to_json(self.world.controller(wanted.controller), self.world.now)
 
     def _advance(self, wanted: command.Advance) -> object:
-        done = advance(self.world, self.follow, wanted)
+        done = advance(self.world, self.subscribe, wanted)
         return {**self.time(), **done}
 
     def _restore(self, wanted: command.RestoreSnapshot) -> object:
@@ -265,7 +265,7 @@ class WorldSubject:
         return self.time()
 
     def go_back(self, snapshot: SimulationSnapshot, name: str | None) -> None:
-        """Restore a snapshot, with its name if it has one, and notify followers."""
+        """Restore a snapshot, with its name if it has one, and notify subscribers."""
         self.world.restore(snapshot)
         self.numbering.moved(self.world.now)
         self.publish(self.world.now, WORLD, RestoredPayload(name))
@@ -309,8 +309,8 @@ class WorldSubject:
         self.publish(self.world.now, WORLD, pace)
 
     def publish(self, time: Nanos, controller: str, payload: Payload) -> None:
-        if self.followers:
-            self.followers.publish(self.numbering.event(time, controller, payload))
+        if self.subscribers:
+            self.subscribers.publish(self.numbering.event(time, controller, payload))
 
     def _recorded(self, record: TraceRecord) -> None:
         if record.kind == "frame":  # lines report frames themselves, recorded or not
@@ -331,35 +331,35 @@ class WorldSubject:
         drive = self.world.controllers[controller].axes[int(payload.axis) - 1]
         return PlanPayload(payload.axis, payload.plan, drive.offset_p)
 
-    def _followed(self) -> None:
-        """Subscribe to the world only while it is followed, to frames and statements only while they are wanted."""
-        self.on_followed()
-        watchers = self.world.trace.watchers
-        if bool(self.followers) is not self._is_watching:
+    def _subscribed(self) -> None:
+        """Subscribe to the world only while it has subscribers, to frames and statements only while they are wanted."""
+        self.on_subscribed()
+        watchers = self.world.trace.subscribers
+        if bool(self.subscribers) is not self._is_watching:
             self._is_watching = not self._is_watching
             if self._is_watching:
                 watchers.append(self._recorded)
             else:
                 watchers.remove(self._recorded)
-        if ("statement" in self.followers.kinds) is not (self._statements is not None):
+        if ("statement" in self.subscribers.kinds) is not (self._statements is not None):
             if self._statements is None:
-                self._statements = StatementFollower(self.world.programs, self._executed)
+                self._statements = StatementSubscription(self.world.programs, self._executed)
             else:
                 self._statements.close()
                 self._statements = None
-        self._follow_writes(is_wanted="write" in self.followers.kinds)
-        wanted = "frame" in self.followers.kinds
+        self._subscribe_to_writes(is_wanted="write" in self.subscribers.kinds)
+        wanted = "frame" in self.subscribers.kinds
         if wanted is bool(self._traffic):
             return
         for spec in self.world.spec.lines:
             line = self.world.lines[spec.name]
             if wanted:
                 self._traffic[line.name] = line_kinds()[spec.kind].traffic_log(line, "", partial(self._framed, line.name))
-                line.follow_frames(self._traffic[line.name])
+                line.subscribe_to_frames(self._traffic[line.name])
             else:
-                line.unfollow_frames(self._traffic.pop(line.name))
+                line.unsubscribe_from_frames(self._traffic.pop(line.name))
 
-    def _follow_writes(self, *, is_wanted: bool) -> None:
+    def _subscribe_to_writes(self, *, is_wanted: bool) -> None:
         if is_wanted is bool(self._writes):
             return
         for end in self._writes:

@@ -19,7 +19,7 @@ from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.jsonvalues import read
 from steptwin.live.world import LiveWorld, PlacePort
-from steptwin.live.world_frames import follow_frames
+from steptwin.live.world_frames import subscribe_to_frames
 from steptwin.simulation.describe.generated import LINE
 from steptwin.simulation.faults import read as read_fault
 from steptwin.simulation.scheduler.trace import TraceRecord
@@ -185,8 +185,8 @@ class LineRig(Rig):
             for record in live.world.trace.events(controller):  # what power-on had to say
                 self._happened(record)
             live.world.stop_recording()
-            follow_frames(live, self._log_frame)
-            live.world.trace.watchers.append(self._happened)
+            subscribe_to_frames(live, self._log_frame)
+            live.world.trace.subscribers.append(self._happened)
 
     def _happened(self, record: TraceRecord) -> None:
         if record.kind == "event" and record.controller == self._controller:

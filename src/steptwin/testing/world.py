@@ -109,7 +109,7 @@ class WorldRig(Rig):
             None,
             base,
         )
-        world.trace.watchers.append(self._happened)
+        world.trace.subscribers.append(self._happened)
 
     def _happened(self, record: TraceRecord) -> None:
         if is_shown(record):

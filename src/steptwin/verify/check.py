@@ -1,4 +1,4 @@
-"""A check as a value: its interpretation, what it may do, and its steps without I/O."""
+"""A check as a value: its assumption, what it may do, and its steps without I/O."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class Check(Generic[T]):
 
 @dataclass(frozen=True, slots=True)
 class CheckResult:
-    """Result for one interpretation: ``why`` it was not checked, or its ``probes``."""
+    """Result for one assumption: ``why`` it was not checked, or its ``probes``."""
 
     id: str
     outcome: CheckOutcome

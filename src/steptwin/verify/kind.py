@@ -33,7 +33,7 @@ class CheckedKind(ABC, Generic[T]):
     @property
     @abstractmethod
     def unchecked(self) -> Mapping[str, str]:
-        """Ids of interpretations that no check decides, with the reason."""
+        """Ids of assumptions that no check decides, with the reason."""
 
     @abstractmethod
     def prepare(self, address: DeviceAddress, permitted: frozenset[CheckNeed], move: tuple[int, float] | None) -> ReadyChecks[T]:

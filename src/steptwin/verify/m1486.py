@@ -1,4 +1,4 @@
-"""The checks of the M1486, and the talk of checks with a chip. The facts are those of docs/interpretations.md."""
+"""The checks of the M1486, and the talk of checks with a chip. The facts are those of docs/assumptions.md."""
 
 from __future__ import annotations
 

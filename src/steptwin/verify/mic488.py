@@ -1,4 +1,4 @@
-"""The checks of the MIC488. The facts are those of docs/interpretations.md under the same id."""
+"""The checks of the MIC488. The facts are those of docs/assumptions.md under the same id."""
 
 from __future__ import annotations
 

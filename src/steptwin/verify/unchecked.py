@@ -1,6 +1,6 @@
-"""The interpretations that no check decides, each with the reason.
+"""The assumptions that no check decides, each with the reason.
 
-With the tables of checks these are all ids of docs/interpretations.md.
+With the tables of checks these are all ids of docs/assumptions.md.
 """
 
 from __future__ import annotations

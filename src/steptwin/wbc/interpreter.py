@@ -269,12 +269,12 @@ class Interpreter(Stateful):
 
     # ------------------------------------------------------------------ hooks
 
-    def hook(self, hook: StatementHook, numbers: Collection[int] | None = None) -> None:
+    def add_hook(self, hook: StatementHook, numbers: Collection[int] | None = None) -> None:
         """Call ``hook`` before each of these statements from now on; None: before all."""
         self._hooks = (*self._hooks, HookedStatements(hook, numbers))
         self._hooked = None
 
-    def unhook(self, hook: StatementHook) -> None:
+    def remove_hook(self, hook: StatementHook) -> None:
         self._hooks = without(self._hooks, hook)
         self._hooked = None
 

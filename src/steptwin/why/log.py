@@ -129,13 +129,13 @@ class CauseLog:
                 self._holds[signal].append(Hold(began.get(held.fault, self.begin), held))
         self._built = {group: len(records) for group, records in self.records.items()}
         self.points = points.NotedPoints(world)
-        world.trace.watchers.append(self._take)
-        world.act_watchers.append(self._act)
+        world.trace.subscribers.append(self._take)
+        world.act_subscribers.append(self._act)
         for name, programs in world.programs.items():
             if not self.is_whole:
                 for frame in programs.stack(self.begin)[:1]:
                     self._executes(name, self.begin, frame.place)
-            programs.hook(self._hook(name, programs))
+            programs.add_hook(self._hook(name, programs))
 
     @property
     def is_whole(self) -> bool:

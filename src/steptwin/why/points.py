@@ -34,7 +34,7 @@ class NotedPoints:
         for owner, reader in self._readers.items():
             scheduler = world.objects.scheduler_of[owner]
             scheduler.hears_requests = True
-            scheduler.follow(reader, (owner,))
+            scheduler.subscribe(reader, (owner,))
 
     def executes(self, owner: str, now: Nanos, *, keeps: bool) -> None:
         """A controller executes a statement next, which may change points without an event if it ``keeps``."""
@@ -48,7 +48,7 @@ class NotedPoints:
         self._looks += 1
         if self._noted > MOST_CHANGES or self._looks > MOST_LOOKS:
             for owner, reader in self._readers.items():
-                self._world.objects.scheduler_of[owner].unfollow(reader)
+                self._world.objects.scheduler_of[owner].unsubscribe(reader)
             self._readers.clear()
 
     def series(self, name: str) -> Sequence[TimedValue] | None:
@@ -67,7 +67,7 @@ class NotedPoints:
 class _Reader:
     """Reader of the points of one controller. ``points``: the series of each.
 
-    As `steptwin.simulation.scheduler.followers.SchedulerFollower`.
+    As `steptwin.simulation.scheduler.subscribers.SchedulerSubscriber`.
     """
 
     def __init__(self, noted: NotedPoints, world: Simulation, owner: str) -> None:

@@ -234,13 +234,13 @@ class _Noted:
         levels = levels_of(world) if asked.edges else {}
         self.series: dict[str, TimeSeries] = {name: [(world.now, levels.get(name, 0.0))] for name in asked.edges}
         if asked.edges:
-            world.trace.watchers.append(self._take)
-            stack.callback(world.trace.watchers.remove, self._take)
+            world.trace.subscribers.append(self._take)
+            stack.callback(world.trace.subscribers.remove, self._take)
         for name in asked.signals:
             if name not in self.series:
-                follower = _Follower(world, name)
-                self.series[name] = follower.series
-                follower.follow(stack, is_replaced=is_replaced)
+                subscriber = _Subscriber(world, name)
+                self.series[name] = subscriber.series
+                subscriber.subscribe(stack, is_replaced=is_replaced)
 
     def _take(self, record: TraceRecord) -> None:
         if record.kind == "edge":
@@ -249,8 +249,8 @@ class _Noted:
                 points.note_value(series, record.time, record.level())
 
 
-class _Follower:
-    """Notes the series of a signal that has no edges. As `steptwin.simulation.scheduler.followers.SchedulerFollower`."""
+class _Subscriber:
+    """Notes the series of a signal that has no edges. As `steptwin.simulation.scheduler.subscribers.SchedulerSubscriber`."""
 
     def __init__(self, world: Simulation, name: str) -> None:
         signal = world.signal(name)
@@ -265,18 +265,18 @@ class _Follower:
         self._keeping: Nanos | None = None
         """Time of the last statement that may have changed the signal; it was not read after that."""
 
-    def follow(self, stack: ExitStack, *, is_replaced: bool) -> None:
+    def subscribe(self, stack: ExitStack, *, is_replaced: bool) -> None:
         """``is_replaced``: whether programs may get other statements meanwhile."""
         for scheduler, name in self._sources:
-            scheduler.follow(self, (name,))
-            stack.callback(scheduler.unfollow, self)
+            scheduler.subscribe(self, (name,))
+            stack.callback(scheduler.unsubscribe, self)
             scheduler.hears_requests |= self._is_kept
         programs = self._world.programs.get(self._owner)
         if self._is_kept and programs is not None:
             keeping = {} if is_replaced else dict(_acting(programs))
             hook = self._hook(programs, keeping)
-            programs.hook(hook, None if is_replaced else frozenset(keeping))
-            stack.callback(programs.unhook, hook)
+            programs.add_hook(hook, None if is_replaced else frozenset(keeping))
+            stack.callback(programs.remove_hook, hook)
 
     def _hook(self, programs: Programs, keeping: Mapping[Place, bool]) -> StatementHook:
         """``keeping``: whether a statement keeps something, as far as that is known."""

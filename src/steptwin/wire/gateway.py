@@ -18,7 +18,7 @@ from steptwin.state import Plain, Stateful
 from steptwin.wire import mbap, rtu
 from steptwin.wire.crc import with_crc
 from steptwin.wire.pdu import DEVICE_BUSY, GATEWAY_TARGET_FAILED, READS, REFUSED, exception_pdu
-from steptwin.wire.slave import FrameDirection, FrameObserver, SlavePort, tcp_response
+from steptwin.wire.slave import FrameCallback, FrameDirection, SlavePort, tcp_response
 from steptwin.wire.timed import TimedUnits, Turn
 
 QUEUE_REQUESTS = 16
@@ -126,7 +126,7 @@ class GatewayPort(SlavePort, ABC):
     FIXED = ("__weakref__", "_gateway")
     __slots__ = (*FIXED, "_responses", "waiting")
 
-    def __init__(self, gateway: ModbusGateway, *, on_frame: FrameObserver | None = None) -> None:
+    def __init__(self, gateway: ModbusGateway, *, on_frame: FrameCallback | None = None) -> None:
         super().__init__(on_frame)
         self._gateway = gateway
         self._responses: list[tuple[Nanos, bytes]] = []
@@ -206,7 +206,7 @@ class TcpGatewayPort(GatewayPort):
 
     __slots__ = ("_framer",)
 
-    def __init__(self, gateway: ModbusGateway, *, on_frame: FrameObserver | None = None) -> None:
+    def __init__(self, gateway: ModbusGateway, *, on_frame: FrameCallback | None = None) -> None:
         super().__init__(gateway, on_frame=on_frame)
         self._framer = mbap.TcpFramer()
 
@@ -243,13 +243,13 @@ class TcpGatewayPort(GatewayPort):
 class ScriptPort(GatewayPort):
     """RTU frames of the scripts of a world: their requests wait for those of Modbus TCP clients and are not lost.
 
-    The observer is called for a request when it is executed, and not for a unit that is not served.
+    The callback is called for a request when it is executed, and not for a unit that is not served.
     """
 
     broken = None
     __slots__ = ("_framer",)
 
-    def __init__(self, gateway: ModbusGateway, *, on_frame: FrameObserver | None = None) -> None:
+    def __init__(self, gateway: ModbusGateway, *, on_frame: FrameCallback | None = None) -> None:
         super().__init__(gateway, on_frame=on_frame)
         self._framer = rtu.RtuFramer(gateway.units.devices)
 

@@ -38,14 +38,14 @@ class FrameDirection(enum.Enum):
     OUT = "out"
 
 
-FrameObserver: TypeAlias = Callable[[Nanos, FrameDirection, bytes], None]
+FrameCallback: TypeAlias = Callable[[Nanos, FrameDirection, bytes], None]
 """Called with the moment, the direction and the bytes of every whole frame on the wire, also of foreign units and broadcasts."""
 
-WriteObserver: TypeAlias = Callable[[Nanos, int, bytes, bytes], None]
+WriteCallback: TypeAlias = Callable[[Nanos, int, bytes, bytes], None]
 """Called with the moment, the unit, the request PDU and the response PDU of every request that was executed and is no read. Unit
 0 is a broadcast, whose response PDU is empty."""
 
-PauseObserver: TypeAlias = Callable[[int, Nanos], None]
+PauseCallback: TypeAlias = Callable[[int, Nanos], None]
 """Called after a request with a pause of more than 750 µs, for which the device drops a frame (MIC-15): with its unit
 (0: broadcast) and the pause, ns."""
 
@@ -59,9 +59,9 @@ class SlavePort(Stateful):
     FIXED = ("exceptions", "on_frame", "on_write", "requests")
     __slots__ = (*FIXED,)
 
-    def __init__(self, on_frame: FrameObserver | None) -> None:
+    def __init__(self, on_frame: FrameCallback | None) -> None:
         self.on_frame = on_frame
-        self.on_write: WriteObserver | None = None
+        self.on_write: WriteCallback | None = None
         self.requests = 0
         """Number of whole requests received so far, also of foreign units. Counters are no state: a restore leaves them."""
         self.exceptions = 0
@@ -95,7 +95,7 @@ def check_units(devices: Mapping[int, SlaveDevice]) -> None:
 
 
 def execute_frame(
-    devices: Mapping[int, SlaveDevice], frame: rtu.RtuFrame, now: Nanos, on_write: WriteObserver | None = None
+    devices: Mapping[int, SlaveDevice], frame: rtu.RtuFrame, now: Nanos, on_write: WriteCallback | None = None
 ) -> bytes:
     """Execute an RTU frame on the devices to which it is addressed; returns the response frame, empty if there is none.
 
@@ -134,17 +134,17 @@ def tcp_response(request: bytes, pdu: bytes) -> bytes:
 class PauseReports(Stateful):
     """Reports requests that the device would have dropped because of a pause (MIC-15)."""
 
-    FIXED = ("_observer",)
+    FIXED = ("_callback",)
     __slots__ = (*FIXED, "_next")
 
-    def __init__(self, observer: PauseObserver | None) -> None:
-        self._observer = observer
+    def __init__(self, observer: PauseCallback | None) -> None:
+        self._callback = observer
         self._next: Nanos = 0
 
     def served(self, frame: rtu.RtuFrame, now: Nanos) -> None:
-        if frame.pause > rtu.UART_GAP_NS and now >= self._next and self._observer is not None:
+        if frame.pause > rtu.UART_GAP_NS and now >= self._next and self._callback is not None:
             self._next = now + PAUSE_REPORT_NS
-            self._observer(frame.unit, frame.pause)
+            self._callback(frame.unit, frame.pause)
 
 
 class RtuSlavePort(SlavePort):
@@ -166,8 +166,8 @@ class RtuSlavePort(SlavePort):
         *,
         gap_ns: Nanos = rtu.BURSTY_GAP_NS,
         line: SerialLine | None = None,
-        on_frame: FrameObserver | None = None,
-        on_pause: PauseObserver | None = None,
+        on_frame: FrameCallback | None = None,
+        on_pause: PauseCallback | None = None,
     ) -> None:
         super().__init__(on_frame)
         check_units(devices)
@@ -244,7 +244,7 @@ class TcpSlavePort(SlavePort):
     FIXED = ("_devices",)
     __slots__ = (*FIXED, "_framer", "broken")
 
-    def __init__(self, devices: Mapping[int, SlaveDevice], *, on_frame: FrameObserver | None = None) -> None:
+    def __init__(self, devices: Mapping[int, SlaveDevice], *, on_frame: FrameCallback | None = None) -> None:
         super().__init__(on_frame)
         check_units(devices)
         self._devices = dict(devices)

@@ -20,7 +20,7 @@ from steptwin.wire import rtu
 from steptwin.wire.crc import with_crc
 from steptwin.wire.line import CharacterClock, SerialLine
 from steptwin.wire.pdu import READS, REFUSED, WRITES
-from steptwin.wire.slave import FrameDirection, FrameObserver, PauseObserver, PauseReports, SlaveDevice, SlavePort, check_units
+from steptwin.wire.slave import FrameCallback, FrameDirection, PauseCallback, PauseReports, SlaveDevice, SlavePort, check_units
 
 # MIC-32: the highest rate the manual gives.
 FRAME_INTERVAL_NS: Nanos = 10 * MILLISECOND
@@ -140,8 +140,8 @@ class TimedRtuSlavePort(SlavePort):
         units: TimedUnits,
         *,
         gap_ns: Nanos = rtu.BURSTY_GAP_NS,
-        on_frame: FrameObserver | None = None,
-        on_pause: PauseObserver | None = None,
+        on_frame: FrameCallback | None = None,
+        on_pause: PauseCallback | None = None,
     ) -> None:
         super().__init__(on_frame)
         self._units = units

@@ -269,7 +269,9 @@ def test_what_several_properties_compare_is_followed_once(monkeypatch: pytest.Mo
     assert len(made) < comparisons
     for one in several:
         one.close()
-    assert all(scheduler.followers is None or not any(scheduler.followers.by_name.values()) for scheduler in joined.schedulers)
+    assert all(
+        scheduler.subscribers is None or not any(scheduler.subscribers.by_name.values()) for scheduler in joined.schedulers
+    )
 
 
 def _atoms(text: str) -> list[Atom]:

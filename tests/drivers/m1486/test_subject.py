@@ -21,7 +21,7 @@ from steptwin.jsonvalues import read
 from steptwin.simulation.script import steps as do
 from steptwin.subject import commands as command
 from steptwin.subject.contract import UNKNOWN
-from steptwin.subject.following import filter_of
+from steptwin.subject.subscriptions import filter_of
 from steptwin.subject.world import WorldSubject
 
 
@@ -77,23 +77,23 @@ def test_the_state_of_an_m1486_is_known_at_rest(drum: DeviceSubject, rig: Rig) -
 
 
 def test_an_m1486_jogs_and_stops(drum: DeviceSubject, rig: Rig) -> None:
-    following = drum.follow(filter_of(), 9)
-    following.take()
+    subscription = drum.subscribe(filter_of(), 9)
+    subscription.take()
     drum.do(command.Jog("drum", 1, -50.0))
     rig.time.sleep(2.0)
-    assert [event.text for event in following.take().events] == [
+    assert [event.text for event in subscription.take().events] == [
         "moves, waits or runs its program",
         "axis 1: the position is not known",
     ]
     assert rig.world.read("drum.velocity") == -50.0 * 64
     drum.do(command.StopAxes("drum", 1))
     rig.time.sleep(2.0)
-    status, sample = following.take().events
+    status, sample = subscription.take().events
     assert status.text == "is at rest"
     assert sample.payload.to_json()["velocity"] == 0.0
     assert rig.world.read("drum.velocity") == 0.0
     rig.time.sleep(2.0)
-    assert following.take().events == []
+    assert subscription.take().events == []
     assert {reading.value for reading in drum.read("drum.moving", "drum.velocity")} == {0.0}
     drum.do(command.Jog("drum", 1, 50.0))
     rig.time.sleep(2.0)
@@ -109,7 +109,7 @@ def test_an_m1486_is_moved_and_shown_in_the_unit_of_its_driver(rig: Rig) -> None
         drum.do(command.Move("drum", 1, to=-60.0))
         rig.time.sleep(60.0)
         assert rig.world.read("drum.counter") == 40 * 40 * 64
-        (sample,) = drum.follow(filter_of(), 9).take().events
+        (sample,) = drum.subscribe(filter_of(), 9).take().events
         assert sample.payload.to_json() == {"axis": "1", "position": -60.0, "unit": "mm", "velocity": 0.0}
         drum.do(command.Move("drum", 1, by=-2.0))
         rig.time.sleep(60.0)
@@ -120,15 +120,15 @@ def test_an_m1486_is_moved_and_shown_in_the_unit_of_its_driver(rig: Rig) -> None
 
 
 def test_of_an_m1486_only_what_was_asked_for_is_followed(drum: DeviceSubject, rig: Rig) -> None:
-    samples, states = drum.follow(filter_of(["sample"]), 9), drum.follow(filter_of(["status"]), 9)
+    samples, states = drum.subscribe(filter_of(["sample"]), 9), drum.subscribe(filter_of(["status"]), 9)
     drum.do(command.Move("drum", 1, by=5000.0))
     found = []
     for pause in (2.0, 60.0):
         rig.time.sleep(pause)
-        found.append([[event.kind for event in following.take().events] for following in (samples, states)])
+        found.append([[event.kind for event in subscription.take().events] for subscription in (samples, states)])
     assert found == [[["sample", "sample"], ["status"]], [["sample"], ["status"]]], "where it stood, not known, where it stands"
     samples.close()
-    frames = WorldSubject(rig.world).follow(filter_of(["frame"]), 99)
+    frames = WorldSubject(rig.world).subscribe(filter_of(["frame"]), 99)
     drum.do(do.Send("chips", b"t80\r"))
     states.take()
     rig.time.sleep(1.0)
@@ -142,8 +142,8 @@ def test_an_m1486_that_begins_to_move_while_it_is_looked_at(
     drum: DeviceSubject, rig: Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It was at rest when it was asked, and its counter is not to be had any more."""
-    following = drum.follow(filter_of(), 9)
-    following.take()
+    subscription = drum.subscribe(filter_of(), 9)
+    subscription.take()
     drum.do(do.Send("chips", b"t80\r"))
 
     async def moves(*numbers: int) -> int:
@@ -151,7 +151,7 @@ def test_an_m1486_that_begins_to_move_while_it_is_looked_at(
 
     monkeypatch.setattr(rig.chip._driver._unit, "read", moves)
     rig.time.sleep(1.0)
-    assert [event.text for event in following.take().events] == ["axis 1: the position is not known"]
+    assert [event.text for event in subscription.take().events] == ["axis 1: the position is not known"]
 
 
 def test_the_program_of_an_m1486_is_ended(drum: DeviceSubject, rig: Rig) -> None:
@@ -240,10 +240,10 @@ def test_a_value_is_not_known_of_an_m1486_that_begins_to_move(rig: Rig, monkeypa
 
 
 def test_a_move_that_is_stopped_leaves_the_position_unknown(drum: DeviceSubject, rig: Rig) -> None:
-    following = drum.follow(filter_of(["sample"]), 9)
-    following.take()
+    subscription = drum.subscribe(filter_of(["sample"]), 9)
+    subscription.take()
     drum.do(command.Move("drum", 1, by=5000.0))
     rig.time.sleep(1.0)
     drum.do(command.StopAxes("drum", 1))
     rig.time.sleep(2.0)
-    assert following.take().events[-1].payload.to_json() == {"axis": "1", "position": None, "unit": "step", "velocity": 0.0}
+    assert subscription.take().events[-1].payload.to_json() == {"axis": "1", "position": None, "unit": "step", "velocity": 0.0}

@@ -146,7 +146,7 @@ def test_tokens_give_roles_and_are_not_seen_by_the_subject(tmp_path: Path) -> No
         (b"\xff\x00", "misuse", "a request is a line of JSON"),
         (b"[]", "misuse", "a request is a line of JSON"),
         (b"[" * 100_000, "misuse", "a request is a line of JSON"),
-        ({"do": "follow"}, "refusal", "follow is not taken over MQTT"),
+        ({"do": "subscribe"}, "refusal", "subscribe is not taken over MQTT"),
         ({"do": "move", "controller": "table", "axis": 1, "to": 1, "lease_s": 1}, "misuse", "lease_s is for a jog only"),
         ({"do": "jog", "controller": "table", "axis": 1, "velocity": 5}, "misuse", "a jog needs lease_s"),
         ({"do": "jog", "controller": "table", "axis": 1, "velocity": 5, "lease_s": True}, "misuse", "a jog needs lease_s"),

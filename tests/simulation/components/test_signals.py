@@ -280,7 +280,7 @@ def test_nor_is_it_over_tcp_where_nothing_is_recorded() -> None:
     live = LiveWorld(world)
     world.stop_recording()
     notes: list[int] = []
-    world.trace.watchers.append(lambda record: notes.append(record.time) if record.subject == "note" else None)
+    world.trace.subscribers.append(lambda record: notes.append(record.time) if record.subject == "note" else None)
     port = PlacePort(live, "bus", "tcp-1", "tcp")
     for moment, value in ((1, "3f80"), (2, "4000")):
         live.advance(moment * SECOND)

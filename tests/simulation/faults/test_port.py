@@ -54,12 +54,12 @@ def test_an_observer_sees_frames_as_without_faults() -> None:
 def test_who_comes_while_there_are_faults_sees_frames_too() -> None:
     rig = FaultRig("crc nth=1")
     seen: list[FrameDirection] = []
-    rig.port.watch(lambda now, direction, raw: seen.append(direction))
+    rig.port.call_with_frames(lambda now, direction, raw: seen.append(direction))
     for _ in range(2):
         rig.ask()
         rig.faults.clear(rig.now)
     assert seen == [FrameDirection.IN, FrameDirection.OUT] * 2
-    rig.port.watch(None)
+    rig.port.call_with_frames(None)
     rig.ask()
     assert len(seen) == 4
 

@@ -60,8 +60,8 @@ def followed(there: World, line: str) -> list[str]:
     found: list[str] = []
     spec = next(one for one in there.spec.lines if one.name == line)
     words = line_kinds()[spec.kind].traffic_log(there.lines[line], "", lambda frame: found.append(str(frame)))
-    there.lines[line].follow_frames(words)
-    there.trace.watchers.append(words.recorded)
+    there.lines[line].subscribe_to_frames(words)
+    there.trace.subscribers.append(words.recorded)
     return found
 
 
@@ -406,9 +406,9 @@ def test_a_line_that_nobody_follows_any_more_observes_no_frames() -> None:
     line = there.lines["bus"]
     framed = line.connect("p", "rtu").framed
     assert framed is not None
-    line.follow_frames(frames)
+    line.subscribe_to_frames(frames)
     assert framed.on_frame is not None
-    line.unfollow_frames(frames)
+    line.unsubscribe_from_frames(frames)
     assert framed.on_frame is None
 
 

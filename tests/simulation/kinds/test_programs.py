@@ -10,9 +10,9 @@ from steptwin.controller import MILLISECOND, SECOND
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.simulation.kinds.programs import Place, Programs, StatementFollower
+from steptwin.simulation.kinds.programs import Place, Programs, StatementSubscription
 from steptwin.simulation.scheduler.trace import TraceRecord
-from steptwin.subject.following import filter_of
+from steptwin.subject.subscriptions import filter_of
 from steptwin.subject.world import WorldSubject
 
 WBC = """\
@@ -55,9 +55,9 @@ def two() -> World:
 
 def executed(world: World, seconds: float) -> list[tuple[int, str, str, object]]:
     found: list[TraceRecord] = []
-    follower = StatementFollower(world.programs, found.append)
+    subscriber = StatementSubscription(world.programs, found.append)
     world.run_to(world.now + round(seconds * SECOND))
-    follower.close()
+    subscriber.close()
     count = len(found)
     world.run_to(world.now + SECOND)
     assert len(found) == count  # nobody is called after `close`
@@ -214,22 +214,22 @@ def test_a_command_that_was_overwritten_comes_from_no_text() -> None:
 def test_following_statements_does_not_change_what_happens() -> None:
     plain, followed = two(), two()
     subject = WorldSubject(followed)
-    following = subject.follow(filter_of(["statement"]), 10_000)
+    subscription = subject.subscribe(filter_of(["statement"]), 10_000)
     for world in (plain, followed):
         world.run_to(2 * SECOND)
     assert followed.trace.digest() == plain.trace.digest()
-    _, events = following.take()
+    _, events = subscription.take()
     assert {("c", "program: line 4"), ("m", "program 0: line 1")} <= {(event.controller, event.payload.text) for event in events}
-    following.close()
+    subscription.close()
     assert not followed.m1486["c"].chip.program._hooks
     assert not followed.mic488["m"].device.program.interpreter._hooks
 
 
 def test_statements_are_not_among_what_is_usually_followed() -> None:
     world = two()
-    following = WorldSubject(world).follow(filter_of(), 1000)
+    subscription = WorldSubject(world).subscribe(filter_of(), 1000)
     world.run_to(SECOND)
-    assert "statement" not in {event.kind for event in following.take().events}
+    assert "statement" not in {event.kind for event in subscription.take().events}
     assert not world.mic488["m"].device.program.interpreter._hooks
 
 
@@ -326,10 +326,10 @@ def test_a_hook_at_places_is_called_there_as_one_at_all_statements(controller: s
         def note(now: int, number: int, mine: list[tuple[int, Place | None]] = mine, programs: Programs = programs) -> None:
             mine.append((now, programs.place(number)))
 
-        programs.hook(note, None if at_all else wanted)
+        programs.add_hook(note, None if at_all else wanted)
         world.run_to(SECOND)
         count = len(mine)
-        programs.unhook(note)
+        programs.remove_hook(note)
         world.run_to(2 * SECOND)
         assert len(mine) == count
         if at_all:

@@ -15,7 +15,7 @@ from steptwin.files.world import World
 from steptwin.mic488.config import read_config
 from steptwin.mic488.inifile import IniFile
 from steptwin.simulation.kinds.m1486.kind import M1486
-from steptwin.simulation.kinds.programs import StatementFollower
+from steptwin.simulation.kinds.programs import StatementSubscription
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.inputs import Download
 from steptwin.simulation.world.worldprograms import WorldPrograms, configuration_text, program_texts
@@ -215,13 +215,15 @@ def test_a_chip_that_is_shut_down_receives_nothing(is_off: bool) -> None:
 def test_statements_are_those_of_the_present_texts() -> None:
     there = world()
     seen: list[tuple[str, str, object]] = []
-    follower = StatementFollower(there.programs, lambda record: seen.append((record.controller, record.subject, record.value)))
+    subscriber = StatementSubscription(
+        there.programs, lambda record: seen.append((record.controller, record.subject, record.value))
+    )
     there.apply_input(Download("drum", "program", "; two\n\nf640\nr\n"))
     there.apply_input(Download("table", "program 3", "\n\nDELAY 0.5\n"))
     there.apply_input(do.Write((("table", "PROG_BANK_SEL", 3.0),)))
     start(there)
     there.run(for_="1 s")
-    follower.close()
+    subscriber.close()
     assert [row for row in seen if row[0] == "drum"] == [("drum", "program", 3), ("drum", "program", 4)]
     assert ("table", "program 3", 3) in seen
 

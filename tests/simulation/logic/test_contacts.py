@@ -148,7 +148,7 @@ def test_a_normally_closed_button_opens_when_it_is_pressed() -> None:
     device = Mic488Device(controller())
     scheduler.add("m", device)
     seen: list[PinEdge] = []
-    scheduler.observers.append(lambda name, edge: seen.append(edge))
+    scheduler.edge_subscribers.append(lambda name, edge: seen.append(edge))
     circuit = Circuit(scheduler, PinName("m", "IN3"))
     button = Button(circuit, normally_closed=True, bounce_ns=0, bounces=0, chance=Chance(0, "b"))
     button.rest_at(True)

@@ -140,7 +140,7 @@ def test_edges_travel_along_a_chain_with_the_delays_of_its_controllers() -> None
     scheduler.connect(wire("r0.B", "r1.A"))
     scheduler.connect(wire("r1.B", "r2.A"))
     scheduler.advance(10 * MILLISECOND)
-    scheduler.observers.append(lambda name, edge: seen.append((name, edge)))
+    scheduler.edge_subscribers.append(lambda name, edge: seen.append((name, edge)))
     relays[0].set_pin("A", 1.0, 10 * MILLISECOND)
     assert scheduler.deadline() == 13 * MILLISECOND
     scheduler.advance(SECOND)
@@ -165,7 +165,7 @@ def test_a_loop_with_a_delay_oscillates() -> None:
     scheduler = Scheduler()
     scheduler.add("r", Relay(MILLISECOND))
     seen: list[Nanos] = []
-    scheduler.observers.append(lambda name, edge: seen.append(edge.time))
+    scheduler.edge_subscribers.append(lambda name, edge: seen.append(edge.time))
     scheduler.connect(wire("r.B", "r.A"))
     scheduler.advance(5 * MILLISECOND)
     assert seen == [n * MILLISECOND for n in range(1, 6)]
@@ -226,7 +226,7 @@ def test_a_controller_takes_the_place_of_another_with_what_it_has_to_do() -> Non
 def test_ties_are_broken_by_the_order_of_joining() -> None:
     scheduler = Scheduler()
     seen: list[str] = []
-    scheduler.observers.append(lambda name, edge: seen.append(name))
+    scheduler.edge_subscribers.append(lambda name, edge: seen.append(name))
     relays = {name: Relay(7) for name in ("b", "c", "a")}
     for name, relay in relays.items():
         scheduler.add(name, relay)
@@ -261,7 +261,7 @@ def test_a_switch_is_crossed_at_the_moment_of_the_pulse_in_both_directions() -> 
     """1000 p/s² to 1000 p/s and back: pulse 100 comes √0.2 s after the start."""
     scheduler, relay = on_axis(100, 200)
     seen: list[PinEdge] = []
-    scheduler.observers.append(lambda name, edge: seen.append(edge))
+    scheduler.edge_subscribers.append(lambda name, edge: seen.append(edge))
     relay.follow(plan_position(MotionState(0, 0, 0.0, 0.0), 1000, 1000.0, 1000.0, 1000.0))
     scheduler.advance(3 * SECOND)
     back = plan_position(MotionState(3 * SECOND, 1000, 0.0, 0.0), 150, 1000.0, 1000.0, 1000.0)

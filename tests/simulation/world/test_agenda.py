@@ -13,7 +13,7 @@ from tests.support.toy.controller import Bare
 
 from steptwin.errors import Misuse
 from steptwin.simulation.scheduler.scheduler import Scheduler
-from steptwin.simulation.world.agenda import Agenda, Watchers
+from steptwin.simulation.world.agenda import Agenda, Dependencies
 
 
 @dataclass(eq=False)
@@ -103,43 +103,43 @@ def joined(*names: str) -> Scheduler:
 
 
 def test_scripts_are_evaluated_when_what_they_depend_on_has_changed() -> None:
-    watchers: Any = Watchers()
+    dependencies: Any = Dependencies()
     one, other, third = joined("a", "b"), joined("c"), joined("d")
     a, b, c = one.source("a"), one.source("b"), other.source("c")
     scripts = [Waiter(number) for number in range(3)]
-    assert watchers.take() == []
-    watchers.set(scripts[2], (a, c))
-    watchers.set(scripts[0], (b, c))
-    watchers.set(scripts[1], ())
+    assert dependencies.take() == []
+    dependencies.set(scripts[2], (a, c))
+    dependencies.set(scripts[0], (b, c))
+    dependencies.set(scripts[1], ())
     one.notify()
-    assert watchers.take() == [scripts[0], scripts[2]]
-    assert watchers.take() == []
+    assert dependencies.take() == [scripts[0], scripts[2]]
+    assert dependencies.take() == []
     one.notify("a")
-    assert watchers.take() == [scripts[2]]
-    assert watchers.take() == []
+    assert dependencies.take() == [scripts[2]]
+    assert dependencies.take() == []
     other.notify("c")
     one.notify("b")
     third.notify("d")
-    assert watchers.take() == [scripts[0], scripts[2]], "each once, in the order of their numbers"
-    watchers.again(scripts[1])
+    assert dependencies.take() == [scripts[0], scripts[2]], "each once, in the order of their numbers"
+    dependencies.again(scripts[1])
     other.notify()
-    assert watchers.take() == scripts
-    assert watchers.take() == []
-    watchers.set(scripts[2], (a,))
+    assert dependencies.take() == scripts
+    assert dependencies.take() == []
+    dependencies.set(scripts[2], (a,))
     other.notify("c")
     one.notify("b")
-    assert watchers.take() == [scripts[0]]
-    watchers.set(scripts[0], ())
+    assert dependencies.take() == [scripts[0]]
+    dependencies.set(scripts[0], ())
     assert (other.on_change, scripts[0].sources) == (None, ())
     other.notify("c")
     one.notify("b")
-    assert watchers.take() == []
+    assert dependencies.take() == []
     assert one.on_change is not None
-    watchers.set(scripts[1], (a,))
-    watchers.set(scripts[2], ())
+    dependencies.set(scripts[1], (a,))
+    dependencies.set(scripts[2], ())
     one.notify("a")
-    assert watchers.take() == [scripts[1]]
-    watchers.set(scripts[1], ())
+    assert dependencies.take() == [scripts[1]]
+    dependencies.set(scripts[1], ())
     assert one.on_change is None
 
 

@@ -46,7 +46,7 @@ WRITES = (
 
 
 class Follows:
-    """Compares after each event with all values. As `steptwin.simulation.scheduler.followers.SchedulerFollower`."""
+    """Compares after each event with all values. As `steptwin.simulation.scheduler.subscribers.SchedulerFollower`."""
 
     def __init__(self, world: World) -> None:
         points = {path: point for path, point in points_of(world, "m") if point is not None and not point.is_kept}
@@ -54,7 +54,7 @@ class Follows:
         self._found = EventPoints(world, "m", self._points)
         self._values = self._all(world.now)
         self.changes = 0
-        world.objects.scheduler_of["m"].follow(self, ("m",))
+        world.objects.scheduler_of["m"].subscribe(self, ("m",))
 
     def _all(self, now: Nanos) -> dict[str, float]:
         return {path: point.read(now) for path, point in self._points.items() if point.read is not None}

@@ -334,7 +334,7 @@ def test_whoever_watches_schedulers_sees_those_that_scripts_wait_for_as_well() -
     world = small('[[script]]\nname = "s"\nsteps = [{ until = "a.IN5" }, { until = "a.IN6" }]\n')
     world.run(for_=0.1)
     seen: list[str] = []
-    world.watch_schedulers(lambda scheduler: seen.append(next(iter(scheduler.controllers))))
+    world.subscribe_to_schedulers(lambda scheduler: seen.append(next(iter(scheduler.controllers))))
     for controller, pin in (("a", "IN7"), ("c", "IN7"), ("a", "IN5"), ("a", "IN6"), ("a", "IN8")):
         seen.clear()
         world.apply_input(do.Set(((controller, pin, 1.0),)))
@@ -404,7 +404,7 @@ def test_the_gap_of_a_line_is_waited_for_where_a_length_is_not_known(timing: str
     )
     heard = Heard()
     line = world.lines["bus"]
-    line.follow_frames(heard)
+    line.subscribe_to_frames(heard)
     unknown, refusal = with_crc(bytes.fromhex("01 41 01 02")), with_crc(bytes.fromhex("01 C1 01"))
     world.apply_input(Bytes("bus", "plc", "rtu", unknown))
     world.run(for_=0.1)
@@ -443,11 +443,11 @@ def test_frames_can_be_followed_on_a_link_that_is_in_use() -> None:
     line, heard = world.lines["bus"], Heard()
     world.stop_recording()
     world.apply_input(Bytes("bus", "plc", "rtu", request))
-    line.follow_frames(heard)
+    line.subscribe_to_frames(heard)
     assert heard.frames == []
     world.apply_input(Bytes("bus", "plc", "rtu", request))
     assert [frame[1:] for frame in heard.frames] == [("plc", "in", request), ("plc", "out", answer)]
-    line.unfollow_frames(heard)
+    line.unsubscribe_from_frames(heard)
     world.apply_input(Bytes("bus", "plc", "rtu", request))
     assert len(heard.frames) == 2
 
@@ -471,7 +471,7 @@ def test_programs_that_are_answered_at_one_moment_are_answered_in_the_same_order
 def test_who_watches_actions_is_told_who_did_what() -> None:
     world = small('[[script]]\nname = "s"\nsteps = [{ wait = "1 s" }, { press = "go" }]\n')
     seen: list[tuple[int, str, object]] = []
-    world.act_watchers.append(lambda by, what: seen.append((world.now, by, what)))
+    world.act_subscribers.append(lambda by, what: seen.append((world.now, by, what)))
     world.apply_input(do.Set((("a", "IN5", 1.0),)))
     world.run(for_=2)
     assert seen == [(0, "", do.Set((("a", "IN5", 1.0),))), (SECOND, "s", do.Press("go"))]

@@ -289,13 +289,13 @@ def test_inputs_are_bounded_by_their_bytes_too(monkeypatch: pytest.MonkeyPatch) 
 
 def test_nothing_watches_the_trace_after_the_end() -> None:
     world = make()
-    watchers = list(world.trace.watchers)
+    watchers = list(world.trace.subscribers)
     snapshots = SnapshotLog(world)
-    assert world.trace.watchers != watchers
+    assert world.trace.subscribers != watchers
     snapshots.close()
-    assert world.trace.watchers == watchers
-    followers = world.objects.scheduler_of["m"].followers
-    assert followers is None or not followers.by_name["m"]
+    assert world.trace.subscribers == watchers
+    subscribers = world.objects.scheduler_of["m"].subscribers
+    assert subscribers is None or not subscribers.by_name["m"]
 
 
 @pytest.mark.parametrize(("controllers", "most"), [(1, 60), (2, 30), (3, 20), (5, 16)])

@@ -1,7 +1,7 @@
 """The values of one comparison in a running world over time, exact at every event, turn and crossing.
 
 While signals go on as they did, nothing is computed: a trajectory is read as a whole once another one follows. Signals of one
-scheduler are followed by that scheduler (`steptwin.simulation.scheduler.followers`).
+scheduler are followed by that scheduler (`steptwin.simulation.scheduler.subscribers`).
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ PROBES = (0.0625, *SHARES, 0.9375)
 class ComparisonRecord:
     """``is_fine``: between its turns its shape counts, too, because it meets others or a window.
 
-    It is notified of events by `leave` and `look`, as a `SchedulerFollower`: by its ``scheduler``, or, where that is None because
-    its signals have several, by who observes the world.
+    It is notified of events by `leave` and `look`, as a `SchedulerSubscriber`: by its ``scheduler``, or, where that is None
+    because its signals have several, by who observes the world.
     """
 
     def __init__(self, world: Simulation, atom: Atom, *, is_fine: bool) -> None:
@@ -75,7 +75,7 @@ class ComparisonRecord:
         self._is_monotonic = len(self._moving) == 1 and _is_alone(self.node.left, self.node.right, *self._moving)
         """Whether it is monotonic between turning points, so that its extremes are there."""
         self._is_fine = is_fine or not self._is_monotonic
-        self.scheduler, self.names = self._followed()
+        self.scheduler, self.names = self._subscribed()
         self._closed: Shape = []
         self._known: object = None
         """Version of the sources of the present trajectory."""
@@ -93,7 +93,7 @@ class ComparisonRecord:
         self._turning_points: Iterator[Nanos] = iter(())
         self._turning_point: Nanos | None = None
 
-    def _followed(self) -> tuple[Scheduler | None, tuple[str, ...]]:
+    def _subscribed(self) -> tuple[Scheduler | None, tuple[str, ...]]:
         """The only scheduler on which it depends, and the names there."""
         sources: set[Source] = set()
         for signal in self._signals.values():
@@ -103,7 +103,7 @@ class ComparisonRecord:
         schedulers = {source.scheduler for source in sources}
         return (schedulers.pop(), tuple(sorted(source.name for source in sources))) if len(schedulers) == 1 else (None, ())
 
-    def follow(self, world: Simulation) -> None:
+    def subscribe(self, world: Simulation) -> None:
         """From now on its scheduler notifies it."""
         scheduler = self.scheduler
         if scheduler is None:
@@ -112,11 +112,11 @@ class ComparisonRecord:
             scheduler.advance(world.now)
         if not all(_is_event(world, name, signal) for name, signal in self._signals.items()):
             scheduler.is_step_exact = True
-        scheduler.follow(self, self.names, leaves=not self._stays)
+        scheduler.subscribe(self, self.names, leaves=not self._stays)
 
-    def unfollow(self) -> None:
-        if self.scheduler is not None and self.scheduler.followers is not None:
-            self.scheduler.followers.remove(self)
+    def unsubscribe(self) -> None:
+        if self.scheduler is not None and self.scheduler.subscribers is not None:
+            self.scheduler.subscribers.remove(self)
 
     def sync(self, now: Nanos) -> tuple[Source, ...]:
         """Advance its schedulers to ``now`` and return what it depends on."""

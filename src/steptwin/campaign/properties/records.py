@@ -34,7 +34,7 @@ class SharedRecord:
 
 
 class ComparisonRecords:
-    """An observer of a world (`steptwin.simulation.scheduler.observing`). It ends once all who use it have released it."""
+    """A subscriber of a world (`steptwin.simulation.scheduler.worldsubscriber`). It ends once all who use it have released it."""
 
     number, entry = 0, 0
     _begins = True
@@ -68,23 +68,23 @@ class ComparisonRecords:
         for record in self._known.values():
             if record.scheduler is None:
                 self._spread.append(record)
-            record.follow(self._world)
+            record.subscribe(self._world)
         if self._known:
-            self._world.observe(self)
+            self._world.subscribe(self)
 
     def release(self) -> None:
         """One who used it does so no longer."""
         self._users -= 1
         if not self._users:
             for record in self._known.values():
-                record.unfollow()
-            self._world.unobserve(self)
+                record.unsubscribe()
+            self._world.unsubscribe(self)
 
     def sync(self, now: Nanos) -> None:
         for record in self._known.values():
             record.sync(now)
 
-    # ------------------------------------------------------------------ as an observer
+    # ------------------------------------------------------------------ as a subscriber
 
     def leave(self, moment: Nanos) -> None:
         for record in self._spread:

@@ -16,7 +16,7 @@ from steptwin.campaign.runner import CaseRunner
 from steptwin.campaign.shrink import ADDED
 from steptwin.controller import Nanos
 from steptwin.simulation.faults import Fault
-from steptwin.simulation.kinds.programs import StatementFollower
+from steptwin.simulation.kinds.programs import StatementSubscription
 from steptwin.simulation.scheduler.trace import TraceRecord
 
 _MOMENTS = frozenset({"edge", "plan", "statement"})
@@ -62,10 +62,10 @@ class ExhaustiveCases:
                 found.add(record.time)
 
         world = runner.begin(self._nominal)
-        world.trace.watchers.append(note)
-        follower = StatementFollower(world.programs, note)
+        world.trace.subscribers.append(note)
+        subscriber = StatementSubscription(world.programs, note)
         world.run_to(self._nominal.end_ns, description.until)
-        follower.close()
+        subscriber.close()
         moments = tuple(sorted(found))
         possible = possible_faults(runner.begin(self._nominal))
         counts = occasions(runner.begin(self._nominal), possible, self._nominal.end_ns, description.until)

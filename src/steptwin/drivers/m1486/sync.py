@@ -128,7 +128,7 @@ class M1486(BlockingLine):
         return M1486Jog(self._driver.jog(velocity))
 
     def subject(self, name: str = "m1486", *, period_s: float = PERIOD_S) -> DeviceSubject:
-        """The open device with the commands, points and events of a twin. It is polled for events while there are followers, at
+        """The open device with the commands, points and events of a twin. It is polled for events while there are subscribers, at
         most once per ``period_s``."""
         return DeviceSubject(AsyncDeviceSubject(name, M1486Part(self._driver), period_s))
 

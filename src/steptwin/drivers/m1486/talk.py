@@ -95,14 +95,14 @@ class ChipRequest:
         return f"{chip_name(self.address)}: {' '.join(self.text.split()) or 'select'}"
 
 
-ByteObserver = Callable[[Nanos, FrameDirection, bytes], object]
+ByteCallback = Callable[[Nanos, FrameDirection, bytes], object]
 """Called with all bytes sent and received."""
 
 
 class CharacterTalk:
     """The protocol of all exchanges of a line. ``echoing``: chips known to echo; ``owed``: pending type letters of each chip."""
 
-    def __init__(self, serial: SerialLine, place: str, *, on_bytes: ByteObserver | None = None) -> None:
+    def __init__(self, serial: SerialLine, place: str, *, on_bytes: ByteCallback | None = None) -> None:
         self._serial = serial
         self._place = place
         self.on_bytes = on_bytes

@@ -46,7 +46,7 @@ class FrameLog:
         self._wordings[unit] = wording
 
     def observe(self, now: Nanos, direction: FrameDirection, raw: bytes) -> None:
-        """Take a frame that a master sent or received: a `steptwin.wire.slave.FrameObserver`."""
+        """Take a frame that a master sent or received: a `steptwin.wire.slave.FrameCallback`."""
         self._emit(self.frame(now, direction, raw))
 
     def unframed(self, now: Nanos, raw: bytes) -> None:

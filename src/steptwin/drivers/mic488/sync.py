@@ -215,7 +215,7 @@ class Mic488(BlockingLine):
         return self._axes[self._driver.axis(number).number]
 
     def subject(self, name: str = "mic488", *, period_s: float = PERIOD_S) -> DeviceSubject:
-        """The open device with the commands, points and events of a twin. It is polled for events while there are followers, at
+        """The open device with the commands, points and events of a twin. It is polled for events while there are subscribers, at
         most once per ``period_s``."""
         return DeviceSubject(AsyncDeviceSubject(name, Mic488Part(self._driver), period_s))
 

@@ -26,7 +26,7 @@ class Ring:
     def __init__(self, trace: Trace, size: int) -> None:
         self._controllers = trace.controllers
         self._records: deque[TraceRecord] = deque(trace, maxlen=size)
-        trace.watchers.append(self._records.append)
+        trace.subscribers.append(self._records.append)
 
     def __len__(self) -> int:
         return len(self._records)
@@ -75,7 +75,7 @@ class TraceFile:
                 _begin(self._file, trace, views, title)
         except OSError as error:
             raise Misuse(f"cannot write {path}: {reason(error)}") from error
-        trace.watchers.append(self._add)
+        trace.subscribers.append(self._add)
 
     def _add(self, record: TraceRecord) -> None:
         self._write(record_line(record))
@@ -93,8 +93,8 @@ class TraceFile:
 
     def close(self, until: Nanos) -> None:
         """Write the end of the run and close. Raises `Misuse` if not everything could be written."""
-        if self._add in self._trace.watchers:
-            self._trace.watchers.remove(self._add)
+        if self._add in self._trace.subscribers:
+            self._trace.subscribers.remove(self._add)
         self._write(end_records(self._trace, until))
         try:
             self._file.close()

@@ -14,7 +14,7 @@ from steptwin.gateways.epics.records import Putter
 from steptwin.gateways.leases import LEASE_S, JogLeases
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.subject.commands import Command, Jog, ReadPoints, StopAxes
-from steptwin.subject.following import Filter, Following
+from steptwin.subject.subscriptions import Filter, Subscription
 
 JOG_LEASE_S = 1.0
 """A jog ends so long after the gateway has last looked after it."""
@@ -148,9 +148,9 @@ class EpicsController:
         self._commands += 1
         self._leases.drop(owner)
 
-    def follow_inputs(self) -> Following:
+    def subscribe_to_inputs(self) -> Subscription:
         """Stops by anybody are among them (`steptwin.subject.payloads.InputPayload`)."""
-        return self._subject.follow(Filter(frozenset({"input"}), frozenset({self.name})), MOST_INPUTS)
+        return self._subject.subscribe(Filter(frozenset({"input"}), frozenset({self.name})), MOST_INPUTS)
 
     def replace_jog(self, axis: int) -> None:
         """Another command has taken the axis."""

@@ -48,8 +48,8 @@ from steptwin.simulation.script.control import Halt
 from steptwin.simulation.script.steps import Write
 from steptwin.subject.commands import Enable, Home, Jog, Move, StopAxes
 from steptwin.subject.contract import ControllerDescription
-from steptwin.subject.following import Following
 from steptwin.subject.payloads import InputPayload
+from steptwin.subject.subscriptions import Subscription
 
 ON_ITS_WAY = SECOND // 2
 """A motion that has not begun so long after its command does not begin any more."""
@@ -114,7 +114,7 @@ class MotorRecord(RecordBase):
         """Who has asked for a jog that has not begun yet, by which button; None once it is let go of."""
         self._is_homed = False
         self._is_pausing = False
-        self._inputs: Following | None = None
+        self._inputs: Subscription | None = None
         """While a motion waits for Go."""
         self._has_not_aimed = True
         """Before the first sample VAL is not known."""
@@ -345,7 +345,7 @@ class MotorRecord(RecordBase):
         """From now on others may stop the motion that waits for Go."""
         if self._inputs is not None:
             self._inputs.close()
-        self._inputs = self._controller.follow_inputs()
+        self._inputs = self._controller.subscribe_to_inputs()
 
     def _see_stops(self) -> None:
         """End a motion that waits for Go if others have stopped its axis."""

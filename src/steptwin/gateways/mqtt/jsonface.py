@@ -30,7 +30,7 @@ from steptwin.gateways.mqtt.options import MqttSpec
 from steptwin.gateways.points import CLOCK
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.subject.dispatch import failure
-from steptwin.subject.following import Filter
+from steptwin.subject.subscriptions import Filter
 
 KINDS = frozenset({"status", "report", "note", "fault", "button", "input"})
 """Kinds of events that are published."""
@@ -50,7 +50,7 @@ class JsonFace:
         self._topics = topics
         self._sampler = sampler
         self._commands = commands
-        self._following = subject.follow(Filter(KINDS), spec.store)
+        self._subscription = subject.subscribe(Filter(KINDS), spec.store)
         self._instance = secrets.token_hex(8)
         self._texts: dict[str, ControllerText] = {}
         """Texts that have been published in this session, by controller."""
@@ -60,7 +60,7 @@ class JsonFace:
         self._is_online = False
 
     def close(self) -> None:
-        self._following.close()
+        self._subscription.close()
         for task in self._doing:
             task.cancel()
 
@@ -127,7 +127,7 @@ class JsonFace:
         await link.publish_all(found)
 
     async def _publish_events(self, link: BrokerLink) -> None:
-        missed, events = self._following.take()
+        missed, events = self._subscription.take()
         for event in events:
             data = event.to_json() | ({"missed": missed} if missed else {})
             missed = 0

@@ -14,8 +14,8 @@ from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.opcua.addressspace import NAMESPACE, node_id
 from steptwin.gateways.opcua.nodetypes import standard
 from steptwin.subject.events import Event
-from steptwin.subject.following import Filter, Following
 from steptwin.subject.payloads import StatusPayload
+from steptwin.subject.subscriptions import Filter, Subscription
 
 KINDS = frozenset({"status", "report", "note", "fault", "button"})
 MOST_EVENTS = 4096
@@ -39,8 +39,8 @@ SERVER = ""
 class Notifications:
     """Events for clients that subscribe to the server, or to one controller."""
 
-    def __init__(self, subject: GatewaySubject, following: Following, generators: Mapping[str, EventGenerator]) -> None:
-        self._following = following
+    def __init__(self, subject: GatewaySubject, subscription: Subscription, generators: Mapping[str, EventGenerator]) -> None:
+        self._subscription = subscription
         self._generators = generators
         self._severities = {
             (part.name, event.code): SEVERITIES[event.severity]
@@ -57,13 +57,13 @@ class Notifications:
             event = copy(generators[SERVER].event)  # the library would collect its fields from the type again
             event.SourceNode, event.SourceName = None, None
             generators[part.name] = await server.get_event_generator(event, node_id(part.name))
-        return cls(subject, subject.follow(Filter(KINDS), MOST_EVENTS), generators)
+        return cls(subject, subject.subscribe(Filter(KINDS), MOST_EVENTS), generators)
 
     def close(self) -> None:
-        self._following.close()
+        self._subscription.close()
 
     async def publish(self) -> None:
-        missed, events = self._following.take()
+        missed, events = self._subscription.take()
         if missed:
             generator = self._generators[SERVER]
             generator.event.Severity = SEVERITIES[EventSeverity.WARNING]

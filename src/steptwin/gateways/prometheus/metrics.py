@@ -18,7 +18,7 @@ from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.heldstate import BUSY
 from steptwin.subject import commands as command
 from steptwin.subject.contract import Description
-from steptwin.subject.following import Filter
+from steptwin.subject.subscriptions import Filter
 
 MetricSample: TypeAlias = tuple[tuple[str, ...], bool | float | None]
 """Values of the labels, and the value; None where it is unknown."""
@@ -37,12 +37,12 @@ class Metrics:
 
     def __init__(self, subject: GatewaySubject) -> None:
         self._subject = subject
-        self._following = subject.follow(Filter(COUNTED), MOST_EVENTS)
+        self._subscription = subject.subscribe(Filter(COUNTED), MOST_EVENTS)
         self._counts: Counter[tuple[str, str]] = Counter()
         self._missed = 0
 
     def close(self) -> None:
-        self._following.close()
+        self._subscription.close()
 
     async def read(self) -> list[Metric]:
         """The present values."""
@@ -78,7 +78,7 @@ class Metrics:
         ]
 
     def _events(self) -> list[Metric]:
-        missed, events = self._following.take()
+        missed, events = self._subscription.take()
         self._missed += missed
         self._counts.update((event.controller, event.kind) for event in events)
         counted = CounterMetricFamily(f"{PREFIX}events", "Events since the gateway was opened.", labels=("controller", "kind"))

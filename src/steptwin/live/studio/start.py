@@ -211,7 +211,7 @@ class _Page:
 
         jogs = WorldJogs(live.subject, running.control.at_present)
         live.external_actor = jogs
-        world = WorldMember(running.control, live.subject.followers, jogs)
+        world = WorldMember(running.control, live.subject.subscribers, jogs)
         subject = CompositeSubject(world, lambda: moment().time, live.subject.numbering)
 
         def configuration(controller: str) -> SourceText | None:

@@ -76,7 +76,7 @@ class Carrier(TerminalComponent):
         """How many have fallen."""
 
     @property
-    def watches(self) -> tuple[str, ...]:
+    def depends_on(self) -> tuple[str, ...]:
         return (self.block.name, *(() if self.source is None else (self.source.block.name,)))
 
     def is_occupied(self, now: Nanos) -> bool:

@@ -139,7 +139,7 @@ class Conveyor(TerminalComponent):
         return self.drive.version(), self.load.version()
 
     @property
-    def watches(self) -> tuple[str, ...]:
+    def depends_on(self) -> tuple[str, ...]:
         return (self.block.name, *self._moved_by, *(() if self.spec.next is None else (self.spec.next,)))
 
     def _state(self) -> object:

@@ -118,9 +118,9 @@ class FurtherLoad(TerminalComponent):
         """Fault: how much of it there is instead of all."""
 
     @property
-    def watches(self) -> tuple[str, ...] | None:
+    def depends_on(self) -> tuple[str, ...] | None:
         """All, with a condition or a curve: they may be over anything."""
-        return super().watches if self._condition is None and self._curve is None else None
+        return super().depends_on if self._condition is None and self._curve is None else None
 
     @property
     def most(self) -> float:

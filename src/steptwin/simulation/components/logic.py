@@ -66,7 +66,7 @@ class TerminalComponent(Stateful, ABC):
         self.block = block
 
     @property
-    def watches(self) -> tuple[str, ...] | None:
+    def depends_on(self) -> tuple[str, ...] | None:
         """The controllers and elements whose changes concern it; None: all."""
         return (self.block.name,)
 
@@ -179,7 +179,7 @@ def with_terminals(
 
     def build(found: S, context: ElementContext) -> P:
         component = make(found, context)
-        component.block.scheduler.add_part(component, component.watches, found.name)
+        component.block.scheduler.add_part(component, component.depends_on, found.name)
         for wire, path in context.memo.once((*found.path, "wires"), lambda: tuple(_wires(found))):
             context.join(wire, path)
         fit(found, component, context)

@@ -45,7 +45,7 @@ class Touch(TerminalComponent):
         """How often they touched."""
 
     @property
-    def watches(self) -> None:
+    def depends_on(self) -> None:
         """The condition may be over anything."""
 
     def is_moved_by(self, mechanism: Mechanism) -> bool:

@@ -13,7 +13,7 @@ from steptwin.simulation.faults.answers import Exchange, must_not_be_sent, pdu_o
 from steptwin.simulation.faults.stream import spoil
 from steptwin.simulation.faults.table import Layer, LineProtocol
 from steptwin.state import Plain, Stateful
-from steptwin.wire.slave import FrameDirection, FrameObserver, SlavePort
+from steptwin.wire.slave import FrameCallback, FrameDirection, SlavePort
 
 _ASKED = 64
 """More requests than this never wait for their answers (`steptwin.wire.gateway.QUEUE_REQUESTS`)."""
@@ -72,7 +72,7 @@ class FaultyPort(Stateful):
         self._units = units
         self.link = link
         self.line_name = line_name
-        self._before: FrameObserver | None = None
+        self._before: FrameCallback | None = None
         self._now: Nanos = 0  # of the present call: an answer may have left before it
         self._asked: deque[bytes] = deque(maxlen=_ASKED)
         self._fresh: list[tuple[Nanos, Nanos, bytes]] = []  # moment, delay, bytes: as the faults of frames leave them
@@ -176,13 +176,13 @@ class FaultyPort(Stateful):
                 at = moment + delay + more
                 self._leaving.append((max(at, self._leaving[-1][0]) if self._leaving else at, piece))
 
-    def watch(self, observer: FrameObserver | None) -> None:
-        """Call ``observer`` with the frames of the port from now on; None ends that."""
+    def call_with_frames(self, callback: FrameCallback | None) -> None:
+        """Call ``callback`` with the frames of the port from now on; None ends that."""
         framed = self._framed
         if framed is not None and framed.on_frame == self._observe:
-            self._before = observer
+            self._before = callback
         elif framed is not None:
-            framed.on_frame = observer
+            framed.on_frame = callback
 
     def _observe(self, moment: Nanos, direction: FrameDirection, raw: bytes) -> None:
         if direction is FrameDirection.OUT and must_not_be_sent(self._line, raw):

@@ -20,7 +20,7 @@ from steptwin.simulation.kinds.master import Master
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
 from steptwin.state import Plain, Stateful
-from steptwin.wire.slave import FrameDirection, FrameObserver, SlaveDevice, SlavePort
+from steptwin.wire.slave import FrameCallback, FrameDirection, SlaveDevice, SlavePort
 
 SCRIPTS = "script"
 """The place of the world's own scripts on every line."""
@@ -29,7 +29,7 @@ MOST_RECEIVED = 1 << 16
 """Limit of received pieces kept for a program that does not fetch them; the oldest are dropped."""
 
 
-class FrameFollower(Protocol):
+class FrameSubscriber(Protocol):
     """Observes the traffic of a line."""
 
     def frame(self, now: Nanos, place: str, direction: FrameDirection, data: bytes) -> None:
@@ -67,7 +67,7 @@ class LineWrite(NamedTuple):
     outcome: str
 
 
-class TrafficLog(FrameFollower, Protocol):
+class TrafficLog(FrameSubscriber, Protocol):
     """Decodes the traffic of a line into text."""
 
     def recorded(self, record: TraceRecord) -> None:
@@ -129,7 +129,7 @@ OTHER_KIND_OF_CONNECTION = Message(
 class Line(Stateful, ABC):
     """Base class of lines; a part of its scheduler."""
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_before", "_busy", "_faults", "_followers", "_scheduler", "_record", "name", "places")
+    FIXED: ClassVar[tuple[str, ...]] = ("_before", "_busy", "_faults", "_subscribers", "_scheduler", "_record", "name", "places")
     __slots__ = (*FIXED,)
 
     kinds: ClassVar[tuple[str, ...]]
@@ -144,7 +144,7 @@ class Line(Stateful, ABC):
         self._faults = faults
         self.name = name
         self.places: dict[str, LineEndPoint] = {}
-        self._followers: list[FrameFollower] = []
+        self._subscribers: list[FrameSubscriber] = []
         self._before = LineTraffic()
         """Traffic of programs that have disconnected."""
         self._busy: dict[str, LineEndPoint] = {}
@@ -249,8 +249,8 @@ class Line(Stateful, ABC):
             return
         unframed = place.framed.unframed
         if unframed > place.unframed:
-            for follower in self._followers:
-                follower.unframed(now, name, unframed - place.unframed)
+            for subscriber in self._subscribers:
+                subscriber.unframed(now, name, unframed - place.unframed)
         place.unframed = unframed
 
     def exchange(self, place: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
@@ -262,7 +262,7 @@ class Line(Stateful, ABC):
             self._scheduler.notify(self.name)
         if self._scheduler.is_step_exact or self._scheduler.hears_requests:
             self._scheduler.notify()
-        if self._followers:
+        if self._subscribers:
             self._count_unframed(place, found, now)
         return answer
 
@@ -271,7 +271,7 @@ class Line(Stateful, ABC):
         return False
 
     def exchange_unrecorded(self, place: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
-        """As `exchange`; followers see the frames, the trace does not."""
+        """As `exchange`; subscribers see the frames, the trace does not."""
         record, self._record = self._record, None
         try:
             return self.exchange(place, found, data, now)
@@ -298,7 +298,7 @@ class Line(Stateful, ABC):
             pieces = place.port.to_send(now)
             if pieces:
                 self._came(name, place, pieces)
-            if self._followers:
+            if self._subscribers:
                 self._count_unframed(name, place, now)
             if not place.talks and place.port.deadline() is None:
                 self._busy.pop(name, None)
@@ -316,31 +316,31 @@ class Line(Stateful, ABC):
     def _report(self, place: str, now: Nanos, direction: FrameDirection, data: bytes) -> None:
         if self._record is not None:
             self._record(TraceRecord(now, self.name, "frame", f"{place}/{direction.value}", data))
-        for follower in self._followers:
-            follower.frame(now, place, direction, data)
+        for subscriber in self._subscribers:
+            subscriber.frame(now, place, direction, data)
 
-    def follow_frames(self, follower: FrameFollower) -> None:
-        """Call ``follower`` with every frame from now on."""
-        self._followers.append(follower)
+    def subscribe_to_frames(self, subscriber: FrameSubscriber) -> None:
+        """Call ``subscriber`` with every frame from now on."""
+        self._subscribers.append(subscriber)
         self._watch_ports()
 
-    def unfollow_frames(self, follower: FrameFollower) -> None:
-        """Stop calling ``follower``."""
-        self._followers.remove(follower)
+    def unsubscribe_from_frames(self, subscriber: FrameSubscriber) -> None:
+        """Stop calling ``subscriber``."""
+        self._subscribers.remove(subscriber)
         self._watch_ports()
 
     def _watch_ports(self) -> None:
         for name, place in self.places.items():
-            place.port.watch(self._observer(name))
+            place.port.call_with_frames(self._frame_callback(name))
 
-    def _observer(self, place: str) -> FrameObserver | None:
-        """The observer of frames for the port at ``place``; None if frames are not observed, or the line has none."""
+    def _frame_callback(self, place: str) -> FrameCallback | None:
+        """The callback of frames for the port at ``place``; None if frames are not observed, or the line has none."""
 
         return None
 
     @property
-    def _is_followed(self) -> bool:
-        return self._record is not None or bool(self._followers)
+    def _has_subscribers(self) -> bool:
+        return self._record is not None or bool(self._subscribers)
 
     # ------------------------------------------------------------------ snapshots
 

@@ -1,6 +1,6 @@
 """The programs of controllers while they are executed: their statements, where they stand, their variables.
 
-One contract for all languages: traces, followers and the debugger ask for no more. A place is a statement of a text; texts are
+One contract for all languages: traces, subscribers and the debugger ask for no more. A place is a statement of a text; texts are
 named as in `steptwin.simulation.kinds.programtexts`.
 """
 
@@ -104,11 +104,11 @@ class Programs(Protocol):
         """Numbers of the statements at labels and interrupts, by name."""
         ...
 
-    def hook(self, hook: StatementHook, places: Collection[Place] | None = None) -> None:
+    def add_hook(self, hook: StatementHook, places: Collection[Place] | None = None) -> None:
         """Call ``hook`` before each statement (`steptwin.statements`), or before those at places, and at others by chance."""
         ...
 
-    def unhook(self, hook: StatementHook) -> None: ...
+    def remove_hook(self, hook: StatementHook) -> None: ...
 
     def begun(self, now: Nanos) -> Sequence[int]:
         """The numbers of statements that were executed at power-on, before there could be a hook; empty after 0 s, and where
@@ -157,7 +157,7 @@ class Programs(Protocol):
         ...
 
 
-class StatementFollower:
+class StatementSubscription:
     """Reports each statement that a program of the world executes as a record of kind ``statement``, until `close`."""
 
     def __init__(self, programs_of: Mapping[str, Programs], report: RecordSink) -> None:
@@ -165,12 +165,12 @@ class StatementFollower:
         self._hooks: list[tuple[Programs, StatementHook]] = []
         for name, programs in programs_of.items():
             hook = _reporting(name, programs, report)
-            programs.hook(hook)
+            programs.add_hook(hook)
             self._hooks.append((programs, hook))
 
     def close(self) -> None:
         for programs, hook in self._hooks:
-            programs.unhook(hook)
+            programs.remove_hook(hook)
         self._hooks.clear()
 
 

@@ -14,8 +14,8 @@ def successors(
 ) -> list[set[int]]:
     """The parts that an update of each part may concern at the same moment.
 
-    ``names``: the element of each part; ``watching``: the parts that watch a name; ``drives``: the name whose input a part drives
-    (a contact is notified with it, too).
+    ``names``: the element of each part; ``watching``: the parts that depend on a name; ``drives``: the name whose input a part
+    drives (a contact is notified with it, too).
     """
     reached: dict[str, set[str]] = {}
     for wire in wires:

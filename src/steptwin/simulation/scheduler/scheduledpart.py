@@ -16,7 +16,7 @@ class ScheduledPart(Protocol):
         ...
 
     def update(self, now: Nanos) -> None:
-        """Process events due by ``now`` and changes of what it watches, repeatedly until nothing changes. Levels go to
+        """Process events due by ``now`` and changes of what it depends on, repeatedly until nothing changes. Levels go to
         `Scheduler.drive`."""
         ...
 

@@ -12,21 +12,21 @@ from steptwin.simulation.scheduler.wires import Wire
 
 
 class ScheduledParts:
-    """Parts with numbers in the order in which they are updated: what each watches, computes and drives, and when it runs.
+    """Parts with numbers in the order in which they are updated: what each depends on, computes and drives, and when it runs.
 
     All that is kept by number is here, and `arranged` makes it anew, so that nothing of one numbering gets into another.
     """
 
-    __slots__ = ("_drives", "_watched", "all", "by_name", "computes", "deadlines", "parts", "queue", "visited")
+    __slots__ = ("_depends_on", "_drives", "all", "by_name", "computes", "deadlines", "parts", "queue", "visited")
 
     def __init__(self) -> None:
         self.parts: list[ScheduledPart] = []
         self.by_name: dict[str, list[int]] = {}
-        """The parts that watch a controller, a line or an element, by its name."""
-        self._watched: list[tuple[str, ...] | None] = []
-        """The names that each part watches; None: everything."""
+        """The parts that depend on a controller, a line or an element, by its name."""
+        self._depends_on: list[tuple[str, ...] | None] = []
+        """The names on which each part depends; None: everything."""
         self.all: list[int] = []
-        """Those that watch everything."""
+        """Those that depend on everything."""
         self.computes: list[str | None] = []
         """The line or element whose signals each part computes."""
         self._drives: dict[int, str] = {}
@@ -37,19 +37,19 @@ class ScheduledParts:
         self.visited: set[int] = set()
         """Those whose deadlines may have changed since the signals last settled."""
 
-    def add(self, part: ScheduledPart, watches: Iterable[str] | None, computes: str | None, drives: str | None) -> int:
-        """The number of another part, the last one. ``watches``: None is everything."""
+    def add(self, part: ScheduledPart, depends_on: Iterable[str] | None, computes: str | None, drives: str | None) -> int:
+        """The number of another part, the last one. ``depends_on``: None is everything."""
         number = len(self.parts)
         self.parts.append(part)
         self.computes.append(computes)
         if drives is not None:
             self._drives[number] = drives
-        watched = None if watches is None else tuple(dict.fromkeys(watches))
-        self._watched.append(watched)
-        if watched is None:
+        dependencies = None if depends_on is None else tuple(dict.fromkeys(depends_on))
+        self._depends_on.append(dependencies)
+        if dependencies is None:
             self.all.append(number)
         else:
-            for name in watched:
+            for name in dependencies:
                 self.by_name.setdefault(name, []).append(number)
         return number
 
@@ -62,5 +62,5 @@ class ScheduledParts:
         """The same parts, added in another order; none waits to run yet. ``order``: their present numbers."""
         found = ScheduledParts()
         for old in order:
-            found.add(self.parts[old], self._watched[old], self.computes[old], self._drives.get(old))
+            found.add(self.parts[old], self._depends_on[old], self.computes[old], self._drives.get(old))
         return found

@@ -15,12 +15,12 @@ from steptwin.errors import Misuse, Runaway, TimeReversal
 from steptwin.messages import NONE, Message
 from steptwin.motioncontroller import Drive, MotionController
 from steptwin.simulation.scheduler.deadlines import Deadlines
-from steptwin.simulation.scheduler.followers import SchedulerFollower, SchedulerFollowers
 from steptwin.simulation.scheduler.recordedplans import RecordedPlans
 from steptwin.simulation.scheduler.runqueue import RunQueue
 from steptwin.simulation.scheduler.scheduledpart import ScheduledPart
 from steptwin.simulation.scheduler.scheduledparts import ScheduledParts
 from steptwin.simulation.scheduler.schedulerstate import SchedulerState
+from steptwin.simulation.scheduler.subscribers import SchedulerSubscriber, SchedulerSubscribers
 from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
 from steptwin.simulation.scheduler.wires import PinName, Wire, Wires
 from steptwin.state import Stateful
@@ -131,7 +131,7 @@ class Scheduler:
         self.terminal_blocks: dict[str, TerminalBlock] = {}
         """Terminals of elements."""
         self._parts = ScheduledParts()
-        self.observers: list[Callable[[str, PinEdge], None]] = []
+        self.edge_subscribers: list[Callable[[str, PinEdge], None]] = []
         """Called with controller name and edge, in order, for every output edge."""
         self.is_dirty = False
         """Whether something changed since the signals last settled."""
@@ -142,8 +142,8 @@ class Scheduler:
         """Whether every request counts as an event, because what one may change is noted."""
         self.on_change: Callable[[Scheduler], None] | None = None
         """Called with the scheduler after each of its events and after each change from outside."""
-        self.followers: SchedulerFollowers | None = None
-        """Followers that are notified of each event; None: there have been none yet."""
+        self.subscribers: SchedulerSubscribers | None = None
+        """Subscribers that are notified of each event; None: there have been none yet."""
         self._changed: set[str] = set()
         """The controllers, lines and elements that were visited since the last `take_changed`."""
         self._is_checked, self.is_blank = is_checked, is_blank
@@ -215,17 +215,17 @@ class Scheduler:
         self.terminal_blocks[block.name] = block
 
     def add_part(
-        self, part: ScheduledPart, watches: Iterable[str] | None = None, name: str | None = None, drives: str | None = None
+        self, part: ScheduledPart, depends_on: Iterable[str] | None = None, name: str | None = None, drives: str | None = None
     ) -> None:
-        """Add a part; it is first updated when the signals settle next, then whenever it is due or something that it watches has
-        changed.
+        """Add a part; it is first updated when the signals settle next, then whenever it is due or something that it depends on
+        has changed.
 
-        ``watches``: names of controllers, lines and elements; None: every change. ``name``: the line or element whose signals it
-        computes; they may change with each of its updates, and only then. ``drives``: the controller or element whose input
+        ``depends_on``: names of controllers, lines and elements; None: every change. ``name``: the line or element whose signals
+        it computes; they may change with each of its updates, and only then. ``drives``: the controller or element whose input
         it drives.
         """
         self._join()
-        number = self._parts.add(part, watches, name, drives)
+        number = self._parts.add(part, depends_on, name, drives)
         if name is not None:
             self._sources[name] = Source(self, name)
         if not self.is_blank:
@@ -291,16 +291,16 @@ class Scheduler:
             raise Misuse(NO_AXIS_OF(axis=axis, controller=controller, count=len(axes)))
         return axes[axis - 1]
 
-    def follow(self, follower: SchedulerFollower, names: Iterable[str], *, leaves: bool = False) -> None:
-        """Tell it of events from now on, as `SchedulerFollowers.add`."""
-        if self.followers is None:
-            self.followers = SchedulerFollowers()
-        self.followers.add(follower, names, leaves=leaves)
+    def subscribe(self, subscriber: SchedulerSubscriber, names: Iterable[str], *, leaves: bool = False) -> None:
+        """Tell it of events from now on, as `SchedulerSubscribers.add`."""
+        if self.subscribers is None:
+            self.subscribers = SchedulerSubscribers()
+        self.subscribers.add(subscriber, names, leaves=leaves)
 
-    def unfollow(self, follower: SchedulerFollower) -> None:
+    def unsubscribe(self, subscriber: SchedulerSubscriber) -> None:
         """Tell it no more."""
-        if self.followers is not None:
-            self.followers.remove(follower)
+        if self.subscribers is not None:
+            self.subscribers.remove(subscriber)
 
     def take_changed(self) -> set[str]:
         """The controllers, lines and elements whose signals may have changed since the last call, if signals have settled."""
@@ -387,8 +387,8 @@ class Scheduler:
         due = self._due
         if due is not None and due <= now:
             self._run(now)
-        if self.followers is not None and self.followers.leaving and now > self.now:
-            self.followers.leave(now)  # something may come from outside next
+        if self.subscribers is not None and self.subscribers.leaving and now > self.now:
+            self.subscribers.leave(now)  # something may come from outside next
         self.now = now
 
     def _run(self, now: Nanos) -> None:
@@ -399,8 +399,8 @@ class Scheduler:
                 self.on_change(self)
             return
         while self._due is not None and self._due <= now:
-            if self.followers is not None and self.followers.leaving:
-                self.followers.leave(self._due)
+            if self.subscribers is not None and self.subscribers.leaving:
+                self.subscribers.leave(self._due)
             self.now = self._due
             self._advance_controllers(now)
             for number in self._parts.deadlines.take(self.now):
@@ -435,17 +435,17 @@ class Scheduler:
         controller, due = self.controllers[name], self._due
         self._changed.add(name)
         while due is not None and due <= now:
-            if self.followers is not None:
-                self.followers.leave(due)
+            if self.subscribers is not None:
+                self.subscribers.leave(due)
             if self.is_step_exact:
                 controller.advance(due)
                 self.now = due
             else:
                 self.now = controller.advance_to_change(now)
             self._propagate_alone(name, plans)
-            if self.followers is not None:
-                self.followers.news |= self.followers.by_name.get(name, {})
-                self.followers.tell(self.now)
+            if self.subscribers is not None:
+                self.subscribers.news |= self.subscribers.by_name.get(name, {})
+                self.subscribers.notify(self.now)
             due = self._due
             if self.is_step_exact and self.on_change is not None:
                 self.on_change(self)
@@ -471,12 +471,12 @@ class Scheduler:
         if self._alone is not None:
             self._changed.add(self._alone[0])
             self._propagate_alone(*self._alone)
-            if self.followers is not None:
-                self.followers.news |= self.followers.by_name.get(self._alone[0], {})
+            if self.subscribers is not None:
+                self.subscribers.news |= self.subscribers.by_name.get(self._alone[0], {})
         else:
             self._settle_connected()
-        if self.followers is not None and self.followers.news:
-            self.followers.tell(self.now)
+        if self.subscribers is not None and self.subscribers.news:
+            self.subscribers.notify(self.now)
         if self.on_change is not None:
             self.on_change(self)
 
@@ -508,22 +508,22 @@ class Scheduler:
 
     def _find_deadlines(self) -> None:
         """Record new plans of the controllers that were visited, and find when anything is due next."""
-        followers = self.followers
+        subscribers = self.subscribers
         for number in sorted(self._controllers_visited):
             if self._record is not None:
                 self._plans[number].report(self._record, self.now)
             name = self._names[number]
             self._changed.add(name)
-            if followers is not None and name in followers.by_name:
-                followers.news |= followers.by_name[name]
+            if subscribers is not None and name in subscribers.by_name:
+                subscribers.news |= subscribers.by_name[name]
             self._controller_deadlines.put(number, self.controllers[name].deadline())
         parts = self._parts
         for number in parts.visited:
             of = parts.computes[number]
             if of is not None:
                 self._changed.add(of)
-                if followers is not None and of in followers.by_name:
-                    followers.news |= followers.by_name[of]
+                if subscribers is not None and of in subscribers.by_name:
+                    subscribers.news |= subscribers.by_name[of]
             parts.deadlines.put(number, parts.parts[number].deadline())
         self._controllers_visited.clear()
         parts.visited.clear()
@@ -539,8 +539,8 @@ class Scheduler:
             self._record(TraceRecord(edge.time, name, "edge", edge.pin, edge.value))
             if pin in self._recorded:
                 self._recorded[pin] = edge.time, edge.value
-        for observer in self.observers:
-            observer(name, edge)
+        for subscriber in self.edge_subscribers:
+            subscriber(name, edge)
         self.wires.transmit(pin, edge.value, self.now)
 
     # ------------------------------------------------------------------ snapshots

@@ -85,7 +85,7 @@ class Trace:
         self._streams: dict[str, _Stream] = {name: _Stream() for name in controllers}
         self._together: Sequence[Sequence[str]] = ()
         self._latest_number = 0
-        self.watchers: list[RecordSink] = []
+        self.subscribers: list[RecordSink] = []
         """Called with every record."""
 
     @property
@@ -115,8 +115,8 @@ class Trace:
             stream.numbers.append(self._latest_number)
         elif self.is_recorded:
             stream.hash.update(encode(record))
-        for watcher in self.watchers:
-            watcher(record)
+        for subscriber in self.subscribers:
+            subscriber(record)
 
     def __len__(self) -> int:
         """Number of records so far, kept or not."""
@@ -167,7 +167,7 @@ class Trace:
         return self.of("fault", controller=controller)
 
     def stop(self) -> None:
-        """Keep no records and no digest from now on; only `watchers` are called."""
+        """Keep no records and no digest from now on; only `subscribers` are called."""
         self.is_kept = self.is_recorded = False
         for stream in self._streams.values():
             stream.clear()

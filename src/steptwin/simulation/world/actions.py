@@ -334,7 +334,7 @@ def _expect(model: Model, step: do.Expect) -> Action:
 
 def _note(model: Model, step: do.Note) -> Action:
     def action(scripts: Scripts) -> None:
-        if model.trace.watchers:
+        if model.trace.subscribers:
             model.sync_all()  # earlier events are shown first
         model.trace.add(TraceRecord(model.now, WORLD, "event", "note", step.text))
 

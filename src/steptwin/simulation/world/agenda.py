@@ -14,12 +14,12 @@ from typing import Generic, TypeAlias, TypeVar
 
 from steptwin.controller import Nanos
 from steptwin.simulation.scheduler.deadlines import Deadlines
-from steptwin.simulation.scheduler.observing import WorldObserver
 from steptwin.simulation.scheduler.scheduler import Scheduler, Source
+from steptwin.simulation.scheduler.worldsubscriber import WorldSubscriber
 from steptwin.simulation.world.running import Script
 
-Waiter: TypeAlias = "Script | WorldObserver"
-W = TypeVar("W", Script, WorldObserver)
+Waiter: TypeAlias = "Script | WorldSubscriber"
+W = TypeVar("W", Script, WorldSubscriber)
 _FEW = 64
 """Number of outdated entries that a queue tolerates before it removes them."""
 
@@ -105,7 +105,7 @@ class Agenda(Generic[W]):
         return taken
 
 
-class Watchers:
+class Dependencies:
     """Which scripts depend on which controllers, lines and elements, when their schedulers are due, and what has changed since
     the last `take`."""
 
@@ -172,7 +172,7 @@ class Watchers:
         if self._watch is not None:
             self._watch(scheduler)
 
-    def watch_all(self, schedulers: Iterable[Scheduler], watch: Callable[[Scheduler], None]) -> None:
+    def subscribe_to_all(self, schedulers: Iterable[Scheduler], watch: Callable[[Scheduler], None]) -> None:
         """Call ``watch`` with every one of these schedulers that has changed."""
         self._watch = watch
         for scheduler in schedulers:

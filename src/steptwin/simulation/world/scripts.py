@@ -11,11 +11,11 @@ from steptwin.controller import Nanos
 from steptwin.errors import Refusal, Runaway
 from steptwin.messages import Message
 from steptwin.simulation.kinds.master import Master
-from steptwin.simulation.scheduler.observing import WorldObserver
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.scheduler.worldsubscriber import WorldSubscriber
 from steptwin.simulation.script import steps as do
-from steptwin.simulation.world.agenda import Agenda, Watchers
+from steptwin.simulation.world.agenda import Agenda, Dependencies
 from steptwin.simulation.world.inputs import FOR_SCRIPTS, ExternalInput, Refused
 from steptwin.simulation.world.model import WORLD, Model
 from steptwin.simulation.world.motions import motion_ends, ordered
@@ -54,15 +54,15 @@ class Scripts:
         self._scripts: dict[int, Script] = {}
         self._described: Agenda[Script] = Agenda()
         self._external: Agenda[Script] = Agenda()
-        self._observed: Agenda[WorldObserver] = Agenda()
-        self._observers: list[WorldObserver] = []
-        self._watchers = Watchers()
+        self._looking: Agenda[WorldSubscriber] = Agenda()
+        self._subscribers: list[WorldSubscriber] = []
+        self._dependencies = Dependencies()
         self._scheduled: dict[str, Script] = {}
         """Scheduled steps that can be cancelled, by name."""
 
-    def watch_schedulers(self, schedulers: Iterable[Scheduler], watch: Callable[[Scheduler], None]) -> None:
+    def subscribe_to_schedulers(self, schedulers: Iterable[Scheduler], watch: Callable[[Scheduler], None]) -> None:
         """Call ``watch`` from now on with every scheduler that has changed."""
-        self._watchers.watch_all(schedulers, watch)
+        self._dependencies.subscribe_to_all(schedulers, watch)
 
     def __iter__(self) -> Iterator[Script]:
         """The scripts that have not ended, in order of their start."""
@@ -110,68 +110,68 @@ class Scripts:
     def _remove(self, script: Script) -> None:
         script.waiting = None
         self._agenda_of(script).remove(script)
-        self._watchers.set(script, ())
+        self._dependencies.set(script, ())
         if self._scripts.get(script.number) is script:  # a step may have restored another state
             del self._scripts[script.number]
 
     def _agenda_of(self, script: Script) -> Agenda[Script]:
         return self._external if script.is_external else self._described
 
-    # ------------------------------------------------------------------ observers
+    # ------------------------------------------------------------------ subscribers
 
-    def observe(self, observer: WorldObserver) -> None:
+    def subscribe(self, subscriber: WorldSubscriber) -> None:
         """Let it look from now on, after all scripts of each moment."""
-        observer.number = min((one.number for one in self._observers), default=0) - 1
-        self._observers.append(observer)
-        self._watchers.again(observer)
+        subscriber.number = min((one.number for one in self._subscribers), default=0) - 1
+        self._subscribers.append(subscriber)
+        self._dependencies.again(subscriber)
 
-    def unobserve(self, observer: WorldObserver) -> None:
-        self._observers.remove(observer)
-        self._observed.remove(observer)
-        self._watchers.set(observer, ())
-        self._watchers.forget(observer)
+    def unsubscribe(self, subscriber: WorldSubscriber) -> None:
+        self._subscribers.remove(subscriber)
+        self._looking.remove(subscriber)
+        self._dependencies.set(subscriber, ())
+        self._dependencies.forget(subscriber)
 
-    def first_observed(self) -> Nanos | None:
-        """The moment at which an observer looks next, after `first`."""
-        return self._observed.first() if self._observers else None
+    def first_look(self) -> Nanos | None:
+        """The moment at which a subscriber looks next, after `first`."""
+        return self._looking.first() if self._subscribers else None
 
     def leave(self, moment: Nanos) -> None:
         """Time goes on to ``moment``, at which nothing has happened yet."""
-        for observer in self._observers:
-            observer.leave(moment)
+        for subscriber in self._subscribers:
+            subscriber.leave(moment)
 
     def look(self) -> None:
-        """Let observers look that are due now."""
-        for observer in self._observed.take_watching(self._model.now):
-            self._watchers.set(observer, observer.look(self._model.now))
+        """Let subscribers look that are due now."""
+        for subscriber in self._looking.take_watching(self._model.now):
+            self._dependencies.set(subscriber, subscriber.look(self._model.now))
 
     # ------------------------------------------------------------------ scheduling
 
     def first(self) -> tuple[Nanos | None, Nanos | None, Nanos | None]:
         """The earliest due moments: of schedulers that scripts wait for, of scripts of the description, of external scripts."""
         self._renew()
-        return self._watchers.due(), self._described.first(), self._external.first()
+        return self._dependencies.due(), self._described.first(), self._external.first()
 
     def advance_schedulers(self) -> None:
         """Advance the schedulers that are due now; scripts that wait for what happens there become due."""
-        self._watchers.advance(self._model.now)
+        self._dependencies.advance(self._model.now)
 
     def _renew(self) -> None:
         """Update the due moments of scripts when something has changed on which they depend."""
-        while changed := self._watchers.take():
+        while changed := self._dependencies.take():
             for script in changed:
                 if isinstance(script, Script):
                     self._plan(script)
                 else:
-                    self._observed.watch(script, self._model.now)
+                    self._looking.watch(script, self._model.now)
 
     def _wait(self, script: Script, waiting: ScriptWait) -> None:
         script.waiting = waiting
         if waiting.is_timed and waiting.until is not None:
-            self._watchers.set(script, ())
+            self._dependencies.set(script, ())
             self._agenda_of(script).wait(script, waiting.until)
         else:
-            self._watchers.again(script)  # once, with what its last step has changed
+            self._dependencies.again(script)  # once, with what its last step has changed
 
     def _plan(self, script: Script) -> None:
         """Schedule the evaluation of a script that waits for a condition or answers."""
@@ -186,7 +186,7 @@ class Scripts:
             condition = model.condition(waiting.condition)
             sources = condition.sync(model.now)
             deadlines.append(condition.due(model.now))
-        self._watchers.set(script, sources)
+        self._dependencies.set(script, sources)
         self._agenda_of(script).watch(script, min((due for due in deadlines if due is not None), default=None))
 
     def _are_answered(self, waiting: ScriptWait) -> bool:
@@ -248,7 +248,7 @@ class Scripts:
             self._report_overdue(script, waiting, has_come=has_come)
             self._resume(script, value)
         else:
-            self._watchers.again(script)
+            self._dependencies.again(script)
 
     def _answer(self, waiting: ScriptWait) -> bytes | None:
         """The PDU of the answer to a `Request`; None for a `Write`."""
@@ -366,9 +366,9 @@ class Scripts:
         for script in list(self._scripts.values()):
             self.end(script)
         self._begun = state.begun
-        for observer in self._observers:
-            observer.rewind(self._model.now)
-            self._watchers.again(observer)
+        for subscriber in self._subscribers:
+            subscriber.rewind(self._model.now)
+            self._dependencies.again(subscriber)
         for one in state.scripts:
             script = self._scripts[one.number] = Script.at(one)
             if one.waiting is not None:

@@ -17,8 +17,8 @@ from steptwin.simulation.describe.blueprint import Blueprint, FileContents
 from steptwin.simulation.describe.build import Keep
 from steptwin.simulation.describe.overrides import Overrides
 from steptwin.simulation.describe.spec import ScriptSpec
-from steptwin.simulation.scheduler.observing import WorldObserver
 from steptwin.simulation.scheduler.scheduler import Scheduler
+from steptwin.simulation.scheduler.worldsubscriber import WorldSubscriber
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.actions import prepare
 from steptwin.simulation.world.boundedlog import BoundedLog
@@ -53,9 +53,9 @@ class Simulation(Model):
         up."""
         self.inputs: list[RecordedInput] = []
         """All external inputs so far, if they are kept."""
-        self.input_watchers: list[Callable[[RecordedInput], None]] = []
+        self.input_subscribers: list[Callable[[RecordedInput], None]] = []
         """Called with everything from outside as it comes."""
-        self.act_watchers: list[Callable[[str, ExternalInput], None]] = []
+        self.act_subscribers: list[Callable[[str, ExternalInput], None]] = []
         """Called before each action at the present moment, with the script that does it; empty: what comes from outside."""
         self.is_settled = False
         """Whether the scripts of the description have run since the last external input."""
@@ -92,12 +92,12 @@ class Simulation(Model):
             steps = (do.At(spec.at or 0), *spec.steps)
             self.start(spec.name, partial(do.run_through, steps, spec.repeat))
 
-    def observe(self, observer: WorldObserver) -> None:
-        """Let it look at the world from now on, until `unobserve`."""
-        self._scripts.observe(observer)
+    def subscribe(self, subscriber: WorldSubscriber) -> None:
+        """Let it look at the world from now on, until `unsubscribe`."""
+        self._scripts.subscribe(subscriber)
 
-    def unobserve(self, observer: WorldObserver) -> None:
-        self._scripts.unobserve(observer)
+    def unsubscribe(self, subscriber: WorldSubscriber) -> None:
+        self._scripts.unsubscribe(subscriber)
 
     def start(self, name: str, make: Callable[[], do.Steps | do.Walk], *, is_external: bool = False) -> Script:
         """Start a script now. ``make`` creates its steps; it is called again when a snapshot is restored."""
@@ -113,30 +113,30 @@ class Simulation(Model):
     @property
     def records_inputs(self) -> bool:
         """Whether anything wants to know of what comes from outside."""
-        return self.keeps_inputs or bool(self.input_watchers)
+        return self.keeps_inputs or bool(self.input_subscribers)
 
     def record_input(self, what: ExternalInput) -> None:
-        """Keep what was done from outside at the present moment, where inputs are kept, and tell watchers."""
+        """Keep what was done from outside at the present moment, where inputs are kept, and call subscribers."""
         if self.records_inputs:
             given = RecordedInput(self.now, what, self.is_settled)
             if self.keeps_inputs:
                 self.inputs.append(given)
-            for watcher in self.input_watchers:
-                watcher(given)
+            for subscriber in self.input_subscribers:
+                subscriber(given)
         self.is_settled = False
 
     def perform(self, what: ExternalInput, by: str = "") -> None:
         """Execute a step at the present moment; ``by``: its script. Raises as `prepare`; nothing has changed then."""
         action = prepare(self, what)
-        for watcher in self.act_watchers:
-            watcher(by, what)
+        for subscriber in self.act_subscribers:
+            subscriber(by, what)
         action(self._scripts)
 
     # ------------------------------------------------------------------ time
 
     def next(self) -> Nanos | None:
         """The time of the next event of a script; None if there is none."""
-        return _first(_first(*self._scripts.first()), self._scripts.first_observed(), None)
+        return _first(_first(*self._scripts.first()), self._scripts.first_look(), None)
 
     def advance(self, now: Nanos) -> None:
         """Advance the scripts, and the schedulers they depend on, to ``now``, or to the moment at which a script stops the run.
@@ -149,9 +149,9 @@ class Simulation(Model):
         while True:
             schedulers, own, guests = self._scripts.first()
             due = _first(schedulers, own, guests)
-            observed = self._scripts.first_observed()
-            if observed is not None and (due is None or observed < due):
-                due = observed
+            look = self._scripts.first_look()
+            if look is not None and (due is None or look < due):
+                due = look
             if due is None or due > (now if self.stopped is None else self.now):
                 break
             if due > self.now:
@@ -175,12 +175,12 @@ class Simulation(Model):
                 self._scripts.leave(now)
             self.now = now
 
-    def watch_schedulers(self, watch: Callable[[Scheduler], None]) -> None:
+    def subscribe_to_schedulers(self, watch: Callable[[Scheduler], None]) -> None:
         """Call ``watch`` from now on with every scheduler that has changed, as `Scheduler.on_change`."""
-        self._scripts.watch_schedulers(self.schedulers, watch)
+        self._scripts.subscribe_to_schedulers(self.schedulers, watch)
 
     def stop_recording(self) -> None:
-        """Record nothing from now on: no trace, digest or recording. Watchers of the trace are called, but not with frames."""
+        """Record nothing from now on: no trace, digest or recording. Subscribers of the trace are called, but not with frames."""
         self.keeps_inputs = False
         self.inputs.clear()
         self.trace.stop()

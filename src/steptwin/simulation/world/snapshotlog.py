@@ -162,13 +162,13 @@ class ChangedSince:
     def __init__(self, world: Simulation) -> None:
         self._world = world
         self._names: set[Changed] = set()
-        world.trace.watchers.append(self._take)
-        world.act_watchers.append(self._act)
+        world.trace.subscribers.append(self._take)
+        world.act_subscribers.append(self._act)
         self._points = [_ChangedPoints(world, owner, self._names.add) for owner in world.controllers]
 
     def close(self) -> None:
-        self._world.trace.watchers.remove(self._take)
-        self._world.act_watchers.remove(self._act)
+        self._world.trace.subscribers.remove(self._take)
+        self._world.act_subscribers.remove(self._act)
         for points in self._points:
             points.close()
 
@@ -196,16 +196,16 @@ class ChangedSince:
 
 class _ChangedPoints:
     """Those of one controller that have the same value between events, and are not only kept (`LivePoint.is_kept`). As
-    `steptwin.simulation.scheduler.followers.SchedulerFollower`."""
+    `steptwin.simulation.scheduler.subscribers.SchedulerSubscriber`."""
 
     def __init__(self, world: Simulation, owner: str, note: Callable[[Changed], None]) -> None:
         self._world, self._owner, self._note = world, owner, note
         found = {path: point for path, point in points_of(world, owner) if point is not None and not point.is_kept}
         self._points = EventPoints(world, owner, {path: point for path, point in found.items() if stays_between_events(point)})
-        world.objects.scheduler_of[owner].follow(self, (owner,))
+        world.objects.scheduler_of[owner].subscribe(self, (owner,))
 
     def close(self) -> None:
-        self._world.objects.scheduler_of[self._owner].unfollow(self)
+        self._world.objects.scheduler_of[self._owner].unsubscribe(self)
 
     def read(self) -> None:
         """The present values, whatever they were before."""
@@ -239,12 +239,12 @@ class SnapshotLog:
         self._dropped = 0
         """Number of inputs that were removed."""
         self._changed = ChangedSince(world)
-        world.input_watchers.append(self._input_came)
+        world.input_subscribers.append(self._input_came)
         self.take()
 
     def close(self) -> None:
         """End the recording."""
-        self.world.input_watchers.remove(self._input_came)
+        self.world.input_subscribers.remove(self._input_came)
         self._changed.close()
 
     def __len__(self) -> int:

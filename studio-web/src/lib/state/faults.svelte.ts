@@ -17,7 +17,7 @@ export class ActiveFaults {
   constructor(private readonly studio: Studio) {}
 
   /** Gives what ends it. */
-  follow(): () => void {
+  subscribe(): () => void {
     if (!this.studio.may("faults")) return () => undefined;
     void this.read();
     const timer = setInterval(() => void this.read(), READ_MS);

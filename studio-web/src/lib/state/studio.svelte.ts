@@ -35,7 +35,7 @@ const EMPTY: Model = {
   commands: new Set(),
 };
 /** Frames and statements are as frequent as requests: a panel that shows them follows them itself. */
-const FOLLOWED: readonly EventKind[] = [
+const SUBSCRIBED: readonly EventKind[] = [
   "plan",
   "coordinate",
   "sample",
@@ -54,7 +54,7 @@ const FOLLOWED: readonly EventKind[] = [
 /** Events that may wait for this page. */
 const EVENTS_BOUND = 10_000;
 
-interface Following {
+interface Subscription {
   kinds: readonly EventKind[];
   /** Of the request; another one after a reconnection. */
   id: number;
@@ -106,7 +106,7 @@ export class Studio {
     (part) => this.takeEarlier(part),
   );
   private readonly listeners = new Set<Listener>();
-  private readonly followings = new Set<Following>();
+  private readonly subscriptions = new Set<Subscription>();
   private readonly connection: Connection;
   private noticeTimer = 0;
 
@@ -123,7 +123,7 @@ export class Studio {
   }
 
   open(): void {
-    this.follow(FOLLOWED);
+    this.subscribe(SUBSCRIBED);
     this.connection.open();
   }
 
@@ -232,8 +232,8 @@ export class Studio {
   /** Events as they come, those of further kinds such as frames too; gives what ends it. */
   listen(kinds: readonly EventKind[], listener: Listener): () => void {
     this.listeners.add(listener);
-    const more = kinds.filter((kind) => !FOLLOWED.includes(kind));
-    const end = more.length ? this.follow(more) : () => undefined;
+    const more = kinds.filter((kind) => !SUBSCRIBED.includes(kind));
+    const end = more.length ? this.subscribe(more) : () => undefined;
     return () => {
       this.listeners.delete(listener);
       end();
@@ -256,7 +256,7 @@ export class Studio {
     if (!isNewConnection) return;
     this.timeTravel.forget();
     this.earlier.begin(BigInt(hello.time_ns));
-    for (const following of this.followings) this.beginFollowing(following);
+    for (const subscription of this.subscriptions) this.beginSubscription(subscription);
     this.watches.renew();
   }
 
@@ -283,20 +283,20 @@ export class Studio {
   }
 
   /** Asks for kinds of events, again after each reconnection; gives what ends it. */
-  private follow(kinds: readonly EventKind[]): () => void {
-    const following: Following = { kinds, id: 0 };
-    this.followings.add(following);
-    if (this.hello !== null) this.beginFollowing(following);
+  private subscribe(kinds: readonly EventKind[]): () => void {
+    const subscription: Subscription = { kinds, id: 0 };
+    this.subscriptions.add(subscription);
+    if (this.hello !== null) this.beginSubscription(subscription);
     return () => {
-      this.followings.delete(following);
-      this.ask("unfollow", { follow: following.id }).catch(() => undefined);
+      this.subscriptions.delete(subscription);
+      this.ask("unsubscribe", { subscription: subscription.id }).catch(() => undefined);
     };
   }
 
-  private beginFollowing(following: Following): void {
-    following.id = this.connection.newId();
+  private beginSubscription(subscription: Subscription): void {
+    subscription.id = this.connection.newId();
     this.connection
-      .request("follow", { kinds: [...following.kinds], bound: EVENTS_BOUND }, undefined, following.id)
+      .request("subscribe", { kinds: [...subscription.kinds], bound: EVENTS_BOUND }, undefined, subscription.id)
       .catch((error: unknown) => this.report(error));
   }
 

@@ -41,7 +41,7 @@ export const t = texts(
     tried: "Tried",
     checks: "Does it behave as the twin does?",
     checksExplained:
-      "Checks the numbered interpretations on a device that is not connected. It reads, and sends requests that are to be refused.",
+      "Checks the numbered assumptions on a device that is not connected. It reads, and sends requests that are to be refused.",
     verifyAddress: "Check the device at the address",
     mayWrite: "also write settings, and put them back",
     counts: "{confirmed} confirmed, {refuted} refuted, {rest} not checked",
@@ -112,7 +112,7 @@ export const t = texts(
     tried: "Wypróbowano",
     checks: "Czy działa tak jak bliźniak?",
     checksExplained:
-      "Sprawdza numerowane interpretacje na urządzeniu, które nie jest połączone. Czyta i wysyła żądania, które powinny zostać odrzucone.",
+      "Sprawdza numerowane założenia na urządzeniu, które nie jest połączone. Czyta i wysyła żądania, które powinny zostać odrzucone.",
     verifyAddress: "Sprawdź urządzenie pod adresem",
     mayWrite: "także zapisuj ustawienia i przywracaj je",
     counts: "potwierdzone: {confirmed}, obalone: {refuted}, niesprawdzone: {rest}",

@@ -49,5 +49,5 @@ class CharacterLines(LineKind[M1486Chip, ChipLine]):
                 take(LineWrite(shown.time, shown.link, (), shown.meaning, ""))
 
         log = ChipTrafficLog(line, "", sent)
-        line.follow_frames(log)
-        return partial(line.unfollow_frames, log)
+        line.subscribe_to_frames(log)
+        return partial(line.unsubscribe_from_frames, log)

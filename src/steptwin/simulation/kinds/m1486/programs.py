@@ -142,13 +142,13 @@ class ChipPrograms:
     def labels(self, text: str) -> Mapping[str, int]:
         return self._text.labels
 
-    def hook(self, hook: StatementHook, places: Collection[Place] | None = None) -> None:
+    def add_hook(self, hook: StatementHook, places: Collection[Place] | None = None) -> None:
         offsets = self._text.offsets
         numbers = None if places is None else frozenset(offsets[place.number] for place in places if place.number < len(offsets))
-        self._chip.program.hook(hook, numbers)
+        self._chip.program.add_hook(hook, numbers)
 
-    def unhook(self, hook: StatementHook) -> None:
-        self._chip.program.unhook(hook)
+    def remove_hook(self, hook: StatementHook) -> None:
+        self._chip.program.remove_hook(hook)
 
     def place(self, number: int) -> Place | None:
         text = self._text

@@ -8,7 +8,7 @@ from operator import itemgetter
 from typing import ClassVar
 
 from steptwin.controller import Nanos, Port
-from steptwin.mic488.device import Mic488Device, pause_observer
+from steptwin.mic488.device import Mic488Device, pause_callback
 from steptwin.mic488.vision import Com1Port, uses_vision
 from steptwin.simulation.faults import Faults
 from steptwin.simulation.faults import LineProtocol as FaultLine
@@ -20,7 +20,7 @@ from steptwin.wire.gateway import ModbusGateway, ScriptPort, TcpGatewayPort
 from steptwin.wire.line import SerialLine
 from steptwin.wire.pdu import READS
 from steptwin.wire.rtu import BROADCAST, BURSTY_GAP_NS, UART_GAP_NS
-from steptwin.wire.slave import FrameObserver, RtuSlavePort, SlaveDevice, SlavePort, TcpSlavePort
+from steptwin.wire.slave import FrameCallback, RtuSlavePort, SlaveDevice, SlavePort, TcpSlavePort
 from steptwin.wire.timed import LineTiming, TimedRtuSlavePort, TimedUnits
 
 SILENT_CHARACTERS = 4
@@ -73,12 +73,12 @@ class ModbusBus(Line):
         """Without line timing; ports that are made from now on use it."""
         self._served = served(self.devices)
 
-    def watch_writes(self, observer: Callable[[str, Nanos, int, bytes, bytes], None] | None) -> None:
-        """Call ``observer`` with the place and what `steptwin.wire.slave.WriteObserver` says, from now on; None ends that."""
-        self._on_write = observer
+    def subscribe_to_writes(self, callback: Callable[[str, Nanos, int, bytes, bytes], None] | None) -> None:
+        """Call ``callback`` with the place and what `steptwin.wire.slave.WriteCallback` says, from now on; None ends that."""
+        self._on_write = callback
         for name, place in self.places.items():
             if place.framed is not None:
-                place.framed.on_write = None if observer is None else partial(observer, name)
+                place.framed.on_write = None if callback is None else partial(callback, name)
 
     def is_idle_read(self, place: LineEndPoint, data: bytes) -> bool:
         # With timing a request takes the line and the controller; faults count requests.
@@ -108,8 +108,8 @@ class ModbusBus(Line):
     def units(self) -> tuple[int, ...]:
         return tuple(self.devices)
 
-    def _observer(self, place: str) -> FrameObserver | None:
-        return partial(self._report, place) if self._is_followed else None
+    def _frame_callback(self, place: str) -> FrameCallback | None:
+        return partial(self._report, place) if self._has_subscribers else None
 
     def _port(self, place: str, kind: str) -> Port:
         port = self._slave_port(place, kind)
@@ -120,21 +120,21 @@ class ModbusBus(Line):
         return port
 
     def _slave_port(self, place: str, kind: str) -> RtuSlavePort | TimedRtuSlavePort | TcpSlavePort | TcpGatewayPort | ScriptPort:
-        observe = self._observer(place)
+        callback = self._frame_callback(place)
         if self._timed is None and kind == "tcp":
-            return TcpSlavePort(self._served, on_frame=observe)
+            return TcpSlavePort(self._served, on_frame=callback)
         if self._timed is not None and kind == "tcp":
-            return TcpGatewayPort(self._timed[1], on_frame=observe)
+            return TcpGatewayPort(self._timed[1], on_frame=callback)
         if self._timed is not None and place == SCRIPTS:
-            return ScriptPort(self._timed[1], on_frame=observe)
+            return ScriptPort(self._timed[1], on_frame=callback)
         usual = UART_GAP_NS if kind == "serial" else BURSTY_GAP_NS
         gap = usual if self._gap is None else self._gap
-        on_pause = pause_observer(self.devices)
+        on_pause = pause_callback(self.devices)
         if self._timed is not None:
-            return TimedRtuSlavePort(self._timed[0], gap_ns=gap, on_frame=observe, on_pause=on_pause)
+            return TimedRtuSlavePort(self._timed[0], gap_ns=gap, on_frame=callback, on_pause=on_pause)
         devices = self.devices if place == SCRIPTS else self._served
         wire = SerialLine(self._baud) if kind == "serial" else None
-        return RtuSlavePort(devices, gap_ns=gap, line=wire, on_frame=observe, on_pause=on_pause)
+        return RtuSlavePort(devices, gap_ns=gap, line=wire, on_frame=callback, on_pause=on_pause)
 
     @property
     def baud(self) -> int:

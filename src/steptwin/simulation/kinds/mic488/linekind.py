@@ -65,5 +65,5 @@ class ModbusLines(LineKind[Mic488Device, ModbusBus]):
             outcome = "" if not response else "refusal" if response[0] & REFUSED else "done"
             take(LineWrite(now, place, units, words, outcome))
 
-        line.watch_writes(seen)
-        return partial(line.watch_writes, None)
+        line.subscribe_to_writes(seen)
+        return partial(line.subscribe_to_writes, None)

@@ -71,9 +71,9 @@ class ProgramWatch:
         self._axes = [(axis.status, axis.revision, axis.velocity_p) for axis in device.axes]
         self._following: set[int] = set()
         """Axes of which it was told that they follow their encoders."""
-        device.program.interpreter.hook(self._begins)
+        device.program.interpreter.add_hook(self._begins)
         scheduler.add_part(self, (name,))
-        scheduler.observers.append(self._edge)
+        scheduler.edge_subscribers.append(self._edge)
 
     # ------------------------------------------------------------------ what the program does
 

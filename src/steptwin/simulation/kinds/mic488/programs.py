@@ -66,12 +66,12 @@ class WbcPrograms:
     def labels(self, text: str) -> Mapping[str, int]:
         return self._bank(text).labels
 
-    def hook(self, hook: StatementHook, places: Collection[Place] | None = None) -> None:
+    def add_hook(self, hook: StatementHook, places: Collection[Place] | None = None) -> None:
         numbers = None if places is None else frozenset(place.number for place in places)
-        self._device.program.interpreter.hook(hook, numbers)
+        self._device.program.interpreter.add_hook(hook, numbers)
 
-    def unhook(self, hook: StatementHook) -> None:
-        self._device.program.interpreter.unhook(hook)
+    def remove_hook(self, hook: StatementHook) -> None:
+        self._device.program.interpreter.remove_hook(hook)
 
     def begun(self, now: Nanos) -> Sequence[int]:
         return ()  # the first statement is executed one statement time after power-on

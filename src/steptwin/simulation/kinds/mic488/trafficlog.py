@@ -10,7 +10,7 @@ from steptwin.simulation.kinds.mic488.line import ModbusBus
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.wire.frameline import FrameLine
 from steptwin.wire.pdu import WRITES
-from steptwin.wire.slave import FrameDirection, FrameObserver
+from steptwin.wire.slave import FrameCallback, FrameDirection
 
 
 class ModbusTrafficLog:
@@ -21,15 +21,15 @@ class ModbusTrafficLog:
         self._prefix = prefix
         self._log = FrameLog(line.devices)
         self._log.sinks.append(sink)
-        self._observers: dict[str, FrameObserver] = {}
+        self._callbacks: dict[str, FrameCallback] = {}
 
     def frame(self, now: Nanos, place: str, direction: FrameDirection, data: bytes) -> None:
-        observer = self._observers.get(place)
-        if observer is None:
-            for gone in [name for name in self._observers if name not in self._line.places]:
-                del self._observers[gone]
-            observer = self._observers[place] = self._log.observer(self._prefix + place, tcp=self._is_tcp(place))
-        observer(now, direction, data)
+        callback = self._callbacks.get(place)
+        if callback is None:
+            for gone in [name for name in self._callbacks if name not in self._line.places]:
+                del self._callbacks[gone]
+            callback = self._callbacks[place] = self._log.callback(self._prefix + place, tcp=self._is_tcp(place))
+        callback(now, direction, data)
 
     def _is_tcp(self, place: str) -> bool:
         there = self._line.places.get(place)

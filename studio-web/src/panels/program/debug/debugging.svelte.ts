@@ -98,7 +98,7 @@ export class Debugging {
   }
 
   /** Follows the debugger; gives what ends that. */
-  follow(): () => void {
+  subscribe(): () => void {
     return this.studio.listen(FOLLOWED, (events) => this.happened(events));
   }
 

@@ -67,9 +67,9 @@ def test_of_a_controller_alone(step_exact: bool) -> None:
     scheduler.add("m", Clock(10, 20, 20, 30))
     scheduler.is_step_exact = step_exact
     scheduler.propagate()
-    scheduler.follow(plain, ["m"])
-    scheduler.follow(leaving, ["m", "x"], leaves=True)
-    scheduler.follow(other, ["x"])
+    scheduler.subscribe(plain, ["m"])
+    scheduler.subscribe(leaving, ["m", "x"], leaves=True)
+    scheduler.subscribe(other, ["x"])
     scheduler.advance(25)
     assert (plain.take(), other.take()) == (([10, 20], []), ([], []))
     assert leaving.take() == ([10, 20], [10, 20, 25])
@@ -78,11 +78,11 @@ def test_of_a_controller_alone(step_exact: bool) -> None:
     scheduler.controllers["m"].set_pin("A", 1.0, 25)
     scheduler.propagate()
     assert (plain.take(), leaving.take()) == (([25], []), ([25], []))
-    scheduler.unfollow(plain)
-    scheduler.unfollow(other)
+    scheduler.unsubscribe(plain)
+    scheduler.unsubscribe(other)
     scheduler.advance(40)
     assert (plain.take(), leaving.take()) == (([], []), ([30], [30, 40]))
-    scheduler.unfollow(leaving)
+    scheduler.unsubscribe(leaving)
     scheduler.advance(50)
     assert leaving.take() == ([], [])
 
@@ -94,14 +94,14 @@ def test_of_controllers_that_are_joined() -> None:
     scheduler.add("c", Clock(60, 70))
     scheduler.connect(Wire(PinName("a", "B"), PinName("b", "A")))
     scheduler.propagate()
-    scheduler.follow(one, ["a"])
-    scheduler.follow(two, ["b"], leaves=True)
-    scheduler.follow(both, ["a", "b"])
+    scheduler.subscribe(one, ["a"])
+    scheduler.subscribe(two, ["b"], leaves=True)
+    scheduler.subscribe(both, ["a", "b"])
     scheduler.advance(50)
     assert one.take() == ([10, 30], [])
     assert two.take() == ([10, 20, 30], [10, 20, 30, 50])  # the wire changes its input
     assert both.take() == ([10, 20, 30], [])
-    scheduler.unfollow(two)
+    scheduler.unsubscribe(two)
     scheduler.controllers["b"].set_pin("A", 0.0, 50)
     scheduler.propagate()
     assert (one.take(), two.take(), both.take()) == (([], []), ([], []), ([50], []))
@@ -113,14 +113,14 @@ def test_who_is_gone_is_not_told_what_is_new_already() -> None:
     scheduler, one, other = Scheduler(), Told(), Told()
     scheduler.add("m", Clock())
     scheduler.propagate()
-    scheduler.follow(one, ["m"])
-    scheduler.follow(other, ["m"])
-    assert scheduler.followers is not None
-    scheduler.followers.news = {one: None, other: None}
-    scheduler.unfollow(one)
-    scheduler.followers.tell(5)
+    scheduler.subscribe(one, ["m"])
+    scheduler.subscribe(other, ["m"])
+    assert scheduler.subscribers is not None
+    scheduler.subscribers.news = {one: None, other: None}
+    scheduler.unsubscribe(one)
+    scheduler.subscribers.notify(5)
     assert (one.take(), other.take()) == (([], []), ([5], []))
-    assert scheduler.followers.news == {}
+    assert scheduler.subscribers.news == {}
 
 
 @pytest.mark.parametrize("step_exact", [False, True])
@@ -150,7 +150,7 @@ def test_two_that_are_due_together_do_not_run_ahead_of_each_other(step_exact: bo
 def test_who_wants_to_be_told_before_each_event_is_told_once_of_a_moment() -> None:
     scheduler, leaving = Scheduler(), Told()
     scheduler.add("m", Clock())
-    scheduler.follow(leaving, ["m"], leaves=True)
+    scheduler.subscribe(leaving, ["m"], leaves=True)
     scheduler.advance(5)
     assert leaving.take() == ([0], [5])
     scheduler.advance(5)

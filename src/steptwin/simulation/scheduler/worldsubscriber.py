@@ -1,7 +1,7 @@
-"""Observers of a running world: they see its signals at every moment at which these change, and change nothing.
+"""Subscribers of a running world: they see its signals at every moment at which these change, and change nothing.
 
-A `SchedulerFollower` is notified by one scheduler, event by event, however far that runs at once. A `WorldObserver` is for what
-depends on several schedulers: the world brings them to each moment together.
+A `SchedulerSubscriber` is notified by one scheduler, event by event, however far that runs at once. A `WorldSubscriber` is for
+what depends on several schedulers: the world brings them to each moment together.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from steptwin.controller import Nanos
 from steptwin.simulation.scheduler.scheduler import Source
 
 
-class WorldObserver(Protocol):
+class WorldSubscriber(Protocol):
     number: int
-    """Below 0, given by `steptwin.simulation.world.scripts.Scripts.observe`."""
+    """Below 0, given by `steptwin.simulation.world.scripts.Scripts.subscribe`."""
     entry: int
     """The number of its valid entry in an agenda."""
     sources: tuple[Source, ...]

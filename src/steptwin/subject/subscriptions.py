@@ -1,4 +1,4 @@
-"""Subscriptions to events: each follower has a bounded queue, and dropped events are counted."""
+"""Subscriptions to events: each subscriber has a bounded queue, and dropped events are counted."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from steptwin.subject.events import Event
 from steptwin.subject.payloads import KINDS
 
 USUAL = frozenset(KINDS) - {"frame", "write", "statement", "stopped", "log", "breakpoints"}
-"""Kinds that are followed where none are named: frames and writes are as frequent as requests, statements as milliseconds; a
-debugger is there for followers that name its events."""
+"""Kinds that are subscribed to where none are named: frames and writes are as frequent as requests, statements as milliseconds; a
+debugger is there for subscribers that name its events."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,12 +51,12 @@ class EventBatch(NamedTuple):
     events: list[Event]
 
 
-class Following:
-    """The pending events of one follower; if there are more than ``bound``, the oldest are dropped."""
+class Subscription:
+    """The pending events of one subscriber; if there are more than ``bound``, the oldest are dropped."""
 
     __slots__ = ("_close", "_missed", "_waiting", "filter", "on_event")
 
-    def __init__(self, what: Filter, bound: int, close: Callable[[Following], None]) -> None:
+    def __init__(self, what: Filter, bound: int, close: Callable[[Subscription], None]) -> None:
         self.filter = what
         self.on_event: Callable[[], None] | None = None
         """Called when an event arrives in an empty queue."""
@@ -90,40 +90,40 @@ class Following:
         self._close(self)
 
 
-class Followers:
-    """All followers of a subject. ``on_change`` is called when the set of followed kinds has changed."""
+class Subscriptions:
+    """All subscribers of a subject. ``on_change`` is called when the set of subscribed kinds has changed."""
 
     def __init__(self, on_change: Callable[[], None] = lambda: None) -> None:
-        self._all: list[Following] = []
+        self._all: list[Subscription] = []
         self._on_change = on_change
         self.kinds: frozenset[str] = frozenset()
-        """Kinds that at least one follower selects."""
-        self._by_kind: dict[str, list[Following]] = {}
+        """Kinds that at least one subscriber selects."""
+        self._by_kind: dict[str, list[Subscription]] = {}
         """Who selects them."""
 
     def __bool__(self) -> bool:
         return bool(self._all)
 
-    def follow(self, what: Filter, bound: int) -> Following:
-        following = Following(what, bound, self.remove)
-        self.add(following)
-        return following
+    def subscribe(self, what: Filter, bound: int) -> Subscription:
+        subscription = Subscription(what, bound, self.remove)
+        self.add(subscription)
+        return subscription
 
-    def add(self, following: Following) -> None:
-        self._all.append(following)
+    def add(self, subscription: Subscription) -> None:
+        self._all.append(subscription)
         self._changed()
 
     def publish(self, event: Event) -> None:
-        for following in self._by_kind.get(event.payload.kind, ()):
-            if following.filter.is_of_kinds or following.filter.wants(event):
-                following.add(event)
+        for subscription in self._by_kind.get(event.payload.kind, ()):
+            if subscription.filter.is_of_kinds or subscription.filter.wants(event):
+                subscription.add(event)
 
-    def remove(self, following: Following) -> None:
-        if following in self._all:
-            self._all.remove(following)
+    def remove(self, subscription: Subscription) -> None:
+        if subscription in self._all:
+            self._all.remove(subscription)
             self._changed()
 
     def _changed(self) -> None:
-        self.kinds = frozenset().union(*(following.filter.kinds for following in self._all))
+        self.kinds = frozenset().union(*(subscription.filter.kinds for subscription in self._all))
         self._by_kind = {kind: [one for one in self._all if kind in one.filter.kinds] for kind in self.kinds}
         self._on_change()

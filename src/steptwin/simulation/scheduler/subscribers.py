@@ -1,4 +1,4 @@
-"""Followers of the signals of one scheduler, which are notified of each of its events."""
+"""Subscribers of the signals of one scheduler, which are notified of each of its events."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Protocol
 from steptwin.controller import Nanos
 
 
-class SchedulerFollower(Protocol):
+class SchedulerSubscriber(Protocol):
     """It reads signals of one scheduler only, and changes nothing."""
 
     def leave(self, moment: Nanos) -> None:
@@ -20,37 +20,37 @@ class SchedulerFollower(Protocol):
         ...
 
 
-class SchedulerFollowers:
-    """Followers of one scheduler."""
+class SchedulerSubscribers:
+    """Subscribers of one scheduler."""
 
     __slots__ = ("by_name", "leaving", "news")
 
     def __init__(self) -> None:
-        self.by_name: dict[str, dict[SchedulerFollower, None]] = {}
+        self.by_name: dict[str, dict[SchedulerSubscriber, None]] = {}
         """By the controllers, lines and elements on which they depend."""
-        self.leaving: list[SchedulerFollower] = []
+        self.leaving: list[SchedulerSubscriber] = []
         """Those that are notified before each event."""
-        self.news: dict[SchedulerFollower, None] = {}
+        self.news: dict[SchedulerSubscriber, None] = {}
         """Those that will be notified."""
 
-    def add(self, follower: SchedulerFollower, names: Iterable[str], *, leaves: bool) -> None:
+    def add(self, subscriber: SchedulerSubscriber, names: Iterable[str], *, leaves: bool) -> None:
         """Tell it of events at controllers, lines and elements with these names; ``leaves``: and before each event."""
         for name in names:
-            self.by_name.setdefault(name, {})[follower] = None
+            self.by_name.setdefault(name, {})[subscriber] = None
         if leaves:
-            self.leaving.append(follower)
+            self.leaving.append(subscriber)
 
-    def remove(self, follower: SchedulerFollower) -> None:
+    def remove(self, subscriber: SchedulerSubscriber) -> None:
         for there in (*self.by_name.values(), self.news):
-            there.pop(follower, None)
-        if follower in self.leaving:
-            self.leaving.remove(follower)
+            there.pop(subscriber, None)
+        if subscriber in self.leaving:
+            self.leaving.remove(subscriber)
 
     def leave(self, moment: Nanos) -> None:
-        for follower in self.leaving:
-            follower.leave(moment)
+        for subscriber in self.leaving:
+            subscriber.leave(moment)
 
-    def tell(self, now: Nanos) -> None:
+    def notify(self, now: Nanos) -> None:
         """The signals have settled."""
         while self.news:
             self.news.popitem()[0].look(now)
