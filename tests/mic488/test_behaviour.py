@@ -17,7 +17,7 @@ _OF_KEY = {row.key: row for row in ROWS}
 
 
 def _row(of: str, **changes: Any) -> MapRow:
-    return replace(_OF_KEY[of], key="NEW", name="NEW{n}", **changes)
+    return replace(_OF_KEY[of], name="NEW{n}", **changes)
 
 
 def _read(*_: object) -> Any: ...

@@ -105,7 +105,6 @@ SMALL = Firmware("9.9", "1.70", control_base=10000, user_registers=2000, stored_
 
 
 GOOD = MapRow(
-    key="GOOD",
     name="GOOD",
     space=Space.HOLDING,
     address=40,
@@ -128,20 +127,23 @@ def _with(**changes: Any) -> MapRow:
     ("rows", "message"),
     [
         (
-            [GOOD, _with(key="NEXT", name="NEXT", address=41)],
+            [GOOD, _with(name="NEXT", address=41)],
             "NEXT at 10041 (0x2739)…10042 (0x273A) overlaps GOOD at 10040 (0x2738)…10041 (0x2739) among the holding registers",
         ),
         (
-            [GOOD, _with(key="NEXT", address=60)],
+            [GOOD, _with(address=60)],
             "the name GOOD is given to 10040 (0x2738)…10041 (0x2739) and to 10060 (0x274C)…10061 (0x274D)",
         ),
         (
-            [GOOD, _with(key="NEXT", name="NEXT", aliases=("good",), address=60)],
+            [GOOD, _with(name="NEXT", aliases=("good",), address=60)],
             "the name good is given to 10040 (0x2738)…10041 (0x2739) and to 10060 (0x274C)…10061 (0x274D)",
         ),
         (
-            [GOOD, _with(name="NEXT", address=60)],
-            "the key GOOD is given to GOOD at 10040 (0x2738)…10041 (0x2739) and to NEXT at 10060 (0x274C)…10061 (0x274D)",
+            [
+                _with(name="M{n}_X", per=Per.AXIS, copies=2, step=2),
+                _with(name="X{n}", per=Per.AXIS, copies=2, step=2, address=60),
+            ],
+            "the key X is given to M1_X at 10040 (0x2738)…10041 (0x2739) and to X1 at 10060 (0x274C)…10061 (0x274D)",
         ),
         (
             [_with(address=65535, control=False)],
@@ -166,7 +168,7 @@ def test_a_table_that_contradicts_itself_names_the_culprit(rows: list[MapRow], m
 
 
 def test_a_good_row_passes() -> None:
-    chart = RegisterMap(SMALL, [GOOD, _with(key="NEXT", name="NEXT", address=42)])
+    chart = RegisterMap(SMALL, [GOOD, _with(name="NEXT", address=42)])
     assert [r.name for r in chart] == ["GOOD", "NEXT"]
 
 

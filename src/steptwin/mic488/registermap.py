@@ -148,8 +148,8 @@ class MapRow:
     ``{n}`` in name and meaning is the number of the copy, from 1. ``address`` counts from the control base when ``control``.
     """
 
-    key: str
     name: str
+    """``M{n}_STOP``, with the number of axis or channel."""
     space: Space
     address: int
     type: Type
@@ -176,6 +176,11 @@ class MapRow:
     word_write: bool = False
     """A 32-bit register whose first address also takes function 06: a signed 16-bit number in the same unit (MIC-6)."""
     aliases: tuple[str, ...] = ()
+
+    @property
+    def key(self) -> str:
+        """Its name without numbers, the same for all axes and firmwares: ``STOP``."""
+        return self.name.removeprefix("M{n}_").replace("{n}", "")
 
 
 @dataclass(frozen=True, slots=True)

@@ -105,7 +105,6 @@ _motion = partial(_value, reads=(), writes=(16,), effect=WriteEffect.MOVE)
 ROWS: tuple[MapRow, ...] = (
     # Bits (table 3.1)
     _axis_coil(
-        key="EN",
         name="M{n}_EN",
         address=2000,
         effect=WriteEffect.STORE,
@@ -113,7 +112,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Enable output of axis M{n}: ON switches the drive on, OFF switches it off.",
     ),
     _axis_coil(
-        key="STOP",
         name="M{n}_STOP",
         address=2004,
         effect=WriteEffect.ACT,
@@ -121,7 +119,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Writing ON stops axis M{n} at once, without ramp.",
     ),
     _axis_coil(
-        key="JOG_PLUS",
         name="M{n}_JOG_PLUS",
         address=2008,
         step=2,
@@ -130,7 +127,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="While ON, axis M{n} moves in the positive direction at JOG_SPEED.",
     ),
     _axis_coil(
-        key="JOG_MINUS",
         name="M{n}_JOG_MINUS",
         address=2009,
         step=2,
@@ -139,7 +135,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="While ON, axis M{n} moves in the negative direction at JOG_SPEED.",
     ),
     _bit(
-        key="USER_REG_READ",
         name="USER_REG_READ",
         address=2100,
         reads=(),
@@ -150,7 +145,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Writing ON reads user registers 1000–1999 from non-volatile memory.",
     ),
     _bit(
-        key="USER_REG_SAVE",
         name="USER_REG_SAVE",
         address=2101,
         reads=(),
@@ -161,7 +155,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Writing ON saves user registers 1000–1999 to non-volatile memory.",
     ),
     _bit(
-        key="USER_REG_ZERO",
         name="USER_REG_ZERO",
         aliases=("USER_REG_RESET",),
         address=2102,
@@ -173,7 +166,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Writing ON sets user registers 1000–1999 to 0.",
     ),
     _bit(
-        key="OUT",
         name="OUT{n}",
         address=6000,
         reads=(1,),
@@ -185,7 +177,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Output OUT{n}.",
     ),
     _bit(
-        key="IN",
         name="IN{n}",
         space=Space.INPUT,
         address=5000,
@@ -199,7 +190,6 @@ ROWS: tuple[MapRow, ...] = (
     ),
     # User registers (table 3.2)
     MapRow(
-        key="USER_REGISTER",
         name="USER_REGISTER",
         space=Space.HOLDING,
         address=0,
@@ -214,7 +204,6 @@ ROWS: tuple[MapRow, ...] = (
     ),
     # Control registers of type WORD (table 3.2)
     _setting(
-        key="DATA_TYPE",
         name="DATA_TYPE",
         address=0,
         kind=QuantityKind.ENUMERATION,
@@ -224,7 +213,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="How REAL/DINT registers travel, as REAL in configured units or as DINT in pulses.",
     ),
     _setting(
-        key="PROG_BANK_SEL",
         name="PROG_BANK_SEL",
         address=1,
         kind=QuantityKind.NUMBER,
@@ -233,7 +221,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Program bank the next start runs.",
     ),
     _setting(
-        key="POS_BANK_SEL",
         name="POS_BANK_SEL",
         address=2,
         kind=QuantityKind.NUMBER,
@@ -242,7 +229,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Position bank the next start uses.",
     ),
     _word(
-        key="PROGRAM_CTRL",
         name="PROGRAM_CTRL",
         address=3,
         reads=(3,),
@@ -255,7 +241,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Stops, starts or pauses the program; reads as the program's state.",
     ),
     _setting(
-        key="AXIS_CTR_MODE",
         name="AXIS_CTR_MODE",
         address=4,
         kind=QuantityKind.ENUMERATION,
@@ -265,31 +250,26 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Whether a motion register acts when written (DIRECT) or waits for its trigger register (TRIGGER).",
     ),
     _trigger(
-        key="AXIS_VEL_ABS_TRIG",
         name="AXIS_VEL_ABS_TRIG",
         address=5,
         meaning="In TRIGGER mode starts the chosen axes with their absolute velocities.",
     ),
     _trigger(
-        key="AXIS_VEL_REL_TRIG",
         name="AXIS_VEL_REL_TRIG",
         address=6,
         meaning="In TRIGGER mode starts the chosen axes with their relative velocities.",
     ),
     _trigger(
-        key="AXIS_POS_ABS_TRIG",
         name="AXIS_POS_ABS_TRIG",
         address=7,
         meaning="In TRIGGER mode starts the chosen axes towards their absolute positions.",
     ),
     _trigger(
-        key="AXIS_POS_REL_TRIG",
         name="AXIS_POS_REL_TRIG",
         address=8,
         meaning="In TRIGGER mode starts the chosen axes by their relative positions.",
     ),
     _word(
-        key="M_ALL_STATUS",
         name="M_ALL_STATUS",
         address=9,
         reads=(3,),
@@ -301,7 +281,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Listed but not available in this firmware: reads 0.",
     ),
     _word(
-        key="M_STATUS",
         name="M_STATUS",
         address=9,
         reads=(3,),
@@ -314,7 +293,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Status of the controller.",
     ),
     _word(
-        key="STATUS",
         name="M{n}_STATUS",
         address=10,
         reads=(3,),
@@ -327,12 +305,11 @@ ROWS: tuple[MapRow, ...] = (
         sections=_sections("3.2", "4.7", "4.8"),
         meaning="Status of axis M{n}.",
     ),
-    _drives(key="M_ENABLE", name="M_ENABLE", address=14, meaning="Switches the enable outputs of the chosen axes on."),
-    _drives(key="M_DISABLE", name="M_DISABLE", address=15, meaning="Switches the enable outputs of the chosen axes off."),
-    _drives(key="M_STOP", name="M_STOP", address=16, meaning="Stops the chosen axes at once, without ramp."),
+    _drives(name="M_ENABLE", address=14, meaning="Switches the enable outputs of the chosen axes on."),
+    _drives(name="M_DISABLE", address=15, meaning="Switches the enable outputs of the chosen axes off."),
+    _drives(name="M_STOP", address=16, meaning="Stops the chosen axes at once, without ramp."),
     # Control registers of type REAL and DINT (table 3.2)
     MapRow(
-        key="JOG_SPEED",
         name="JOG_SPEED",
         space=Space.HOLDING,
         control=True,
@@ -347,7 +324,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Velocity of all axes while jogging, always REAL in units; function 06 writes it as a signed 16-bit number.",
     ),
     _kept(
-        key="POS_ACT",
         name="M{n}_POS_ACT",
         address=20,
         kind=QuantityKind.POSITION,
@@ -355,7 +331,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Counted position of axis M{n}; a write overwrites the counter without motion.",
     ),
     _value(
-        key="VEL_ACT",
         name="M{n}_VEL_ACT",
         address=28,
         reads=(3,),
@@ -366,7 +341,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Present velocity of axis M{n}.",
     ),
     _kept(
-        key="ACC",
         name="M{n}_ACC",
         address=36,
         kind=QuantityKind.ACCELERATION,
@@ -375,7 +349,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Acceleration of axis M{n} in position mode; speeding up and slowing down in velocity mode.",
     ),
     _kept(
-        key="DEC",
         name="M{n}_DEC",
         address=44,
         kind=QuantityKind.ACCELERATION,
@@ -384,7 +357,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Deceleration of axis M{n} in position mode.",  # MIC-29
     ),
     _kept(
-        key="VMAX",
         name="M{n}_VMAX",
         address=52,
         kind=QuantityKind.VELOCITY,
@@ -393,7 +365,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Cruise velocity of axis M{n} in position mode.",
     ),
     _motion(
-        key="HOME",
         name="M{n}_HOME",
         address=60,
         kind=QuantityKind.VELOCITY,
@@ -401,7 +372,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Homes axis M{n} at this velocity at once: negative towards KL, positive towards KR.",
     ),
     _motion(
-        key="VEL_ABS",
         name="M{n}_VEL_ABS",
         address=68,
         kind=QuantityKind.VELOCITY,
@@ -409,7 +379,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Moves axis M{n} at this velocity.",
     ),
     _motion(
-        key="VEL_REL",
         name="M{n}_VEL_REL",
         address=76,
         kind=QuantityKind.VELOCITY,
@@ -418,7 +387,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Moves axis M{n} at its present velocity plus this value.",
     ),
     _motion(
-        key="POS_ABS",
         name="M{n}_POS_ABS",
         address=84,
         kind=QuantityKind.POSITION,
@@ -426,7 +394,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Moves axis M{n} to this position.",
     ),
     _motion(
-        key="POS_REL",
         name="M{n}_POS_REL",
         address=92,
         kind=QuantityKind.POSITION,
@@ -435,7 +402,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Moves axis M{n} to its present position plus this value.",
     ),
     _kept(
-        key="ENC_IMP",
         name="ENC{n}_IMP",
         address=100,
         type=Type.DINT,
@@ -444,7 +410,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Counter of encoder {n} in encoder pulses.",
     ),
     _kept(
-        key="ENC_XPOS",
         name="ENC{n}_XPOS",
         address=108,
         kind=QuantityKind.POSITION,
@@ -452,7 +417,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Counter of encoder {n} converted into a position of its drive.",
     ),
     _kept(
-        key="POSLIM_L",
         name="M{n}_POSLIM_L",
         address=120,
         kind=QuantityKind.POSITION,
@@ -460,7 +424,6 @@ ROWS: tuple[MapRow, ...] = (
         meaning="Soft limit of axis M{n} towards negative positions (L).",
     ),
     _kept(
-        key="POSLIM_R",
         name="M{n}_POSLIM_R",
         address=128,
         kind=QuantityKind.POSITION,
