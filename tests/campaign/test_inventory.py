@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from steptwin.campaign.inventory import FaultCategory, PossibleFault, occasions, possible_faults
+from steptwin.campaign.inventory import PossibleFault, occasions, possible_faults
 from steptwin.controller import SECOND
 from steptwin.files.world import World
 from steptwin.simulation.faults import read
+from steptwin.simulation.faults.table import FaultCategory
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 LINE = """

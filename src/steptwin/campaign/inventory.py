@@ -2,58 +2,18 @@
 
 from __future__ import annotations
 
-import enum
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from steptwin.errors import Misuse
 from steptwin.simulation.faults import Fault, parse
 from steptwin.simulation.faults.kinds import KINDS
-from steptwin.simulation.faults.table import FaultKind, FaultValue, Layer
+from steptwin.simulation.faults.table import FaultCategory, FaultKind, FaultValue, Layer
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.script.steps import Repeat, Set, Step
 from steptwin.simulation.world.simulation import Simulation
 
 STUCK_INPUT, STUCK_OUTPUT = "stuck-input", "stuck-output"
-TRIED: dict[str, tuple[dict[str, FaultValue], ...]] = {
-    "stuck": ({"value": 0.0}, {"value": 1.0}),
-    STUCK_OUTPUT: ({"level": 0}, {"level": 1}),
-    STUCK_INPUT: ({"level": 0}, {"level": 1}),
-    "drift": ({"volts": 0.5}, {"volts": -0.5}),
-    "no-answer": ({"lost": "answer"}, {"lost": "request"}),
-    "bounce": ({},),
-    "wear": ({"writes": 0},),
-}
-"""Parameters with which a kind of fault is tried, where it is not tried with their defaults alone."""
-
-
-class FaultCategory(enum.StrEnum):
-    """Kind of part that has a fault."""
-
-    SENSOR = "sensor"
-    ACTUATOR = "actuator"
-    LOGIC = "logic"
-    LINE = "line"
-    POWER = "power"
-    MEMORY = "memory"
-
-
-_OF_KIND = {
-    "stuck": FaultCategory.SENSOR,
-    STUCK_INPUT: FaultCategory.SENSOR,
-    "bounce": FaultCategory.SENSOR,
-    "slip": FaultCategory.SENSOR,
-    "broken-wire": FaultCategory.SENSOR,
-    "drift": FaultCategory.SENSOR,
-    "master-error": FaultCategory.LINE,
-    "supply-drop": FaultCategory.POWER,
-    "power-cut": FaultCategory.POWER,
-    "brown-out": FaultCategory.POWER,
-    "wear": FaultCategory.MEMORY,
-    "welded-contact": FaultCategory.LOGIC,
-    "open-coil": FaultCategory.LOGIC,
-}
-"""The parts of kinds of faults; those of lines are faults of lines, all others of actuators."""
 _LOGIC = frozenset({"gate", "latch", "timer", "relay", "counter"})
 """Elements whose outputs are neither sensors nor actuators."""
 
@@ -91,7 +51,7 @@ def possible_faults(world: Simulation) -> list[PossibleFault]:
 
 def _of_kind(world: Simulation, kind: FaultKind) -> Iterator[PossibleFault]:
     for where, place in _places(world, kind):
-        for more in TRIED.get(kind.name, ({},)):
+        for more in kind.tried:
             given: dict[str, object] = {**where, **more}
             try:
                 fault = parse({"kind": kind.name, **given})
@@ -101,7 +61,7 @@ def _of_kind(world: Simulation, kind: FaultKind) -> Iterator[PossibleFault]:
             yield PossibleFault(_part(world, kind, where), place, _mode(kind, more, where), fault)
 
 
-def _mode(kind: FaultKind, more: dict[str, FaultValue], where: dict[str, FaultValue]) -> str:
+def _mode(kind: FaultKind, more: Mapping[str, FaultValue], where: dict[str, FaultValue]) -> str:
     shown = {**({"direction": where["direction"]} if "direction" in where else {}), **more}
     return " ".join(
         (kind.name, *(f"{key}={value:g}" if isinstance(value, float) else f"{key}={value}" for key, value in shown.items()))
@@ -109,13 +69,11 @@ def _mode(kind: FaultKind, more: dict[str, FaultValue], where: dict[str, FaultVa
 
 
 def _part(world: Simulation, kind: FaultKind, where: dict[str, FaultValue]) -> FaultCategory:
-    if kind.layer not in (Layer.PHYSICS, Layer.ELEMENT):
-        return FaultCategory.LINE
     if kind.name == STUCK_OUTPUT:
         name = where["element"]
         of = next((of for of, built in world.objects.elements.items() if name in built), "")
         return FaultCategory.LOGIC if of in _LOGIC else FaultCategory.SENSOR
-    return _OF_KIND.get(kind.name, FaultCategory.ACTUATOR)
+    return kind.part
 
 
 def _places(world: Simulation, kind: FaultKind) -> Iterator[tuple[dict[str, FaultValue], str]]:

@@ -81,9 +81,7 @@ def test_shared_parameters_say_which_kinds_have_them() -> None:
     ]
     assert {parameter.name: of for parameter, of in found}["from_s"] == (
         "each byte, each delivery, each answer, each request, each change, each save, stuck, master-error, "
-        "broken-wire, drift, stuck-output, stuck-input, welded-contact, open-coil, no-air, jam, belt-stop, empty-feeder, leak, "
-        "worn-jaws, worn-brake, stuck-brake, slipping-coupling, stuck-follower, worn-cam, slack-belt, slipping-belt, "
-        "stiff-guides, brown-out, other-load"
+        + ", ".join(kind.name for kind in rows(Layer.ELEMENT))
     )
     assert len({parameter for parameter, _ in found}) == len(found)
     for parameter, of in found:

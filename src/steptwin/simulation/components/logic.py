@@ -16,7 +16,7 @@ from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.faults import ActiveFault, Fault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
-from steptwin.simulation.faults.table import Parameter, ParameterForm, whole
+from steptwin.simulation.faults.table import FaultCategory, Parameter, ParameterForm, whole
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.drawing import Drawing
@@ -134,6 +134,7 @@ STUCK_OUTPUT = FaultKind(
     ),
     effect=ElementEffect(_stick, holds="output"),
     check=_check_output,
+    tried=({"level": 0}, {"level": 1}),
 )
 """For elements with outputs."""
 STUCK_INPUT = FaultKind(
@@ -147,6 +148,8 @@ STUCK_INPUT = FaultKind(
     ),
     effect=ElementEffect(_stick, holds="input"),
     check=_check_input,
+    faulty=FaultCategory.SENSOR,
+    tried=({"level": 0}, {"level": 1}),
 )
 """For elements with inputs."""
 STUCK = (STUCK_OUTPUT, STUCK_INPUT)

@@ -10,6 +10,7 @@ from steptwin.messages import Message
 from steptwin.simulation.components.logic import STUCK, Joint, TerminalComponent, TerminalComponentSpec, with_terminals
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
+from steptwin.simulation.faults.table import FaultCategory
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.table import key, table
@@ -110,9 +111,15 @@ RELAY = with_terminals(
             Occasion.ALWAYS,
             "The contact NO of a relay stays closed once it is.",
             effect=ElementEffect(_weld),
+            faulty=FaultCategory.LOGIC,
         ),
         FaultKind(
-            "open-coil", Layer.ELEMENT, Occasion.ALWAYS, "The coil of a relay is interrupted.", effect=ElementEffect(_interrupt)
+            "open-coil",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "The coil of a relay is interrupted.",
+            effect=ElementEffect(_interrupt),
+            faulty=FaultCategory.LOGIC,
         ),
     ),
 )

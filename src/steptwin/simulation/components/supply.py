@@ -16,6 +16,7 @@ from steptwin.simulation.components.logic import STUCK, Joint, TerminalComponent
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.controller import FaultyController
 from steptwin.simulation.faults.effects import ElementEffect
+from steptwin.simulation.faults.table import FaultCategory
 from steptwin.simulation.faults.table import number as parameter
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
@@ -250,6 +251,7 @@ SUPPLY = with_terminals(
             "A power supply has less voltage; its controllers are off while that is not enough.",
             own=(parameter("volts", "V that it has at most.", 0.0, 1000.0, default=12.0),),
             effect=ElementEffect(_sag),
+            faulty=FaultCategory.POWER,
         ),
     ),
 )

@@ -8,7 +8,7 @@ from steptwin.controller import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
-from steptwin.simulation.faults.table import number
+from steptwin.simulation.faults.table import FaultCategory, number
 
 
 class VoltageOutput(Protocol):
@@ -45,6 +45,7 @@ BROKEN_WIRE = FaultKind(
     Occasion.ALWAYS,
     "The wire of an analog sensor is broken: 0 V.",
     effect=ElementEffect(_break),
+    faulty=FaultCategory.SENSOR,
 )
 DRIFT = FaultKind(
     "drift",
@@ -53,4 +54,6 @@ DRIFT = FaultKind(
     "An analog sensor reads too high or too low.",
     own=(number("volts", "Too high; negative: too low.", -10.0, 10.0, default=0.5),),
     effect=ElementEffect(_drift),
+    faulty=FaultCategory.SENSOR,
+    tried=({"volts": 0.5}, {"volts": -0.5}),
 )

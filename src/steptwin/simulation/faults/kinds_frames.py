@@ -122,6 +122,7 @@ FRAMES = (
         (Parameter("lost", ParameterForm.WORD, "What was lost.", words=("answer", "request"), default="answer"),),
         MODBUS,
         effect=RequestEffect(_lose_request, _is_request_lost, _lose_answer),
+        tried=({"lost": "answer"}, {"lost": "request"}),
     ),
     FaultKind(
         "late",

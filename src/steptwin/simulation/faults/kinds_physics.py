@@ -15,6 +15,7 @@ from steptwin.simulation.faults.table import (
     OFF,
     PIN,
     Fault,
+    FaultCategory,
     FaultKind,
     Layer,
     Need,
@@ -143,6 +144,7 @@ PHYSICS = (
         (AXIS, whole("counts", "By how many counts.", -(10**9), 10**9, default=4)),
         effect=MomentEffect(_slip),
         needs=Need.ENCODER,
+        faulty=FaultCategory.SENSOR,
     ),
     FaultKind(
         "stuck",
@@ -151,6 +153,8 @@ PHYSICS = (
         "An input keeps a level, whatever its switch does.",
         (PIN, number("value", "The level; volts on analog inputs.", 0, 10, otherwise="the one it has")),
         effect=WindowEffect(_stick),
+        faulty=FaultCategory.SENSOR,
+        tried=({"value": 0.0}, {"value": 1.0}),
     ),
     FaultKind(
         "master-error",
@@ -159,6 +163,7 @@ PHYSICS = (
         "A slave of the controller's own Modbus master does not answer: M_STATUS is 3.",
         effect=WindowEffect(_fail_master),
         needs=Need.MODBUS_MASTER,
+        faulty=FaultCategory.LINE,
     ),
     FaultKind(
         "bounce",
@@ -172,6 +177,7 @@ PHYSICS = (
         ),
         effect=ChangeEffect(_bounce),
         check=_needs_switch,
+        faulty=FaultCategory.SENSOR,
     ),
     FaultKind(
         "supply-drop",
@@ -180,6 +186,7 @@ PHYSICS = (
         "The supply fails and comes back: nothing answers, drives and outputs are off, then it is as after power-on.",
         (OFF,),
         effect=MomentEffect(_drop_supply),
+        faulty=FaultCategory.POWER,
     ),
     FaultKind(
         "power-cut",
@@ -188,6 +195,7 @@ PHYSICS = (
         "The supply fails while memory is being saved: what was not yet written keeps its old content.",
         (OFF, whole("written", "Bytes written until then.", 0, None, otherwise="any number")),
         effect=SaveEffect(_cut_power),
+        faulty=FaultCategory.POWER,
     ),
     FaultKind(
         "wear",
@@ -196,5 +204,7 @@ PHYSICS = (
         "The memory is worn out: with each save one more byte, chosen by chance, keeps what it has for ever.",
         (whole("writes", "Saves that go well.", 0, None, default=100_000),),
         effect=SaveEffect(_wear),
+        faulty=FaultCategory.MEMORY,
+        tried=({"writes": 0},),
     ),
 )

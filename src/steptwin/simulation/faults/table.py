@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TypeAlias, TypedDict, Unpack
 
 from steptwin.errors import Misuse
@@ -121,6 +121,17 @@ def _format(number: float) -> str:
     return f"{number:.6f}".rstrip("0").rstrip(".")
 
 
+class FaultCategory(enum.StrEnum):
+    """Kind of part that has a fault."""
+
+    SENSOR = "sensor"
+    ACTUATOR = "actuator"
+    LOGIC = "logic"
+    LINE = "line"
+    POWER = "power"
+    MEMORY = "memory"
+
+
 @dataclass(frozen=True, slots=True)
 class FaultKind:
     """A row. ``own`` are the parameters of this kind alone, ``lines`` what it can happen on. ``needs``: what a
@@ -137,6 +148,16 @@ class FaultKind:
     """Its effect: one of those that fit the occasion. A kind without it is refused when the table is built."""
     needs: Need | None = None
     check: Callable[[Any, Fault], None] | None = None
+    faulty: FaultCategory | None = None
+    """What is faulty; without it the line, or of physics and elements an actuator."""
+    tried: tuple[Mapping[str, FaultValue], ...] = field(default=({},), hash=False)
+    """Parameters with which campaigns try it."""
+
+    @property
+    def part(self) -> FaultCategory:
+        if self.faulty is not None:
+            return self.faulty
+        return FaultCategory.ACTUATOR if self.layer in (Layer.PHYSICS, Layer.ELEMENT) else FaultCategory.LINE
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
