@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
 from steptwin.datasheet import Datasheet, Limits
 from steptwin.diagnostics import Diagnostic, SourceText
@@ -18,8 +18,7 @@ class ConfigurationKey:
     """The vendor's spelling: ``MotResol``."""
     meaning: str
     unit: str
-    text: str
-    """The value as text in the file; empty where the key is missing."""
+    text: Annotated[str, "As it is written; empty where it is not in the file."]
     value: float
     """The value; the default where the key is missing or its value is wrong."""
     default: float
@@ -27,8 +26,7 @@ class ConfigurationKey:
     is_whole: bool
     choices: Mapping[int, str]
     """Texts of the values, where there are few of them."""
-    point: str = ""
-    """The point of the data sheet with this value at run time; empty without one."""
+    point: Annotated[str, "The point that has it at run time; empty without one."] = ""
     source: str
 
 

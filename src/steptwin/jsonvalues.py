@@ -32,6 +32,8 @@ class JsonForm:
 def to_json(value: Any) -> Any:
     """A value of a dataclass as JSON has values, or of another type whose form its value shows."""
     kind = type(value)
+    if kind in _PLAIN:
+        return value
     if is_dataclass(kind):
         return _form_of_class(kind).to_json(value)  # pyrefly: ignore[not-callable]
     if isinstance(value, enum.Enum):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 
-from steptwin.configuration import ConfigurationFormat, ConfigurationKey, Form, Section
+from steptwin.configuration import ConfigurationFormat, Form
 from steptwin.datasheet import Datasheet
 from steptwin.diagnostics import SourceText, diagnostics_to_json
 from steptwin.errors import Refusal
@@ -69,15 +69,7 @@ def _to_json(form: Form) -> Mapping[str, object]:
     return {
         "name": form.source.name,
         "text": form.source.text,
-        "sections": [_section(one) for one in form.sections],
+        "sections": [to_json(one) for one in form.sections],
         "diagnostics": findings,
         "points": dict(form.points),
     }
-
-
-def _section(section: Section) -> Mapping[str, object]:
-    return {"name": section.name, "title": section.title, "settings": [_setting(one) for one in section.settings]}
-
-
-def _setting(setting: ConfigurationKey) -> Mapping[str, object]:
-    return to_json(setting)

@@ -8,7 +8,9 @@ from typing import Annotated, Any, TypeAlias
 
 from steptwin.access.roles import LOOK
 from steptwin.calc import Formula, MovePhase, RequiredSetting
+from steptwin.configuration import Section
 from steptwin.controller import Nanos
+from steptwin.datasheet import Limits
 from steptwin.diagnostics import Severity
 from steptwin.errors import Misuse
 from steptwin.fields import (
@@ -26,7 +28,7 @@ from steptwin.fields import (
     read_fields,
     wrong,
 )
-from steptwin.jsonvalues import FLAG, NUMBER, TEXT, WHOLE, list_of, members, or_null, with_sentences
+from steptwin.jsonvalues import FLAG, NUMBER, TEXT, WHOLE, list_of, members, or_null, shape, with_sentences
 from steptwin.messages import Message
 from steptwin.studio.requesttype import request
 from steptwin.wire.pcapng import CapturedFrame
@@ -41,14 +43,13 @@ _NUMBERS: Schema = {"type": "object", "additionalProperties": NUMBER}
 _TEXTS: Schema = {"type": "object", "additionalProperties": TEXT}
 
 
-_LIMITS = members({"low": or_null(NUMBER), "high": or_null(NUMBER), "is_low_excluded": FLAG})
 _QUANTITY = members(
     {
         "name": TEXT,
         "meaning": TEXT,
         "unit": TEXT,
         "pulses": {**NUMBER, "description": "Pulses (per s, per s²) in one of its unit."},
-        "limits": _LIMITS,
+        "limits": shape(Limits),
         "choices": list_of(WHOLE),
         "default": or_null(NUMBER),
         "same_as": {**or_null(TEXT), "description": "The quantity whose value it has where none is given."},
@@ -89,26 +90,11 @@ FINDING = members(
         "hint": or_null(TEXT),
     }
 )
-_SETTING = members(
-    {
-        "name": TEXT,
-        "meaning": TEXT,
-        "unit": TEXT,
-        "text": {**TEXT, "description": "As it is written; empty where it is not in the file."},
-        "value": NUMBER,
-        "default": NUMBER,
-        "limits": _LIMITS,
-        "is_whole": FLAG,
-        "choices": _TEXTS,
-        "point": {**TEXT, "description": "The point that has it at run time; empty without one."},
-        "source": TEXT,
-    }
-)
 _FORM = members(
     {
         "name": {**TEXT, "description": "Of the file."},
         "text": TEXT,
-        "sections": list_of(members({"name": TEXT, "title": TEXT, "settings": list_of(_SETTING)})),
+        "sections": list_of(shape(Section)),
         "diagnostics": list_of(FINDING),
         "is_file": {
             **FLAG,
