@@ -23,10 +23,6 @@ class Token:
     text: str
 
 
-def _always() -> bool:
-    return True
-
-
 WRONG_TOKEN = Message("access.wrong-token", "wrong token")
 NO_TOKEN = Message(
     "access.no-token", "no token: it is in the address that the studio prints on a terminal, and in its file of tokens"
@@ -34,10 +30,11 @@ NO_TOKEN = Message(
 
 
 class AccessGate:
-    """Admits clients with one of the ``tokens``. Clients without a token have the role ``open_to``, while ``is_open`` says so."""
+    """Admits clients with one of the ``tokens``. Clients without a token have the role ``open_to``, while ``is_open`` says so,
+    always without it."""
 
     def __init__(
-        self, tokens: Iterable[Token] = (), *, open_to: Role | None = None, is_open: Callable[[], bool] = _always
+        self, tokens: Iterable[Token] = (), *, open_to: Role | None = None, is_open: Callable[[], bool] | None = None
     ) -> None:
         self._tokens = tuple(tokens)
         self._open_to = open_to
@@ -46,7 +43,7 @@ class AccessGate:
     @property
     def asks(self) -> bool:
         """Whether a token is required at present."""
-        return self._open_to is None or not self._is_open()
+        return self._open_to is None or (self._is_open is not None and not self._is_open())
 
     @property
     def has_tokens(self) -> bool:

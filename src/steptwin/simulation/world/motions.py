@@ -21,7 +21,7 @@ def ordered(model: Model, command: ControllerCommand | Seek) -> Step | Halt:
     Raises `Misuse` and `Refusal`.
     """
     name = command.controller
-    kind, controller = model.kind(name), model.controller(name)
+    kind, controller = model.kind(name), model.objects.controllers[name]
     model.sync(name)
     controller.advance(model.now)
     on = model.objects.line_of.get(name)
