@@ -38,7 +38,7 @@ def test_a_complete_table_is_read_only() -> None:
     ("adding_a_row", "module", "message"),
     [
         (
-            "import dataclasses, steptwin.mic488.registers as t; t.ROWS += (dataclasses.replace(t.ROWS[-1], key='NEW'),)",
+            "import dataclasses, steptwin.mic488.registers as t; t.ROWS += (dataclasses.replace(t.ROWS[-1], name='NEW'),)",
             "steptwin.mic488.device",
             "register NEW lacks its behaviour",
         ),
