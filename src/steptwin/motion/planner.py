@@ -70,7 +70,10 @@ def plan_position(state: MotionState, target: float, acc: float, dec: float, vma
         segments.append(s)
         t, p, peak = s.end_s, s.c0, vmax
     else:
-        # Speed that the distance permits beyond braking from the present speed. Differences of nearly equal speeds are avoided.
+        #      peak         With d1 + d2 = d, v0 the present speed, a and b the rates:
+        #     ╱    ╲        peak² = v0² + 2·a·d1 = 2·b·d2, so peak² = v0² + 2·(d − v0²/2b)·a·b/(a + b).
+        # v0 ╱ a  b ╲       The second term is ``gain``; peak − v0 = gain/(peak + v0) avoids a difference of nearly equal speeds.
+        #     d1   d2
         gain = 2.0 * (abs(distance) - speed * speed / (2.0 * dec)) * acc * dec / (acc + dec)
         peak = speed
         if gain > 0.0 and speed < vmax:

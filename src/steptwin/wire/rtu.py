@@ -1,5 +1,11 @@
 """Modbus RTU frames in a stream of bytes.
 
+::
+
+    unit | function | data … | CRC, low byte | CRC, high byte        4 to 256 bytes
+
+The function gives the length, for some with a count among the data. The CRC over a whole frame with its own CRC is 0.
+
 A frame is cut where its function makes it end and its CRC is right; silence does not cut frames, because pseudo
 terminals, USB adapters and networks deliver in bursts (MIC-15). A burst is what comes without a silence as long as the gap.
 

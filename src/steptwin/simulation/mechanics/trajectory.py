@@ -9,6 +9,14 @@ A rotor that was held synchronises at the nearest position with the electrical a
 reverses: the loss is a whole number of electrical periods (four full steps). If that position is up to two full steps before a
 stop, the rotor springs back to it; if it is beyond the stop, the rotor leaves the stop when the field has returned that far.
 
+The torque of the field on a rotor that lags by x is T·sin(2π·x/λ), λ being an electrical period, four full steps::
+
+    lag       −λ/2           0          +λ/2          +λ         +3λ/2
+    torque      0  pulls →   0  ← pulls   0  pulls →   0  ← pulls   0
+             unstable     stable      unstable      stable     unstable
+
+So it settles at the nearest multiple of λ, which is at most λ/2 away: two full steps.
+
 Between two reversals of the field, rotor and load are constant or have a constant distance to the field: a trajectory is a list
 of such sections. While no current drives the rotor of a `Build.coasts_unpowered` axis, its motion
 (`steptwin.simulation.mechanics.coasting`) is in the place of the field, and the load keeps its distance to the rotor.

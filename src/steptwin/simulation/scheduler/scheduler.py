@@ -2,6 +2,16 @@
 
 A scheduler is itself a machine in virtual time. Controllers without a common wire are put into separate schedulers, so that each
 one is advanced only when an event concerns it.
+
+One round of its loop, for the earliest moment at which anything is due::
+
+    controllers that are due → edges of their pins ─┬→ wires → inputs of controllers
+                                                    └→ parts that depend on them, in order
+                     ↑                                                  │
+                     └──────────── again, at the same moment, while anything has changed
+
+Signals propagate in zero time, so a moment is over when a round changes nothing. Then plans are recorded, subscribers are
+notified, and the next deadline is the least of those of controllers, parts and delayed wires.
 """
 
 from __future__ import annotations
