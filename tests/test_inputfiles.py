@@ -41,7 +41,7 @@ def test_a_recorded_file_within_the_bounds(file: Path) -> None:
 
 def test_a_recorded_file_is_utf8(file: Path) -> None:
     file.write_bytes(b'{"name": "\xff"}')
-    with pytest.raises(Misuse, match="it is no UTF-8 text"):
+    with pytest.raises(Misuse, match="it is not UTF-8 text"):
         read_recorded(file)
 
 

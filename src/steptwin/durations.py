@@ -39,7 +39,7 @@ def duration(value: object) -> Nanos:
 
 @lru_cache(maxsize=1024)
 def _of_text(text: str) -> Nanos | None:
-    """Nanoseconds; None for what is no time. 0 is 0 in any unit."""
+    """Nanoseconds; None for what is not a time. 0 is 0 in any unit."""
     match = _DURATION.match(text)
     if match is None or not (match[2] or Decimal(match[1]) == 0):
         return None

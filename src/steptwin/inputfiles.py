@@ -47,7 +47,7 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
 TOO_MANY_VALUES = Message(
     "inputfiles.too-many-values", "cannot read {path}: it has about {values} values; permitted are at most {most}"
 )
-NO_TEXT = Message("inputfiles.no-text", "cannot read {path}: it is no UTF-8 text")
+NO_TEXT = Message("inputfiles.no-text", "cannot read {path}: it is not UTF-8 text")
 
 
 def read_recorded(path: Path) -> str:

@@ -101,7 +101,7 @@ def test_microsteps_after_power_on_depend_on_the_interface() -> None:
         ({"velocity": 20001}, None, r"velocity = 20001 step/s: permitted from 16 up to 20000 step/s"),
         ({"start_stop": 1951}, None, r"permitted from 16 up to 1950 step/s"),
         ({"microstep": 3}, None, r"microstep = 3: permitted 1, 2, 4, 8, 16, 32, 64"),
-        ({"microstep": 2, "distance": 64, "velocity": 100, "acceleration": 99}, None, r"M2 and Q1 do not go together: .* Q2"),
+        ({"microstep": 2, "distance": 64, "velocity": 100, "acceleration": 99}, None, r"M2 does not permit Q1: .* Q2"),
         ({"distance": 64, "velocity": 100, "time": 1}, "microstep", r"microstep cannot be calculated, it is a choice"),
         ({"deceleration": 5}, None, r"no quantity 'deceleration' \(did you mean 'acceleration'\?\)"),
     ],

@@ -60,7 +60,7 @@ def test_a_picture(tmp_path: Path, suffix: str, head: bytes) -> None:
         (("mic488", "--gear", "640", *SCREW), "--gear and the mechanics exclude each other"),
         (("mic488", "--unit", "step", *SCREW), "unit step: a MIC488 has imp, rev"),
         (("mic488", "--variant", "B"), "--variant is not for the MIC488"),
-        (("mic488", "--lead", "5deg", "--microsteps", "16"), "--lead: '5deg' is no length: units are mm, cm, m"),
+        (("mic488", "--lead", "5deg", "--microsteps", "16"), "--lead: '5deg' is not a length: units are mm, cm, m"),
         (("m1486", "--gear", "3"), "--gear is not for the M1486"),
         (("m1486", "--deceleration", "3"), "--deceleration is not for the M1486A"),
         (("m1486", "--variant", "Z"), "no M1486 variant is called 'Z'"),

@@ -164,7 +164,7 @@ def test_folders_without_results(shell: Shell, file: Path, tmp_path: Path) -> No
     assert "its campaign has not ended, run it again to go on" in shell.errors
     (tmp_path / "summary.json").write_text("{}")
     shell("campaign", "show", str(tmp_path))
-    assert "summary.json is no summary of a campaign" in shell.errors
+    assert "summary.json is not a summary of a campaign" in shell.errors
     assert shell.code == 2
 
 

@@ -58,7 +58,7 @@ def test_a_converted_program_moves_as_before(run: Run, tmp_path: Path) -> None:
 
 
 def test_numbers_out_of_range_stay_and_are_errors(run: Run, tmp_path: Path) -> None:
-    """At 12 MHz V would have to be 32000, P beyond 7000 is no profile, and half of W1 is no time. P9000 is none at any clock."""
+    """At 12 MHz V would have to be 32000, P beyond 7000 is no profile, half of W1 is not a time. P9000 is none at any clock."""
     (tmp_path / "a.m1486").write_text("[\nW500\nV16000\nA1000\nP5000\nR\nP9000\nR\n]\n")
     code, out, _ = run(tmp_path / "a.m1486", "--from", "A2x", "--to", "A")
     assert code == 1

@@ -27,7 +27,7 @@ def test_it_is_checked(file: str, shell: Shell) -> None:
         checked = json.loads(shell("check", "--json", file))
         assert (checked["language"], checked["targets"], checked["errors"]) == ("targets", 2, 1)
         assert shell.code == 1
-        assert checked["diagnostics"][0]["message"] == "'-' is no number"
+        assert checked["diagnostics"][0]["message"] == "'-' is not a number"
     assert json.loads(shell("check", "--json", file))["language"] == "m1486"  # as all files with unknown suffixes
 
 

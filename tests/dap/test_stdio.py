@@ -170,7 +170,7 @@ def test_a_world_with_two_controllers_and_a_breakpoint_in_each(client: DapClient
     client.ask("setBreakpoints", source={"path": str(tmp_path / "m.prg")}, breakpoints=[{"line": 8}])
     client.ask("setBreakpoints", source={"path": str(tmp_path / "c.m1486")}, breakpoints=[{"line": 8}])
     (other,) = client.ask("setBreakpoints", source={"path": str(tmp_path / "x.prg")}, breakpoints=[{"line": 8}])["breakpoints"]
-    assert "x.prg is no program of this session" in other["message"]
+    assert "x.prg is not a program of this session" in other["message"]
     client.ask("configurationDone")
     assert client.event("stopped")["threadId"] == 1
     assert [thread["name"] for thread in client.ask("threads")["threads"]] == ["m", "c"]
@@ -191,7 +191,7 @@ def test_a_program_that_is_not_in_the_world_is_refused_and_another_launch_is_tak
     (tmp_path / "m.prg").write_text(WBC)
     (tmp_path / "c.m1486").write_text(CHIP)
     (tmp_path / "two.toml").write_text(BOTH)
-    with pytest.raises(Refused, match=r"x\.prg is no program of .*two\.toml: there are .*m\.prg"):
+    with pytest.raises(Refused, match=r"x\.prg is not a program of .*two\.toml: there are .*m\.prg"):
         client.launch(world=str(tmp_path / "two.toml"), program=str(tmp_path / "x.prg"))
     client.launch(world=str(tmp_path / "two.toml"))
     assert len(client.ask("loadedSources")["sources"]) == 2

@@ -60,7 +60,7 @@ def test_a_database_that_is_not_there_yet(tmp_path: Path, monkeypatch: pytest.Mo
     url = f"sqlite:///{tmp_path / 'later' / 'h.db'}"
     writer = start(url, spool, notices)
     spool.append(batch(1))
-    assert notices == [f"history: {url}: unable to open database file; what comes waits on this disk"]
+    assert notices == [f"history: {url}: unable to open database file; rows are buffered on this disk"]
     (tmp_path / "later").mkdir()
     until(lambda: len(notices) == 2, "the database has been found")
     assert notices[1] == f"history: {url} answers again"

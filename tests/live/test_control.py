@@ -191,7 +191,7 @@ def test_follows_need_an_id_of_their_own_and_are_not_too_many() -> None:
     found = served(play)
     assert found[0]["error"]["message"] == "subscribe: an id is required; its events carry it"
     assert all("ok" in one for one in found[1:17])
-    assert found[17]["error"]["message"] == "subscribe: there are 16 already, the most for a client"
+    assert found[17]["error"]["message"] == "subscribe: too many: the limit for a client is 16"
     assert found[18]["error"]["message"] == "subscribe: the id 0 is in use"
 
 

@@ -27,7 +27,7 @@ def test_devices_and_gateways() -> None:
         (DEVICE, "error D005: [gateway.NAME] or [history] is missing"),
         (DEVICE + DEVICE + GATEWAY, "cell.toml:5:1: error D006: there is a [[device]] named 'table' already"),
         (GATEWAY + "[[devise]]\n", "the file has no [devise] (did you mean 'device'?)"),
-        (GATEWAY + '[device]\nname = "table"\n', "[device] stands once"),
+        (GATEWAY + '[device]\nname = "table"\n', "[device] is a single table"),
         (GATEWAY + '[[device]]\nname = "table"\n', "address is missing"),
         (GATEWAY + '[[device]]\nname = "a table"\naddress = "x"\n', "'a table' is not a name"),
         (GATEWAY + DEVICE + "speed = 3\n", "[device] has no 'speed'"),

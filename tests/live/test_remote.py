@@ -149,7 +149,7 @@ def test_a_twin_of_another_version_is_named_and_others_are_listed(own_directory:
                             client.sendall(b'{"error": "unknown request"}\n')
 
         answers = pool.submit(answer)
-        with pytest.raises(LineFailure, match="'old' does not answer: 'unknown request' is no response of this version"):
+        with pytest.raises(LineFailure, match="'old' does not answer: 'unknown request' is not a response of this version"):
             ask("old", do.Note("a"))
         assert running_twins() == []
         other.shutdown(socket.SHUT_RDWR)

@@ -248,7 +248,7 @@ def test_a_text_of_any_size_is_not_looked_at() -> None:
     analysis = made.analysis("file:///chip.m1486")
     assert analysis is not None
     (found,) = analysis.diagnostics()
-    assert found.message == "the text has 150000 characters: texts of more than 131072 are not looked at"
+    assert found.message == "the text has 150000 characters: texts of more than 131072 are not analysed"
 
 
 # ---------------------------------------------------------------------- questions

@@ -520,7 +520,7 @@ def test_blanks_of_a_text_system_are_named_and_replaced(line: str, fixed: str) -
     (found,) = check(line).diagnostics
     assert found.code == "M101"
     assert found.fix is not None
-    assert ("no-break space (U+" in found.message, "which is no blank to the chip" in found.message) == (True, True)
+    assert ("no-break space (U+" in found.message, "which is not a blank to the chip" in found.message) == (True, True)
     start, end = found.fix.span.start, found.fix.span.end
     assert line[:start] + found.fix.text + line[end:] == fixed
     assert "M101" not in codes(fixed)

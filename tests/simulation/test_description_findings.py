@@ -166,7 +166,7 @@ name = "other"
             "w.toml:10:1: error D009: nothing is called 'none'",
         ),
         ("world = 3\n", "w.toml:1:1: error D002: [world] is 3"),
-        ("[mic488]\nname = 't'\n", "w.toml:1:1: error D002: [mic488] stands once"),
+        ("[mic488]\nname = 't'\n", "w.toml:1:1: error D002: [mic488] is a single table"),
         ("[[mic488]]\nname = 'ось'\n", "'ось' is not a name: expected a letter from A to Z, then letters, digits, '-' and '_'"),
         ("[[mic488]]\nname = 'tür'\n", "'tür' is not a name: expected a letter from A to Z"),
         (TABLE + "[[event]]\nat = 1\nsteps = [{ send = 'bus', text = '→' }]\n", "text: '→': '→' is not an 8-bit character"),
@@ -227,7 +227,7 @@ name = "other"
             "x = " + "[" * 3000 + "]" * 3000,
             "w.toml:1:38: error D001: values are nested more than 32 deep",
         ),
-        (TABLE + '[fault]\nkind = "crc"\n', "w.toml:3:1: error D002: [fault] stands once"),
+        (TABLE + '[fault]\nkind = "crc"\n', "w.toml:3:1: error D002: [fault] is a single table"),
         ('fault = ["crc"]\n' + TABLE, "w.toml:1:10: error D002: [[fault]] is 'crc'"),
         (
             TABLE + '[[source]]\nto = "table.AIN1"\nkind = "ramp"\nover = 1\nrepeat = 0\n',

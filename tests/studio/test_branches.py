@@ -129,7 +129,7 @@ def test_roles_and_the_most_branches(start_studio: Callable[..., Process], tmp_p
     for _ in range(3):
         assert "ok" in ask(studio.url, "start_branch", operator)
     most = ask(studio.url, "start_branch", operator)["error"]["message"]
-    assert most == "4 branches are open already, which is the most: end one"
+    assert most == "too many branches: the limit is 4; end one"
     assert len(ask(studio.url, "branches", viewer)["ok"]) == 4
 
 

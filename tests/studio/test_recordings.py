@@ -137,7 +137,7 @@ def test_devices_alone_are_not_recorded(start_studio: Callable[..., Process], se
     twin = serve()
     studio = start_studio("--itself", "--device", f"tcp://127.0.0.1:{twin.tcp_port}")
     answer = ask(studio, "recordings")["error"]
-    assert answer["message"] == "nothing is recorded here: there is no world"
+    assert answer["message"] == "no world to record here"
 
 
 def save_in(page: Page, name: str) -> None:

@@ -18,7 +18,7 @@ MOST_SHOWN = 80
 """Characters of a header in a message."""
 
 
-UNKNOWN_HOST = Message("access.unknown-host", "Host {host} is no name of this studio; it is reached as {names}")
+UNKNOWN_HOST = Message("access.unknown-host", "unknown host name {host}; use {names}")
 OTHER_ORIGIN = Message("access.other-origin", "Origin {origin} is another site; only pages of this studio may ask it")
 
 

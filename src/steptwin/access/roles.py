@@ -10,7 +10,7 @@ class Role(IntEnum):
     """A higher role may do what a lower one may."""
 
     VIEWER = 1
-    """Looks, and stops."""
+    """May view and stop."""
     OPERATOR = 2
     """Moves axes, sets inputs, starts and stops programs, changes the pace of time."""
     ENGINEER = 3

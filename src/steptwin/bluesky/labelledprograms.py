@@ -29,7 +29,7 @@ class LabelledProgram(StandardReadable, Flyable, Stoppable):
 
     @AsyncStatus.wrap
     async def kickoff(self) -> None:
-        """Raises `Busy` for a chip that is not at rest, `Misuse` for a number that is no label."""
+        """Raises `Busy` for a chip that is not at rest, `Misuse` for a number that is not a label."""
         await self._chip.start_program(await self.label.get_value())
         self._is_begun, self._is_failure = True, False
 

@@ -14,7 +14,7 @@ from steptwin.errors import Refusal
 from steptwin.mic488.present import controller_status
 
 PERIOD_S = 0.1
-"""How often a program is looked at, s."""
+"""Period at which a program is polled, s."""
 
 
 class RunnableProgram(Device, Triggerable, Flyable, Stoppable):

@@ -61,7 +61,7 @@ SHORT_MOVE = Message("calc.short-move", "short move")
 RAMPS_MEET = Message("calc.ramps-meet", "the ramps meet where the braking distance is what remains")
 MICROSTEPS_AND_QUALIFICATION = Message(
     "calc.microsteps-and-qualification",
-    "M{microstep} and Q{qualification} do not go together: with M{microstep} permitted is {permitted}",
+    "M{microstep} does not permit Q{qualification}: permitted is {permitted}",
 )
 
 

@@ -116,7 +116,7 @@ def unit_of(text: str) -> str:
     return name
 
 
-NO_LENGTH = Message("calc.no-length", "{text!r} is no length: units are {names}")
+NO_LENGTH = Message("calc.no-length", "{text!r} is not a length: units are {names}")
 
 
 def read_lead(text: str) -> float:

@@ -65,17 +65,17 @@ class CampaignChecks:
         spread = self._by_name.get(name)
         if spread is None:
             near = self._toml.near(name, self._by_name)
-            self._toml.wrong(place, "D009", f"{name!r} is no time, and no [[vary]] has this name{near}")
+            self._toml.wrong(place, "D009", f"{name!r} is not a time, and no [[vary]] has this name{near}")
             return
         start = (self._head.get("start_ns") or 0) / SECOND
         ends = spread.values if isinstance(spread, Choice) else (spread.low, spread.high)
         if isinstance(spread, Normal) and spread.low is None:
-            self._toml.wrong(place, "D007", f"{name!r} is no time, because it may be below 0", "give times, or between")
+            self._toml.wrong(place, "D007", f"{name!r} is not a time, because it may be below 0", "give times, or between")
             return
         try:
             earliest = min(duration(value) for value in ends if value is not None) / SECOND
         except Misuse as error:
-            self._toml.wrong(place, "D007", f"{name!r} varies, but is no time: {error}")
+            self._toml.wrong(place, "D007", f"{name!r} varies, but is not a time: {error}")
             return
         if earliest > self._head.get("end_ns", LONGEST_NS) / SECOND:
             self._toml.wrong(place, "D007", f"{name!r} is at least {earliest:g} s: {_LATE}")

@@ -109,7 +109,7 @@ def _tables(toml: TomlText, kind: str, spec: type[S]) -> Iterator[S]:
     """Each table that has all it needs."""
     given = toml.data.get(kind, [])
     if not isinstance(given, list):
-        toml.wrong((kind,), "D002", f"[{kind}] stands once", f"expected [[{kind}]], for there may be several")
+        toml.wrong((kind,), "D002", f"[{kind}] is a single table", f"expected [[{kind}]], for there may be several")
         return
     for n, table in enumerate(given):
         if (found := read_spec(toml, (kind, n), spec, table)) is not None:

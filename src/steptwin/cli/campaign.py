@@ -206,7 +206,7 @@ def _show(folder: Path, out: Print, *, as_json: bool) -> bool:
         lines: list[str] = []
         _print(data, lines.append)
     except (LookupError, TypeError, ValueError, AttributeError) as error:
-        raise error if isinstance(error, Misuse) else Misuse(f"{path} is no summary of a campaign") from None
+        raise error if isinstance(error, Misuse) else Misuse(f"{path} is not a summary of a campaign") from None
     for line in [text] if as_json else lines:
         out(line)
     return not data["failed"]

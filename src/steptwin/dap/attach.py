@@ -34,7 +34,7 @@ from steptwin.subject.subscriptions import filter_of
 from steptwin.why.answer import Answer, read_answer
 
 PART_S = 0.05
-"""So long is waited for the twin before the editor is served again."""
+"""Time-out for the twin; then the editor is served again."""
 MOST_EVENTS = 10_000
 
 Log = Callable[[Nanos, str, str, str, int], None]
@@ -75,7 +75,7 @@ class AttachedTwin:
         return {one["program"]: SourceText(one["source"], one["text"]) for one in found}
 
     def close(self) -> None:
-        """Debug no more; a twin that went on when this began goes on, and stops at the events at which it did."""
+        """Detach; a twin that went on when this began goes on, and stops at the events at which it did."""
         try:
             self.set_breakpoints(())
             if self._has_set_events:

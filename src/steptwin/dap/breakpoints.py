@@ -43,7 +43,7 @@ class EditorBreakpoints:
         texts = self._debugged.sources.of(path)
         wanted: Sequence[Arguments] = arguments.get("breakpoints") or ()
         if not texts:
-            reason = f"{path.name} is no program of this session: there are {self._debugged.sources.known}"
+            reason = f"{path.name} is not a program of this session: there are {self._debugged.sources.known}"
             return {"breakpoints": [{"verified": False, "message": reason} for _ in wanted]}
         points: list[AnyPoint] = [point for one in wanted for point in line_points(one, self._debugged.first_line, texts)]
         self._lines[path] = points

@@ -42,7 +42,7 @@ class Sources:
     def check(self, program: Path, world: Path) -> None:
         """Raises `Misuse` for a program that is none of a world."""
         if not self.of(program.resolve()):
-            raise Misuse(f"launch: {program} is no program of {world}: there are {self.known}")
+            raise Misuse(f"launch: {program} is not a program of {world}: there are {self.known}")
 
     def of(self, path: Path) -> Sequence[Text]:
         """The texts with a file: several controllers may have the same."""

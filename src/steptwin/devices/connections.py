@@ -51,7 +51,7 @@ class _Connected:
 
 UNKNOWN_DEVICE = Message("devices.unknown-device", "no device is called {controller!r}{hint}; {known}")
 THERE_IS_NONE = Message("devices.there-is-none", "there is none")
-TOO_MANY_DEVICES = Message("devices.too-many-devices", "{most} devices are connected already, which is the most")
+TOO_MANY_DEVICES = Message("devices.too-many-devices", "too many devices: the limit is {most}; disconnect one")
 WRONG_NAME = Message("devices.wrong-name", "name = {name!r}: permitted are {form}")
 NAME_IN_USE = Message("devices.name-in-use", "name = {name!r}: a controller is called that already")
 

@@ -202,7 +202,7 @@ class ConnectedDevice:
                 return await self._subject.do(wanted)
             return await self._in_turn(wanted)
         finally:
-            self._wanted.set()  # what it has changed is looked at soon
+            self._wanted.set()  # what it has changed is polled soon
 
     async def _stop(self, wanted: Command) -> Result:
         self._stops += 1

@@ -117,7 +117,7 @@ class StateDirectory:
         if self._lock is None:
             raise Misuse(f"the state directory {self.path} is not open")
         if not _NAME.match(name):
-            raise Misuse(f"{name!r} is no image name: permitted are up to 64 letters, digits, '-' and '_'")
+            raise Misuse(f"{name!r} is not an image name: permitted are up to 64 letters, digits, '-' and '_'")
         return self.path / f"{name}.image"
 
     def _content(self, path: Path) -> bytes | None:

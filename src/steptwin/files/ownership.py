@@ -34,7 +34,7 @@ def _open(path: Path) -> int:
     if is_own(found) and stat.S_ISREG(found.st_mode) and found.st_nlink <= 1:
         return file
     os.close(file)
-    raise PermissionError(EPERM, f"{path} is no lock file of this user")
+    raise PermissionError(EPERM, f"{path} is not a lock file of this user")
 
 
 def _content(file: int) -> bytes:

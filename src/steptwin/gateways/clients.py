@@ -46,7 +46,7 @@ IGNORED = "ignored: not enabled"
 LOOKS_AT_DRIVE, BETWEEN_LOOKS_S = 6, 0.05
 """So often is it seen whether a drive is on before a motion is refused: what switches it on may be on its way."""
 UNDER_WAY_S = 1.0
-"""So long is it waited for what becomes of a motion that was written to a twin over its line."""
+"""Time-out for the outcome of a motion that was written to a twin over its line."""
 MOVING = (Move, Home, Write, Request)
 """Commands that a controller may ignore; a jog is refused, and devices are asked by their drivers first."""
 

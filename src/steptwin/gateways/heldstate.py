@@ -124,8 +124,8 @@ class HeldState:
         return self.state
 
     def put(self, parts: Mapping[str, Any], now: Nanos | None) -> State:
-        """Parts that were ``wanted`` have been read at ``now``, of which None is nothing. What has not changed is the same object
-        as before."""
+        """Take the parts that were ``wanted`` and read at ``now``; None: no part was read. What has not changed is the same
+        object as before."""
         if self.state is None:
             raise AssertionError
         before = self.state

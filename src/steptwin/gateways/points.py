@@ -249,7 +249,9 @@ CLOCK_POINTS = (
         part=whole_state,
         of=itemgetter("time_s"),
     ),
-    GatewayPoint(path=("paused",), meaning="Whether it stands.", type=PointType.TRUTH, part=whole_state, of=itemgetter("paused")),
+    GatewayPoint(
+        path=("paused",), meaning="Whether it is paused.", type=PointType.TRUTH, part=whole_state, of=itemgetter("paused")
+    ),
     GatewayPoint(
         path=("speed",),
         meaning="Virtual seconds in a second; unknown where it is as fast as it can be.",

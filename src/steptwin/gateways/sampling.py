@@ -35,7 +35,7 @@ RESTING_INTERVALS = 10
 REST_S = 10.0
 """A twin is read as a whole so often: for what no event tells, such as a character that a chip has received."""
 TICK_S = 0.01
-"""Controllers become due at multiples of this, so that what happens at almost the same time is looked at together."""
+"""Controllers become due at multiples of this, so that what happens at almost the same time is read together."""
 AT_ONCE = 64
 """Controllers that are sampled before others in this event loop have their turn."""
 INTERVAL = SECOND // 10
@@ -226,7 +226,7 @@ class Sampler:
         self._slots = max(round(interval / SECOND / TICK_S), 1)
         """Slots of an interval, as long as `TICK_S` each; moments are numbers of slots of the event loop's time."""
         self._last: dict[str, int] = {}
-        """Controllers that are looked at, and when each of them was due the last time."""
+        """Sampled controllers, and when each of them was due the last time."""
         self._phases: dict[str, int] = {}
         """In which slot of `REST_S` each of them is read as a whole: not all of a thousand at the same moment."""
         self._at: dict[str, int] = {}
@@ -248,7 +248,7 @@ class Sampler:
         for task in self._reading.values():
             task.cancel()
 
-    # ------------------------------------------------------------------ what is looked at
+    # ------------------------------------------------------------------ what is sampled
 
     def watch(self, controllers: Iterable[str]) -> None:
         """Look at these from now on, and at no others."""

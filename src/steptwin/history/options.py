@@ -16,7 +16,7 @@ class HistorySpec(TableSpec):
     """Files are relative to the description."""
 
     database: str = key(text_value, "where it is kept: sqlite:///FILE or postgresql://HOST/NAME")
-    interval: Nanos = key(positive_time, "how often values that come without events are looked at", default=100 * MILLISECOND)
+    interval: Nanos = key(positive_time, "how often values that come without events are read", default=100 * MILLISECOND)
     registers: tuple[str, ...] = key(
         texts, "further points to keep: CONTROLLER.POINT, such as table.USER_REGISTER[5]", default=()
     )

@@ -26,14 +26,14 @@ MOST_EVENTS = 100_000
 """Between two looks."""
 TWIN_KINDS = SHOWN_KINDS | {"plan", "coordinate", "edge", "write"}
 REST_NS: Nanos = SECOND
-"""Twins whose events tell most of it are looked at so often without one."""
+"""Period at which twins whose events say most of it are polled without one."""
 ALIVE_US = 60_000_000
 """A run without changes says so often that it goes on."""
 SET_US = 1_000_000
 """By how much the wall clock has to differ from the steady one to have been set; a clock that is corrected slowly has not."""
 FROM_PLANS = ("position", "velocity", "moving")
 PASSING = ("program.line", "program.statement", "virtual_time")
-"""Too quick to be looked at now and then."""
+"""They change too fast to be polled."""
 LINES, COMMAND = "lines", "command"
 TRAFFIC_POINTS = tuple(
     GatewayPoint(path=(name,), meaning=meaning, type=PointType.WHOLE, part=whole_state, of=itemgetter(name))

@@ -110,7 +110,7 @@ class HistoryWriter:
     def _away(self, error: LineFailure) -> None:
         if self.lost is None:
             self.lost = str(error)
-            self._notice(f"history: {error}; what comes waits on this disk")
+            self._notice(f"history: {error}; rows are buffered on this disk")
 
     def _write_next(self) -> bool:
         taken = self._spool.take()

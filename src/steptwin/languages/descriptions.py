@@ -30,7 +30,9 @@ def print_world(text: str, name: str) -> None:
 def save_world(describe: DescribeNamed, where: Path) -> None:
     """Write the description to a file, and copy the files it names beside it. Raises `Misuse` if another file is in the way."""
     if is_written_directly(where):
-        raise Misuse(f"--save-world {where}: it is no file beside which others could lie; --print-world prints the description")
+        raise Misuse(
+            f"--save-world {where}: not a regular file, beside which others can lie; --print-world prints the description"
+        )
     check_folder(where)
     name = str(where)
     given, text = describe(str), describe(lambda path: path.name)

@@ -127,7 +127,7 @@ TOKEN_COMES_FIRST = Message(
 UNKNOWN_SUBSCRIPTION = Message("live.unknown-subscription", "no subscription has the id {name!r}")
 SUBSCRIPTION_WITHOUT_ID = Message("live.subscription-without-id", "subscribe: an id is required; its events carry it")
 SUBSCRIPTION_ID_IN_USE = Message("live.subscription-id-in-use", "subscribe: the id {name!r} is in use")
-TOO_MANY_SUBSCRIPTIONS = Message("live.too-many-subscriptions", "subscribe: there are {most} already, the most for a client")
+TOO_MANY_SUBSCRIPTIONS = Message("live.too-many-subscriptions", "subscribe: too many: the limit for a client is {most}")
 
 
 class _Conversation(asyncio.Protocol):

@@ -204,7 +204,7 @@ class Debugging:
 
 
 DEBUGGER_IS_AT_THE_PRESENT = Message(
-    "live.debugger-is-at-the-present", "the debugger stands at the present: there is nothing to go back to"
+    "live.debugger-is-at-the-present", "the debugger is at the present: there is nothing to go back to"
 )
 DEBUGGER_IS_ON_ITS_WAY = Message("live.debugger-is-on-its-way", "the debugger is on its way through the past: pause it first")
 WORLD_IS_RUNNING = Message("live.world-is-running", "the world is running: pause it first")

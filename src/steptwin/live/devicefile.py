@@ -63,7 +63,7 @@ def read_device_file(name: str, text: str) -> DeviceFile:
 def _devices(toml: TomlText) -> Iterator[DeviceSpec]:
     given = toml.data.get(DEVICE, [])
     if not isinstance(given, list):
-        toml.wrong((DEVICE,), "D002", f"[{DEVICE}] stands once", f"expected [[{DEVICE}]], for there may be several")
+        toml.wrong((DEVICE,), "D002", f"[{DEVICE}] is a single table", f"expected [[{DEVICE}]], for there may be several")
         return
     names: set[str] = set()
     for number, one in enumerate(given):

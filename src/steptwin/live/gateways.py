@@ -61,7 +61,7 @@ async def open_gateways(
     *,
     listen_any: bool,
 ) -> list[OpenGateway]:
-    """Open those of a description in ``folder``. The history keeps what ``audit`` is told.
+    """Open those of a description in ``folder``. The history keeps the entries of ``audit``.
 
     Raises `Misuse` or `LineFailure` for one that cannot be opened.
     """

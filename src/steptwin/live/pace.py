@@ -41,7 +41,7 @@ PART_S = 0.1
 """Longest real time of a part of a step, s; each request executes one part."""
 PERMITTED_SPEEDS = Message("live.permitted-speeds", "permitted are {least:g} to {most:g}, and 'max'")
 PERMITTED_SPEEDS_AND_NONE = Message(
-    "live.permitted-speeds-and-none", "permitted are 0 (stands), {least:g} to {most:g}, and 'max'"
+    "live.permitted-speeds-and-none", "permitted are 0 (paused), {least:g} to {most:g}, and 'max'"
 )
 WRONG_SPEED = Message("live.wrong-speed", "--speed {problem}: {permitted}")
 SPEED_IS_NOT_PERMITTED = Message("live.speed-is-not-permitted", "--speed {text}: {permitted}")

@@ -172,7 +172,7 @@ class RemoteSubject:
                 return _result(message)
             if "id" not in message and "error" in message:
                 if not isinstance(message["error"], Mapping):
-                    raise self._silent(f"{message['error']!r} is no response of this version of steptwin")
+                    raise self._silent(f"{message['error']!r} is not a response of this version of steptwin")
                 raise raised(message["error"])
             self._take_event(message)
         raise self._silent("timed out")

@@ -21,7 +21,7 @@ MOST_QUESTIONS = 16
 KEPT_S = 60.0
 """After so long without a question what was noted is dropped, s."""
 NO_PAST = Message("live.no-past", "no past is kept here: start the twin with 'steptwin up --past' or in the studio")
-TOO_MANY_QUESTIONS = Message("live.too-many-questions", "{most} questions wait for their answers, which is the most")
+TOO_MANY_QUESTIONS = Message("live.too-many-questions", "too many questions: the limit is {most}; wait for an answer")
 
 
 class LiveWhy:

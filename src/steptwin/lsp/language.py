@@ -19,7 +19,7 @@ class ControllerFiles(Protocol):
 
     @property
     def files(self) -> Iterable[str]:
-        """Those that belong to it."""
+        """Files that belong to it."""
         ...
 
 

@@ -17,5 +17,5 @@ class TooLong(Analysis):
         self._most = most
 
     def diagnostics(self) -> Sequence[Diagnostic]:
-        message = f"the text has {len(self.text)} characters: texts of more than {self._most} are not looked at"
+        message = f"the text has {len(self.text)} characters: texts of more than {self._most} are not analysed"
         return [Diagnostic("S001", Severity.NOTE, Span(0, 0), message)]

@@ -39,7 +39,7 @@ BAD_CONDITION = _F("M106", "incomplete condition", "If needs a line or flag, H o
 
 OUT_OF_RANGE = _F("M110", "number out of range", "The chip drops the command (M-11).")
 NOT_A_MULTIPLE = _F("M111", "not a multiple of the microstep", "Distances and positions are multiples of 64 / M (M-11).")
-FORBIDDEN_PAIR = _F("M112", "M and Q do not go together", "A move with these divisions does not start (M-11).")
+FORBIDDEN_PAIR = _F("M112", "M does not permit this Q", "A move with these divisions does not start (M-11).")
 LINE_OCCUPIED = _F("M113", "line taken by the driver interface", "The driver interface needs the pin of this line (M-21).")
 DIVIDEND_TOO_LARGE = _F("M114", "dividend too large", "Above 65 000 only 2, 4, 8, 16, 32 and 64 divide.")
 

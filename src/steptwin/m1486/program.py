@@ -2,7 +2,7 @@
 
 Each command is compiled, when it is first met, into a closure that does it and returns the place of the next one. Those that
 only compute run in a bare loop; a closure that is not there yet or does more raises `_Look`, and the command is done with the
-chip's clock set to its moment. Commands with a hook are looked at, too.
+chip's clock set to its moment. Commands with a hook take the general way, too.
 """
 
 from __future__ import annotations

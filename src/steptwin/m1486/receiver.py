@@ -236,7 +236,7 @@ class Receiver(Stateful):
     def _begin_line(self) -> None:
         # Of the line that is arriving: its first characters, in capitals; how many of it are in the buffer; whether a beginning
         # that needed no room is missing there, and how many characters of that have no answer yet; whether characters were
-        # lost; whether it was longer than the buffer, so that its rest is no command.
+        # lost; whether it was longer than the buffer, so that its rest is not a command.
         self._seen = ""
         self._seen_stored = 0
         self._in_comment = False

@@ -44,7 +44,7 @@ class CommandFile:
 
 @dataclass(slots=True)
 class CommandStream:
-    """The commands one chip receives, in order, and how they hang together. Indices count its commands from 0.
+    """The commands that one chip receives, in order, and their structure. Indices count its commands from 0.
 
     ``address`` is None where the program has no ``X``: a single chip.
     """

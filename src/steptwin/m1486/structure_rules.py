@@ -1,4 +1,4 @@
-"""Rules on how the commands of one chip hang together: brackets, memory, labels, loops, what an EEPROM stores."""
+"""Structural rules of one chip's program: brackets, memory, labels, loops, what an EEPROM stores."""
 
 from __future__ import annotations
 

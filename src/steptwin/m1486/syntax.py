@@ -29,7 +29,7 @@ NO_COMMAND_BEGINS_WITH_NUL = Message(
 )
 SECOND_COMMAND = Message("m1486.second-command", "{char!r} begins a second command ({name}) on this line")
 FOUND_THE_END_OF_THE_LINE = Message("m1486.found-the-end-of-the-line", "found the end of the line")
-NO_BLANK_TO_THE_CHIP = Message("m1486.no-blank-to-the-chip", "{name} (U+{code:04X}), which is no blank to the chip")
+NO_BLANK_TO_THE_CHIP = Message("m1486.no-blank-to-the-chip", "{name} (U+{code:04X}), which is not a blank to the chip")
 TOO_MANY_DIGITS = Message("m1486.too-many-digits", "a number of {count} digits")
 MOST_DIGITS = Message("m1486.most-digits", "no number has more than 8")
 A_NUMBER_OR_THE_VARIABLE = Message("m1486.a-number-or-the-variable", "a number, or the end of the line for the internal variable")

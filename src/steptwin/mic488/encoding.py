@@ -76,7 +76,7 @@ def wrapped_dint(value: int) -> int:
     return (value - DINT_MIN) % 2**32 + DINT_MIN
 
 
-NAN_IS_NO_DINT = Message("mic488.nan-is-no-dint", "NaN is no DINT")
+NAN_IS_NO_DINT = Message("mic488.nan-is-no-dint", "NaN is not a DINT")
 
 
 def saturated_dint(value: float) -> int:
@@ -89,7 +89,7 @@ def saturated_dint(value: float) -> int:
     return round(min(max(value, DINT_MIN), DINT_MAX))
 
 
-NAN_IS_NO_REAL = Message("mic488.nan-is-no-real", "NaN is no REAL of this device")
+NAN_IS_NO_REAL = Message("mic488.nan-is-no-real", "NaN is not a REAL of this device")
 
 
 def saturated_real(value: float) -> float:

@@ -1,7 +1,7 @@
 """The Modbus face of the MIC488: request PDU in, response PDU out.
 
 A request is compiled once into a plan, code without state, that every controller of the firmware shares: which registers it
-touches, whether it may, and how their values lie in its bytes. Only values are looked at every time.
+touches, whether it may, and how their values lie in its bytes. Only values are checked every time.
 """
 
 from __future__ import annotations

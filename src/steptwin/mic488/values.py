@@ -31,7 +31,9 @@ _NAME = re.compile(r"(?P<name>\w+?)(?:\[(?P<cell>\d{1,5})\])?(?::(?P<view>\w+))?
 _SWITCHES = {"on": 1.0, "true": 1.0, "off": 0.0, "false": 0.0}
 PROGRAM = 0
 """The program beside axes 1 to 4, in `halted`."""
-FORM = Message("mic488.form-of-a-name", "expected NAME, or USER_REGISTER[N] with :int, :dint or :real behind it if it is no WORD")
+FORM = Message(
+    "mic488.form-of-a-name", "expected NAME, or USER_REGISTER[N] with :int, :dint or :real behind it unless it is a WORD"
+)
 
 
 class UserFormat(enum.Enum):

@@ -95,17 +95,17 @@ class SharedState:
         return [(name, self._texts[name]) for name, number in self._changed.items() if number > change]
 
 
-NO_WORLD_TO_RECORD = Message("studio.no-world-to-record", "nothing is recorded here: there is no world")
-NO_WORLD_TO_BRANCH = Message("studio.no-world-to-branch", "branches are worlds: there is none here")
-NO_WORLD_TO_DRAW = Message("studio.no-world-to-draw", "what is drawn is a world: there is none here")
-NO_WORLD_WITH_GATEWAYS = Message("studio.no-world-with-gateways", "gateways and a history are beside a world: there is none here")
-NO_FILE_FOR_CAMPAIGNS = Message("studio.no-file-for-campaigns", "campaigns are beside the file of a world: there is none here")
-NO_WORLD_WITH_LINES = Message("studio.no-world-with-lines", "traffic is counted on lines of a world: there is no world")
+NO_WORLD_TO_RECORD = Message("studio.no-world-to-record", "no world to record here")
+NO_WORLD_TO_BRANCH = Message("studio.no-world-to-branch", "no world to branch here: start the studio with the file of a world")
+NO_WORLD_TO_DRAW = Message("studio.no-world-to-draw", "no world to draw here: start the studio with the file of a world")
+NO_WORLD_WITH_GATEWAYS = Message("studio.no-world-with-gateways", "no world here, so no gateways and no history")
+NO_FILE_FOR_CAMPAIGNS = Message("studio.no-file-for-campaigns", "no campaigns here: start the studio with the file of a world")
+NO_WORLD_WITH_LINES = Message("studio.no-world-with-lines", "no world here, so no lines whose traffic is counted")
 TOO_MANY_VIEWERS = Message("studio.too-many-viewers", "there are {most} viewers already, the most possible")
 TOO_FAST_FOR_A_JOG = Message(
     "studio.too-fast-for-a-jog", "time goes too fast for a jog ({speed:g} times): it is possible up to {most:g} times"
 )
-TOO_MANY_JOGS = Message("studio.too-many-jogs", "{most} axes are jogged already, which is the most")
+TOO_MANY_JOGS = Message("studio.too-many-jogs", "too many jogs: the limit is {most} axes; end one")
 VIEWER_HAS_GONE = Message("studio.viewer-has-gone", "the viewer has gone")
 LEASE_HAS_ENDED = Message("studio.lease-has-ended", "lease {number} has ended, or is another viewer's")
 NO_POINTS = Message("studio.no-points", "points: at least one is needed")

@@ -13,7 +13,7 @@ from steptwin.subject.commands import VERSION
 _COUNT: Schema = {"type": "integer", "minimum": 0}
 SPEED: Schema = {
     "anyOf": [NUMBER, {"const": "max"}],
-    "description": "Virtual seconds in a second; the one at which time will go on where it stands.",
+    "description": "Virtual seconds in a second; the one at which time will be resumed while it is paused.",
 }
 
 
@@ -122,7 +122,7 @@ _ROWS = (
         },
         {"time_ns": MOMENT},
     ),
-    MessageRow("clock", "The present moment: once a second, and whenever time stands or goes on.", CLOCK),
+    MessageRow("clock", "The present moment: once a second, and whenever time is paused or resumed.", CLOCK),
     MessageRow(
         "past",
         "The moment of the past that is shown to this viewer from now on; null for the present. Events go on as they happen.",

@@ -255,7 +255,7 @@ class Connect:
     name: Annotated[str | None, Meaning("Of the controller; its kind without one.")] = None
 
 
-@request("disconnect", SERVICE, "A device is no controller here any more: jogs end, other motions and its program go on.")
+@request("disconnect", SERVICE, "Remove a device: its jogs end, other motions and its program go on.")
 @dataclass(frozen=True, slots=True)
 class Disconnect:
     controller: Annotated[str, Meaning("Of a device.")]

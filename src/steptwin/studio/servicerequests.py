@@ -59,7 +59,7 @@ _GATEWAY = members(
         "place": {**TEXT, "description": "Its address."},
         "is_up": FLAG,
         "text": {**TEXT, "description": "Its state in words, such as why it is not up."},
-        "shown": {"type": ["integer", "null"], "description": "How many values it shows; null where that is no fixed number."},
+        "shown": {"type": ["integer", "null"], "description": "How many values it shows; null where that number is not fixed."},
         "has_clients": {**FLAG, "description": "Whether it knows its clients; those of a broker or database only that knows."},
         "clients": list_of(_CLIENT),
     }

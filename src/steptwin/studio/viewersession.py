@@ -82,12 +82,12 @@ PAST_CANNOT_BE_CHANGED = Message(
     "studio.past-cannot-be-changed", "{request}: the past cannot be changed: return to the present first"
 )
 SECOND_HELLO = Message("studio.second-hello", "hello: this connection has said hello already; resync asks for the state again")
-TOO_MANY_WATCHES = Message("studio.too-many-watches", "watch: there are {most} already, which is the most")
+TOO_MANY_WATCHES = Message("studio.too-many-watches", "watch: too many: the limit is {most}; end one")
 TOO_MANY_WATCHED_POINTS = Message("studio.too-many-watched-points", "watch: more than {most} points in all")
 UNKNOWN_WATCH = Message("studio.unknown-watch", "unwatch: no watch {number}; there are {names}")
 SUBSCRIPTION_WITHOUT_ID = Message("studio.subscription-without-id", "subscribe: give an id, by which it is ended")
 SUBSCRIPTION_ID_IN_USE = Message("studio.subscription-id-in-use", "subscribe: the id {id!r} is in use")
-TOO_MANY_SUBSCRIPTIONS = Message("studio.too-many-subscriptions", "subscribe: there are {most} already, which is the most")
+TOO_MANY_SUBSCRIPTIONS = Message("studio.too-many-subscriptions", "subscribe: too many: the limit is {most}; end one")
 UNKNOWN_SUBSCRIPTION = Message("studio.unknown-subscription", "no subscription has the id {id!r}")
 
 

@@ -120,7 +120,7 @@ class Subscribe:
     ] = 1000
 
 
-@command("unsubscribe", "No more events.")
+@command("unsubscribe", "End a subscription.")
 @dataclass(frozen=True, slots=True)
 class Unsubscribe:
     id: Annotated[object, Meaning("The id of the request.", ID, name="subscription")]
@@ -137,13 +137,13 @@ class StopAll:
     pass
 
 
-@command("pause", "Time stands.", "as time")
+@command("pause", "Pause time.", "as time")
 @dataclass(frozen=True, slots=True)
 class Pause:
     pass
 
 
-@command("resume", "Time goes on.", "as time")
+@command("resume", "Resume time.", "as time")
 @dataclass(frozen=True, slots=True)
 class Resume:
     speed: Annotated[float | None, Meaning("Virtual seconds in a second.", SPEED)] = None
@@ -151,7 +151,7 @@ class Resume:
 
 @command(
     "step",
-    "Time goes on for a duration, to a moment, or to the next thing that happens by itself, and stands then.",
+    "Run for a duration, to a moment, or to the next thing that happens by itself, then pause.",
     "as time; events, missed, came (whether the condition ended it), idle, statements; to_ns where a request has to go on",
 )
 @dataclass(frozen=True, slots=True)
@@ -179,7 +179,7 @@ class ListSnapshots:
     pass
 
 
-@command("restore", "Go back to a state that is kept. Time stands there; what happened since is undone.", "as time")
+@command("restore", "Go back to a kept state and pause there; what happened since is undone.", "as time")
 @dataclass(frozen=True, slots=True)
 class RestoreSnapshot:
     name: Annotated[str, Meaning("The name of a snapshot.")]

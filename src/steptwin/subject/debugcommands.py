@@ -90,7 +90,7 @@ class ClearBreakpoint:
 
 @command(
     "breakpoints",
-    "What time stops at, and why the debugger stands.",
+    "What time stops at, and why the debugger has stopped.",
     f"breakpoints: a list of {_BREAKPOINT}; stop_on; stop: as the event stopped, null while time goes on",
 )
 @dataclass(frozen=True, slots=True)
@@ -118,7 +118,7 @@ class StepProgram:
 
 @command(
     "run",
-    "Go on from where the debugger stands, through the past to the present and on, or back, to the next reason to stop.",
+    "Go on from the debugger's moment, through the past to the present and on, or back, to the next reason to stop.",
     _PLACE,
 )
 @dataclass(frozen=True, slots=True)
@@ -126,7 +126,7 @@ class RunProgram:
     way: Annotated[str, Meaning("Which way.", choice(FORWARDS, BACKWARDS))] = FORWARDS
 
 
-@command("look_at", "The debugger goes to a moment of the past; the world stands at the present.", _PLACE)
+@command("look_at", "Move the debugger to a moment of the past; the world stays at the present, paused.", _PLACE)
 @dataclass(frozen=True, slots=True)
 class LookAt:
     to: Annotated[Nanos, Meaning("Which moment.", TIME, unit="ns", name="to_ns")]
@@ -134,7 +134,7 @@ class LookAt:
 
 @command(
     "branch",
-    "The world goes back to the moment of the past at which the debugger stands; what came later has not happened.",
+    "Take the world back to the debugger's moment of the past; what came later has not happened.",
     _PLACE,
 )
 @dataclass(frozen=True, slots=True)
@@ -153,14 +153,14 @@ class Stack:
     controller: ControllerName
 
 
-@command("values", "A group of values where the debugger stands.", f"a list of {_VALUE}", is_list=True)
+@command("values", "A group of values at the debugger's moment.", f"a list of {_VALUE}", is_list=True)
 @dataclass(frozen=True, slots=True)
 class Values:
     controller: ControllerName
     scope: Annotated[str, Meaning("Which group.", choice(*SCOPES))]
 
 
-@command("evaluate", "The value of an expression where the debugger stands.", _VALUE)
+@command("evaluate", "The value of an expression at the debugger's moment.", _VALUE)
 @dataclass(frozen=True, slots=True)
 class Evaluate:
     controller: ControllerName

@@ -28,7 +28,7 @@ POSITION_MARK = "//!position"
 _RECORD = re.compile(rf"{RECORD_MARK}\s+([0-9a-f]{{32}})$", re.IGNORECASE)
 _JUMP = re.compile(r"^[ \t]*JUMP[ \t]+(\w+)", re.IGNORECASE | re.MULTILINE)
 _LONGEST_EXPLAINED = 500
-"""Characters of a line up to which it is looked at for what other languages write: looking takes time."""
+"""Characters of a line that are searched for what other languages write: the search takes time."""
 _MOST_LOOK_ALIKES = 3
 """Messages of one line about them."""
 _POSITION = re.compile(rf"{POSITION_MARK}\s+([0-9]{{1,5}})\s+([0-9a-f]{{36}})$", re.IGNORECASE)

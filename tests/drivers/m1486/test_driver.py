@@ -27,7 +27,7 @@ from steptwin.m1486.lines import DUAL_DAC
         (lambda c: c.configure(velocity=20_001), "velocity = 20001: M1486B takes 16 to 20 000 step/s"),
         (lambda c: c.configure(start_stop=15), "start_stop = 15: M1486B takes 16 to 1950 step/s"),
         (lambda c: c.configure(microstep=3), "microstep = 3: M1486B takes 1, 2, 4, 8, 16, 32, 64"),
-        (lambda c: c.configure(microstep=16, qualification=1), "M16 and Q1 do not go together: with M16 go Q4"),
+        (lambda c: c.configure(microstep=16, qualification=1), "M16 does not permit Q1: permitted are Q4"),
         (lambda c: c.move_to(-1.0), "position -1 step is outside 0 to 250000 step"),
         (lambda c: c.move_by(250_001.0), "distance 250001 step is outside ±250000 step"),
         (lambda c: c.move_by(0.25), "0.25 step is 16 minimum microsteps, which is not a whole full step"),

@@ -149,7 +149,7 @@ def test_m_and_q_change_together() -> None:
     writing(["Q=4"])(chip)
     writing(["M=8", "Q=2"])(chip)
     assert (wire.chip.drive.microstep, wire.chip.drive.qualification) == (8, 2)
-    with pytest.raises(Misuse, match="M8 and Q4 do not go together"):
+    with pytest.raises(Misuse, match="M8 does not permit Q4"):
         writing(["B6=off", "Q=4"])(chip)
     assert wire.chip.pins()["B6"] == 1
 

@@ -59,7 +59,7 @@ def test_a_duration_is_not_known_without_all_that_it_depends_on(unknown: str) ->
 
 
 def test_m_and_q_have_to_go_together() -> None:
-    with pytest.raises(Misuse, match=r"^M8 and Q4 do not go together: with M8 go Q1, Q2$"):
+    with pytest.raises(Misuse, match=r"^M8 does not permit Q4: permitted are Q1, Q2$"):
         RAMP.with_(microstep=8, qualification=4).check()
     RAMP.with_(microstep=8, qualification=2).check()
     RAMP.with_(microstep=8, qualification=None).check()

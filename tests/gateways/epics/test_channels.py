@@ -81,7 +81,7 @@ class _Counted:
 
 @pytest.mark.parametrize(("name", "value"), [("MRES", float("nan")), ("HLM", 10.0)])
 def test_what_has_not_changed_is_not_published_again(name: str, value: FieldValue) -> None:
-    """Not even what is no number: MRES where pulses per unit are not known."""
+    """Not even what is not a number: MRES where pulses per unit are not known."""
 
     async def act(rig: MotorRig) -> None:
         rig.record.values[name] = value

@@ -52,7 +52,7 @@ def test_a_world_with_a_name_is_called_by_it() -> None:
 
 @pytest.mark.parametrize("name", ["do", "online", "events", "answer"])
 def test_a_controller_cannot_be_called_like_a_topic(name: str) -> None:
-    with pytest.raises(Misuse, match=f"plant/steptwin/hall/{name} is no topic for a controller"):
+    with pytest.raises(Misuse, match=f"plant/steptwin/hall/{name} is not a topic for a controller"):
         topics(f'[[mic488]]\nname = "{name}"\n')
 
 

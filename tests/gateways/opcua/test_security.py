@@ -50,7 +50,7 @@ def test_a_folder_without_certificates_would_admit_nobody(tmp_path: Path) -> Non
     with pytest.raises(Misuse, match=r"trusted: .*clients has no certificate"):
         asyncio.run(wanted.apply(Server()))
     _, key = make_certificate(tmp_path / "clients", [], 2)
-    with pytest.raises(Misuse, match=r"clients has a file that is no certificate"):
+    with pytest.raises(Misuse, match=r"clients has a file that is not a certificate"):
         asyncio.run(wanted.apply(Server()))
     key.unlink()
     server = Server()

@@ -202,5 +202,5 @@ def test_a_restored_snapshot_of_another_past_has_its_own_moment() -> None:
 
 def test_a_controller_with_the_name_of_a_signal_is_no_quantity() -> None:
     text = TEXT.replace("left.position + 42.5", "idle + 42.5")
-    with pytest.raises(WorldError, match="when: 'idle' is no quantity of a controller or an element"):
+    with pytest.raises(WorldError, match="when: 'idle' is not a quantity of a controller or an element"):
         World.from_toml(f'[[mic488]]\nname = "idle"\n{text}')

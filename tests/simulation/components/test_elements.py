@@ -200,7 +200,7 @@ def test_what_elements_record_begins_with_its_first_level() -> None:
 
 @table("[[button]]")
 class Unread(ContactSpec):
-    """A button with a field that is no key."""
+    """A button with a field that is not a key."""
 
     name: str = ""
     colour: str = "green"

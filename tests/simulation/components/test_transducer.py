@@ -195,5 +195,5 @@ def test_the_order_of_tables_and_kinds_does_not_count() -> None:
 
 def test_a_controller_with_the_name_of_a_signal_is_not_measured() -> None:
     text = TEXT.replace('of = "x.position"', 'of = "time"')
-    with pytest.raises(WorldError, match="of = 'time' is no quantity of what 'a' is connected to"):
+    with pytest.raises(WorldError, match="of = 'time' is not a quantity of what 'a' is connected to"):
         World.from_toml(f'[[mic488]]\nname = "time"\n{text}')

@@ -210,7 +210,7 @@ def test_marks_are_crossed_at_the_nanosecond_of_their_pulse_whatever_is_looked_a
 
 
 def test_a_mark_that_never_goes_off_is_refused() -> None:
-    with pytest.raises(Misuse, match="a zone of 161 imp, hysteresis included, comes again every 120 imp: it must be shorter"):
+    with pytest.raises(Misuse, match="a zone of 161 imp, hysteresis included, repeats every 120 imp: it must be shorter"):
         turntable(0.0, "period = 3.0")
     with pytest.raises(Misuse, match="period means nothing without position"):
         world_of(

@@ -160,7 +160,7 @@ def test_an_error_of_the_file_is_shown_once_with_all_places_that_use_it() -> Non
     [
         ("[[axis]\n", "parts/station.toml:1:"),
         ("[world]\nseed = 1\n", "parts/station.toml:1:1: error D004: [world] is for the description"),
-        ("[axis]\nname = 'x'\n", "parts/station.toml:1:1: error D002: [axis] stands once"),
+        ("[axis]\nname = 'x'\n", "parts/station.toml:1:1: error D002: [axis] is a single table"),
         ("[[axes]]\n", "parts/station.toml:1:1: error D004: the file has no [axes] (did you mean 'axis'?)"),
         ("parameters = 3\n", "parts/station.toml:1:1: error D002: parameters is 3"),
         (
@@ -398,7 +398,7 @@ def test_as_many_uses_as_are_permitted(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("text", "files", "findings"),
     [
-        ("[use]\nname = 'u'\nfile = 'p'\n", {}, ["D002 [use] stands once"]),
+        ("[use]\nname = 'u'\nfile = 'p'\n", {}, ["D002 [use] is a single table"]),
         ("[[use]]\nname = 'u'\nfile = 'p'\n", {"p": "mic488 = ['x']\nbutton = [3, 'b']\n"}, []),
         (
             "[[use]]\nname = 'u'\nfile = 'p'\n",
@@ -452,7 +452,7 @@ def test_a_file_beside_another(file: str, name: str, found: str) -> None:
 
 
 def test_a_file_that_is_no_text_is_refused() -> None:
-    with pytest.raises(WorldError, match=r"cannot read parts/station\.toml: it is no UTF-8 text"):
+    with pytest.raises(WorldError, match=r"cannot read parts/station\.toml: it is not UTF-8 text"):
         World.from_toml(MAIN, {"parts/station.toml": b"\xff\xfe[\0"})
 
 

@@ -115,7 +115,7 @@ def test_what_comes_next_in_the_text() -> None:
         ("c", "program", [7], [7, 8]),
         ("c", "program", [8], [8]),
         ("c", "program", [], []),
-        ("c", "program", [8, 9], [8]),  # 9 is no command
+        ("c", "program", [8, 9], [8]),  # 9 is not a command
     ],
 )
 def test_what_is_reached(name: str, text: str, starts: list[int], reached: Iterable[int]) -> None:

@@ -248,7 +248,7 @@ def test_signals_that_part_late_are_found() -> None:
 @pytest.mark.parametrize(
     ("text", "due"),
     [
-        ("x / b > 2", 1),  # 0/0 is no number, anything above it by 0 is infinite
+        ("x / b > 2", 1),  # 0/0 is not a number, anything above it by 0 is infinite
         ("(x + a) / b < 2", None),
         ("b / x == 0", 1),
         ("a / x < 0.5", 2_000_001),

@@ -107,7 +107,7 @@ def test_hysteresis_keeps_a_switch_on() -> None:
     [
         ((5, 4), "low 5 imp is above high 4 imp"),
         ((0, 1, -1), "hysteresis of -1"),
-        ((0, 9, 0, 10), "zone of 10 imp, hysteresis included, comes again every 10 imp: it must be shorter"),
+        ((0, 9, 0, 10), "zone of 10 imp, hysteresis included, repeats every 10 imp: it must be shorter"),
         ((0, 5, 2, 10), "zone of 10 imp, hysteresis included"),
         ((0, None, 0, 10), "two ends"),
     ],

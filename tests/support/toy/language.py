@@ -19,7 +19,7 @@ class Targets(FileLanguage):
 
     def check(self, source: SourceText, options: GivenOptions) -> CheckReport:
         found = [
-            Diagnostic("T1", Severity.ERROR, Span(place, place + len(word)), f"{word!r} is no number")
+            Diagnostic("T1", Severity.ERROR, Span(place, place + len(word)), f"{word!r} is not a number")
             for word in source.text.split()
             if not word.isdecimal() and (place := source.text.index(word)) >= 0
         ]

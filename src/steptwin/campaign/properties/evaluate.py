@@ -201,7 +201,7 @@ class Evaluation:
         return self.decided(inner, _lowest(shape, moment, end) if failed is None else failed, undecided=below)
 
     def _miscounted(self, node: Tally, moment: Nanos) -> Nanos:
-        """When it came once too often; if too seldom, that is sure at the end."""
+        """Time of the first surplus occurrence; too few occurrences are certain only at the end."""
         moments = [one for one in rises(self.shape(node.inner, undecided=False)) if one >= moment]
         most = {"<": ceil(node.number) - 1, "<=": floor(node.number), "==": floor(node.number)}.get(node.sign)
         if most is None or len(moments) <= most:

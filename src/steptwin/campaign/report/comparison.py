@@ -38,7 +38,7 @@ def compare(before: Path, after: Path) -> dict[str, Any]:
             "measures": _measures(one, other),
         }
     except (LookupError, TypeError, ValueError, AttributeError):
-        raise Misuse(f"{before} or {after}: {REPORT} is no report of a campaign") from None
+        raise Misuse(f"{before} or {after}: {REPORT} is not a report of a campaign") from None
 
 
 def _report(folder: Path) -> Mapping[str, Any]:
@@ -48,9 +48,9 @@ def _report(folder: Path) -> Mapping[str, Any]:
     try:
         found = json.loads(read_recorded(path))
     except ValueError:
-        raise Misuse(f"{path} is no report of a campaign") from None
+        raise Misuse(f"{path} is not a report of a campaign") from None
     if not isinstance(found, dict):
-        raise Misuse(f"{path} is no report of a campaign")
+        raise Misuse(f"{path} is not a report of a campaign")
     return found
 
 

@@ -30,7 +30,7 @@ COMMANDS = {
 
 
 MICROSTEPS_AND_QUALIFICATION = Message(
-    "drivers.m1486.microsteps-and-qualification", "M{m} and Q{q} do not go together: with M{m} go {names}"
+    "drivers.m1486.microsteps-and-qualification", "M{m} does not permit Q{q}: permitted are {names}"
 )
 
 

@@ -1,6 +1,6 @@
 """A page with a timeline: one file without anything from outside that any browser opens, exact at every scale.
 
-Motion goes into the page as plans, not as samples, so that the page can be looked at down to single pulses.
+Motion goes into the page as plans, not as samples, so that the page shows single pulses.
 """
 
 from __future__ import annotations

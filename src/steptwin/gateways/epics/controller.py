@@ -28,7 +28,7 @@ class SampledRecord(Protocol):
 
     @property
     def is_busy(self) -> bool:
-        """Whether it has to be looked at even where nobody asks."""
+        """Whether it has to be read even where nobody asks."""
         ...
 
     async def take(self, sample: Sample, *, is_sure: bool) -> None:

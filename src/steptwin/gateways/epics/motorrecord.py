@@ -373,7 +373,7 @@ class MotorRecord(RecordBase):
         self.values |= {"STAT": _STAT.index(self.alarm.kind.name), "SEVR": self.alarm.severity.value}
 
     def _end(self, motion: RecordMotion, state: Any) -> None:
-        """It stands."""
+        """The axis is at rest."""
         if motion.is_paused:
             return
         self._motion = None

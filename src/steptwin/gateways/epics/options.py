@@ -49,7 +49,7 @@ class EpicsSpec(GatewaySpec):
     pva_beacons: str = key(
         _beacons, "HOST:PORT to which the server of PV Access announces itself", default="127.0.0.1:5076", needs="pva"
     )
-    interval: Nanos = samples("how often values are looked at that clients have asked for")
+    interval: Nanos = samples("how often values that clients have asked for are read")
     registers: tuple[str, ...] = shows()
     role: str | None = key(word(*ROLES), "role of all clients", default=None)
     """The protocols know no more of clients than names. None: engineer where only this computer is served, otherwise viewer."""

@@ -29,7 +29,7 @@ FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.25, 30.0
 STEADY_S = 10.0
 """After a session of this length the pauses begin anew."""
 MOST_INCOMING = 1000
-"""Messages that wait to be looked at; more are dropped."""
+"""Limit of messages that wait to be processed; more are dropped."""
 AT_ONCE = 32
 """Messages that wait at the same time until they have left."""
 CANCEL_AGAIN_S = 0.1

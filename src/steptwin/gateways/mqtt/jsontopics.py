@@ -119,7 +119,7 @@ class Topics:
         self.groups: dict[str, tuple[Group, ...]] = {}
         for part in description.controllers:
             if part.name in OWN:
-                raise Misuse(f"[gateway.mqtt]: {self.base}/{part.name} is no topic for a controller: call it otherwise")
+                raise Misuse(f"[gateway.mqtt]: {self.base}/{part.name} is not a topic for a controller: rename the controller")
             points = points_of(part, description, registers.get(part.name, ()))
             self.groups[part.name] = tuple(_groups(f"{self.base}/{part.name}", points))
         if "time" in description.commands:

@@ -67,7 +67,7 @@ class MqttSpec(GatewaySpec):
     extra: ClassVar[str] = "mqtt"
     broker: str = key(_broker, "HOST:PORT of the broker", default="127.0.0.1:1883")
     topic: str = key(_topic, "with what topics begin; the name of the world follows", default="steptwin", excludes=("sparkplug",))
-    interval: Nanos = samples("how often values are looked at")
+    interval: Nanos = samples("how often values are read")
     registers: tuple[str, ...] = shows()
     keep_alive: Nanos = key(whole_seconds, "after how long a broker that is silent is given up", default=15 * SECOND)
     store: int = key(whole(1, 1_000_000), "events, with sparkplug values, that are kept while it is away", default=4096)

@@ -1,6 +1,6 @@
 """The Sparkplug face: an edge node whose devices are the controllers (Sparkplug B, version 3.0 of the specification).
 
-Values are looked at whether a broker is there or not. What changes before the births is kept, up to a number, and follows them as
+Values are read whether a broker is there or not. What changes before the births is kept, up to a number, and follows them as
 historical data.
 """
 
@@ -40,7 +40,7 @@ AT_MOST = 500
 COUNTED = 256
 """Values of seq and bdSeq: 0 to 255."""
 CLOCK_S = 1.0
-"""How often the time is looked at."""
+"""Period at which the time is read."""
 MOST_COMMANDS = 1000
 
 

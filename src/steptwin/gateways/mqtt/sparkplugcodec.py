@@ -144,7 +144,7 @@ def _value(kind: SparkplugType, value: bool | float | str | bytes, first: int) -
             return _block(first + _TEXT, value.encode())
         case bytes() if kind is SparkplugType.BYTES and first == _METRIC_VALUES:
             return _block(_METRIC_BYTES, value)
-    raise Misuse(f"{value!r} is no value of the type {kind.name}")
+    raise Misuse(f"{value!r} is not a value of the type {kind.name}")
 
 
 def _varint(number: int) -> bytes:

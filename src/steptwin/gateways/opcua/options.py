@@ -16,7 +16,7 @@ class OpcUaSpec(GatewaySpec):
 
     extra: ClassVar[str] = "opcua"
     listen: str = listens("127.0.0.1:4840")
-    interval: Nanos = samples("how often values are looked at that clients subscribe to")
+    interval: Nanos = samples("how often values that clients subscribe to are read")
     registers: tuple[str, ...] = shows()
     security: str = key(word("none", "sign", "encrypt"), "what connections need at least", default="none")
     certificate: str | None = key(text_value, "file with the certificate of the server, PEM", default=None, needs="key")

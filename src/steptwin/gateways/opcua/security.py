@@ -121,7 +121,7 @@ class Security(UserManager):
             try:
                 await trusted.load()
             except ValueError as error:
-                raise Misuse(f"[gateway.opcua]: trusted: {where} has a file that is no certificate: {error}") from None
+                raise Misuse(f"[gateway.opcua]: trusted: {where} has a file that is not a certificate: {error}") from None
             checks |= CertificateValidatorOptions.TRUSTED
         if options.certificate is not None:
             server.set_certificate_validator(CertificateValidator(checks, trusted))

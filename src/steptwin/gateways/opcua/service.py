@@ -23,7 +23,7 @@ from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.subject.commands import Jog, ReadPoints, StopAxes
 
 ARRAY_PAUSE = 10
-"""Arrays take long to read: they are looked at once in so many publications."""
+"""Publications between two reads of an array, because arrays take long to read."""
 
 
 _NOTHING = object()

@@ -50,7 +50,7 @@ BRANCH_FROM_ELSEWHERE = Message(
     "live.branch-from-elsewhere",
     "a branch is reached from the computer of the studio only: there is none while others can reach it",
 )
-TOO_MANY_BRANCHES = Message("live.too-many-branches", "{most} branches are open already, which is the most: end one")
+TOO_MANY_BRANCHES = Message("live.too-many-branches", "too many branches: the limit is {most}; end one")
 BRANCH = Message("live.branch", "branch {number}")
 UNKNOWN_BRANCH = Message("live.unknown-branch", "no branch {branch}: open are {names}")
 

@@ -46,7 +46,7 @@ class _CampaignFile:
 
 CAMPAIGN_IS_RUNNING = Message("live.campaign-is-running", "{name} runs: one campaign at a time")
 UNKNOWN_CAMPAIGN = Message("live.unknown-campaign", "no campaign {name!r}: there are {names}")
-NO_FILE_OF_RESULTS = Message("live.no-file-of-results", "{name!r} is no file of the results of a campaign here")
+NO_FILE_OF_RESULTS = Message("live.no-file-of-results", "{name!r} is not a file of the results of a campaign here")
 
 
 class FolderCampaigns:
@@ -121,7 +121,7 @@ class FolderCampaigns:
         return {name: known for name, known in found if known is not None}
 
     def _read(self, file: Path) -> _CampaignFile | None:
-        """None for what is no campaign, or one of another world."""
+        """None for what is not a campaign, or one of another world."""
         try:
             text = read_text(file, MOST_DESCRIPTION_BYTES).source.text
         except SteptwinError:

@@ -104,7 +104,7 @@ def server_context(files: TlsFiles, folder: Path) -> ssl.SSLContext:
         try:
             context.load_verify_locations(file)
         except (OSError, ssl.SSLError) as error:
-            raise Misuse(f"trusted: {file} is no certificate: {reason(error)}") from None
+            raise Misuse(f"trusted: {file} is not a certificate: {reason(error)}") from None
     try:
         context.load_cert_chain(folder / files.certificate, folder / files.key, password="")
     except (OSError, ssl.SSLError, ValueError) as error:

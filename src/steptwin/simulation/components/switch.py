@@ -28,7 +28,7 @@ class SwitchSpec(ContactSpec):
     width: float = key(number(0.0), "how wide the zone around position is, likewise", default=0.0, needs="position")
     period: float | None = key(
         number(0.0, above=True),
-        "the zone comes again after each, likewise; default a turn of a rotary axis",
+        "the zone repeats after each, likewise; default a turn of a rotary axis",
         default=None,
         needs="position",
     )

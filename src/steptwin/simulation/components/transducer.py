@@ -91,7 +91,7 @@ def _build(spec: TransducerSpec, context: ElementContext) -> Transducer:
     found = find_signal(context.objects, spec.of)
     found.watch(spec.of)
     if all(source.scheduler is not scheduler for source in found.sync(scheduler.now)):
-        raise Misuse(f"of = {spec.of!r} is no quantity of what {spec.target[0]!r} is connected to")
+        raise Misuse(f"of = {spec.of!r} is not a quantity of what {spec.target[0]!r} is connected to")
     transducer = Transducer(scheduler, spec, found)
     scheduler.add_part(transducer, name=spec.name)
     return transducer

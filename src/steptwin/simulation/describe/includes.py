@@ -125,7 +125,7 @@ class Includes:
         try:
             text = self._read(name).decode()
         except UnicodeDecodeError as error:
-            raise Misuse(f"cannot read {name}: it is no UTF-8 text") from error
+            raise Misuse(f"cannot read {name}: it is not UTF-8 text") from error
         return TomlText(name, text, self._controllers, self._named)
 
     @staticmethod

@@ -63,7 +63,7 @@ class CountedPosition:
 class Zone:
     """Where a switch is on: from ``low`` to ``high`` (None: open), once on up to ``hysteresis`` further on both sides.
 
-    With ``period`` (pulses) the zone comes again after each, in both directions, each time at the pulse nearest to it.
+    With ``period`` (pulses) the zone repeats after each, in both directions, each time at the pulse nearest to it.
     """
 
     low: int | None
@@ -79,11 +79,11 @@ class Zone:
         if self.period is None:
             return
         if self.low is None or self.high is None:
-            raise Misuse("a zone that comes again has two ends")
+            raise Misuse("a periodic zone needs both limits")
         width = self.high - self.low + 1 + 2 * self.hysteresis
         if width >= self.period:
             raise Misuse(
-                f"a zone of {width} imp, hysteresis included, comes again every {float(self.period):g} imp: it must be shorter"
+                f"a zone of {width} imp, hysteresis included, repeats every {float(self.period):g} imp: it must be shorter"
             )
 
     def _turn(self, place: int, period: Fraction | int) -> int:

@@ -87,7 +87,7 @@ class Stepped(Stateful):
         self._version = version
         value = self._signal.value(now)
         self.due = None
-        if not isnan(value):  # it stays where it is: a register can have a value that is no number
+        if not isnan(value):  # it stays where it is: a register can have a value that is not a number
             value = min(max(value, -MOST), MOST)
             self._level = self._curve.level(value)
             self.due = self._next(value, now)

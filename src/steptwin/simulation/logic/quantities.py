@@ -24,7 +24,7 @@ UNIT_NAMES = frozenset(unit for kin in UNITS for unit in kin)
 LARGEST = 1e200
 """Largest number in a condition: no unit converts it to one that overflows."""
 MOST_LOOKS = 20_000
-"""Intervals that are looked at to the nanosecond in one search. Beyond it the resolution halves with each `LOOKS_MORE`."""
+"""Limit of intervals that one search resolves to the nanosecond. Beyond it the resolution halves with each `LOOKS_MORE`."""
 LOOKS_MORE = 1000
 
 Range: TypeAlias = tuple[float, float]
@@ -32,7 +32,7 @@ Range: TypeAlias = tuple[float, float]
 UnitOf: TypeAlias = Callable[[str], str]
 """The unit of the signal of a name; empty: none."""
 NO_NUMBER = 2
-"""The side of 0 of what is no number, besides -1, 0 and 1."""
+"""The side of 0 of what is not a number, besides -1, 0 and 1."""
 
 
 class Quantity(Protocol):
@@ -124,7 +124,7 @@ class Sum:
 
 @dataclass(frozen=True, slots=True)
 class Product:
-    """``divides``: a quotient; one by 0 is infinite, 0/0 is no number, with which no comparison but ``!=`` is true."""
+    """``divides``: a quotient; one by 0 is infinite, 0/0 is not a number, with which no comparison but ``!=`` is true."""
 
     left: Quantity
     right: Quantity
@@ -155,7 +155,7 @@ class Product:
 
 @dataclass(frozen=True, slots=True)
 class Remainder:
-    """Remainder of a division whose quotient is rounded towards 0; for one by 0 it is no number."""
+    """Remainder of a division whose quotient is rounded towards 0; for one by 0 it is not a number."""
 
     left: Quantity
     right: Quantity

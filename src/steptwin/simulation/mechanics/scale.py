@@ -117,7 +117,7 @@ def _per_unit(given: GivenScale, drive: DriveScale) -> tuple[str, Fraction]:
 
 
 def _arm(scale: Scale, what: str) -> float:
-    """Metres per radian of the motor. Raises `Misuse` for a unit that is no length."""
+    """Metres per radian of the motor. Raises `Misuse` for a unit that is not a length."""
     metres = LENGTHS.get(scale.unit)
     if metres is None:
         raise Misuse(f"{what}: mass and forces need a unit of {', '.join(LENGTHS)}, not {scale.unit!r}")
@@ -136,7 +136,7 @@ class Loading(NamedTuple):
 
 
 def burden_of(loading: Loading, scale: Scale, what: str) -> Burden:
-    """Burden of a motor, in pulses. Raises `Misuse` for masses and forces on an axis whose unit is no length."""
+    """Burden of a motor, in pulses. Raises `Misuse` for masses and forces on an axis whose unit is not a length."""
     has_forces = loading.mass or loading.force or loading.friction_force
     arm = _arm(scale, what) if has_forces else 0.0
     inertia = loading.inertia + loading.mass * arm * arm

@@ -304,7 +304,9 @@ class TomlText:
 
     def stands_once(self, name: str) -> None:
         """There may be several tables ``name``."""
-        self.wrong((name,), "D002", f"[{name}] stands once", f"expected [[{name}]], for there may be several", self.doubled(name))
+        self.wrong(
+            (name,), "D002", f"[{name}] is a single table", f"expected [[{name}]], for there may be several", self.doubled(name)
+        )
 
     def error(self) -> WorldError:
         return WorldError(self.source, self.findings, self._in_files)

@@ -220,7 +220,7 @@ _AXIS = re.compile(r"M([1-9][0-9]{0,3})\Z")
 
 
 def axis_number(name: str) -> int:
-    """The number of the axis ``M1``, ``M2`` and so on; 0 if this is no name of an axis."""
+    """The number of the axis ``M1``, ``M2`` and so on; 0 if this is not a name of an axis."""
     found = _AXIS.match(name)
     return int(found[1]) if found is not None else 0
 

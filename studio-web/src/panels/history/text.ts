@@ -4,7 +4,7 @@ export const t = texts(
   {
     title: "History",
     none: "Nothing is kept. This table in the description of the machine keeps what happens, also after the studio has ended:",
-    noWorld: "A history belongs to a world with ports: there is none here.",
+    noWorld: "No history here: it needs a world with ports.",
     empty: "Nothing has been kept yet.",
     database: "in {database}",
     run: "Run",
@@ -49,7 +49,7 @@ export const t = texts(
   {
     title: "Historia",
     none: "Nic nie jest przechowywane. Ta tabela w opisie maszyny zachowuje to, co się dzieje, także po zamknięciu studia:",
-    noWorld: "Historia należy do świata z portami: tu go nie ma.",
+    noWorld: "Nie ma tu historii: potrzebuje świata z portami.",
     empty: "Nic jeszcze nie zachowano.",
     database: "w {database}",
     run: "Przebieg",

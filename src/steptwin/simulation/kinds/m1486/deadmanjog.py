@@ -25,7 +25,7 @@ LINK_NS: Nanos = 100 * MILLISECOND
 TYPED = 12
 """Characters that are typed for a move."""
 LOOK_NS: Nanos = MILLISECOND
-"""How often a chip that is not yet at rest is looked at."""
+"""Period at which a chip that is not yet at rest is polled."""
 PATIENCE_NS: Nanos = 2 * SECOND
 """A chip that is busy for so long does something else."""
 WRONG_VELOCITY = Message("simulation.m1486.wrong-velocity", "velocity {velocity:g} {unit}/s, V{number}: {why}")

@@ -70,7 +70,7 @@ class ProgramWatch:
         """The one that was executed last."""
         self._axes = [(axis.status, axis.revision, axis.velocity_p) for axis in device.axes]
         self._following: set[int] = set()
-        """Axes of which it was told that they follow their encoders."""
+        """Axes that were reported to follow their encoders."""
         device.program.interpreter.add_hook(self._begins)
         scheduler.add_part(self, (name,))
         scheduler.edge_subscribers.append(self._edge)
