@@ -85,7 +85,7 @@ def test_a_lock_file_that_is_a_link_is_refused_and_its_target_untouched(tmp_path
     (tmp_path / "soft").symlink_to(target)
     (tmp_path / "hard").hardlink_to(target)
     (tmp_path / "nowhere").symlink_to(tmp_path / "new")
-    for name, message in (("soft", "is a symbolic link"), ("hard", "is no lock file"), ("nowhere", "is a symbolic link")):
+    for name, message in (("soft", "is a symbolic link"), ("hard", "is not a lock file"), ("nowhere", "is a symbolic link")):
         with pytest.raises(PermissionError, match=message):
             Ownership(tmp_path / name)
     assert target.read_text() == "precious"
@@ -96,11 +96,11 @@ def test_a_lock_file_of_another_user_is_refused(tmp_path: Path, monkeypatch: pyt
     (tmp_path / "lock").write_text("")
     owner = os.getuid()
     monkeypatch.setattr(os, "getuid", lambda: owner + 1)
-    with pytest.raises(PermissionError, match="is no lock file of this user"):
+    with pytest.raises(PermissionError, match="is not a lock file of this user"):
         Ownership(tmp_path / "lock")
 
 
 def test_a_lock_file_that_is_a_pipe_is_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "lock")
-    with pytest.raises(PermissionError, match="is no lock file of this user"):
+    with pytest.raises(PermissionError, match="is not a lock file of this user"):
         Ownership(tmp_path / "lock")

@@ -192,4 +192,4 @@ def test_a_server_that_crashes_under_load_loses_nothing_and_takes_nothing_twice(
     rows = sent * 200
     assert found == (rows, rows, 0.0, float(rows - 1))
     assert ordered == 0
-    assert [notice.endswith("what comes waits on this disk") for notice in notices] == [True, False] * 3
+    assert [notice.endswith("rows are buffered on this disk") for notice in notices] == [True, False] * 3

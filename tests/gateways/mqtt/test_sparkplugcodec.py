@@ -101,7 +101,7 @@ def test_a_value_of_another_type_is_refused() -> None:
         (SparkplugType.STRING, 1.0),
         (SparkplugType.DOUBLE, True),
     ):
-        with pytest.raises(Misuse, match=f"no value of the type {kind.name}"):
+        with pytest.raises(Misuse, match=f"not a value of the type {kind.name}"):
             encode_payload(SparkplugPayload(metrics=(SparkplugMetric(name="x", type=kind, value=value),)))
 
 
