@@ -50,7 +50,7 @@ def signal_of(key: str, block: TerminalBlock, context: ElementContext, name: str
     """A signal of what is in one scheduler with a terminal block. Raises `Misuse`."""
     found = find_signal(context.objects, name)
     if isinstance(found, Idle) or any(source.scheduler is not block.scheduler for source in found.sources):
-        raise Misuse(f"{key}: {name!r} is no quantity of a controller or an element")
+        raise Misuse(f"{key}: {name!r} is not a quantity of a controller or an element")
     found.watch(name)
     return found
 
