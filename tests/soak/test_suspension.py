@@ -6,6 +6,7 @@ import random
 
 import pytest
 import suspended_chip
+import suspended_unit
 from host_rig import Wire, driver, thread_line
 from soak import factor, scaled
 from suspension import Suspension
@@ -20,6 +21,16 @@ def test_a_chip_at_every_point(name: str, tasks: bool) -> None:
     points, _ = suspended_chip.trial(name, None, tasks=tasks)
     chosen = random.Random(name).sample(range(1, points), max(1, round((points - 1) * min(factor(), 1.0))))
     wrong = [fault for at in chosen if (fault := suspended_chip.trial(name, at, tasks=tasks)[1])]
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.parametrize("loss", [0, 3])
+@pytest.mark.parametrize("tasks", [False, True], ids=["threads", "tasks"])
+@pytest.mark.parametrize("name", suspended_unit.OPERATIONS)
+def test_a_mic488_at_every_point(name: str, tasks: bool, loss: int) -> None:
+    points, _ = suspended_unit.trial(name, None, tasks=tasks, loss=loss)
+    chosen = random.Random(name).sample(range(1, points), max(1, round((points - 1) * min(factor(), 1.0))))
+    wrong = [fault for at in chosen if (fault := suspended_unit.trial(name, at, tasks=tasks, loss=loss)[1])]
     assert not wrong, "\n".join(wrong)
 
 
