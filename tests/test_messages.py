@@ -45,7 +45,10 @@ DONE = (
         f"live/{name}.py"
         for name in ("clock", "control", "debugging", "directory", "keptsettings", "pace", "timetravel", "why", "world")
     ),
-    *(f"drivers/{name}.py" for name in ("address", "exchange", "place", "subject", "tcp", "*/failures", "*/jog", "*/subject")),
+    *(
+        f"drivers/{name}.py"
+        for name in ("address", "exchange", "lineaddress", "subject", "tcp", "*/failures", "*/jog", "*/subject")
+    ),
     *(f"drivers/{name}.py" for name in ("m1486/chip", "mic488/axis")),
     *(f"live/studio/{name}.py" for name in ("branches", "campaigns", "drawing", "services", "processes", "recordings", "work")),
     *(

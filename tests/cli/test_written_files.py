@@ -29,7 +29,7 @@ from steptwin.files.memory import StateDirectory
 from steptwin.files.recording import recording_of, save
 from steptwin.files.world import World
 from steptwin.live.studio.drawing import WorldArrangement
-from steptwin.simulation.describe.arrangement import DrawnPlace
+from steptwin.simulation.describe.arrangement import DrawnPosition
 
 OLD = b"[mic488]\n# the old one\n" * 100
 PROGRAM = "if in1=1\nmoveptp 1 2\nendif\nend\n"
@@ -59,7 +59,7 @@ class Way(NamedTuple):
 
 def _arrange(folder: Path) -> object:
     world = World.load(folder / "w.toml")
-    there = WorldArrangement(world.spec, ["table"], folder / "arranged.toml").save([DrawnPlace("table", 1, 2)])
+    there = WorldArrangement(world.spec, ["table"], folder / "arranged.toml").save([DrawnPosition("table", 1, 2)])
     if there["file"] is None:
         raise OSError(errno.ENOSPC, "")  # the page gets the text instead
     return there

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from steptwin.drivers import LineLost
-from steptwin.drivers.place import SerialEndpoint
+from steptwin.drivers.lineaddress import SerialEndpoint
 
 SE, SB, WILL, DO, IAC = 240, 250, 251, 253, 255
 COM_PORT = 44

@@ -13,7 +13,7 @@ import pytest
 from tls_files import Authority
 
 from steptwin.drivers import LineLost
-from steptwin.drivers.place import LineAddress, parse_line_address
+from steptwin.drivers.lineaddress import LineAddress, parse_line_address
 from steptwin.drivers.tls import TlsEndpoint
 from steptwin.errors import Misuse
 

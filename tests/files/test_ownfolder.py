@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from steptwin.errors import Misuse
-from steptwin.files.ownfolder import place_in
+from steptwin.files.ownfolder import path_in_folder
 
 
 @pytest.fixture
@@ -29,8 +29,8 @@ def folder(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("name", ["new.json", "there.json", "sub/new.json", "./new.json", "sub/../new.json"])
 def test_files_in_the_folder_and_below_it(name: str, folder: Path) -> None:
-    assert place_in(folder, name) == folder / name
-    assert place_in(folder, str(folder / name)) == folder / name
+    assert path_in_folder(folder, name) == folder / name
+    assert path_in_folder(folder, str(folder / name)) == folder / name
 
 
 @pytest.mark.parametrize(
@@ -54,10 +54,10 @@ def test_files_in_the_folder_and_below_it(name: str, folder: Path) -> None:
 )
 def test_places_elsewhere_and_links_are_refused(name: str, message: str, folder: Path) -> None:
     with pytest.raises(Misuse) as refused:
-        place_in(folder, name)
+        path_in_folder(folder, name)
     assert message.format(folder=folder) in str(refused.value)
 
 
 def test_a_folder_that_is_reached_through_a_link_is_the_same(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "way").symlink_to(folder)
-    assert place_in(tmp_path / "way", str(folder / "new.json")) == folder / "new.json"
+    assert path_in_folder(tmp_path / "way", str(folder / "new.json")) == folder / "new.json"

@@ -15,7 +15,7 @@ from steptwin.errors import Misuse
 from steptwin.files.recording import load, recording_of, save
 from steptwin.files.world import World
 from steptwin.simulation.script import steps as do
-from steptwin.simulation.toml import tomlplaces
+from steptwin.simulation.toml import keypaths
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 
@@ -105,8 +105,8 @@ def test_without_a_trace_a_world_has_no_past_to_pickle() -> None:
 
 def test_a_branch_reads_no_toml(monkeypatch: pytest.MonkeyPatch) -> None:
     world = running()
-    monkeypatch.setattr(tomlplaces, "find_places", None)
-    monkeypatch.setattr("steptwin.simulation.toml.reader.find_places", None)
+    monkeypatch.setattr(keypaths, "find_spans", None)
+    monkeypatch.setattr("steptwin.simulation.toml.reader.find_spans", None)
     assert world.branch().now == world.now
 
 

@@ -16,7 +16,7 @@ from steptwin.live import debugging as module
 from steptwin.live.clock import Clock
 from steptwin.live.pace import Pace
 from steptwin.live.realtimedriver import RealTimeDriver
-from steptwin.live.world import LiveWorld, PlacePort
+from steptwin.live.world import ClientPort, LiveWorld
 from steptwin.live.world_control import WorldControl
 from steptwin.simulation.world import snapshotlog
 from steptwin.subject.commands import read_command
@@ -242,7 +242,7 @@ def test_a_client_that_was_connected_before_the_debugger_is_seen(run: Run) -> No
     async def play() -> None:
         text = '[[line]]\nname = "bus"\ntcp = "127.0.0.1:0"\n[[mic488]]\nname = "table"\nline = "bus"\nprogram = "count.prg"\n'
         rig = Rig(text, b"A:\nOUT1 = ON\nWAIT $I0 = 1\nOUT2 = ON\nDELAY 0.1\nJUMP A\n", records=False)
-        port = PlacePort(rig.live, "bus", "tcp-1", "tcp")
+        port = ClientPort(rig.live, "bus", "tcp-1", "tcp")
 
         def ask(pdu: str) -> bytes:
             rig.realtime.enter()

@@ -25,7 +25,7 @@ from steptwin.live.links import Feed
 from steptwin.live.options import LiveOptions, UpOptions
 from steptwin.live.pace import Pace
 from steptwin.live.realtimedriver import RealTimeDriver
-from steptwin.live.running import LiveWorld, PlacePort, up
+from steptwin.live.running import ClientPort, LiveWorld, up
 from steptwin.live.world_control import WorldControl
 from steptwin.subject.commands import read_command
 from steptwin.wire.crc import with_crc
@@ -115,7 +115,7 @@ def the_same_again(world: World) -> bool:
 def test_whatever_is_done_to_the_pace_a_session_replays(run: Run, deeds: list[tuple[str, Any]]) -> None:
     async def scene() -> World:
         rig = Rig(feeder())
-        ports = {"bus": PlacePort(rig.live, "bus", "tcp-1", "rtu"), "chips": PlacePort(rig.live, "chips", "raw-1", "raw")}
+        ports = {"bus": ClientPort(rig.live, "bus", "tcp-1", "rtu"), "chips": ClientPort(rig.live, "chips", "raw-1", "raw")}
         for number, (what, how) in enumerate(deeds):
             before = rig.live.now
             if what == "wall":
@@ -285,7 +285,7 @@ def test_a_standing_world_answers_what_takes_no_time(run: Run, timing: str, kind
         rig = Rig(world, 0.0)
         assert "to_ns" not in rig.do("step", for_ns=20 * SECOND)
         client = Client()
-        feed = Feed(rig.realtime, PlacePort(rig.live, "bus", f"{kind}-1", kind), client)
+        feed = Feed(rig.realtime, ClientPort(rig.live, "bus", f"{kind}-1", kind), client)
         feed.take(request)
         await asyncio.sleep(100)
         assert client.heard == (b"" if timing == "real" else answer)
@@ -371,7 +371,7 @@ def test_a_session_goes_on_live_without_those_who_were_there(run: Run, tmp_path:
     async def scene() -> None:
         rig = Rig(World.from_toml(description), 0.0)
         rig.do("step", for_ns=2 * SECOND)
-        PlacePort(rig.live, "bus", "tcp-1", "tcp").exchange(b"\0", rig.realtime.enter())
+        ClientPort(rig.live, "bus", "tcp-1", "tcp").exchange(b"\0", rig.realtime.enter())
         rig.do("save", file=str(tmp_path / "s.json"))
         rig.close()
 
@@ -420,7 +420,7 @@ def test_going_back_leaves_programs_connected_and_the_session_whole(run: Run) ->
         rig.do("enable", controller="m", axis=1)
         rig.do("jog", controller="m", axis=1, velocity=40.0)
         rig.do("step", for_ns=3 * SECOND)
-        bus, chips = PlacePort(rig.live, "bus", "tcp-1", "tcp"), PlacePort(rig.live, "chips", "tcp-1", "raw")
+        bus, chips = ClientPort(rig.live, "bus", "tcp-1", "tcp"), ClientPort(rig.live, "chips", "tcp-1", "raw")
         read = bytes.fromhex("0001 0000 0006") + READ_POSITION[:-2]
         rig.do("send", line="chips", text="u20\r")
         rig.do("step", for_ns=SECOND)
@@ -430,7 +430,7 @@ def test_going_back_leaves_programs_connected_and_the_session_whole(run: Run) ->
         rig.do("resume")
         await asyncio.sleep(4)
         rig.realtime.enter()
-        late = PlacePort(rig.live, "chips", "tcp-2", "raw")
+        late = ClientPort(rig.live, "chips", "tcp-2", "raw")
         assert bus.exchange(read, rig.world.now) != before
         assert rig.do("restore", name="here")["time_ns"] == 4 * SECOND == rig.world.now
         assert rig.do("time")["paused"]

@@ -22,7 +22,7 @@ from steptwin.live.links import Feed
 from steptwin.live.options import LiveOptions, UpOptions
 from steptwin.live.pace import Pace
 from steptwin.live.realtimedriver import RealTimeDriver
-from steptwin.live.running import LiveWorld, PlacePort, up
+from steptwin.live.running import ClientPort, LiveWorld, up
 from steptwin.live.world_control import WorldControl
 from steptwin.simulation.script import steps as do
 from steptwin.subject.subscriptions import filter_of
@@ -66,7 +66,7 @@ def test_live_and_virtual_give_the_same_trace(looks: list[tuple[int, str]], spee
     async def run() -> World:
         wall = Wall()
         world, live, realtime = started(wall, speed)
-        bus, chips = PlacePort(live, "bus", "tcp-1", "rtu"), PlacePort(live, "chips", "raw-1", "raw")
+        bus, chips = ClientPort(live, "bus", "tcp-1", "rtu"), ClientPort(live, "chips", "raw-1", "raw")
         hand = WorldControl(realtime, live, Pace(live, realtime, lambda _: None, has_clients=True), list)
         realtime.clock.run(speed)
         for pause, what in looks:
@@ -97,7 +97,7 @@ def test_answers_come_to_the_client_when_the_line_has_carried_them() -> None:
     async def run() -> None:
         wall = Wall()
         world, live, realtime = started(wall)
-        client, port = Client(), PlacePort(live, "bus", "rtu-1", "rtu")
+        client, port = Client(), ClientPort(live, "bus", "rtu-1", "rtu")
         feed = Feed(realtime, port, client)
         wall.now = 20 * SECOND
         realtime.enter()

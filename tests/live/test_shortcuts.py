@@ -19,7 +19,7 @@ from steptwin.live.batches import batches
 from steptwin.live.clock import Clock
 from steptwin.live.links import Feed
 from steptwin.live.realtimedriver import RealTimeDriver
-from steptwin.live.world import LiveWorld, PlacePort
+from steptwin.live.world import ClientPort, LiveWorld
 from steptwin.simulation.kinds.mic488.line import ModbusBus
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.world.inputs import Bytes
@@ -105,10 +105,10 @@ class Frames:
     def __init__(self, found: list[tuple[int, str, FrameDirection, bytes]]) -> None:
         self._found = found
 
-    def frame(self, now: int, place: str, direction: FrameDirection, data: bytes) -> None:
-        self._found.append((now, place, direction, data))
+    def frame(self, now: int, client: str, direction: FrameDirection, data: bytes) -> None:
+        self._found.append((now, client, direction, data))
 
-    def unframed(self, now: int, place: str, count: int) -> None:
+    def unframed(self, now: int, client: str, count: int) -> None:
         """There is none."""
 
 
@@ -147,7 +147,7 @@ def played(given_batches: list[Batch], *, shortcuts: bool, records: bool) -> See
         realtime = RealTimeDriver(live, Clock(wall_ns=lambda: wall[0]))
         if shortcuts:
             live.share_reads(realtime)
-        ports = [PlacePort(live, "bus", f"{kind}-{number}", kind) for number, kind in enumerate(KINDS)]
+        ports = [ClientPort(live, "bus", f"{kind}-{number}", kind) for number, kind in enumerate(KINDS)]
         clients = [Client() for _ in KINDS]
         feeds = [Feed(realtime, port, client) for port, client in zip(ports, clients, strict=True)]
         realtime.start()

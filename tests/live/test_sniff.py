@@ -16,9 +16,9 @@ from virtual_loop import run_virtually
 
 from steptwin.cli import app
 from steptwin.drivers.kind import Decoder
+from steptwin.drivers.lineaddress import LineAddress, parse_line_address
 from steptwin.drivers.m1486.decoder import M1486Decoder
 from steptwin.drivers.mic488.decoder import ModbusDecoder
-from steptwin.drivers.place import LineAddress, parse_line_address
 from steptwin.errors import LineFailure, Misuse
 from steptwin.live.sniff import Tap, sniff
 from steptwin.simulation.toml.addresses import Address

@@ -16,7 +16,7 @@ from steptwin.files.recording import recording_of
 from steptwin.files.world import World
 from steptwin.live import timetravel as module
 from steptwin.live.timetravel import WorldPastView, WorldTimeTravel
-from steptwin.live.world import PlacePort
+from steptwin.live.world import ClientPort
 from steptwin.subject.commands import ReadPoints, ReadState, TakeSnapshot
 
 Run = Callable[..., Any]
@@ -54,7 +54,7 @@ async def at(view: WorldPastView, moment: Nanos) -> tuple[Any, ...]:
 def test_every_moment_is_as_it_was_seen_while_the_world_goes_on(run: Run) -> None:
     async def scene() -> None:
         rig = Back(feeder())
-        bus = PlacePort(rig.live, "bus", "tcp-1", "tcp")
+        bus = ClientPort(rig.live, "bus", "tcp-1", "tcp")
         read = bytes.fromhex("0001 0000 0006") + READ_POSITION[:-2]
         seen: dict[Nanos, tuple[Any, ...]] = {}
         for step in range(12):
@@ -127,7 +127,7 @@ def test_the_world_goes_back_to_what_is_looked_at_and_its_session_replays(run: R
     async def scene() -> World:
         rig = Back(feeder())
         rig.world.trace.let_go()
-        bus = PlacePort(rig.live, "bus", "tcp-1", "tcp")
+        bus = ClientPort(rig.live, "bus", "tcp-1", "tcp")
         read = bytes.fromhex("0001 0000 0006") + READ_POSITION[:-2]
         await asyncio.sleep(3.3)
         rig.do("set", levels={"table.IN9": 1})

@@ -16,7 +16,7 @@ from steptwin.live.output import Output
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.server import EndPoint
 from steptwin.live.view import LiveView, page
-from steptwin.live.world import LiveWorld, PlacePort
+from steptwin.live.world import ClientPort, LiveWorld
 from steptwin.simulation.describe.generated import LINE, Whole
 from steptwin.simulation.describe.generated_m1486 import m1486_world
 from steptwin.simulation.describe.generated_mic488 import mic488_world
@@ -40,7 +40,7 @@ def screen(run: Run, world: World, width: int, height: int, *requests: bytes, ki
         live = LiveWorld(world)
         view = LiveView(live, RealTimeDriver(live, Clock()), Output(None))
         view.begin(banner(world, END_POINTS, REMARKS), {})
-        port = PlacePort(live, LINE, "tcp-1", kind)
+        port = ClientPort(live, LINE, "tcp-1", kind)
         for request in requests:
             port.exchange(request, 0)
         live.advance(2 * SECOND)

@@ -11,7 +11,7 @@ from mic488_rig import loaded
 from steptwin.controller import MILLISECOND, Port
 from steptwin.controllerstate import ProgramActivity, StateProgram
 from steptwin.files.world import World
-from steptwin.live.world import LiveWorld, PlacePort, VisionPort
+from steptwin.live.world import ClientPort, LiveWorld, VisionPort
 from steptwin.mic488.present import state_of
 from steptwin.mic488.vision import uses_vision
 from steptwin.simulation.describe.generated import LINE, Whole
@@ -62,7 +62,7 @@ def records(live: LiveWorld) -> tuple[int, list[float]]:
 @pytest.mark.parametrize("timing", ["off", "real"])
 def test_wbc_15_records_and_frames_share_an_rtu_line(timing: str) -> None:
     live = running(timing=timing)
-    port = PlacePort(live, LINE, "pty", "rtu")
+    port = ClientPort(live, LINE, "pty", "rtu")
     answered = b""
     for data in (READ, RECORD, READ, RECORD[:9], RECORD[9:], READ):
         live.advance(live.now + 100 * MILLISECOND)
@@ -94,7 +94,7 @@ def test_only_programs_that_ask_for_records_have_them_on_the_line() -> None:
 def test_a_vision_system_belongs_to_one_controller() -> None:
     """On a line of several a record is noise."""
     live = running(units=(1, 2))
-    PlacePort(live, LINE, "pty", "rtu").exchange(RECORD, live.now)
+    ClientPort(live, LINE, "pty", "rtu").exchange(RECORD, live.now)
     live.advance(live.now + 100 * MILLISECOND)
     live.world.sync_all()
     assert [view.device.user[0] for view in live.world.mic488.values()] == [0, 0]

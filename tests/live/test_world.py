@@ -19,7 +19,7 @@ from steptwin.live.clock import Clock
 from steptwin.live.links import Feed
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.sharedreads import share_reads
-from steptwin.live.world import LiveWorld, PlacePort, VisionPort
+from steptwin.live.world import ClientPort, LiveWorld, VisionPort
 from steptwin.live.world_frames import subscribe_to_frames
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
@@ -75,7 +75,7 @@ def test_a_read_through_a_world_takes_few_more_calls_than_one_of_a_served_contro
         served = RealTimeDriver(scheduler, Clock())
         port = FaultyPort(TcpSlavePort(share_reads({1: device}, served)), "tcp-1", Faults(), FaultLine.TCP)
         clients = Client(), Client()
-        feeds = Feed(served, port, clients[0]), Feed(realtime, PlacePort(live, "bus", "tcp-1", "tcp"), clients[1])
+        feeds = Feed(served, port, clients[0]), Feed(realtime, ClientPort(live, "bus", "tcp-1", "tcp"), clients[1])
         for one, feed in zip((served, realtime), feeds, strict=True):
             one.start()
             feed.take(READ)  # connects
@@ -91,7 +91,7 @@ def test_a_read_through_a_world_takes_few_more_calls_than_one_of_a_served_contro
 def test_a_request_visits_no_other_scheduler() -> None:
     controllers = "".join(f'[[mic488]]\nname = "other-{i}"\n' for i in range(20))
     live = LiveWorld(World.from_toml(LINE + controllers))
-    port = PlacePort(live, "bus", "tcp-1", "tcp")
+    port = ClientPort(live, "bus", "tcp-1", "tcp")
     live.deadline()
 
     def read() -> None:
@@ -134,7 +134,7 @@ def test_without_a_recording_watchers_see_events_and_nothing_is_kept() -> None:
     seen: list[str] = []
     world.trace.subscribers.append(lambda record: seen.append(record.kind))
     live = LiveWorld(world)
-    PlacePort(live, "bus", "tcp-1", "tcp").exchange(READ, live.now)
+    ClientPort(live, "bus", "tcp-1", "tcp").exchange(READ, live.now)
     live.advance(2 * MILLISECOND)
     assert "event" in seen
     assert "frame" not in seen
@@ -150,7 +150,7 @@ def test_clients_that_are_served_together_share_what_they_read() -> None:
         realtime = RealTimeDriver(live, Clock(wall_ns=lambda: 0))
         live.share_reads(realtime)
         clients = [Client() for _ in range(3)]
-        feeds = [Feed(realtime, PlacePort(live, "bus", f"tcp-{i}", "tcp"), client) for i, client in enumerate(clients)]
+        feeds = [Feed(realtime, ClientPort(live, "bus", f"tcp-{i}", "tcp"), client) for i, client in enumerate(clients)]
         realtime.start()
         batches().current = 7
         assert calls(lambda: [feed.take(READ) for feed in feeds])["Mic488Device.execute"] == 1
@@ -213,7 +213,7 @@ def test_frames_of_a_world_are_shown_in_words(timing: str) -> None:
     live = LiveWorld(world)
     shown: list[FrameLine] = []
     subscribe_to_frames(live, shown.append)
-    places = PlacePort(live, "bus", "tcp-1", "tcp"), PlacePort(live, "bus", "rtu-1", "rtu")
+    places = ClientPort(live, "bus", "tcp-1", "tcp"), ClientPort(live, "bus", "rtu-1", "rtu")
     for number, data in ((0, READ), (1, bytes.fromhex("01 03 27 24 00 02 8e b4")), (1, b"line noise"), (0, READ)):
         live.advance(live.now + 100 * MILLISECOND)
         places[number].exchange(data, live.now)
@@ -233,9 +233,9 @@ def test_characters_of_a_world_are_shown_with_the_line_where_there_are_several()
     live = LiveWorld(world)
     shown: list[str] = []
     subscribe_to_frames(live, lambda line: shown.append(f"{line.link} {line.meaning}"))
-    PlacePort(live, "chips", "tcp-1", "raw").exchange(b"U1\r", live.now)
+    ClientPort(live, "chips", "tcp-1", "raw").exchange(b"U1\r", live.now)
     live.advance(SECOND)
-    PlacePort(live, "bus", "tcp-1", "tcp").exchange(READ, live.now)
+    ClientPort(live, "bus", "tcp-1", "tcp").exchange(READ, live.now)
     assert shown[:2] == ["chips/tcp-1 U1  Upload 1", "chips/line U1 position, low byte = 0"]
     assert shown[2].startswith("bus/tcp-1 read M1_POS_ACT")
 
@@ -244,7 +244,7 @@ def test_characters_of_a_world_are_shown_with_the_line_where_there_are_several()
 def test_a_line_gives_up_noise_after_its_gap(given: str, nanoseconds: int) -> None:
     world = World.from_toml(LINE.replace("tcp =", f"gap = {given}\ntcp ="))
     live = LiveWorld(world)
-    PlacePort(live, "bus", "rtu-1", "rtu").exchange(b"\x01", live.now)
+    ClientPort(live, "bus", "rtu-1", "rtu").exchange(b"\x01", live.now)
     assert live.deadline() == nanoseconds
 
 
@@ -260,7 +260,7 @@ def test_a_real_serial_port_has_the_gap_of_a_uart() -> None:
     assert (line.baud, line.is_timed) == (9600, False)
     live = LiveWorld(world)
     live.advance(SECOND)
-    port = PlacePort(live, "bus", "serial", "serial")
+    port = ClientPort(live, "bus", "serial", "serial")
     port.exchange(b"\x01\x03", live.now)
     assert live.deadline() == SECOND + 750_000
 
@@ -274,7 +274,7 @@ def test_reads_that_change_nothing_are_not_recorded(kind: str) -> None:
     live = LiveWorld(world)
     shown: list[FrameLine] = []
     subscribe_to_frames(live, shown.append)
-    port, writer = PlacePort(live, "bus", f"{kind}-1", kind), PlacePort(live, "bus", "tcp-2", "tcp")
+    port, writer = ClientPort(live, "bus", f"{kind}-1", kind), ClientPort(live, "bus", "tcp-2", "tcp")
     for step in range(20):
         live.advance(live.now + 10 * MILLISECOND)
         assert port.exchange(read, live.now)
@@ -290,7 +290,7 @@ def test_reads_that_change_nothing_are_not_recorded(kind: str) -> None:
 def test_a_read_in_pieces_or_under_a_fault_is_recorded() -> None:
     world = World.from_toml(LINE)
     live = LiveWorld(world)
-    port = PlacePort(live, "bus", "tcp-1", "tcp")
+    port = ClientPort(live, "bus", "tcp-1", "tcp")
     port.exchange(READ[:5], live.now)
     port.exchange(READ[5:], live.now)
     port.exchange(READ, live.now)

@@ -133,11 +133,11 @@ def test_its_shaft_is_blocked_and_loses_pulses() -> None:
     scheduler.advance(SECOND)
     toy.execute(GO, SECOND)
     scheduler.advance(2 * SECOND)
-    assert (toy.axis.plan.count(2 * SECOND), mechanism.place(2 * SECOND)) == (100, 0)
+    assert (toy.axis.plan.count(2 * SECOND), mechanism.grid_position(2 * SECOND)) == (100, 0)
     scheduler.advance(3 * SECOND)
-    assert (mechanism.place(3 * SECOND), mechanism.lost(3 * SECOND)) == (0, 100)
+    assert (mechanism.grid_position(3 * SECOND), mechanism.lost(3 * SECOND)) == (0, 100)
     scheduler.advance(5 * SECOND)
-    assert (mechanism.place(5 * SECOND), mechanism.lost(5 * SECOND)) == (-4, 104)
+    assert (mechanism.grid_position(5 * SECOND), mechanism.lost(5 * SECOND)) == (-4, 104)
 
 
 def test_its_input_sticks_and_bounces() -> None:
@@ -228,10 +228,10 @@ def test_a_line_of_a_world_carries_its_protocol() -> None:
     line.receive("pty", b"\x0aP", 0)
     scheduler.advance(SECOND)
     line.receive("pty", b"\0", SECOND)
-    assert line.places["pty"].take(SECOND) == [(0, GO), (SECOND, b"P\x0a")]
-    assert line.places["tcp-1"].take(SECOND) == [(0, b"P\0")]
+    assert line.clients["pty"].take(SECOND) == [(0, GO), (SECOND, b"P\x0a")]
+    assert line.clients["tcp-1"].take(SECOND) == [(0, b"P\0")]
     line.leave("pty")
-    assert list(line.places) == ["tcp-1"]
+    assert list(line.clients) == ["tcp-1"]
 
 
 def test_bytes_of_its_protocol_go_wrong_on_the_way() -> None:
@@ -239,7 +239,7 @@ def test_bytes_of_its_protocol_go_wrong_on_the_way() -> None:
     line.receive("pty", b"P\0", 0)
     assert scheduler.deadline() == 5 * MILLISECOND
     scheduler.advance(SECOND)
-    assert line.places["pty"].take(SECOND) == [(5 * MILLISECOND, b"P\0")]
+    assert line.clients["pty"].take(SECOND) == [(5 * MILLISECOND, b"P\0")]
 
 
 def test_half_a_command_is_part_of_a_snapshot() -> None:
@@ -248,4 +248,4 @@ def test_half_a_command_is_part_of_a_snapshot() -> None:
     other, _, its_line = lined()
     other.restore(scheduler.snapshot())
     its_line.receive("pty", b"\x05", 0)
-    assert its_line.places["pty"].take(0) == [(0, b"M\x05")]
+    assert its_line.clients["pty"].take(0) == [(0, b"M\x05")]

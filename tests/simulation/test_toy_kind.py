@@ -25,7 +25,7 @@ from steptwin.live.output import Output
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.running import up
 from steptwin.live.view import LiveView
-from steptwin.live.world import LiveWorld, PlacePort, announced
+from steptwin.live.world import ClientPort, LiveWorld, announced
 from steptwin.live.world_frames import subscribe_to_frames
 from steptwin.simulation.script.steps import Turn
 from steptwin.simulation.toml.reader import WorldError
@@ -183,7 +183,7 @@ def test_run_checks_and_runs_it(tmp_path: Path) -> None:
 
 def test_a_program_outside_talks_to_it() -> None:
     live = LiveWorld(World.from_toml(TEXT))
-    port = PlacePort(live, "bus", "tcp-1", "raw")
+    port = ClientPort(live, "bus", "tcp-1", "raw")
     assert port.exchange(b"P", 0) == b""
     assert port.exchange(b"\0", 0) == b"P\0"
     live.advance(200_000_000)

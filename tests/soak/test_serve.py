@@ -16,7 +16,7 @@ from virtual_loop import run_virtually
 from steptwin.files.world import World
 from steptwin.live.links import Feed
 from steptwin.live.realtimedriver import RealTimeDriver
-from steptwin.live.world import LiveWorld, PlacePort
+from steptwin.live.world import ClientPort, LiveWorld
 from steptwin.live.world_frames import subscribe_to_frames
 from steptwin.m1486.events import EVENTS_KEPT
 from steptwin.simulation.describe.generated import LINE, Whole
@@ -109,7 +109,7 @@ def characters(chance: random.Random) -> Iterator[bytes]:
 
 def to_chips(live: LiveWorld, realtime: RealTimeDriver) -> Callable[[bytes], None]:
     """A client that types and reads, one that has stopped reading."""
-    feeds = [Feed(realtime, PlacePort(live, LINE, name, "raw"), Client()) for name in ("pty", "tcp-1")]
+    feeds = [Feed(realtime, ClientPort(live, LINE, name, "raw"), Client()) for name in ("pty", "tcp-1")]
     feeds[1].is_read = False
     return feeds[0].take
 
@@ -165,7 +165,7 @@ def tcp_requests(chance: random.Random) -> Iterator[bytes]:
 def one_client(kind: str) -> Begin:
     def begin(live: LiveWorld, realtime: RealTimeDriver) -> Callable[[bytes], None]:
         live.share_reads(realtime)
-        return Feed(realtime, PlacePort(live, LINE, f"{kind}-1", kind), Client()).take
+        return Feed(realtime, ClientPort(live, LINE, f"{kind}-1", kind), Client()).take
 
     return begin
 
@@ -186,7 +186,7 @@ def test_clients_that_come_and_go(kind: str) -> None:
 
     def begin(live: LiveWorld, realtime: RealTimeDriver) -> Callable[[bytes], None]:
         def visit(data: bytes) -> None:
-            place = PlacePort(live, LINE, f"tcp-{next(numbers)}", "raw" if kind == "m1486" else "tcp")
+            place = ClientPort(live, LINE, f"tcp-{next(numbers)}", "raw" if kind == "m1486" else "tcp")
             feed = Feed(realtime, place, Client())
             feed.take(data)
             feed.close()

@@ -16,7 +16,7 @@ from steptwin.errors import Misuse
 from steptwin.files.recording import load, save
 from steptwin.files.world import World
 from steptwin.live import world as live_world_module
-from steptwin.live.world import LiveWorld, PlacePort
+from steptwin.live.world import ClientPort, LiveWorld
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.kinds.mic488.line import ModbusBus
 from steptwin.simulation.script import steps as do
@@ -55,8 +55,8 @@ def live_world(*, keep_inputs: bool = False) -> LiveWorld:
 @contextmanager
 def clients(live: LiveWorld) -> Generator[Callable[[], None]]:
     """Work of clients on every line, a moment after the other."""
-    tcp, rtu = PlacePort(live, "bus", "tcp-1", "tcp"), PlacePort(live, "bus", "rtu-1", "rtu")
-    raw = PlacePort(live, "chips", "raw-1", "raw")
+    tcp, rtu = ClientPort(live, "bus", "tcp-1", "tcp"), ClientPort(live, "bus", "rtu-1", "rtu")
+    raw = ClientPort(live, "chips", "raw-1", "raw")
     now = live.now
 
     def work() -> None:
@@ -89,7 +89,7 @@ def test_answers_that_scripts_do_not_fetch_are_dropped() -> None:
         live.advance(live.now + 20 * MILLISECOND)
     line = live.world.lines["bus"]
     assert isinstance(line, ModbusBus)
-    assert (len(line.places[SCRIPTS].received), line.master.answers, line.master.deadline()) == (0, {}, None)
+    assert (len(line.clients[SCRIPTS].received), line.master.answers, line.master.deadline()) == (0, {}, None)
 
 
 def test_a_recorded_session_ends_where_it_is_full(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -125,7 +125,7 @@ def test_clients_that_come_and_go_leave_nothing_behind() -> None:
     live = live_world()
 
     def work() -> None:
-        port = PlacePort(live, "bus", "tcp-1", "tcp")
+        port = ClientPort(live, "bus", "tcp-1", "tcp")
         port.exchange(READ_TCP, live.now)
         port.close()
 

@@ -12,7 +12,7 @@ from playwright.sync_api import Locator, Page, expect
 from studio_page import Studio, button, downloaded, show
 from tests.studio.conftest import Process, StudioWorld
 
-from steptwin.simulation.describe.arrangement import DrawnPlace
+from steptwin.simulation.describe.arrangement import DrawnPosition
 from steptwin.simulation.describe.description import read_world
 
 WORLD = """
@@ -50,7 +50,7 @@ def ask(process: Process, request: str, **fields: object) -> Any:
     return httpx.post(f"{process.url}/api/do/{request}", json=fields, timeout=60).json()
 
 
-def kept(process: Process) -> tuple[DrawnPlace, ...]:
+def kept(process: Process) -> tuple[DrawnPosition, ...]:
     return read_world("hall", (process.directory / "hall.toml").read_text()).drawing
 
 
@@ -61,7 +61,7 @@ def test_places_are_kept_in_the_description(start_studio: Callable[..., Process]
     saved = ask(studio, "save_drawing", places={"x": [40, 0], "tool path": [0, 200]})["ok"]
     assert saved == {"file": str(path), "name": "hall.toml", "text": path.read_text()}
     assert ask(studio, "drawing")["ok"]["places"] == {"x": [40, 0], "tool path": [0, 200]}
-    assert kept(studio) == (DrawnPlace("x", 40, 0), DrawnPlace("tool path", 0, 200))
+    assert kept(studio) == (DrawnPosition("x", 40, 0), DrawnPosition("tool path", 0, 200))
     path.write_text(path.read_text().replace('name = "cell"', 'name = "cell"  # changed meanwhile'))
     assert "ok" in ask(studio, "save_drawing", places={})
     assert "# changed meanwhile" in path.read_text()
@@ -112,7 +112,7 @@ def test_drawing_is_arranged_by_mouse_and_keyboard_undone_and_saved(studio: Stud
     button(page, "✓ Done").click()
     button(page, "Save arrangement").click()
     expect(page.get_by_text("The arrangement is saved in")).to_be_visible()
-    assert DrawnPlace("y", *dragged) in kept(studio.process)
+    assert DrawnPosition("y", *dragged) in kept(studio.process)
     again = studio.page(panel="Machine")
     expect(card(again, "y")).to_have_css("left", f"{dragged[0]}px")
     button(again, "Automatic arrangement").click()
@@ -132,5 +132,5 @@ def test_the_description_of_a_branch_is_in_no_file_and_is_downloaded(studio: Stu
     x, y = corner(page, "x")
     text = downloaded(page, "Save arrangement").decode()
     expect(page.get_by_text("cannot be written here")).to_be_visible()
-    assert DrawnPlace("x", x, y) in read_world("cell", text).drawing
+    assert DrawnPosition("x", x, y) in read_world("cell", text).drawing
     assert (studio.process.directory / "hall.toml").read_text() == before

@@ -25,7 +25,7 @@ from steptwin.live.studio.drawing import WorldArrangement
 from steptwin.live.studio.openpage import OpenedPage
 from steptwin.live.studio.owntokens import own_tokens
 from steptwin.live.studio.start import DEFAULT, AccessInfo
-from steptwin.simulation.describe.arrangement import DrawnPlace
+from steptwin.simulation.describe.arrangement import DrawnPosition
 from steptwin.simulation.describe.description import read_world
 from steptwin.studio.rest import NO_TOKEN
 from steptwin.studio.viewers import REFUSED as CLOSED
@@ -142,7 +142,7 @@ def test_a_description_that_is_a_link_is_not_written(tmp_path: Path) -> None:
     real.write_text(WORLD)
     link.symlink_to(real)
     saved = [
-        WorldArrangement(read_world(file.name, WORLD), ["table.M1"], file).save((DrawnPlace("table.M1", 10, 20),))
+        WorldArrangement(read_world(file.name, WORLD), ["table.M1"], file).save((DrawnPosition("table.M1", 10, 20),))
         for file in (link, real)
     ]
     assert [one["file"] for one in saved] == [None, str(real)]

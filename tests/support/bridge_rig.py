@@ -15,12 +15,12 @@ from mic488_rig import MM, controller, loaded
 from steptwin.controller import SECOND, Nanos
 from steptwin.devices.composite import CompositeSubject
 from steptwin.devices.device import ConnectedDevice, DeviceSurroundings
+from steptwin.drivers.lineaddress import LineAddress
 from steptwin.drivers.m1486 import AsyncM1486
 from steptwin.drivers.m1486.subject import M1486Part
 from steptwin.drivers.mic488.driver import AsyncMic488
 from steptwin.drivers.mic488.lines import modbus_exchanger
 from steptwin.drivers.mic488.subject import Mic488Part
-from steptwin.drivers.place import LineAddress
 from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart
 from steptwin.drivers.tasks import TaskLine
 from steptwin.live.bridge import _Devices, connections_of

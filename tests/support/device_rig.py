@@ -5,7 +5,7 @@ from __future__ import annotations
 from steptwin.drivers.m1486 import M1486
 from steptwin.drivers.mic488.sync import Mic488
 from steptwin.files.world import World
-from steptwin.live.world import LiveWorld, PlacePort
+from steptwin.live.world import ClientPort, LiveWorld
 from steptwin.testing.virtualtime import MemoryEndpoint, VirtualTime, connected_chip, connected_driver
 
 CELL = """
@@ -60,8 +60,8 @@ class Rig:
         self.world = World.from_toml(CELL)
         self.live = LiveWorld(self.world)
         self.time = VirtualTime(self.live)
-        bus = MemoryEndpoint(self.time, lambda: PlacePort(self.live, "bus", "tcp-1", "tcp"), "bus")
+        bus = MemoryEndpoint(self.time, lambda: ClientPort(self.live, "bus", "tcp-1", "tcp"), "bus")
         config = self.world.mic488["table"].device.config
         self.mic: Mic488 = connected_driver(bus, self.time, 1, framed=True, firmware="1.70", config=config)
-        chips = MemoryEndpoint(self.time, lambda: PlacePort(self.live, "chips", "raw-1", "raw"), "chips")
+        chips = MemoryEndpoint(self.time, lambda: ClientPort(self.live, "chips", "raw-1", "raw"), "chips")
         self.chip: M1486 = connected_chip(chips, self.time, 3)

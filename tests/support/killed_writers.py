@@ -24,7 +24,7 @@ from steptwin.files.export import write_trace
 from steptwin.files.recording import recording_of, save
 from steptwin.files.world import World
 from steptwin.live.studio.drawing import WorldArrangement
-from steptwin.simulation.describe.arrangement import DrawnPlace
+from steptwin.simulation.describe.arrangement import DrawnPosition
 
 PROGRAM = "if in1=1\ndelay 5\nendif\n" * 800 + "end\n"
 IMAGE_OF = "IF IN1 = 1\nDELAY 5\nENDIF\n"
@@ -63,7 +63,7 @@ def ways(folder: Path) -> dict[str, tuple[Path, bytes, Act]]:
     return {
         "fmt": (folder / "a.prg", PROGRAM.encode(), partial(command, "fmt", "a.prg")),
         "save": (folder / "s.json", old, partial(save, recording, folder / "s.json")),
-        "save arrangement": (folder / "drawn.toml", WORLD.encode(), partial(drawn.save, [DrawnPlace("table", 1, 2)])),
+        "save arrangement": (folder / "drawn.toml", WORLD.encode(), partial(drawn.save, [DrawnPosition("table", 1, 2)])),
         "build": (folder / "b.wbc", old, partial(command, "build", "i.prg", "-o", "b.wbc")),
         "decompile": (folder / "d.prg", old, partial(command, "decompile", "i.wbc", "-o", "d.prg")),
         "migrate": (folder / "m.m1486", old, partial(command, "migrate", "c.m1486", "--to", "B", "-o", "m.m1486")),

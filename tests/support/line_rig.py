@@ -17,9 +17,9 @@ from virtual_loop import VirtualLoop
 
 from steptwin.controller import MICROSECOND, SECOND
 from steptwin.drivers.exchange import LineLost
+from steptwin.drivers.lineaddress import LineAddress
 from steptwin.drivers.m1486 import lines as m1486_lines
 from steptwin.drivers.mic488 import lines as mic488_lines
-from steptwin.drivers.place import LineAddress
 from steptwin.drivers.threads import ThreadLine
 from steptwin.errors import SteptwinError
 

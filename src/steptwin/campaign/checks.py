@@ -21,8 +21,8 @@ from steptwin.simulation.describe.includes import FILE_KEYS, USE, given_files
 from steptwin.simulation.describe.overrides import override, place_of
 from steptwin.simulation.faults import read as read_fault
 from steptwin.simulation.script import steps as do
+from steptwin.simulation.toml.keypaths import Path as TomlPath
 from steptwin.simulation.toml.reader import TomlText
-from steptwin.simulation.toml.tomlplaces import Path as TomlPath
 from steptwin.simulation.world.references import check_step
 
 CAMPAIGN, VARY, FAULT, STEP, PROPERTY, MEASURE = "campaign", "vary", "fault", "step", "property", "measure"

@@ -43,7 +43,7 @@ def command(
     """
     import asyncio
 
-    from steptwin.drivers.place import parse_line_address
+    from steptwin.drivers.lineaddress import parse_line_address
     from steptwin.live.sniff import sniff as run
     from steptwin.simulation.toml.addresses import parse_address
 

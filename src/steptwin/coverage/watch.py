@@ -12,7 +12,7 @@ from typing import NamedTuple
 from steptwin.controller import Nanos
 from steptwin.coverage.counts import END, Coverage, TextCoverage, Way
 from steptwin.diagnostics import SourceText
-from steptwin.simulation.kinds.programs import Place, Programs
+from steptwin.simulation.kinds.programs import Programs, StatementLocation
 from steptwin.simulation.world.simulation import Simulation
 
 
@@ -45,7 +45,7 @@ class _Branch(NamedTuple):
     """A branch that was executed, and where it can go on."""
 
     text: _KnownText
-    place: Place
+    location: StatementLocation
     after: tuple[int, ...]
 
 
@@ -71,7 +71,7 @@ class _Counter:
         self._know_all()
         if self._branch is not None:
             stack = self._programs.stack(now)
-            self._went(self._branch, now, stack[0].place if stack else None)
+            self._went(self._branch, now, stack[0].location if stack else None)
 
     def _know_all(self) -> None:
         """A text counts as soon as it is there."""
@@ -98,37 +98,37 @@ class _Counter:
         if now < self._last:
             self._branch = None  # the world has gone back: this is not what came after it
         self._last = now
-        place = self._programs.place(number)
+        location = self._programs.location(number)
         if self._branch is not None:
-            self._went(self._branch, now, place)
+            self._went(self._branch, now, location)
             self._branch = None
-        if place is None:
+        if location is None:
             return
-        text = self._text(place.text, self._programs.texts[place.text])
-        start = text.start(place.number)
+        text = self._text(location.text, self._programs.texts[location.text])
+        start = text.start(location.number)
         after = text.coverage.after.get(start)
         if after is not None:
             text.coverage.hits[start] += 1
             if len(after) > 1:
-                self._branch = _Branch(text, place, after)
+                self._branch = _Branch(text, location, after)
 
-    def _went(self, branch: _Branch, now: Nanos, place: Place | None) -> None:
-        """Count the way that a branch went; ``place`` is executed next, or None, a statement of no text."""
-        target = self._target(branch, place)
+    def _went(self, branch: _Branch, now: Nanos, location: StatementLocation | None) -> None:
+        """Count the way that a branch went; ``location`` is executed next, or None, a statement of no text."""
+        target = self._target(branch, location)
         if target is None:
             # An interrupt came between: it returns to what would have come next.
-            returns = (self._target(branch, frame.place) for frame in self._programs.stack(now)[1:2])
+            returns = (self._target(branch, frame.location) for frame in self._programs.stack(now)[1:2])
             target = next((there for there in returns if there is not None), None)
         if target is None and END in branch.after and END not in branch.text.starts:
             target = END  # which is no statement in this language
         if target is not None:
             text = branch.text.coverage
-            text.taken[Way(branch.text.start(branch.place.number), target)] += 1
+            text.taken[Way(branch.text.start(branch.location.number), target)] += 1
 
     @staticmethod
-    def _target(branch: _Branch, place: Place | None) -> int | None:
-        """Where a branch went if a place is executed next; None if it does not lead there."""
-        if place is None or place.text != branch.place.text:
+    def _target(branch: _Branch, location: StatementLocation | None) -> int | None:
+        """Where a branch went if ``location`` is executed next; None if it does not lead there."""
+        if location is None or location.text != branch.location.text:
             return None
-        start = branch.text.start(place.number)
+        start = branch.text.start(location.number)
         return start if start in branch.after else None

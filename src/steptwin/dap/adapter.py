@@ -126,7 +126,9 @@ class Adapter:
         except SteptwinError:
             world.close()
             raise
-        debugger.on_log = lambda logged: self._log(logged.time, logged.text, debugger.location(logged.controller, logged.place))
+        debugger.on_log = lambda logged: self._log(
+            logged.time, logged.text, debugger.location(logged.controller, logged.location)
+        )
         self._world, self._launch, self._debugged.target, self._debugged.sources = world, asked, debugger, sources
         self._stops_on_entry, self._breakpoints.is_off = asked.stop_on_entry, asked.no_debug
         return {}

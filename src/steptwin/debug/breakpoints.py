@@ -14,7 +14,7 @@ from steptwin.debug.values import DataPoint, LabelPoint, LinePoint, SetPoint
 from steptwin.errors import Misuse
 from steptwin.messages import NONE, Message, text_of
 from steptwin.nearmiss import NearMiss
-from steptwin.simulation.kinds.programs import Place, Programs
+from steptwin.simulation.kinds.programs import Programs, StatementLocation
 from steptwin.simulation.world.simulation import Simulation
 
 MOST_HITS = 1 << 16
@@ -29,14 +29,18 @@ class Breakpoint:
     """A breakpoint at statements. Raises `Misuse` for a condition, hit count or log text that is none."""
 
     def __init__(
-        self, number: int, asked: LinePoint | LabelPoint, places: Mapping[str, Sequence[Place]], calculate: ResolveExpression
+        self,
+        number: int,
+        asked: LinePoint | LabelPoint,
+        locations: Mapping[str, Sequence[StatementLocation]],
+        calculate: ResolveExpression,
     ) -> None:
         self.number = number
         self.asked = asked
-        self.places = places
+        self.locations = locations
         """By controller."""
         condition = asked.condition
-        self._conditions = {} if condition is None else {controller: calculate(controller, condition) for controller in places}
+        self._conditions = {} if condition is None else {controller: calculate(controller, condition) for controller in locations}
         self._counts = None if asked.hits is None else HitCount(asked.hits)
         self.log: LogText | None = None
         if isinstance(asked, LinePoint) and asked.log is not None:
@@ -143,27 +147,27 @@ UNKNOWN_TEXT = Message("debug.unknown-text", "{controller} has no text {text!r}:
 NO_STATEMENT_IN_LINE = Message("debug.no-statement-in-line", "no statement is in line {line} of {name} or after it")
 
 
-def places_of_line(programs: Mapping[str, Programs], asked: LinePoint) -> tuple[Place, int]:
+def locations_of_line(programs: Mapping[str, Programs], asked: LinePoint) -> tuple[StatementLocation, int]:
     """The first statement in a line or after it, and its line. Raises `Misuse`."""
     own = _programs_of(programs, asked.controller)
     if asked.text not in own.texts:
         raise Misuse(UNKNOWN_TEXT(controller=asked.controller, text=asked.text, names=list(own.texts)))
     for number, statement in enumerate(own.statements(asked.text)):
         if statement.line >= asked.line and statement.start < statement.end:
-            return Place(asked.text, number), statement.line
+            return StatementLocation(asked.text, number), statement.line
     raise Misuse(NO_STATEMENT_IN_LINE(line=asked.line, name=own.texts[asked.text].name))
 
 
 UNKNOWN_LABEL = Message("debug.unknown-label", "no label is called {label!r}{hint}; there are {names}")
 
 
-def places_of_label(programs: Mapping[str, Programs], label: str) -> dict[str, list[Place]]:
+def locations_of_label(programs: Mapping[str, Programs], label: str) -> dict[str, list[StatementLocation]]:
     """The statements at a label, by controller. Raises `Misuse` with the labels there are."""
-    found: dict[str, list[Place]] = {}
+    found: dict[str, list[StatementLocation]] = {}
     wanted = label.strip().lstrip("@").upper()
     for controller, text, name, number in _labels(programs):
         if name.upper() in (wanted, f"LABEL {wanted}"):
-            found.setdefault(controller, []).append(Place(text, number))
+            found.setdefault(controller, []).append(StatementLocation(text, number))
     if not found:
         known = list(dict.fromkeys(name for _, _, name, _ in _labels(programs)))
         raise Misuse(UNKNOWN_LABEL(label=label, hint=NearMiss().hint(wanted, known), names=list(known) or NONE()))
@@ -177,14 +181,14 @@ def _labels(programs: Mapping[str, Programs]) -> Iterator[tuple[str, str, str, i
                 yield controller, text, name, number
 
 
-def _why_not_reached(programs: Programs, place: Place, standing: Simulation | None, controller: str) -> str:
+def _why_not_reached(programs: Programs, location: StatementLocation, standing: Simulation | None, controller: str) -> str:
     """Why a program will not come to a statement; empty where it can."""
-    line = programs.statements(place.text)[place.number].line
-    if place.number not in programs.reached(place.text, (0,)):
+    line = programs.statements(location.text)[location.number].line
+    if location.number not in programs.reached(location.text, (0,)):
         return f"no way of the program leads to line {line}"
     stack = () if standing is None else standing.programs_of(controller).stack(standing.now)
-    here = [frame.place.number for frame in stack if frame.place.text == place.text]
-    if here and place.number not in programs.reached(place.text, here):
+    here = [frame.location.number for frame in stack if frame.location.text == location.text]
+    if here and location.number not in programs.reached(location.text, here):
         return f"from where it is, the program comes to line {line} only if it is started again"
     return ""
 
@@ -197,7 +201,7 @@ class Breakpoints:
         self._calculate = calculate
         self._all: list[Breakpoint] = []
         self.watches: list[Watch] = []
-        self.at: dict[str, dict[Place, list[Breakpoint]]] = {}
+        self.at: dict[str, dict[StatementLocation, list[Breakpoint]]] = {}
         """By controller and statement."""
         self._next = 1
 
@@ -219,22 +223,22 @@ class Breakpoints:
                 return SetPoint(number)
             line: int | None = None
             if isinstance(asked, LabelPoint):
-                places = places_of_label(self._programs, asked.label)
+                locations = locations_of_label(self._programs, asked.label)
             else:
-                place, line = places_of_line(self._programs, asked)
-                places = {asked.controller: [place]}
-            point = Breakpoint(number, asked, places, self._calculate)
+                location, line = locations_of_line(self._programs, asked)
+                locations = {asked.controller: [location]}
+            point = Breakpoint(number, asked, locations, self._calculate)
         except Misuse as error:
             return SetPoint(number, problem=text_of(error))
         if before is not None:
             point.take_hits(before)
         self._all.append(point)
-        for controller, its_places in places.items():
-            for place in its_places:
-                self.at.setdefault(controller, {}).setdefault(place, []).append(point)
-        found = [(controller, place) for controller, its in places.items() for place in its]
-        notes = [_why_not_reached(self._programs[controller], place, standing, controller) for controller, place in found]
-        return SetPoint(number, [place for _, place in found], line, note="" if "" in notes else notes[0])
+        for controller, its_locations in locations.items():
+            for location in its_locations:
+                self.at.setdefault(controller, {}).setdefault(location, []).append(point)
+        found = [(controller, location) for controller, its in locations.items() for location in its]
+        notes = [_why_not_reached(self._programs[controller], location, standing, controller) for controller, location in found]
+        return SetPoint(number, [location for _, location in found], line, note="" if "" in notes else notes[0])
 
     def reading_others(self) -> list[str]:
         """The controllers with conditions that depend on what has no connection to them."""

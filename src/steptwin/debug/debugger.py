@@ -21,7 +21,7 @@ from steptwin.debug.values import Events, FormattedValue, Location, Scope, SetPo
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.simulation.kinds.programs import Place, Programs
+from steptwin.simulation.kinds.programs import Programs, StatementLocation
 from steptwin.simulation.world.inputs import ExternalInput
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import SimulationSnapshot
@@ -157,14 +157,14 @@ class Debugger:
     def stack(self, controller: str) -> Sequence[StackFrame]:
         """The statement that is executed, or comes next, then those to which it returns; empty where no program runs."""
         frames = self._programs(controller).stack(self.now)
-        return [StackFrame(frame.name, self.location(controller, frame.place)) for frame in frames]
+        return [StackFrame(frame.name, self.location(controller, frame.location)) for frame in frames]
 
-    def location(self, controller: str, place: Place) -> Location:
+    def location(self, controller: str, location: StatementLocation) -> Location:
         programs = self._programs(controller)
-        statement, source = programs.statements(place.text)[place.number], programs.texts[place.text]
+        statement, source = programs.statements(location.text)[location.number], programs.texts[location.text]
         line, column = source.position(statement.start)
         end_line, end_column = source.position(statement.end)
-        return Location(controller, place.text, source.name, line, column, end_line, end_column)
+        return Location(controller, location.text, source.name, line, column, end_line, end_column)
 
     # ------------------------------------------------------------------ values
 
@@ -227,7 +227,7 @@ class Debugger:
         """The next statement that is not in a call or interrupt which begins here."""
         programs = self._programs(controller)
         stack = programs.stack(self.now)
-        comes_back = not stack or programs.comes_back(stack[0].place)
+        comes_back = not stack or programs.comes_back(stack[0].location)
         return Goal((controller,), programs.depth() if comes_back else None)
 
     def out(self, controller: str) -> Goal:

@@ -222,7 +222,7 @@ class LookAheadRun:
         was, watched = self.now, self._watched
         yield from self.look_at(begun.stand)
         held = [point for point in begun.undecided if point.holds(begun.controller, begun.stand) and point.counts(begun.time)]
-        hit = tuple(point for point in held if not self._observer.log(begun.time, begun.controller, begun.place, point))
+        hit = tuple(point for point in held if not self._observer.log(begun.time, begun.controller, begun.location, point))
         yield from self.look_at(was)
         self._watched = watched
         return None if not hit else _stop_at(begun._replace(hit=hit))

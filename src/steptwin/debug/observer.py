@@ -8,7 +8,7 @@ from typing import NamedTuple
 from steptwin.controller import Nanos
 from steptwin.debug.breakpoints import Breakpoint, Breakpoints
 from steptwin.errors import Misuse
-from steptwin.simulation.kinds.programs import Place, Programs
+from steptwin.simulation.kinds.programs import Programs, StatementLocation
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.statements import StatementHook
@@ -22,7 +22,7 @@ class Begun(NamedTuple):
 
     time: Nanos
     controller: str
-    place: Place
+    location: StatementLocation
     depth: int
     hit: tuple[Breakpoint, ...]
     undecided: tuple[Breakpoint, ...]
@@ -36,7 +36,7 @@ class Begun(NamedTuple):
 class Logged(NamedTuple):
     time: Nanos
     controller: str
-    place: Place
+    location: StatementLocation
     text: str
 
 
@@ -66,8 +66,8 @@ class Observer:
         self.logged: list[Logged] = []
         self.happened: list[ObservedEvent] = []
         self._hooks = {controller: self._hook(controller, programs) for controller, programs in world.programs.items()}
-        self._hooked: dict[str, frozenset[Place] | None] = {}
-        """The places before which hooks are called, by controller; None: all."""
+        self._hooked: dict[str, frozenset[StatementLocation] | None] = {}
+        """The locations before which hooks are called, by controller; None: all."""
         world.trace.subscribers.append(self._recorded)
 
     def clear(self) -> None:
@@ -82,15 +82,15 @@ class Observer:
         """
         self.stepping = stepping
         for controller, programs in self.world.programs.items():
-            places = None if controller in stepping else frozenset(self.points.at.get(controller, ()))
-            if places == self._hooked.get(controller, frozenset()):
+            locations = None if controller in stepping else frozenset(self.points.at.get(controller, ()))
+            if locations == self._hooked.get(controller, frozenset()):
                 continue
             if controller in self._hooked:
                 programs.remove_hook(self._hooks[controller])
                 del self._hooked[controller]
-            if places != frozenset():
-                programs.add_hook(self._hooks[controller], places)
-                self._hooked[controller] = places
+            if locations != frozenset():
+                programs.add_hook(self._hooks[controller], locations)
+                self._hooked[controller] = locations
         scheduler_of = self.world.objects.scheduler_of
         self.world.synced_first = [scheduler_of[controller] for controller in self.points.reading_others()]
 
@@ -105,26 +105,30 @@ class Observer:
             points = self.points.at.get(controller)
             if not self.is_on or (not points and controller not in self.stepping):
                 return
-            place = programs.place(number)
-            if place is not None:
-                at = points.get(place, ()) if points else ()
+            location = programs.location(number)
+            if location is not None:
+                at = points.get(location, ()) if points else ()
                 if at or controller in self.stepping:
-                    self._begins(now, controller, programs, place, at)
+                    self._begins(now, controller, programs, location, at)
 
         return hook
 
-    def _begins(self, now: Nanos, controller: str, programs: Programs, place: Place, points: Collection[Breakpoint]) -> None:
+    def _begins(
+        self, now: Nanos, controller: str, programs: Programs, location: StatementLocation, points: Collection[Breakpoint]
+    ) -> None:
         hit: list[Breakpoint] = []
         undecided: list[Breakpoint] = []
         for point in points:
             if not point.is_known(controller, now):
                 undecided.append(point)
-            elif point.holds_at_statement(controller, now) and point.counts(now) and not self.log(now, controller, place, point):
+            elif (
+                point.holds_at_statement(controller, now) and point.counts(now) and not self.log(now, controller, location, point)
+            ):
                 hit.append(point)
         if hit or undecided or controller in self.stepping:
-            self.begun.append(Begun(now, controller, place, programs.depth(), tuple(hit), tuple(undecided)))
+            self.begun.append(Begun(now, controller, location, programs.depth(), tuple(hit), tuple(undecided)))
 
-    def log(self, now: Nanos, controller: str, place: Place, point: Breakpoint) -> bool:
+    def log(self, now: Nanos, controller: str, location: StatementLocation, point: Breakpoint) -> bool:
         """Log what a breakpoint that is hit has to log. False where it has nothing: then it stops."""
         if point.log is None:
             return False
@@ -132,7 +136,7 @@ class Observer:
             text = point.log.formatted(now)
         except Misuse as error:
             text = f"log: {error}"
-        self.logged.append(Logged(now, controller, place, text))
+        self.logged.append(Logged(now, controller, location, text))
         return True
 
     def _recorded(self, record: TraceRecord) -> None:

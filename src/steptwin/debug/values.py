@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from steptwin.controller import Nanos
-from steptwin.simulation.kinds.programs import Place
+from steptwin.simulation.kinds.programs import StatementLocation
 
 
 class StopReason(enum.Enum):
@@ -96,7 +96,7 @@ class SetPoint(NamedTuple):
     """Result of setting a breakpoint: where it is, or why it is nowhere."""
 
     number: int
-    places: Sequence[Place] = ()
+    locations: Sequence[StatementLocation] = ()
     line: int | None = None
     """Line of the statement, which may come after the line that was asked for."""
     problem: str = ""

@@ -14,7 +14,7 @@ ONLY_INTO_THE_FOLDER = Message("files.only-into-the-folder", "cannot write {path
 NOT_THROUGH_A_LINK = Message("files.not-through-a-link", "cannot write {path}: it is a link, and requests write through none")
 
 
-def place_in(folder: Path, name: str) -> Path:
+def path_in_folder(folder: Path, name: str) -> Path:
     """The path of the file ``name`` in ``folder`` or below it; ``name`` may be absolute.
 
     Raises `Misuse` for a place elsewhere, also one that a link leads to, and for a file that is a link or has a second name.

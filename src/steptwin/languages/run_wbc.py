@@ -43,7 +43,7 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.homing import Homing
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.inputs import index_input
-from steptwin.mic488.present import place_of, state_of
+from steptwin.mic488.present import current_line, state_of
 from steptwin.mic488.program import RUNNING
 from steptwin.mic488.status import AxisStatus, ProgramState
 from steptwin.simulation.describe.generated import Whole
@@ -287,7 +287,7 @@ def _ending(watch: RunWatch, ending: Ending) -> str:
         return f"an error has stopped the program in line {line}: {fault.text}"
     if ending.why == "ended":
         return "the program has ended"
-    place = place_of(watch.device)
+    place = current_line(watch.device)
     if place is None:
         return "ended at the time limit"
     if ending.why == "waiting":

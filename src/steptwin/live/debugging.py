@@ -465,7 +465,7 @@ class _OpenDebugger:
         self._live.subject.publish(debugger.now, controller, said)
 
     def _log(self, logged: Logged) -> None:
-        at = self.debugger.location(logged.controller, logged.place)
+        at = self.debugger.location(logged.controller, logged.location)
         self._live.subject.publish(logged.time, logged.controller, LogPayload(logged.text, at.text, at.line))
 
 

@@ -83,7 +83,7 @@ class Link(Protocol):
     async def close(self) -> None: ...
 
 
-class PlacedLink(Link, Protocol):
+class PathLink(Link, Protocol):
     """A link with a path."""
 
     @property

@@ -7,12 +7,12 @@ from pathlib import Path
 
 from steptwin.controller import Port
 from steptwin.errors import Misuse
-from steptwin.live.links import PlacedLink
+from steptwin.live.links import PathLink
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.system import HAS_PTYS
 
 
-def pty_link(realtime: RealTimeDriver, path: Path, make_port: Callable[[], Port]) -> PlacedLink:
+def pty_link(realtime: RealTimeDriver, path: Path, make_port: Callable[[], Port]) -> PathLink:
     """A link at ``path``, not yet open. Raises `Misuse` on a system without pseudo terminals."""
     if not HAS_PTYS:
         raise Misuse(

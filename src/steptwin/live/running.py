@@ -37,7 +37,7 @@ from steptwin.live.serving import check_name, shows_live_view
 from steptwin.live.timetravel import WorldTimeTravel
 from steptwin.live.tracedport import TracedPort
 from steptwin.live.transports import TRANSPORTS, VISION
-from steptwin.live.world import LiveWorld, PlacePort, VisionPort, announced
+from steptwin.live.world import ClientPort, LiveWorld, VisionPort, announced
 from steptwin.live.world_control import WorldControl
 from steptwin.services import read_services
 from steptwin.simulation.kinds.kind import LinkKind
@@ -125,8 +125,8 @@ def up_with(world: World, options: UpOptions, addition: Addition | None = None) 
 def send_away(world: World) -> None:
     """Disconnect the clients of a continued recording: they are not connected now."""
     for line in world.lines.values():
-        for place in [place for place in line.places if place != SCRIPTS]:
-            world.apply_input(Leave(line.name, place))
+        for client in [client for client in line.clients if client != SCRIPTS]:
+            world.apply_input(Leave(line.name, client))
 
 
 async def _serve(
@@ -279,7 +279,7 @@ async def _open_line(server: Server, live: LiveWorld, line: LineSpec, options: U
 
     def maker(link: LinkKind, *, several: bool) -> Callable[[], SendingPort]:
         def make() -> SendingPort:
-            port = PlacePort(live, line.name, f"{link.place}-{next(number)}" if several else link.place, link.place_kind)
+            port = ClientPort(live, line.name, f"{link.client}-{next(number)}" if several else link.client, link.client_kind)
             return TracedPort(port, line.name) if is_traced() else port
 
         return make

@@ -11,7 +11,7 @@ from typing import cast
 
 from steptwin.controller import SECOND, Nanos, Port
 from steptwin.drivers.kind import Decoder
-from steptwin.drivers.place import LineAddress
+from steptwin.drivers.lineaddress import LineAddress
 from steptwin.errors import LineFailure, Misuse
 from steptwin.live.clients import Clients
 from steptwin.live.clock import Clock

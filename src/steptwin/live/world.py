@@ -120,7 +120,7 @@ class LiveWorld:
         self.subject = WorldSubject(world, self.apply_input)
         self.trace_file: Path | None = None
         """Where its trace is written as it happens."""
-        self.ports: set[PlacePort] = set()
+        self.ports: set[ClientPort] = set()
         """Programs that are connected to lines."""
         self.external_actor: ExternalActor | None = None
         """``is_dirty`` is to be set when its deadline has changed."""
@@ -187,9 +187,9 @@ class LiveWorld:
         if self.ring is not None:
             self.ring.clear()
         for line in world.spec.lines:
-            links = {link.place for link in line_kinds()[line.kind].opened_by.values()}
-            for place in [place for place in world.lines[line.name].places if place.partition("-")[0] in links]:
-                self.apply_input(Leave(line.name, place))
+            links = {link.client for link in line_kinds()[line.kind].opened_by.values()}
+            for client in [client for client in world.lines[line.name].clients if client.partition("-")[0] in links]:
+                self.apply_input(Leave(line.name, client))
         for port in list(self.ports):
             port.join()
         if self.snapshots is not None:
@@ -346,18 +346,18 @@ class VisionPort:
         """Nothing is kept of it."""
 
 
-class PlacePort:
+class ClientPort:
     """A port of a line for another program, which uses the line directly."""
 
-    def __init__(self, live: LiveWorld, line: str, place: str, kind: str) -> None:
+    def __init__(self, live: LiveWorld, line: str, client: str, kind: str) -> None:
         world = live.world
         self.line = line
         self._live = live
         self._world = world
         self._line = world.lines[line]
         self._scheduler = world.objects.scheduler_of[line]
-        self._places = self._line.places
-        self._name = place
+        self._clients = self._line.clients
+        self._name = client
         self._kind = kind
         self.broken: str | None = None
         self.on_output: Callable[[], None] | None = None
@@ -376,9 +376,9 @@ class PlacePort:
         self._live.subject.sources[self.line, self._name] = source
 
     def _connected(self) -> LineEndPoint:
-        place = self._line.connect(self._name, self._kind)
-        place.on_output = self._came
-        return place
+        client = self._line.connect(self._name, self._kind)
+        client.on_output = self._came
+        return client
 
     def _came(self) -> None:
         if self.on_output is not None:
@@ -389,46 +389,46 @@ class PlacePort:
         now = world.now  # a world that was stopped stands
         if scheduler.now != now or scheduler.is_dirty:
             scheduler.advance(now)
-        place = self._places.get(self._name)
-        if place is None or place.on_output is None:
-            place = self._connected()
+        client = self._clients.get(self._name)
+        if client is None or client.on_output is None:
+            client = self._connected()
         if world.records_inputs or world.trace.is_recorded:
-            answer = self._recorded(place, data, now)
+            answer = self._recorded(client, data, now)
         else:
-            answer = self._line.exchange(self._name, place, data, now)
-        if scheduler.is_dirty or place.received:
-            answer = self._with_the_rest(place, answer, now)
-        self.broken = place.inner.broken
+            answer = self._line.exchange(self._name, client, data, now)
+        if scheduler.is_dirty or client.received:
+            answer = self._with_the_rest(client, answer, now)
+        self.broken = client.inner.broken
         return answer
 
-    def _recorded(self, place: LineEndPoint, data: bytes, now: Nanos) -> bytes:
+    def _recorded(self, client: LineEndPoint, data: bytes, now: Nanos) -> bytes:
         """An exchange that is recorded in recording and trace, unless it changes nothing."""
         world, line = self._live.world, self._line
-        if line.is_idle_read(place, data):
-            return line.exchange_unrecorded(self._name, place, data, now)
+        if line.is_idle_read(client, data):
+            return line.exchange_unrecorded(self._name, client, data, now)
         given = Bytes(line.name, self._name, self._kind, data)
         if world.keeps_inputs:
             self._live.make_room(given)
-        answer = line.exchange(self._name, place, data, now)
+        answer = line.exchange(self._name, client, data, now)
         world.record_input(given)
         return answer
 
-    def _with_the_rest(self, place: LineEndPoint, answer: bytes, now: Nanos) -> bytes:
+    def _with_the_rest(self, client: LineEndPoint, answer: bytes, now: Nanos) -> bytes:
         """The answer between what came before and what has come with it."""
-        before = place.take(now) if place.received else []
-        place.on_output = None  # what comes at once is given back at once
+        before = client.take(now) if client.received else []
+        client.on_output = None  # what comes at once is given back at once
         if self._scheduler.is_dirty:
             self._scheduler.propagate()
-        place.on_output = self._came
-        if not before and not place.received:
+        client.on_output = self._came
+        if not before and not client.received:
             return answer
-        return b"".join([*(piece for _, piece in before), answer, *(piece for _, piece in place.take(now))])
+        return b"".join([*(piece for _, piece in before), answer, *(piece for _, piece in client.take(now))])
 
     def to_send(self, now: Nanos) -> list[tuple[Nanos, bytes]]:
         now = self._live.world.now
         self._scheduler.advance(now)
-        place = self._places.get(self._name)
-        return [] if place is None else place.take(now)
+        client = self._clients.get(self._name)
+        return [] if client is None else client.take(now)
 
     def deadline(self) -> Nanos | None:
         """Nothing to be asked for: ``on_output`` is called when there is something."""

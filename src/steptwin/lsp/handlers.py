@@ -27,7 +27,7 @@ from steptwin.symbols import SymbolRole
 Answer = TypeVar("Answer")
 
 
-class AtPlace(typing.Protocol):
+class AtPosition(typing.Protocol):
     """The parameters of a question about a place."""
 
     text_document: lsp.TextDocumentIdentifier
@@ -40,7 +40,7 @@ def _of(server: EditorServer, uri: str, ask: Callable[[Analysis, Converter], Ans
     return None if found is None else ask(*found)
 
 
-def _at(server: EditorServer, params: AtPlace, ask: Callable[[Analysis, Converter, int], Answer]) -> Answer | None:
+def _at(server: EditorServer, params: AtPosition, ask: Callable[[Analysis, Converter, int], Answer]) -> Answer | None:
     """As `_of`, for a place."""
     return _of(server, params.text_document.uri, lambda text, converter: ask(text, converter, converter.place(params.position)))
 

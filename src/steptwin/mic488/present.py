@@ -39,7 +39,7 @@ MOST_KEPT = 64
 """Statuses whose meaning is kept."""
 
 
-class StatementPlace(NamedTuple):
+class SourceLine(NamedTuple):
     """A statement of a program's text."""
 
     file: str
@@ -47,20 +47,20 @@ class StatementPlace(NamedTuple):
     text: str
 
 
-def place_of(device: Mic488Device) -> StatementPlace | None:
+def current_line(device: Mic488Device) -> SourceLine | None:
     """The statement that the running or paused program is at; None when there is none."""
     running, span = device.program.running, device.program.statement(device.now)
     if running is None or span is None:
         return None
     source = running.source
-    return StatementPlace(
+    return SourceLine(
         source.name, source.position(span.start)[0], visible(source.text[span.start : span.end].strip()) or "its end"
     )
 
 
 def statement_of(device: Mic488Device) -> str | None:
     """The statement as text: its line and its source."""
-    place = place_of(device)
+    place = current_line(device)
     return None if place is None else f"line {place.line}: {place.text}"
 
 
@@ -105,7 +105,7 @@ class Mic488State(StateReader[Mic488Device]):
         return controller_status(device.status())
 
     def program(self, device: Mic488Device, now: Nanos) -> StateProgram:
-        place, fault = place_of(device), device.program.fault
+        place, fault = current_line(device), device.program.fault
         activity = ACTIVITIES[device.program.state]
         text = activity.value
         if place is not None:

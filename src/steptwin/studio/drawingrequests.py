@@ -9,7 +9,7 @@ from typing import Annotated, Any, Protocol, TypeAlias
 from steptwin.access.roles import LOOK, SERVICE
 from steptwin.fields import LONGEST_TEXT, Meaning, Schema, ValueType, check_text, whole, wrong
 from steptwin.jsonvalues import TEXT, members, or_null
-from steptwin.simulation.describe.arrangement import MOST_PLACED, MOST_PX, DrawnPlace
+from steptwin.simulation.describe.arrangement import MOST_PLACED, MOST_PX, DrawnPosition
 from steptwin.studio.requesttype import request
 
 
@@ -20,7 +20,7 @@ class Arrangement(Protocol):
         """As `_DRAWING`."""
         ...
 
-    def save(self, places: Sequence[DrawnPlace]) -> Mapping[str, object]:
+    def save(self, places: Sequence[DrawnPosition]) -> Mapping[str, object]:
         """As `_SAVED`. Raises `Misuse` for what is not there, `Refusal` where the description cannot be changed."""
         ...
 
@@ -29,10 +29,10 @@ _PIXELS: Schema = {"type": "integer", "minimum": 0, "maximum": MOST_PX}
 _CORNER: Schema = {"type": "array", "items": _PIXELS, "minItems": 2, "maxItems": 2}
 
 
-def _places(value: Any) -> tuple[DrawnPlace, ...]:
+def _places(value: Any) -> tuple[DrawnPosition, ...]:
     if not isinstance(value, dict) or len(value) > MOST_PLACED:
         raise wrong(value, PLACES.what)
-    return tuple(DrawnPlace(check_text(name), *_corner(corner)) for name, corner in value.items())
+    return tuple(DrawnPosition(check_text(name), *_corner(corner)) for name, corner in value.items())
 
 
 def _corner(value: Any) -> tuple[int, int]:
@@ -85,7 +85,7 @@ class ReadDrawing:
 @dataclass(frozen=True, slots=True)
 class SaveDrawing:
     places: Annotated[
-        tuple[DrawnPlace, ...],
+        tuple[DrawnPosition, ...],
         Meaning("By the names of axes and elements; 'tool path', 'all buttons'. None: it is drawn by itself.", PLACES),
     ]
 

@@ -67,7 +67,7 @@ class WorldSubject:
         self.snapshots = Snapshots()
         self.dispatcher = Dispatcher(self._actions(), self._begin, self._end)
         self.sources: dict[tuple[str, str], str] = {}
-        """Who is at a place of a line, for writes; a place that is not named here stands for itself."""
+        """Who a client of a line is, for writes; a client that is not named here stands for itself."""
         self._traffic: dict[str, TrafficLog] = {}
         self._writes: list[Callable[[], None]] = []
         """Functions that end the observation of writes; empty while nobody subscribes to them."""
@@ -372,8 +372,8 @@ class WorldSubject:
 
     def _written(self, line: str, seen: LineWrite) -> None:
         controllers = [self._controller_of[line, unit] for unit in seen.units]
-        source = self.sources.get((line, seen.place), seen.place)
-        payload = WritePayload(seen.place, source, seen.words, seen.outcome)
+        source = self.sources.get((line, seen.client), seen.client)
+        payload = WritePayload(seen.client, source, seen.words, seen.outcome)
         self.publish(seen.time, controllers[0] if len(controllers) == 1 else line, payload)
 
     def _framed(self, line: str, frame: FrameLine) -> None:

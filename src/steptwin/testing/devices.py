@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 from steptwin.drivers import Mic488
 from steptwin.drivers.address import parse_device
+from steptwin.drivers.lineaddress import parse_line_address
 from steptwin.drivers.mic488.kind import unit_of
-from steptwin.drivers.place import parse_line_address
 from steptwin.errors import Misuse
 from steptwin.mic488.config import ControllerConfig
 

@@ -13,7 +13,7 @@ import pytest
 from steptwin.controller import Nanos, Port
 from steptwin.drivers import m1486 as host
 from steptwin.drivers.address import parse_device
-from steptwin.drivers.place import parse_line_address
+from steptwin.drivers.lineaddress import parse_line_address
 from steptwin.drivers.tcp import Channel
 from steptwin.errors import Misuse
 from steptwin.files.loader import set_faults

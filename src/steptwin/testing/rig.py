@@ -18,7 +18,7 @@ from steptwin.controllerstate import ControllerState
 from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.jsonvalues import read
-from steptwin.live.world import LiveWorld, PlacePort
+from steptwin.live.world import ClientPort, LiveWorld
 from steptwin.live.world_frames import subscribe_to_frames
 from steptwin.simulation.describe.generated import LINE
 from steptwin.simulation.faults import read as read_fault
@@ -233,7 +233,7 @@ class LineRig(Rig):
     def _place(self, link: str, kind: str) -> Port:
         """A place on its line for one more program."""
         live = self._live or self.twin_only("a port")
-        return PlacePort(live, LINE, f"{link}-{next(self._places)}", kind)
+        return ClientPort(live, LINE, f"{link}-{next(self._places)}", kind)
 
     # ------------------------------------------------------------------ inputs, faults, power
 

@@ -10,10 +10,10 @@ from typing import TypeVar
 
 from steptwin.controller import MILLISECOND, SECOND, Nanos, Port
 from steptwin.drivers import LineLost, Mic488
+from steptwin.drivers.lineaddress import LineAddress
 from steptwin.drivers.m1486 import M1486
 from steptwin.drivers.m1486.lines import BAUD, talking
 from steptwin.drivers.mic488.lines import FRAMES_PER_SECOND, modbus_exchanger
-from steptwin.drivers.place import LineAddress
 from steptwin.drivers.tcp import Channel
 from steptwin.drivers.threads import ThreadLine
 from steptwin.live.realtimedriver import Advanceable
@@ -80,7 +80,7 @@ class VirtualTime:
 
 
 class MemoryEndpoint:
-    """A line of a twin as a driver opens it: see `steptwin.drivers.place.Endpoint`. Bytes take no time."""
+    """A line of a twin as a driver opens it: see `steptwin.drivers.lineaddress.Endpoint`. Bytes take no time."""
 
     def __init__(self, time: VirtualTime, make_port: Callable[[], Port], place: str) -> None:
         self._time = time

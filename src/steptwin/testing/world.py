@@ -13,14 +13,14 @@ import steptwin.services  # noqa: F401  their tables are checked, too
 from steptwin.controller import Nanos
 from steptwin.drivers import Mic488
 from steptwin.drivers.address import parse_device
-from steptwin.drivers.place import parse_line_address
+from steptwin.drivers.lineaddress import parse_line_address
 from steptwin.drivers.tcp import Channel
 from steptwin.durations import duration
 from steptwin.errors import Misuse
 from steptwin.files.textfiles import read_text
 from steptwin.files.world import World, read_beside
 from steptwin.inputfiles import MOST_DESCRIPTION_BYTES
-from steptwin.live.world import LiveWorld, PlacePort
+from steptwin.live.world import ClientPort, LiveWorld
 from steptwin.simulation.describe.description import read_world
 from steptwin.simulation.describe.spec import WorldSpec
 from steptwin.simulation.faults import read
@@ -144,10 +144,10 @@ class WorldRig(Rig):
         found = next((spec for spec in self._spec.lines if spec.name == line), None)
         if found is None:
             raise World.unknown("line", line, [spec.name for spec in self._spec.lines])
-        return line_kinds()[found.kind].opened_by["tcp"].place_kind
+        return line_kinds()[found.kind].opened_by["tcp"].client_kind
 
-    def _port(self, line: str, kind: str) -> PlacePort:
-        return PlacePort(self._live, line, f"test-{next(self._places)}", kind)
+    def _port(self, line: str, kind: str) -> ClientPort:
+        return ClientPort(self._live, line, f"test-{next(self._places)}", kind)
 
     def driver(self, controller: str) -> Mic488:
         """A driver that is connected to a MIC488 of the world; it is closed after the test. Raises `Misuse`."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from steptwin.controller import SECOND
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.kind import DeviceAddress
+from steptwin.drivers.lineaddress import parse_line_address
 from steptwin.drivers.mic488.identify import firmware_of
 from steptwin.drivers.mic488.kind import unit_of
 from steptwin.drivers.mic488.lines import ThreadModbusLine
-from steptwin.drivers.place import parse_line_address
 from steptwin.errors import Misuse
 from steptwin.mic488.registers import AXES, register_map
 from steptwin.verify.check import CheckNeed

@@ -13,7 +13,7 @@ from steptwin.motion.divisions import profile_of
 from steptwin.simulation.components.logic import TerminalComponent
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.kinds.lines import SCRIPTS
-from steptwin.simulation.kinds.programs import Place, Resource, ResourceKind, StatementUse
+from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementLocation, StatementUse
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
@@ -33,7 +33,7 @@ IS_WIRED_TO = Message("why.is-wired-to", ", which is wired to {pin}")
 CONTACT_OF = Message("why.contact-of", ", a contact of {pin}")
 CONTACT_BOUNCED = Message("why.contact-bounced", ", and the contact bounced")
 DRIVES = Message("why.drives", "[[{kind}]] in {where} drives {pin}")
-CLIENT = Message("why.client", "client {place}: {meaning}")
+CLIENT = Message("why.client", "client {client}: {meaning}")
 REQUEST = Message("why.request", "request: {meaning}")
 SCRIPT = Message("why.script", "script {name}: {what}")
 FROM_OUTSIDE = Message("why.from-outside", "from outside: {what}")
@@ -78,7 +78,7 @@ class Causes:
         self._log = log
         self._world = log.world
         self._frames = Frames(log.world)
-        self._uses: dict[tuple[str, Place], StatementUse] = {}
+        self._uses: dict[tuple[str, StatementLocation], StatementUse] = {}
         built = log.world.objects.elements
         self._at_begin = nothing if log.is_whole else unknown
         self.is_far = False
@@ -360,11 +360,11 @@ class Causes:
         return pin in self._world.objects.driven or pin in self._world.objects.circuits
 
     def _frame(self, record: TraceRecord) -> Cause:
-        place = record.subject.rpartition("/")[0]
+        client = record.subject.rpartition("/")[0]
         meaning = self._frames.meaning(record)
-        if place == SCRIPTS:
+        if client == SCRIPTS:
             return Cause(ChainLink(record.time, record.controller, REQUEST(meaning=meaning)), partial(self._requested, record))
-        return Cause(ChainLink(record.time, record.controller, CLIENT(place=place, meaning=meaning)), nothing)
+        return Cause(ChainLink(record.time, record.controller, CLIENT(client=client, meaning=meaning)), nothing)
 
     def _requested(self, record: TraceRecord) -> FoundCause:
         """The step that made a request, which a line with timing carries later."""
@@ -418,7 +418,7 @@ class Causes:
         executed = self._log.executed[controller][index]
         if not self._log.is_of_present_text(executed):
             return StatementUse()
-        key = controller, executed.place
+        key = controller, executed.location
         found = self._uses.get(key)
         if found is None:
             found = self._uses[key] = self._world.programs[controller].use(key[1])
@@ -437,15 +437,15 @@ class Causes:
     def _of_statement(self, controller: str, index: int) -> FoundCause:
         """The wait or condition that let a statement be executed."""
         executed = self._log.executed[controller]
-        number = executed[index].place.number
+        number = executed[index].location.number
         for earlier in range(index - 1, max(-1, index - MOST_UNDECIDED), -1):
             use = self.use(controller, earlier)
-            if use.jumps is not None and executed[earlier + 1].place.number == use.jumps <= number:
-                number = executed[earlier].place.number
+            if use.jumps is not None and executed[earlier + 1].location.number == use.jumps <= number:
+                number = executed[earlier].location.number
             ended = executed[earlier + 1].time
             if use.waits and ended - executed[earlier].time > self._world.programs[controller].statement_time:
                 return self._decided(controller, earlier, ended, ENDED)
-            if number in use.governs or (use.is_loop and executed[earlier + 1].place.number >= use.governs.stop):
+            if number in use.governs or (use.is_loop and executed[earlier + 1].location.number >= use.governs.stop):
                 return self._decided(controller, earlier, executed[earlier].time, DECIDED)
         self.is_far = index >= MOST_UNDECIDED
         return None if self.is_far else self._started(controller)
@@ -453,7 +453,7 @@ class Causes:
     def _decided(self, controller: str, index: int, time: Nanos, how: Message) -> Cause:
         executed, use = self._log.executed[controller][index], self.use(controller, index)
         if use.is_loop:  # its condition is written where it begins
-            executed = executed._replace(place=executed.place._replace(number=use.governs.start - 1))
+            executed = executed._replace(location=executed.location._replace(number=use.governs.start - 1))
         link = ChainLink(time, controller, how(statement=statement(self._log, executed)))
         return Cause(link, partial(self._of_decision, controller, index, time))
 

@@ -17,7 +17,7 @@ from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.faults.active import HeldLevel
-from steptwin.simulation.kinds.programs import Place, Programs
+from steptwin.simulation.kinds.programs import Programs, StatementLocation
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.inputs import Download, ExternalInput
@@ -38,7 +38,7 @@ class Executed(NamedTuple):
 
     time: Nanos
     controller: str
-    place: Place
+    location: StatementLocation
     position: int
 
 
@@ -48,13 +48,13 @@ class ExecutedStatements:
     def __init__(self, controller: str) -> None:
         self._controller = controller
         self.times, self.positions = array("q"), array("q")
-        self.places: list[Place] = []
+        self.locations: list[StatementLocation] = []
 
     def __len__(self) -> int:
         return len(self.times)
 
     def __getitem__(self, index: int) -> Executed:
-        return Executed(self.times[index], self._controller, self.places[index], self.positions[index])
+        return Executed(self.times[index], self._controller, self.locations[index], self.positions[index])
 
     def last(self, until: Nanos) -> int:
         """The number of the last one by a moment; -1 if there is none."""
@@ -115,7 +115,7 @@ class CauseLog:
         self._holds: dict[str, list[Hold]] = defaultdict(list)
         self._replaced: dict[str, Nanos] = {}
         """When the program of a controller was last replaced by a download."""
-        self._keeping: dict[str, dict[Place, bool]] = defaultdict(dict)
+        self._keeping: dict[str, dict[StatementLocation, bool]] = defaultdict(dict)
         """Whether statements may change points without an event, by controller."""
         self._events = 0
         self.inputs = 0
@@ -134,7 +134,7 @@ class CauseLog:
         for name, programs in world.programs.items():
             if not self.is_whole:
                 for frame in programs.stack(self.begin)[:1]:
-                    self._executes(name, self.begin, frame.place)
+                    self._executes(name, self.begin, frame.location)
             programs.add_hook(self._hook(name, programs))
 
     @property
@@ -198,30 +198,30 @@ class CauseLog:
                     if (held := holds[-1].held) is not None and held.fault == name:
                         holds.append(Hold(self.world.now, None))
 
-    def _executes(self, name: str, now: Nanos, place: Place) -> None:
+    def _executes(self, name: str, now: Nanos, location: StatementLocation) -> None:
         executed = self.executed[name]
         executed.times.append(now)
-        executed.places.append(place)
+        executed.locations.append(location)
         executed.positions.append(len(self.records[self._group_of[name]]))
 
     def _hook(self, name: str, programs: Programs) -> StatementHook:
         executed, records = self.executed[name], self.records[self._group_of[name]]
-        add_time, add_place, add_position = executed.times.append, executed.places.append, executed.positions.append
-        place_of, keeping, points = programs.place, self._keeping[name], self.points
+        add_time, add_location, add_position = executed.times.append, executed.locations.append, executed.positions.append
+        location_of, keeping, points = programs.location, self._keeping[name], self.points
         before = False
         """Whether the last statement may have changed points."""
 
         def hook(now: Nanos, number: int) -> None:
             nonlocal before
-            place = place_of(number)
-            if place is None:
+            location = location_of(number)
+            if location is None:
                 return
             add_time(now)
-            add_place(place)
+            add_location(location)
             add_position(len(records))
-            keeps = keeping.get(place)
+            keeps = keeping.get(location)
             if keeps is None:
-                keeps = keeping[place] = programs.use(place).keeps
+                keeps = keeping[location] = programs.use(location).keeps
             if keeps or before:
                 points.executes(name, now, keeps=keeps)
                 before = keeps
@@ -326,7 +326,7 @@ class CauseLog:
     def is_of_present_text(self, executed: Executed) -> bool:
         """Whether the text of a statement is still in its controller."""
         programs = self.world.programs[executed.controller]
-        return executed.time > self._replaced.get(executed.controller, -1) and executed.place.text in programs.texts
+        return executed.time > self._replaced.get(executed.controller, -1) and executed.location.text in programs.texts
 
     def last_executed(self, controller: str, until: Nanos) -> int:
         """The number of the last statement of a controller by a moment; -1 if there is none."""

@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol, TypeAlias
 
 from steptwin.controller import Nanos
 from steptwin.points import MemoryCells
-from steptwin.simulation.kinds.programs import Place, Programs, Resource, ResourceKind
+from steptwin.simulation.kinds.programs import Programs, Resource, ResourceKind, StatementLocation
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.world.inputs import Bytes, Download
@@ -172,7 +172,7 @@ class LastChanges:
             return False
         key = owner, path, tuple(source.text for source in programs.texts.values())
         if key not in self._written:
-            written = {programs.use(place).writes for place, keeps in _acting(programs) if keeps}
+            written = {programs.use(location).writes for location, keeps in _acting(programs) if keeps}
             self._written[key] = any(self._are_in(world, owner, path, memory, resources) for resources in written)
         return self._written[key]
 
@@ -278,14 +278,14 @@ class _Subscriber:
             programs.add_hook(hook, None if is_replaced else frozenset(keeping))
             stack.callback(programs.remove_hook, hook)
 
-    def _hook(self, programs: Programs, keeping: Mapping[Place, bool]) -> StatementHook:
+    def _hook(self, programs: Programs, keeping: Mapping[StatementLocation, bool]) -> StatementHook:
         """``keeping``: whether a statement keeps something, as far as that is known."""
 
         def hook(now: Nanos, number: int) -> None:
             if self._keeping is not None:
                 self._compare(self._keeping)
-            place = programs.place(number)
-            keeps = place is None or (keeping[place] if place in keeping else programs.use(place).keeps)
+            location = programs.location(number)
+            keeps = location is None or (keeping[location] if location in keeping else programs.use(location).keeps)
             self._keeping = now if keeps else None
 
         return hook
@@ -304,11 +304,11 @@ class _Subscriber:
             points.note_value(self.series, now, value)
 
 
-def _acting(programs: Programs) -> Iterator[tuple[Place, bool]]:
+def _acting(programs: Programs) -> Iterator[tuple[StatementLocation, bool]]:
     """The statements that may change more than variables, and whether they keep something."""
     for text in programs.texts:
         for number in range(len(programs.statements(text))):
-            place = Place(text, number)
-            use = programs.use(place)
+            location = StatementLocation(text, number)
+            use = programs.use(location)
             if use.keeps or use.waits or any(one.kind is not ResourceKind.VALUE for one in use.writes):
-                yield place, use.keeps
+                yield location, use.keeps

@@ -68,8 +68,8 @@ def statement(log: CauseLog, executed: Executed) -> MessageText:
     """A statement with its line: "line 12 `OUT3 = OFF`"."""
     if not log.is_of_present_text(executed):
         return REPLACED_STATEMENT()
-    programs, place = log.world.programs[executed.controller], executed.place
-    found, source = programs.statements(place.text)[place.number], programs.texts[place.text]
+    programs, location = log.world.programs[executed.controller], executed.location
+    found, source = programs.statements(location.text)[location.number], programs.texts[location.text]
     text = visible(source.text[found.start : found.end].strip())
     return LINE(line=found.line, code=text) if text else END_OF_PROGRAM()
 
@@ -86,14 +86,14 @@ class Frames:
 
     def meaning(self, record: TraceRecord) -> str:
         """A request in words."""
-        place, _, _ = record.subject.rpartition("/")
+        client, _, _ = record.subject.rpartition("/")
         self._told.clear()
-        self.traffic[record.controller].frame(record.time, place, FrameDirection.IN, record.data())
+        self.traffic[record.controller].frame(record.time, client, FrameDirection.IN, record.data())
         if self._told:
             return self._told[-1].meaning
         return record.data().decode("ascii", "backslashreplace")
 
     def reaches(self, record: TraceRecord, unit: int) -> bool:
         """Whether a record is a request that may change the controller with an address."""
-        place, _, direction = record.subject.rpartition("/")
-        return direction == FrameDirection.IN.value and unit in self.traffic[record.controller].changes(place, record.data())
+        client, _, direction = record.subject.rpartition("/")
+        return direction == FrameDirection.IN.value and unit in self.traffic[record.controller].changes(client, record.data())

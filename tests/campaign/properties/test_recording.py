@@ -39,8 +39,8 @@ def moved(text: str, *, joined: bool) -> tuple[Verdict, list[tuple[float, float]
         before = world.now
         for step in range(1000):
             moment = before + step * 100_000
-            places.append((world.axes["left_x"].units(world.axes["left_x"].mechanism.place(moment)), 0.0))
-            places[-1] = places[-1][0], world.axes["right_x"].units(world.axes["right_x"].mechanism.place(moment))
+            places.append((world.axes["left_x"].units(world.axes["left_x"].mechanism.grid_position(moment)), 0.0))
+            places[-1] = places[-1][0], world.axes["right_x"].units(world.axes["right_x"].mechanism.grid_position(moment))
         world.run(for_=0.1)
     return watch.verdict(), places
 

@@ -24,10 +24,10 @@ from steptwin.drivers import (
 )
 from steptwin.drivers.blocking import finish
 from steptwin.drivers.exchange import Overtaken, SentLate
+from steptwin.drivers.lineaddress import LineAddress
 from steptwin.drivers.mic488.frames import FrameLog
 from steptwin.drivers.mic488.lines import ThreadModbusLine, modbus_exchanger
 from steptwin.drivers.modbus import ModbusQuery
-from steptwin.drivers.place import LineAddress
 from steptwin.errors import Misuse
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.registermap import DataType

@@ -358,7 +358,9 @@ def test_places_are_the_nearest_pulses(mm_per_unit: float) -> None:
     belt = world.objects.built(CONVEYOR)["belt"]
     assert belt.per_mm == Fraction(3200) / Fraction(mm_per_unit)
     for n in range(1, 30):
-        assert abs(belt.places(n * 0.37) - Fraction(str(round(n * 0.37, 2))) * belt.per_mm) <= Fraction(1, 2) + Fraction(1, 10**6)
+        assert abs(belt.to_grid(n * 0.37) - Fraction(str(round(n * 0.37, 2))) * belt.per_mm) <= Fraction(1, 2) + Fraction(
+            1, 10**6
+        )
 
 
 def test_a_mark_and_a_sensor_may_be_at_the_very_end() -> None:

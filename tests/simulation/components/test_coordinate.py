@@ -9,7 +9,7 @@ import pytest
 
 from steptwin.controller import SECOND
 from steptwin.motion import MotionState, Profile, at_rest, plan_velocity
-from steptwin.simulation.components.coordinate import PLACES, Coordinate, Pulled
+from steptwin.simulation.components.coordinate import GRID_PER_UNIT, Coordinate, Pulled
 from steptwin.simulation.mechanics.coasting import CoastingRotor
 from steptwin.simulation.mechanics.trajectory import Build, MechanicalState, Trajectory
 
@@ -42,7 +42,7 @@ def test_it_turns_also_where_no_motion_changes_any_more() -> None:
     its = coordinate(axis(CRUISE), axis(at_rest(0, 0), FALL))
     (turn,) = its.turning_points(0)
     assert abs(turn - 1_200_000_000) <= 1
-    assert its.place(turn) == 72 * PLACES
-    assert its.reaches(72 * PLACES + 1, 0, 1) is None
-    found = its.reaches(64 * PLACES, 0, 1), its.reaches(64 * PLACES, turn, -1)
+    assert its.grid_position(turn) == 72 * GRID_PER_UNIT
+    assert its.reaches(72 * GRID_PER_UNIT + 1, 0, 1) is None
+    found = its.reaches(64 * GRID_PER_UNIT, 0, 1), its.reaches(64 * GRID_PER_UNIT, turn, -1)
     assert found == (pytest.approx(0.8 * SECOND, abs=20), pytest.approx(1.6 * SECOND, abs=20))

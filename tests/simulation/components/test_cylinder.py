@@ -201,5 +201,7 @@ def test_places_are_the_nearest(stroke: float) -> None:
     cylinder = world.objects.built(CYLINDER)["clamp"]
     for n in range(1, 40):
         units = stroke * n / 41
-        assert abs(cylinder.places(units) - Fraction(str(units)) / Fraction(str(stroke)) * cylinder.travel.full) <= Fraction(1, 2)
-    assert cylinder.places(stroke) == cylinder.travel.full == 200 * 300 * MILLISECOND**2
+        assert abs(cylinder.to_grid(units) - Fraction(str(units)) / Fraction(str(stroke)) * cylinder.travel.full) <= Fraction(
+            1, 2
+        )
+    assert cylinder.to_grid(stroke) == cylinder.travel.full == 200 * 300 * MILLISECOND**2

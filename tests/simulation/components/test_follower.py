@@ -228,7 +228,7 @@ def test_its_place_is_the_nearest_also_where_its_cam_is_worn(share: float, place
     world = World.from_toml(TEXT.replace("offset = 20.0", "offset = 120.0"))
     world.fault(f"worn-cam element=knife share={share}")
     world.run(for_=0.1)
-    assert world.objects.built(FOLLOWER)["knife"].place(world.now) == place
+    assert world.objects.built(FOLLOWER)["knife"].grid_position(world.now) == place
 
 
 def test_where_it_may_turn_is_after_the_present_moment() -> None:

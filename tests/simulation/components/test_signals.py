@@ -8,7 +8,7 @@ from world_rig import small
 from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.live.world import LiveWorld, PlacePort
+from steptwin.live.world import ClientPort, LiveWorld
 from steptwin.mic488.datasheet import datasheet_of
 from steptwin.simulation.components.signals import Idle, find_signal
 from steptwin.simulation.logic.signal import SignalOf
@@ -264,7 +264,7 @@ def test_a_condition_on_what_a_master_only_stores_is_not_late() -> None:
     """Nothing happens in the controller when a user register is written."""
     world = World.from_toml(MASTER)
     live = LiveWorld(world)
-    port = PlacePort(live, "bus", "rtu-1", "rtu")
+    port = ClientPort(live, "bus", "rtu-1", "rtu")
     live.advance(SECOND)
     port.exchange(written(bytes.fromhex("0007 0000 3f80")), SECOND)
     live.deadline()
@@ -281,7 +281,7 @@ def test_nor_is_it_over_tcp_where_nothing_is_recorded() -> None:
     world.stop_recording()
     notes: list[int] = []
     world.trace.subscribers.append(lambda record: notes.append(record.time) if record.subject == "note" else None)
-    port = PlacePort(live, "bus", "tcp-1", "tcp")
+    port = ClientPort(live, "bus", "tcp-1", "tcp")
     for moment, value in ((1, "3f80"), (2, "4000")):
         live.advance(moment * SECOND)
         pdu = written(bytes.fromhex(f"0007 0000 {value}"))[1:-2]

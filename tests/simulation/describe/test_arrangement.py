@@ -9,7 +9,7 @@ import pytest
 
 from steptwin.errors import Refusal
 from steptwin.files.world import World
-from steptwin.simulation.describe.arrangement import OTHERS, DrawnPlace, arranged
+from steptwin.simulation.describe.arrangement import OTHERS, DrawnPosition, arranged
 from steptwin.simulation.describe.description import read_world
 from steptwin.simulation.toml.reader import WorldError
 from steptwin.subject.world import WorldSubject
@@ -33,17 +33,17 @@ pitch = 4.0
 
 
 def test_places_are_written_read_replaced_and_removed() -> None:
-    first = arranged(TEXT, [DrawnPlace("x", 10, 20), DrawnPlace("tool path", 0, 300)])
+    first = arranged(TEXT, [DrawnPosition("x", 10, 20), DrawnPosition("tool path", 0, 300)])
     assert first == TEXT + '\n[[drawing]]\nof = "x"\nat = [10, 20]\n\n[[drawing]]\nof = "tool path"\nat = [0, 300]\n'
-    assert read_world("w", first).drawing == (DrawnPlace("x", 10, 20), DrawnPlace("tool path", 0, 300))
-    second = arranged(first, [DrawnPlace("x", 30, 0)])
-    assert read_world("w", second).drawing == (DrawnPlace("x", 30, 0),)
+    assert read_world("w", first).drawing == (DrawnPosition("x", 10, 20), DrawnPosition("tool path", 0, 300))
+    second = arranged(first, [DrawnPosition("x", 30, 0)])
+    assert read_world("w", second).drawing == (DrawnPosition("x", 30, 0),)
     assert arranged(second, []) == TEXT
 
 
 def test_what_stands_after_them_stays() -> None:
     text = '[[drawing]] # by hand\nof = "x"\n# why\nat=[1,2]\n\n' + TEXT
-    found = arranged(text, [DrawnPlace("x", 5, 6)])
+    found = arranged(text, [DrawnPosition("x", 5, 6)])
     assert "# why" in found
     assert found.index("# a table") < found.index('of = "x"')
     assert {key: value for key, value in tomllib.loads(found).items() if key != "drawing"} == tomllib.loads(TEXT)
@@ -51,18 +51,18 @@ def test_what_stands_after_them_stays() -> None:
 
 def test_keys_before_all_tables_stay() -> None:
     text = "at = [1, 2]\n" + TEXT
-    assert arranged(arranged(text, [DrawnPlace("x", 5, 6)]), []) == text
+    assert arranged(arranged(text, [DrawnPosition("x", 5, 6)]), []) == text
 
 
 def test_line_ends_stay() -> None:
-    assert arranged(TEXT.replace("\n", "\r\n"), [DrawnPlace("x", 1, 2)]).count("\r\n") == TEXT.count("\n") + 4
+    assert arranged(TEXT.replace("\n", "\r\n"), [DrawnPosition("x", 1, 2)]).count("\r\n") == TEXT.count("\n") + 4
 
 
 @pytest.mark.parametrize("tables", ['drawing = [{of = "x", at = [1, 2]}]\n', '[[drawing]]\nof = "x"\nat = [\n1,\n2]\n'])
 def test_tables_in_another_form_are_not_touched(tables: str) -> None:
     text = tables + TEXT if tables.startswith("drawing") else TEXT + tables
     with pytest.raises(Refusal, match="in another form: remove them first"):
-        arranged(text, [DrawnPlace("x", 3, 4)])
+        arranged(text, [DrawnPosition("x", 3, 4)])
 
 
 @pytest.mark.parametrize(
@@ -94,5 +94,5 @@ def test_everything_that_is_drawn_can_have_a_place(path: Path) -> None:
 
     shown = WorldSubject(World.load(path)).description
     names = [*(part.name for part in (*shown.axes, *shown.elements)), *OTHERS]
-    places = tuple(DrawnPlace(name, 10 * n, n) for n, name in enumerate(names))
+    places = tuple(DrawnPosition(name, 10 * n, n) for n, name in enumerate(names))
     assert read_world(path.stem, arranged(text, places), read=read).drawing == places

@@ -7,8 +7,8 @@ import pytest
 from steptwin.files.world import World
 from steptwin.simulation.describe.description import read_world
 from steptwin.simulation.kinds.mic488.table import Mic488Spec
+from steptwin.simulation.toml.keypaths import LONGEST_SCALAR
 from steptwin.simulation.toml.reader import TomlText, WorldError
-from steptwin.simulation.toml.tomlplaces import LONGEST_SCALAR
 
 TABLE = '[[mic488]]\nname = "table"\n'
 AXIS = TABLE + '[[axis]]\nname = "x"\ndrive = "table.M1"\n'

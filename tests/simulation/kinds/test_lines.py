@@ -1,4 +1,4 @@
-"""Lines of worlds: places of programs, what they ask and get, and the words for it."""
+"""Lines of worlds: their clients, what they ask and get, and the words for it."""
 
 from __future__ import annotations
 
@@ -70,11 +70,11 @@ def test_kinds_of_connections(line: str, kinds: str) -> None:
     there = world().lines[line]
     with pytest.raises(Misuse, match=f"line {line!r} takes no connection of kind 'usb': permitted are {kinds}"):
         there.connect("p", "usb")
-    assert "p" not in there.places
+    assert "p" not in there.clients
     names = kinds.split(", ")
     first, last = names[0], names[-1]
     assert there.connect("p") is there.connect("p", last)  # known by its name
-    assert there.places["p"].kind == first
+    assert there.clients["p"].kind == first
 
 
 def test_rates_and_timing() -> None:
@@ -108,18 +108,18 @@ def test_answers_of_a_line_with_timing_come_later(kind: str) -> None:
     for timing, early in (("off", True), ("real", False)):
         there = world(f'timing = "{timing}"\nbaud = 9600')
         line = there.lines["bus"]
-        place = line.connect("p", kind)
+        client = line.connect("p", kind)
         outputs: list[int] = []
-        place.on_output = partial(outputs.append, 1)
+        client.on_output = partial(outputs.append, 1)
         line.receive("p", framed(READ_STATUS), there.now)
         there.run(for_="5 ms")
-        assert bool(place.received) is early
+        assert bool(client.received) is early
         there.run(for_="30 ms")
-        ((moment, answer),) = place.take(there.now)
+        ((moment, answer),) = client.take(there.now)
         assert answer == framed(OFF)
         assert (moment == 0) is early
         assert outputs == [1]
-        assert place.take(there.now) == []
+        assert client.take(there.now) == []
 
 
 @pytest.mark.parametrize("timing", ["off", "real"])
@@ -157,13 +157,13 @@ def test_what_cannot_change_anything_is_not_recorded() -> None:
     """A whole read request of a line without timing, faults and held bytes; nothing else."""
     there = world()
     line = there.lines["bus"]
-    place = line.connect("p", "rtu")
-    assert line.is_idle_read(place, rtu(READ_STATUS))
-    assert not line.is_idle_read(place, rtu(ON))
+    client = line.connect("p", "rtu")
+    assert line.is_idle_read(client, rtu(READ_STATUS))
+    assert not line.is_idle_read(client, rtu(ON))
     frames = len(list(there.trace.frames()))
-    assert line.exchange_unrecorded("p", place, rtu(READ_STATUS), there.now) == rtu(OFF)
+    assert line.exchange_unrecorded("p", client, rtu(READ_STATUS), there.now) == rtu(OFF)
     assert len(list(there.trace.frames())) == frames
-    assert line.exchange("p", place, rtu(READ_STATUS), there.now) == rtu(OFF)
+    assert line.exchange("p", client, rtu(READ_STATUS), there.now) == rtu(OFF)
     assert len(list(there.trace.frames())) == frames + 2
     timed = world('timing = "real"').lines["bus"]
     assert not timed.is_idle_read(timed.connect("p", "rtu"), rtu(READ_STATUS))
@@ -239,13 +239,13 @@ def test_characters_in_words() -> None:
 def test_a_program_that_has_disconnected_gets_nothing_more() -> None:
     there = world('timing = "real"')
     line = there.lines["bus"]
-    place = line.connect("p", "rtu")
+    client = line.connect("p", "rtu")
     line.receive("p", rtu(READ_STATUS), there.now)
-    assert place.is_connected
+    assert client.is_connected
     line.leave("p")
     line.leave("p")
     there.run(for_="1 s")
-    assert (place.is_connected, list(place.received), line.places) == (False, [], {})
+    assert (client.is_connected, list(client.received), line.clients) == (False, [], {})
 
 
 def test_what_a_controller_lacks_is_a_refusal() -> None:
@@ -296,10 +296,10 @@ def test_writes_are_told_of_places_that_are_there_and_of_those_that_come(kind: s
     end = line_kinds()["modbus"].writes(line, told.append)
     assert end is not None
     line.connect("late", kind)
-    for place, pdu, unit in (("early", ON, 1), ("late", ON, 2), ("late", READ_STATUS, 1), ("early", b"\x06\xff\x00\0\7", 1)):
-        line.receive(place, framed(pdu, unit), there.now)
+    for client, pdu, unit in (("early", ON, 1), ("late", ON, 2), ("late", READ_STATUS, 1), ("early", b"\x06\xff\x00\0\7", 1)):
+        line.receive(client, framed(pdu, unit), there.now)
         there.run(for_="50 ms")
-    assert [(one.place, one.units, one.outcome) for one in told] == [
+    assert [(one.client, one.units, one.outcome) for one in told] == [
         ("early", (1,), "done"),
         ("late", (2,), "done"),
         ("early", (1,), "refusal"),
@@ -318,12 +318,12 @@ def test_mic_23_writes_are_told_as_their_place_addresses_them() -> None:
     writes = line_kinds()["modbus"].writes
     assert writes is not None
     writes(line, told.append)
-    for place, framed in (("rtu", rtu), ("tcp", tcp)):
-        line.connect(place, place)
+    for client, framed in (("rtu", rtu), ("tcp", tcp)):
+        line.connect(client, client)
         for unit in (0, 255):
-            line.receive(place, framed(ON, unit), there.now)
+            line.receive(client, framed(ON, unit), there.now)
             there.run(for_="50 ms")
-    assert [(one.place, one.words) for one in told] == [
+    assert [(one.client, one.words) for one in told] == [
         ("rtu", "broadcast: write USER_REGISTER 5 = 7"),
         ("tcp", "unit 0: write USER_REGISTER 5 = 7"),
         ("tcp", "unit 255: write USER_REGISTER 5 = 7"),
@@ -337,8 +337,8 @@ def test_ports_are_served_by_what_is_put_around_the_controllers_but_not_those_of
     line.serve_by(lambda devices: {9: devices[1]})
     after, scripts = line.connect("after", "tcp"), line.connect(SCRIPTS, "rtu")
     rtu_after = line.connect("rtu", "rtu")
-    for place, unit in (("before", 1), ("after", 9)):
-        line.receive(place, tcp(READ_STATUS, unit), there.now)
+    for client, unit in (("before", 1), ("after", 9)):
+        line.receive(client, tcp(READ_STATUS, unit), there.now)
     line.receive(SCRIPTS, rtu(READ_STATUS), there.now)
     line.receive("rtu", rtu(READ_STATUS, 9), there.now)
     there.run(for_="50 ms")
@@ -355,7 +355,7 @@ def test_the_wire_of_chips_is_restored_with_their_world() -> None:
     )
     there = World.from_toml(text)
     line = there.lines["chips"]
-    place = line.connect("p")
+    client = line.connect("p")
     snapshot = there.snapshot()
 
     def answers() -> tuple[bytes, int]:
@@ -363,7 +363,7 @@ def test_the_wire_of_chips_is_restored_with_their_world() -> None:
             there.run_to(there.now + after)
             there.m1486[chip].chip.receive(b"u20\r", there.now)
         there.run(for_="100 ms")
-        return b"".join(data for _, data in place.take(there.now)), line.traffic.errors
+        return b"".join(data for _, data in client.take(there.now)), line.traffic.errors
 
     first = answers()
     assert first == (b"B", 1)
@@ -378,8 +378,8 @@ def test_who_has_come_since_is_gone_where_a_line_goes_back() -> None:
     before = line.copy_state()
     line.connect("second")
     line.set_state(before)
-    assert "first" in line.places
-    assert "second" not in line.places
+    assert "first" in line.clients
+    assert "second" not in line.clients
 
 
 def test_a_request_that_comes_while_the_controller_is_busy_is_an_error_of_the_line() -> None:
@@ -395,10 +395,10 @@ def test_a_request_that_comes_while_the_controller_is_busy_is_an_error_of_the_li
 
 def test_a_line_that_nobody_follows_any_more_observes_no_frames() -> None:
     class Frames:
-        def frame(self, now: int, place: str, direction: FrameDirection, data: bytes) -> None:
+        def frame(self, now: int, client: str, direction: FrameDirection, data: bytes) -> None:
             """It needs none."""
 
-        def unframed(self, now: int, place: str, count: int) -> None:
+        def unframed(self, now: int, client: str, count: int) -> None:
             """It needs none."""
 
     there, frames = world(), Frames()
@@ -420,10 +420,10 @@ def test_mic_32_requests_of_several_ports_that_wait_are_restored(moment_ms: int)
     def go_on(there: World, until_ms: int) -> list[tuple[str, int]]:
         line, answers = there.lines["bus"], []
         while there.now < until_ms * MILLISECOND:
-            if there.now == 21 * MILLISECOND and "tcp-1" in line.places:
+            if there.now == 21 * MILLISECOND and "tcp-1" in line.clients:
                 line.leave("tcp-1")
-            for name, place in tuple(line.places.items()):
-                for moment, _ in place.take(there.now):
+            for name, client in tuple(line.clients.items()):
+                for moment, _ in client.take(there.now):
                     answers.append((name, moment))
                     line.receive(name, (tcp if kinds[name] == "tcp" else rtu)(READ_STATUS), there.now)
             there.run(for_="1 ms")

@@ -10,7 +10,7 @@ from steptwin.controller import MILLISECOND, SECOND
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.simulation.kinds.programs import Place, Programs, StatementSubscription
+from steptwin.simulation.kinds.programs import Programs, StatementLocation, StatementSubscription
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.subject.subscriptions import filter_of
 from steptwin.subject.world import WorldSubject
@@ -134,13 +134,13 @@ def test_what_has_begun_before_anybody_could_look() -> None:
 
 def test_calls_come_back_and_loops_do_not() -> None:
     mic = two().programs["m"]
-    assert mic.comes_back(Place("program 0", 3))  # JUMP COUNT
-    assert not mic.comes_back(Place("program 0", 6))  # JUMP MAIN
-    assert mic.comes_back(Place("program 0", 0))
+    assert mic.comes_back(StatementLocation("program 0", 3))  # JUMP COUNT
+    assert not mic.comes_back(StatementLocation("program 0", 6))  # JUMP MAIN
+    assert mic.comes_back(StatementLocation("program 0", 0))
 
 
 def stack(programs: Programs, now: int) -> list[tuple[str, int]]:
-    return [(frame.name, programs.statements(frame.place.text)[frame.place.number].line) for frame in programs.stack(now)]
+    return [(frame.name, programs.statements(frame.location.text)[frame.location.number].line) for frame in programs.stack(now)]
 
 
 def test_the_stack_has_what_is_executed_and_where_it_returns_to() -> None:
@@ -204,11 +204,11 @@ def test_variables_are_read_and_set() -> None:
 def test_a_command_that_was_overwritten_comes_from_no_text() -> None:
     world = two()
     chip = world.programs["c"]
-    assert chip.place(0) == Place("program", 0)
-    assert chip.place(1) is None  # inside a command
+    assert chip.location(0) == StatementLocation("program", 0)
+    assert chip.location(1) is None  # inside a command
     controller = world.m1486["c"].chip
     controller.memory.reset()
-    assert chip.place(0) is None
+    assert chip.location(0) is None
 
 
 def test_following_statements_does_not_change_what_happens() -> None:
@@ -267,7 +267,7 @@ def test_names_of_a_wbc_program_mean_what_they_mean_to_its_statements() -> None:
     world.run_to(200 * MILLISECOND)
     assert programs.stack(world.now) == ()  # the program has ended
     assert programs.read("speed", world.now) is None
-    assert programs.place(0) is None
+    assert programs.location(0) is None
 
 
 def test_names_of_an_m1486_are_its_pins_and_points() -> None:
@@ -297,7 +297,7 @@ def test_depth_and_returns_of_a_chip() -> None:
         world.run_to(world.now + MILLISECOND)
         depths.add((chip.depth(), len(chip.stack(world.now))))
     assert depths == {(0, 1), (1, 2)}
-    assert all(chip.comes_back(Place("program", number)) for number in range(len(chip.statements("program"))))
+    assert all(chip.comes_back(StatementLocation("program", number)) for number in range(len(chip.statements("program"))))
     assert chip.texts["program"].name == "c.m1486"
 
 
@@ -315,16 +315,18 @@ def test_a_chip_without_a_text_of_its_own(text: str | None) -> None:
 
 @pytest.mark.parametrize("controller", ["m", "c"])
 def test_a_hook_at_places_is_called_there_as_one_at_all_statements(controller: str) -> None:
-    found: dict[bool, list[tuple[int, Place | None]]] = {True: [], False: []}
+    found: dict[bool, list[tuple[int, StatementLocation | None]]] = {True: [], False: []}
     for at_all, mine in found.items():
         world = two()
         programs = world.programs[controller]
         (text,) = programs.texts
-        place = Place(text, list(programs.labels(text).values())[-1])
-        wanted = {Place(text, number) for number in range(3)} | {place}
+        location = StatementLocation(text, list(programs.labels(text).values())[-1])
+        wanted = {StatementLocation(text, number) for number in range(3)} | {location}
 
-        def note(now: int, number: int, mine: list[tuple[int, Place | None]] = mine, programs: Programs = programs) -> None:
-            mine.append((now, programs.place(number)))
+        def note(
+            now: int, number: int, mine: list[tuple[int, StatementLocation | None]] = mine, programs: Programs = programs
+        ) -> None:
+            mine.append((now, programs.location(number)))
 
         programs.add_hook(note, None if at_all else wanted)
         world.run_to(SECOND)

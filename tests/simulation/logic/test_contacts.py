@@ -269,7 +269,7 @@ def test_a_switch_whose_carriage_does_as_before_asks_it_nothing() -> None:
         def version(self) -> object:
             return self.plan
 
-        def place(self, now: int) -> int:
+        def grid_position(self, now: int) -> int:
             self.asked += 1
             return 0
 

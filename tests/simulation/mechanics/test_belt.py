@@ -12,20 +12,20 @@ from steptwin.simulation.mechanics.belt import ConstantDrive, Load, Workpiece, n
 def test_a_belt_with_its_own_drive() -> None:
     """2.5 mm/s are 5 places in 2 ns."""
     drive = ConstantDrive(Fraction(5, 2), 100)
-    assert (drive.place(200), drive.reaches(1, 100, 1)) == (0, None)
+    assert (drive.grid_position(200), drive.reaches(1, 100, 1)) == (0, None)
     first = drive.version()
     drive.run(True, 200)
     assert drive.version() != first
-    assert [drive.place(200 + n) for n in range(5)] == [0, 2, 5, 7, 10]
+    assert [drive.grid_position(200 + n) for n in range(5)] == [0, 2, 5, 7, 10]
     second = drive.version()
     drive.run(True, 201)
     assert drive.version() == second, "it runs already"
-    assert drive.place(204) == 10
+    assert drive.grid_position(204) == 10
     drive.run(False, 203)
     assert drive.version() not in (first, second)
-    assert [drive.place(n) for n in (203, 204, 999)] == [7, 7, 7]
+    assert [drive.grid_position(n) for n in (203, 204, 999)] == [7, 7, 7]
     drive.run(True, 300)
-    assert [drive.place(300 + n) for n in range(3)] == [7, 9, 12]
+    assert [drive.grid_position(300 + n) for n in range(3)] == [7, 9, 12]
 
 
 def test_when_a_belt_comes_to_a_place() -> None:
@@ -33,10 +33,10 @@ def test_when_a_belt_comes_to_a_place() -> None:
     drive = ConstantDrive(Fraction(5, 2), 0)
     drive.run(True, 50)
     for place in range(1, 40):
-        expected = next(now for now in range(50, 100) if drive.place(now) >= place)
+        expected = next(now for now in range(50, 100) if drive.grid_position(now) >= place)
         assert drive.reaches(place, 50, 1) == expected
         assert drive.reaches(place, expected - 1, 1) == expected
-        assert drive.reaches(place, expected, 1) == (None if place <= drive.place(expected) else expected + 1)
+        assert drive.reaches(place, expected, 1) == (None if place <= drive.grid_position(expected) else expected + 1)
         assert drive.reaches(place, 50, -1) is None
     assert drive.reaches(0, 50, 1) is None
     drive.run(False, 60)
@@ -100,7 +100,7 @@ class Both:
     def version(self) -> object:
         return None
 
-    def place(self, now: int) -> int:
+    def grid_position(self, now: int) -> int:
         return 0
 
     def reaches(self, position: int, after: int, direction: int) -> int | None:

@@ -258,15 +258,15 @@ def test_steps_taken_away_are_lost_until_the_end() -> None:
     motor.go(100, 0)
     scheduler.advance(20 * SECOND)
     mechanism.lose(7, 20 * SECOND)
-    assert (mechanism.place(20 * SECOND), mechanism.lost(20 * SECOND)) == (93, 7)
+    assert (mechanism.grid_position(20 * SECOND), mechanism.lost(20 * SECOND)) == (93, 7)
     mechanism.block(True, 20 * SECOND)
     motor.go(150, 20 * SECOND)
     scheduler.advance(40 * SECOND)
-    assert (mechanism.place(40 * SECOND), mechanism.lost(40 * SECOND)) == (93, 57)
+    assert (mechanism.grid_position(40 * SECOND), mechanism.lost(40 * SECOND)) == (93, 57)
     mechanism.block(False, 40 * SECOND)
     motor.go(100, 40 * SECOND)
     scheduler.advance(60 * SECOND)
-    assert mechanism.place(60 * SECOND) == pytest.approx(43)
+    assert mechanism.grid_position(60 * SECOND) == pytest.approx(43)
 
 
 def rigged(build: Build, **options: object) -> tuple[Scheduler, Driven, Mechanism, list[TraceRecord]]:
@@ -332,9 +332,9 @@ def test_an_ideal_axis_that_lost_pulses_keeps_the_loss_through_a_snapshot_and_a_
     scheduler.propagate()
     later = mechanism.copy_state()
     scheduler.advance(40 * SECOND)
-    assert (mechanism.place(scheduler.now), mechanism.lost(scheduler.now)) == (43, 7)
+    assert (mechanism.grid_position(scheduler.now), mechanism.lost(scheduler.now)) == (43, 7)
     mechanism.set_state(later)
-    assert mechanism.place(40 * SECOND) == 43
+    assert mechanism.grid_position(40 * SECOND) == 43
     # A drive that is switched off counts from 0 again: the load stays where it is.
     drive.axis.follow(plan_position(MotionState(40 * SECOND, 0, 0.0, 0.0), 0, 1.0, 1.0, 1.0))
     assert mechanism.at(40 * SECOND)[:2] == (43, 43)
@@ -372,7 +372,7 @@ def test_a_motor_without_torque_is_told_when_it_loses_the_field_and_when_it_is_c
     assert (mechanism.at(scheduler.now).stalled, mechanism.at(scheduler.now).rotor) == (True, 10)
     scheduler.advance(5 * SECOND)
     assert mechanism.deadline() is None
-    behind = 200 - mechanism.place(scheduler.now)
+    behind = 200 - mechanism.grid_position(scheduler.now)
     assert behind == 192, "the multiple of 64 nearest to 190"
     events = [(record.time, record.subject, record.value) for record in told if record.kind == "event"]
     assert [event[1:] for event in events] == [
@@ -407,7 +407,7 @@ def test_an_axis_that_pushes_against_a_hard_stop_is_reported_until_it_no_longer_
     assert last == end
     drive.go(sign * 70, scheduler.now)
     scheduler.advance(20 * SECOND)
-    assert (len(reported()), mechanism.place(scheduler.now)) == (2, sign * 10)
+    assert (len(reported()), mechanism.grid_position(scheduler.now)) == (2, sign * 10)
     facts = [dict(record.facts) for record in told if record.subject == "hard-stop"]
     assert facts == [
         {"axis": 1, "element": "x", "stop": side, "pushes": True, "lost": sign},
@@ -425,7 +425,7 @@ def test_an_axis_that_turns_round_at_a_hard_stop_pushes_until_its_field_comes_ba
     texts = [str(record.value) for record in told if record.subject == "hard-stop"]
     assert texts[0] == "x pushes against its upper hard stop"
     assert texts[-1] == "x no longer pushes against its upper hard stop, 0 pulses behind"
-    assert mechanism.place(scheduler.now) == 0
+    assert mechanism.grid_position(scheduler.now) == 0
 
 
 def test_a_blocked_rotor_of_a_motor_is_let_go_to_the_nearest_period() -> None:
@@ -434,7 +434,7 @@ def test_a_blocked_rotor_of_a_motor_is_let_go_to_the_nearest_period() -> None:
     mechanism.block(True, 0)
     drive.go(200, 0)
     scheduler.advance(5 * SECOND)
-    assert (mechanism.place(scheduler.now), mechanism.lost(scheduler.now)) == (0, 200)
+    assert (mechanism.grid_position(scheduler.now), mechanism.lost(scheduler.now)) == (0, 200)
     version = mechanism.version()
     mechanism.block(False, scheduler.now)
     assert mechanism.version() != version

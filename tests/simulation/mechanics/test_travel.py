@@ -12,12 +12,12 @@ def test_forth_and_back() -> None:
     travel = Travel(10, 4, is_forth=False, now=100)
     assert travel.full % 10 == travel.full % 4 == 0
     forth, back = travel.full // 10, travel.full // 4
-    assert (travel.place(100), travel.direction, list(travel.turning_points(100))) == (0, 0, [])
+    assert (travel.grid_position(100), travel.direction, list(travel.turning_points(100))) == (0, 0, [])
     before = travel.version()
     travel.send(1, 100)
     assert travel.version() != before
     assert list(travel.turning_points(100)) == [101, 110]
-    assert [travel.place(100 + n) for n in (0, 1, 9, 10, 11)] == [0, forth, 9 * forth, travel.full, travel.full]
+    assert [travel.grid_position(100 + n) for n in (0, 1, 9, 10, 11)] == [0, forth, 9 * forth, travel.full, travel.full]
     assert list(travel.turning_points(105)) == [110]
     assert list(travel.turning_points(110)) == []
     version = travel.version()
@@ -26,18 +26,18 @@ def test_forth_and_back() -> None:
     travel.send(-1, 106)
     assert travel.version() != version
     assert travel.direction == -1
-    assert [travel.place(106 + n) for n in (0, 1, 2)] == [6 * forth, 6 * forth - back, 6 * forth - 2 * back]
+    assert [travel.grid_position(106 + n) for n in (0, 1, 2)] == [6 * forth, 6 * forth - back, 6 * forth - 2 * back]
     assert list(travel.turning_points(106)) == [109]
     travel.send(0, 107)
-    assert (travel.place(150), list(travel.turning_points(150))) == (6 * forth - back, [])
+    assert (travel.grid_position(150), list(travel.turning_points(150))) == (6 * forth - back, [])
 
 
 def test_it_may_begin_at_the_upper_end() -> None:
     travel = Travel(10, 4, is_forth=True, now=0)
-    assert travel.place(5) == travel.full
+    assert travel.grid_position(5) == travel.full
     travel.send(-1, 5)
     assert list(travel.turning_points(5)) == [6, 9]
-    assert travel.place(9) == 0
+    assert travel.grid_position(9) == 0
 
 
 @pytest.mark.parametrize(

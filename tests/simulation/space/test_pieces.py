@@ -63,7 +63,7 @@ MOTIONS: dict[str, tuple[Callable[[Nanos], Iterator[Piece]], Callable[[Nanos], f
     "arc": (lambda now: pieces_of_profile(ARC, now), ARC.position, 1e-9),
     "trajectory": (lambda now: pieces_of_trajectory(TRAJECTORY, now), TRAJECTORY.position, 1e-9),
     "response": (lambda now: pieces_of_response(RESPONSE, now), lambda now: RESPONSE.at(now)[0], 1e-9),
-    "travel": (lambda now: pieces_of_travel(TRAVEL, now), lambda now: float(TRAVEL.place(now)), 0.0),
+    "travel": (lambda now: pieces_of_travel(TRAVEL, now), lambda now: float(TRAVEL.grid_position(now)), 0.0),
     "cam": (
         lambda now: pieces_of_cam(CAM, pieces_of_profile(THERE, now)),
         lambda now: float(CAM.lift(THERE.count(now))),

@@ -10,9 +10,9 @@ import pytest
 from steptwin.controller import SECOND
 from steptwin.diagnostics import Fix, Span
 from steptwin.errors import Misuse, SourceErrors
+from steptwin.simulation.toml.keypaths import Path
 from steptwin.simulation.toml.names import Unknown
 from steptwin.simulation.toml.reader import FILE_ERRORS, MOST_FINDINGS, TomlText, WorldError
-from steptwin.simulation.toml.tomlplaces import Path
 from steptwin.simulation.toml.values import (
     flag,
     number,

@@ -228,9 +228,9 @@ def test_what_comes_from_outside_acts_and_is_in_the_trace() -> None:
     world.apply_input(do.Turn("a", 2, -7))
     assert world.mic488["a"].axis[2].encoder == -7
     world.line["bus"].send(b"x3\ru20\r", "plc")
-    assert "plc" in world.lines["bus"].places
+    assert "plc" in world.lines["bus"].clients
     world.apply_input(Leave("bus", "plc"))
-    assert "plc" not in world.lines["bus"].places
+    assert "plc" not in world.lines["bus"].clients
     world.apply_input(Leave("bus", "plc"))
     world.apply_input(do.PowerCycle("d"))
     world.run(for_=0.1)
@@ -302,7 +302,7 @@ def test_a_read_changes_nothing_unless_it_takes_time_or_may_fail(timing: str, fa
         world.apply_input(do.SetFault(read(fault)))
     line = world.lines["bus"]
     line.connect("plc", "rtu")
-    assert line.is_idle_read(line.places["plc"], data) is idle
+    assert line.is_idle_read(line.clients["plc"], data) is idle
 
 
 def test_what_a_condition_found_later_is_forgotten_when_time_goes_back() -> None:
@@ -388,11 +388,11 @@ class Heard:
         self.frames: list[tuple[int, str, str, bytes]] = []
         self.lost: list[tuple[str, int]] = []
 
-    def frame(self, now: int, place: str, direction: FrameDirection, data: bytes) -> None:
-        self.frames.append((now, place, direction.value, data))
+    def frame(self, now: int, client: str, direction: FrameDirection, data: bytes) -> None:
+        self.frames.append((now, client, direction.value, data))
 
-    def unframed(self, now: int, place: str, count: int) -> None:
-        self.lost.append((place, count))
+    def unframed(self, now: int, client: str, count: int) -> None:
+        self.lost.append((client, count))
 
 
 @pytest.mark.parametrize("timing", ["off", "real"])
@@ -410,7 +410,7 @@ def test_the_gap_of_a_line_is_waited_for_where_a_length_is_not_known(timing: str
     world.run(for_=0.1)
     world.apply_input(Bytes("bus", "plc", "rtu", b"\xff\xfe"))
     world.run(for_=0.1)
-    ((moment, data),) = line.places["plc"].received
+    ((moment, data),) = line.clients["plc"].received
     assert data == refusal
     # 6 characters there and 5 back at 38400 bit/s, and the turnaround.
     wire_ns = 0 if timing == "off" else 1_562_500 + 750_000 + 1_302_084

@@ -21,7 +21,7 @@ from steptwin.drivers.kind import (
     WantedMoves,
 )
 from steptwin.drivers.kinds import DRIVERS, register
-from steptwin.drivers.place import parse_line_address
+from steptwin.drivers.lineaddress import parse_line_address
 from steptwin.drivers.tcp import Channel
 from steptwin.errors import LineFailure, Misuse, Refusal
 from toy.controller import STEP_P

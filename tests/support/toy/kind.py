@@ -65,17 +65,17 @@ class ToyTrafficLog:
         self._sink = sink
         self._units = line.units
 
-    def frame(self, now: Nanos, place: str, direction: Way, data: bytes) -> None:
+    def frame(self, now: Nanos, client: str, direction: Way, data: bytes) -> None:
         text = f"{chr(data[0])} {int.from_bytes(data[1:], signed=True)}"
-        self._sink(FrameLine(now, self._prefix + place, direction, data, text))
+        self._sink(FrameLine(now, self._prefix + client, direction, data, text))
 
-    def unframed(self, now: Nanos, place: str, count: int) -> None:
+    def unframed(self, now: Nanos, client: str, count: int) -> None:
         """Every two bytes are a command."""
 
     def recorded(self, record: TraceRecord) -> None:
         """Frames alone say what goes over the line."""
 
-    def changes(self, place: str, data: bytes) -> Collection[int]:
+    def changes(self, client: str, data: bytes) -> Collection[int]:
         return self._units
 
 

@@ -66,12 +66,12 @@ class ToyLine(Line):
     def units(self) -> tuple[int, ...]:
         return ()
 
-    def _port(self, place: str, kind: str) -> ToyPort:
+    def _port(self, client: str, kind: str) -> ToyPort:
         return ToyPort(self._toy)
 
-    def exchange(self, place: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
-        self._report(place, now, FrameDirection.IN, data)
-        answer = super().exchange(place, found, data, now)
+    def exchange(self, client: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
+        self._report(client, now, FrameDirection.IN, data)
+        answer = super().exchange(client, found, data, now)
         if answer:
-            self._report(place, now, FrameDirection.OUT, answer)
+            self._report(client, now, FrameDirection.OUT, answer)
         return answer

@@ -6,10 +6,10 @@ from collections.abc import Callable, Hashable
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.drivers.exchange import Exchanger
+from steptwin.drivers.lineaddress import parse_line_address
 from steptwin.drivers.lineframes import FRAMES, LineFrames
 from steptwin.drivers.m1486.decoder import M1486Decoder
 from steptwin.drivers.m1486.talk import CharacterTalk, ChipRequest
-from steptwin.drivers.place import parse_line_address
 from steptwin.drivers.tasks import TaskLine
 from steptwin.drivers.tcp import Endpoint
 from steptwin.drivers.threads import ThreadLine

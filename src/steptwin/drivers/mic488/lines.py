@@ -6,10 +6,10 @@ from collections.abc import Callable, Hashable
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.drivers.exchange import Exchanger
+from steptwin.drivers.lineaddress import LineAddress, parse_line_address
 from steptwin.drivers.lineframes import FRAMES, LineFrames
 from steptwin.drivers.mic488.frames import FrameLog
 from steptwin.drivers.modbus import ModbusQuery, RtuMaster, TcpMaster
-from steptwin.drivers.place import LineAddress, parse_line_address
 from steptwin.drivers.tasks import TaskLine
 from steptwin.drivers.threads import ThreadLine
 from steptwin.errors import Misuse

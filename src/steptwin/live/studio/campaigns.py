@@ -16,7 +16,7 @@ from steptwin.campaign.campaign import RESULTS, SUFFIX
 from steptwin.campaign.report.comparison import REPORT
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.eventloop import later
-from steptwin.files.ownfolder import place_in
+from steptwin.files.ownfolder import path_in_folder
 from steptwin.files.textfiles import read_text
 from steptwin.inputfiles import MOST_DESCRIPTION_BYTES, read_recorded
 from steptwin.live.studio.processes import ChildProcesses, Process, last_words
@@ -81,7 +81,7 @@ class FolderCampaigns:
 
     async def run(self, campaign: str) -> None:
         known = await later(asyncio.to_thread(self._campaign, campaign))
-        place_in(self._folder, str(known.results))
+        path_in_folder(self._folder, str(known.results))
         if (running := self._present()) is not None:
             raise Refusal(CAMPAIGN_IS_RUNNING(name=running))
         self._errors.pop(campaign, None)

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from steptwin.errors import Misuse
-from steptwin.files.ownfolder import place_in
+from steptwin.files.ownfolder import path_in_folder
 from steptwin.files.textfiles import read_text, write_bytes
 from steptwin.messages import Message
-from steptwin.simulation.describe.arrangement import OTHERS, DrawnPlace, arranged
+from steptwin.simulation.describe.arrangement import OTHERS, DrawnPosition, arranged
 from steptwin.simulation.describe.spec import WorldSpec
 
 NO_PLACE_OF = Message("live.no-place-of", "places: no axis or element is called {name!r}; there are {names}")
@@ -23,13 +23,13 @@ class WorldArrangement:
         self._spec = spec
         self._known = {*names, *OTHERS}
         self._file = file
-        self._places: Sequence[DrawnPlace] = spec.drawing
+        self._places: Sequence[DrawnPosition] = spec.drawing
 
     def to_json(self) -> Mapping[str, object]:
         places = {of: [x, y] for of, x, y in self._places}
         return {"places": places, "file": None if self._file is None else str(self._file)}
 
-    def save(self, places: Sequence[DrawnPlace]) -> Mapping[str, object]:
+    def save(self, places: Sequence[DrawnPosition]) -> Mapping[str, object]:
         if strange := [place.of for place in places if place.of not in self._known]:
             raise Misuse(NO_PLACE_OF(name=strange[0], names=sorted(self._known)))
         name = f"{self._spec.name if self._file is None else self._file.stem}.toml"
@@ -40,7 +40,7 @@ class WorldArrangement:
         now = read_text(self._file)  # it may have been changed since
         text = arranged(now.source.text, places)
         try:
-            write_bytes(place_in(self._file.parent, self._file.name), now.to_bytes(text))
+            write_bytes(path_in_folder(self._file.parent, self._file.name), now.to_bytes(text))
         except Misuse:
             return {"file": None, "name": name, "text": text}
         finally:

@@ -16,7 +16,7 @@ from steptwin.eventloop import later
 from steptwin.files import recording as recordings
 from steptwin.files.export import FORMATS
 from steptwin.files.loader import RECORDING_SUFFIX, is_recording
-from steptwin.files.ownfolder import place_in
+from steptwin.files.ownfolder import path_in_folder
 from steptwin.files.savedrecordings import SavedRecording, path_of, read_saved, saved_recordings
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.studio.processes import ChildProcesses, Process, last_words
@@ -68,12 +68,12 @@ class WorldRecordings:
         }
 
     async def save(self, name: str | None) -> Mapping[str, object]:
-        path = place_in(self._folder, path_of(self._folder, name or f"{self._stem}-{datetime.now(UTC):%Y%m%d-%H%M%S}").name)
+        path = path_in_folder(self._folder, path_of(self._folder, name or f"{self._stem}-{datetime.now(UTC):%Y%m%d-%H%M%S}").name)
         self._realtime.enter()
         return _to_json(await later(asyncio.to_thread(_save, self._live.recording(), path)))
 
     def place(self, file: str) -> str:
-        path = place_in(self._folder, file)
+        path = path_in_folder(self._folder, file)
         if path.exists():
             if not is_recording(path):
                 raise Refusal(FILE_IS_THERE(path=path))

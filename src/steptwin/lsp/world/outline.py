@@ -1,4 +1,4 @@
-"""The tables and names of a description that may be incomplete: by its lines, and by `find_places` up to the first error."""
+"""The tables and names of a description that may be incomplete: by its lines, and by `find_spans` up to the first error."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.describe.includes import referring_keys
 from steptwin.simulation.describe.tables import tables
 from steptwin.simulation.kinds.registry import KINDS
-from steptwin.simulation.toml.tomlplaces import Path, find_places
+from steptwin.simulation.toml.keypaths import Path, find_spans
 from steptwin.symbols import Symbol, SymbolKind, SymbolRole, Use
 
 _HEADER = re.compile(r"[ \t]*(\[\[?)[ \t]*([A-Za-z0-9_.\- \t]*)(\]?\]?)")
@@ -71,7 +71,7 @@ class WorldOutline:
     @cached_property
     def _places(self) -> dict[Path, Span]:
         try:
-            return find_places(self._lines.text)
+            return find_spans(self._lines.text)
         except Misuse:
             return {}
 

@@ -35,7 +35,7 @@ class Carrying(Protocol):
         """Another value whenever predictions no longer hold."""
         ...
 
-    def places(self, mm: float) -> int: ...
+    def to_grid(self, mm: float) -> int: ...
 
 
 class Sensor(Contact):
@@ -54,7 +54,7 @@ class Sensor(Contact):
             channel=channel,
         )
         self._belt = belt
-        self._at = belt.places(spec.at)
+        self._at = belt.to_grid(spec.at)
         self._of_marks = spec.sees == MARK
         self._seen: object = None
         self.rest_at(self.normally_closed)
@@ -66,7 +66,7 @@ class Sensor(Contact):
             return
         self._seen = version
         drive, load = self._belt.drive, self._belt.load
-        place = drive.place(now)
+        place = drive.grid_position(now)
         is_seen = load.covering(self._at, place, of_marks=self._of_marks) is not None
         self.change(is_seen is not self.normally_closed, now)
         self._due = next_change(drive, *load.edges(self._at, place, of_marks=self._of_marks), now)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-from steptwin.simulation.toml.tomlplaces import Path
+from steptwin.simulation.toml.keypaths import Path
 
 T = TypeVar("T")
 

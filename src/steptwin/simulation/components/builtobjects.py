@@ -17,7 +17,7 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.scheduler.trace import RecordSink
 from steptwin.simulation.scheduler.wires import PinName
-from steptwin.simulation.toml.tomlplaces import Path
+from steptwin.simulation.toml.keypaths import Path
 
 
 @dataclass(slots=True)

@@ -50,7 +50,7 @@ class Carriage(Stateful):
         self.axis = axis
         self._spring = Spring(spec.frequency, spec.damping)
         now = axis.scheduler.now
-        self._response = self._respond(now, float(axis.mechanism.place(now)), 0.0)
+        self._response = self._respond(now, float(axis.mechanism.grid_position(now)), 0.0)
         self._version: object = axis.mechanism.version()
 
     def _respond(self, now: Nanos, x: float, v: float) -> Response:
@@ -96,7 +96,7 @@ class Carriage(Stateful):
     def version(self) -> object:
         return self._response
 
-    def place(self, now: Nanos) -> int:
+    def grid_position(self, now: Nanos) -> int:
         return floor(self._response.at(now)[0] + 0.5)
 
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:

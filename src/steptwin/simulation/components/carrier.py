@@ -90,7 +90,7 @@ class Carrier(TerminalComponent):
         source = self.source
         if source is None:
             return Workpiece("workpiece", 0, 0)
-        return source.load.covering(source.places(self._pick_at), source.drive.place(now))
+        return source.load.covering(source.to_grid(self._pick_at), source.drive.grid_position(now))
 
     def take(self, now: Nanos) -> None:
         """It holds what is there from now on."""
@@ -120,7 +120,7 @@ class Carrier(TerminalComponent):
         source = self.source
         if source is None or self.carried is not None or not self.block.is_on(PICK):
             return None
-        edges = source.load.edges(source.places(self._pick_at), source.drive.place(now))
+        edges = source.load.edges(source.to_grid(self._pick_at), source.drive.grid_position(now))
         return next_change(source.drive, *edges, now)
 
 

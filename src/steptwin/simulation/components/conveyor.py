@@ -35,7 +35,7 @@ FEEDER_STANDS = "feeder_stands"
 MOST_PLACES = 24
 """Limit of the workpieces of a conveyor whose places are signals."""
 PICOMETRES = 10**9
-"""In a millimetre: places of a belt that no axis moves."""
+"""In a millimetre: steps of the grid of a belt that no axis moves."""
 _PULSE = 1
 """The most that an axis moves a belt within a nanosecond, in its pulses."""
 
@@ -52,7 +52,7 @@ STANDS_AT = Message("simulation.stands-on-a-belt", "{workpiece} stands at {place
 
 
 class Conveyor(TerminalComponent):
-    """A belt with its workpieces. ``drive`` moves it, in places of which ``per_mm`` are a millimetre.
+    """A belt with its workpieces. ``drive`` moves it, on a grid of which ``per_mm`` steps are a millimetre.
 
     What leaves it is put at the beginning of the following one, or is gone. Workpieces stand before a stop that is on, behind
     one that stands, and at the end while the beginning of the following conveyor is occupied. A belt that an axis moves
@@ -101,12 +101,12 @@ class Conveyor(TerminalComponent):
         self.spec = spec
         self.drive = drive
         self.per_mm = per_mm
-        self._length = self.places(spec.length)
-        self._stops = tuple((stop_terminal(n), self.places(stop.at)) for n, stop in enumerate(spec.stops, start=1))
+        self._length = self.to_grid(spec.length)
+        self._stops = tuple((stop_terminal(n), self.to_grid(stop.at)) for n, stop in enumerate(spec.stops, start=1))
         self._own = own
         self._moved_by = moved_by
         self._turning_points = turning_points
-        self._then = drive.place(block.scheduler.now)
+        self._then = drive.grid_position(block.scheduler.now)
         """The place of the belt when it was looked at last: since then it has moved one way while anything stands."""
         self.following: Conveyor | None = None
         self.load = Load()
@@ -130,8 +130,8 @@ class Conveyor(TerminalComponent):
     def has_own_drive(self) -> bool:
         return self._own is not None
 
-    def places(self, mm: float) -> int:
-        """The length in places of the belt."""
+    def to_grid(self, mm: float) -> int:
+        """The length on the grid of the belt."""
         return floor(exact_fraction(mm) * self.per_mm + Fraction(1, 2))
 
     def version(self) -> object:
@@ -169,19 +169,19 @@ class Conveyor(TerminalComponent):
 
     def _feed(self, now: Nanos) -> None:
         """Put a workpiece at the beginning, where there is room for it."""
-        if self.feeder_stands or self.load.covering(0, self.drive.place(now)) is not None:
+        if self.feeder_stands or self.load.covering(0, self.drive.grid_position(now)) is not None:
             self.missed += 1
             self.block.scheduler.notify(self.block.name)
             return
         self.fed += 1
         spec = self.spec
-        marks = tuple((self.places(mark), self.places(mark + spec.mark_width)) for mark in spec.marks)
-        self.put(Workpiece(f"{spec.name}.{self.fed}", 0, self.places(spec.workpiece), spec.mass, marks), 0.0, now)
+        marks = tuple((self.to_grid(mark), self.to_grid(mark + spec.mark_width)) for mark in spec.marks)
+        self.put(Workpiece(f"{spec.name}.{self.fed}", 0, self.to_grid(spec.workpiece), spec.mass, marks), 0.0, now)
 
     def put(self, workpiece: Workpiece, front: float, now: Nanos) -> None:
-        """Put a workpiece, whose lengths are places of this belt, with its front ``front`` mm from the beginning."""
-        self._then = self.drive.place(now)
-        self.load.put(workpiece._replace(origin=self.drive.place(now) - self.places(front), held=None))
+        """Put a workpiece, whose lengths are on the grid of this belt, with its front ``front`` mm from the beginning."""
+        self._then = self.drive.grid_position(now)
+        self.load.put(workpiece._replace(origin=self.drive.grid_position(now) - self.to_grid(front), held=None))
         self.report(IS_ON(workpiece=workpiece.name, belt=self.spec.name), workpiece.name, "on")
         self.block.scheduler.notify(self.block.name)
 
@@ -189,11 +189,11 @@ class Conveyor(TerminalComponent):
         """Put a workpiece that was on another belt on this one."""
         ratio = self.per_mm / other.per_mm
 
-        def places(length: int) -> int:
+        def to_grid(length: int) -> int:
             return floor(length * ratio + Fraction(1, 2))
 
-        marks = tuple((places(begin), places(end)) for begin, end in workpiece.marks)
-        self.put(workpiece._replace(length=places(workpiece.length), marks=marks), front, now)
+        marks = tuple((to_grid(begin), to_grid(end)) for begin, end in workpiece.marks)
+        self.put(workpiece._replace(length=to_grid(workpiece.length), marks=marks), front, now)
 
     def take(self, workpiece: Workpiece) -> None:
         """Take a workpiece off the belt."""
@@ -204,7 +204,7 @@ class Conveyor(TerminalComponent):
         """How far the front of a workpiece is from the beginning, mm. 0 is the workpiece that was put there first; NaN if
         there are fewer."""
         workpieces = self.load.workpieces
-        return float(workpieces[number].front(self.drive.place(now)) / self.per_mm) if number < len(workpieces) else nan
+        return float(workpieces[number].front(self.drive.grid_position(now)) / self.per_mm) if number < len(workpieces) else nan
 
     def mass(self, now: Nanos) -> float:
         """kg of the workpieces on it."""
@@ -218,7 +218,7 @@ class Conveyor(TerminalComponent):
 
     def _hold(self, now: Nanos) -> None:
         """Let workpieces stand where they cannot go on, and let those go on that can."""
-        belt, stride = self.drive.place(now), _PULSE if self._own is None else self._own.stride
+        belt, stride = self.drive.grid_position(now), _PULSE if self._own is None else self._own.stride
         back, self._then = self._then - belt, belt
         if back > 0:
             for workpiece in self.load.workpieces:
@@ -260,11 +260,11 @@ class Conveyor(TerminalComponent):
         return following is not None and following.covers_beginning(now)
 
     def covers_beginning(self, now: Nanos) -> bool:
-        return self.load.covering(0, self.drive.place(now)) is not None
+        return self.load.covering(0, self.drive.grid_position(now)) is not None
 
     def _deliver(self, now: Nanos) -> None:
         """Let go what has come to an end of the belt."""
-        belt, length = self.drive.place(now), self._length
+        belt, length = self.drive.grid_position(now), self._length
         for workpiece in self.load.workpieces:
             front = workpiece.front(belt)
             if front >= length and workpiece.held is None:
@@ -279,7 +279,7 @@ class Conveyor(TerminalComponent):
 
     def _next(self, now: Nanos) -> Nanos | None:
         """When the next workpiece is lost at the beginning, is delivered or cannot go on; or can again, at the end."""
-        belt = self.drive.place(now)
+        belt = self.drive.grid_position(now)
         moving = [workpiece for workpiece in self.load.workpieces if workpiece.held is None]
         below = max((workpiece.origin for workpiece in moving), default=None)
         above = min((workpiece.origin + self._way(workpiece, belt, now) for workpiece in moving), default=None)
@@ -291,7 +291,7 @@ class Conveyor(TerminalComponent):
         following = self.following
         if following is None or not self.load.workpieces or not self._is_blocked(now):
             return due
-        free = next_change(following.drive, *following.load.edges(0, following.drive.place(now)), now)
+        free = next_change(following.drive, *following.load.edges(0, following.drive.grid_position(now)), now)
         return free if due is None else due if free is None else min(due, free)
 
     def _way(self, workpiece: Workpiece, belt: int, now: Nanos) -> int:
@@ -345,7 +345,7 @@ def _make(spec: ConveyorSpec, context: ElementContext) -> Conveyor:
         per_mm = axis.scale.pulses_per_unit / exact_fraction(spec.mm_per_unit)
         turning_points = partial(turning_points_of_axis, axis)
         conveyor = Conveyor(block, spec, axis.mechanism, per_mm, None, (axis.mechanism.controller,), turning_points)
-    if conveyor.places(spec.length) < 1:
+    if conveyor.to_grid(spec.length) < 1:
         raise Misuse(
             f"length = {spec.length:g} mm: the belt is shorter than one step of its drive, {float(1 / conveyor.per_mm):g} mm"
         )

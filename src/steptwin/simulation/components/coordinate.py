@@ -15,8 +15,8 @@ from steptwin.simulation.mechanics.loadmotion import load_intervals
 if TYPE_CHECKING:
     from steptwin.simulation.components.axis import BuiltAxis
 
-PLACES = 10**6
-"""Places of a unit: nanometres of a millimetre."""
+GRID_PER_UNIT = 10**6
+"""Steps of the grid in a unit: nanometres of a millimetre."""
 
 
 class Pulled(NamedTuple):
@@ -27,8 +27,8 @@ class Pulled(NamedTuple):
 
 
 class Coordinate:
-    """A `steptwin.simulation.logic.contacts.MovingPart`: its place is the nearest of `PLACES` to the sum. ``pulled``: of both
-    axes."""
+    """A `steptwin.simulation.logic.contacts.MovingPart`: its position on a grid of `GRID_PER_UNIT` is the nearest to the sum.
+    ``pulled``: of both axes."""
 
     __slots__ = ("_axes", "_pulled", "_shares")
 
@@ -43,8 +43,8 @@ class Coordinate:
     def version(self) -> object:
         return *(axis.mechanism.version() for axis in self._axes), *self._pulled
 
-    def place(self, now: Nanos) -> int:
-        return floor(self.value(now) * PLACES + 0.5)
+    def grid_position(self, now: Nanos) -> int:
+        return floor(self.value(now) * GRID_PER_UNIT + 0.5)
 
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
         """As `MovingPart.reaches`."""
@@ -61,7 +61,7 @@ class Coordinate:
         return None
 
     def _is_short(self, position: int, direction: int, now: Nanos) -> bool:
-        return (self.place(now) - position) * direction < 0
+        return (self.grid_position(now) - position) * direction < 0
 
     def turning_points(self, now: Nanos) -> Iterator[Nanos]:
         """Moments after ``now`` between which it moves one way. Along arcs the acceleration is taken as constant for 1 ms."""

@@ -95,7 +95,7 @@ class Cylinder(TerminalComponent):
         if force != self.travel.direction:
             self.travel.send(force, now)
             self.block.scheduler.notify(self.block.name)
-        place = self.travel.place(now)
+        place = self.travel.grid_position(now)
         self.block.put(EXTENDED, float(place == self.travel.full))
         self.block.put(RETRACTED, float(place == 0))
 
@@ -135,10 +135,10 @@ class Cylinder(TerminalComponent):
 
     def position(self, now: Nanos) -> float:
         """In units of the stroke, 0 retracted."""
-        return self._spec.stroke * (self.travel.place(now) / self.travel.full)
+        return self._spec.stroke * (self.travel.grid_position(now) / self.travel.full)
 
-    def places(self, units: float) -> int:
-        """The place of its travel nearest to a position in units."""
+    def to_grid(self, units: float) -> int:
+        """The position on the grid of its travel nearest to a position in units."""
         exact = exact_fraction(units) / exact_fraction(self._spec.stroke) * self.travel.full
         return floor(exact + Fraction(1, 2))
 
@@ -178,7 +178,7 @@ def _put_switches(spec: CylinderSpec, cylinder: Cylinder, context: ElementContex
 
 
 def _put_switch(cylinder: Cylinder, spec: SwitchSpec, channel: str, context: ElementContext) -> None:
-    zone = zone_of(spec, cylinder.places, None if spec.period is None else cylinder.places(spec.period))
+    zone = zone_of(spec, cylinder.to_grid, None if spec.period is None else cylinder.to_grid(spec.period))
     put_switch(cylinder.block.scheduler, cylinder.travel, cylinder.block.name, zone, spec, channel, context)
 
 

@@ -11,9 +11,9 @@ from steptwin.simulation.logic.contacts import Circuit
 from steptwin.simulation.scheduler.chance import Chance
 from steptwin.simulation.scheduler.scheduler import Scheduler, TerminalBlock
 from steptwin.simulation.scheduler.wires import PinName, Wire
+from steptwin.simulation.toml.keypaths import Path
 from steptwin.simulation.toml.names import Unknown
 from steptwin.simulation.toml.reader import TomlText
-from steptwin.simulation.toml.tomlplaces import Path
 from steptwin.simulation.toml.values import DIGITAL_INPUT, OUTPUT, Terminal
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Generic, NamedTuple, TypeVar, cast
 
+from steptwin.simulation.toml.keypaths import Path
 from steptwin.simulation.toml.table import TableSpec, table
-from steptwin.simulation.toml.tomlplaces import Path
 
 
 @table()

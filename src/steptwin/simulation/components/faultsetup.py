@@ -8,7 +8,7 @@ from typing import Any
 from steptwin.controller import Nanos
 from steptwin.simulation.components.axis import AXIS
 from steptwin.simulation.components.builtobjects import BuiltObjects
-from steptwin.simulation.faults import ActiveFault, Fault, RequestRoute, check_place, prepare_for_faults
+from steptwin.simulation.faults import ActiveFault, Fault, RequestRoute, check_route, prepare_for_faults
 from steptwin.simulation.faults.controller import FaultyController
 from steptwin.simulation.faults.table import Layer, Occasion
 from steptwin.simulation.kinds.kind import LineUnit
@@ -24,7 +24,7 @@ class FaultSetup:
 
     def check(self, fault: Fault) -> None:
         """Raises `Misuse` for a fault at a place that does not exist, or where it is impossible."""
-        check_place(fault, [*_wires(self._plan)])
+        check_route(fault, [*_wires(self._plan)])
         self._prepare(fault)
         self._plan.faults.check(fault)
 
@@ -69,13 +69,14 @@ def _wires(plan: BuiltObjects) -> Iterator[RequestRoute]:
             continue  # something is wrong with it
         kind, name = line_kinds()[spec.kind], f"line {spec.name!r} carries"
         opened = kind.opened_by
-        links = {opened[key].place: opened[key].place_kind for key in spec.links}
+        links = {opened[key].client: opened[key].client_kind for key in spec.links}
         outside = [
-            RequestRoute(name, line.fault_kinds[place_kind], link, line.units, on=spec.name) for link, place_kind in links.items()
+            RequestRoute(name, line.fault_kinds[client_kind], link, line.units, on=spec.name)
+            for link, client_kind in links.items()
         ]
-        for place, there in line.places.items():
-            if place != SCRIPTS and not any(wire.is_called(place) for wire in outside):
-                outside.append(RequestRoute(name, line.fault_kinds[there.kind], place, line.units, on=spec.name))
+        for client, there in line.clients.items():
+            if client != SCRIPTS and not any(wire.is_called(client) for wire in outside):
+                outside.append(RequestRoute(name, line.fault_kinds[there.kind], client, line.units, on=spec.name))
         yield from outside
         yield RequestRoute(name, line.fault_kinds[line.kinds[0]], SCRIPTS, line.units, is_usual=not outside, on=spec.name)
     for name, kind in plan.kind_of.items():

@@ -31,8 +31,8 @@ from steptwin.simulation.toml.table import key, table, tables_in
 from steptwin.simulation.toml.values import NameOf, name_value, points, text_value
 from steptwin.state import Stateful
 
-PLACES = 10**6
-"""Places of a unit of the follower: nanometres of a millimetre."""
+GRID_PER_UNIT = 10**6
+"""Steps of the grid in a unit of the follower: nanometres of a millimetre."""
 
 
 @table("[[follower]]")
@@ -88,18 +88,18 @@ class Follower(Stateful):
         return self.shaft.version(), self._held, self._share
 
     def lift(self, now: Nanos) -> Fraction:
-        return self._cam.lift(self.shaft.place(now)) * self._share if self._held is None else self._held
+        return self._cam.lift(self.shaft.grid_position(now)) * self._share if self._held is None else self._held
 
-    def place(self, now: Nanos) -> int:
+    def grid_position(self, now: Nanos) -> int:
         if self._held is None and self._share == 1:
-            return self._cam.nearest(self.shaft.place(now), PLACES)
-        return floor(self.lift(now) * PLACES + Fraction(1, 2))
+            return self._cam.nearest(self.shaft.grid_position(now), GRID_PER_UNIT)
+        return floor(self.lift(now) * GRID_PER_UNIT + Fraction(1, 2))
 
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
         if self._held is not None or self._share == 0:
             return None
-        level = Fraction(2 * position - direction, 2 * PLACES) / self._share
-        here, found = self.shaft.place(after), []
+        level = Fraction(2 * position - direction, 2 * GRID_PER_UNIT) / self._share
+        here, found = self.shaft.grid_position(after), []
         for heading in (1, -1):
             place = self._cam.next(level, here, direction, heading)
             if place is not None and (due := self.shaft.reaches(place, after, heading)) is not None:
@@ -123,7 +123,7 @@ class Follower(Stateful):
 
     def _corners(self, begin: Nanos, end: Nanos | None) -> Iterator[Nanos]:
         """When its axis, which goes one way from ``begin`` to ``end``, passes points of the cam, in one revolution."""
-        here = self.shaft.place(begin)
+        here = self.shaft.grid_position(begin)
         for heading in (1, -1):
             now = begin
             for place in self._cam.corners(here, heading):
@@ -210,7 +210,7 @@ def _cam(spec: FollowerSpec, shaft: GearedShaft) -> Cam:
     turn = abs(shaft.pulses_per_turn)
     if turn < 2 * len(spec.points):
         raise Misuse(f"points: a turn of {spec.shaft!r} has {float(turn):g} imp, too few for so many")
-    found = ((shaft.place_of(angle), exact_fraction(lift)) for angle, lift in spec.points)
+    found = ((shaft.grid_position_at(angle), exact_fraction(lift)) for angle, lift in spec.points)
     return Cam(((place - floor(place / turn) * turn, lift) for place, lift in found), turn)
 
 
@@ -218,10 +218,10 @@ def _put_switch(follower: Follower, spec: SwitchSpec, channel: str, context: Ele
     if spec.period is not None:
         raise Misuse(f"period = {spec.period:g}: a follower moves between two ends, its switches have one zone")
 
-    def places(units: float) -> int:
-        return floor(exact_fraction(units) * PLACES + Fraction(1, 2))
+    def to_grid(units: float) -> int:
+        return floor(exact_fraction(units) * GRID_PER_UNIT + Fraction(1, 2))
 
-    zone = context.memo.once(spec.path, lambda: zone_of(spec, places))
+    zone = context.memo.once(spec.path, lambda: zone_of(spec, to_grid))
     mechanism = follower.shaft.axis.mechanism
     scheduler = follower.shaft.axis.scheduler
     put_switch(scheduler, follower, (mechanism.controller, follower.spec.shaft, follower.spec.name), zone, spec, channel, context)

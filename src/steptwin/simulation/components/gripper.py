@@ -75,7 +75,7 @@ class Gripper(Carrier):
 
     def update(self, now: Nanos) -> None:
         closes = self.block.is_on(CLOSE)
-        is_narrow = self.travel.place(now) >= self._at
+        is_narrow = self.travel.grid_position(now) >= self._at
         if self.is_held and (not closes or self.slips):
             self.is_held = False
             self.let_go(now)
@@ -87,7 +87,7 @@ class Gripper(Carrier):
         if direction != self.travel.direction:
             self.travel.send(direction, now)
             self.block.scheduler.notify(self.block.name)
-        place = self.travel.place(now)
+        place = self.travel.grid_position(now)
         self.block.put(OPENED, float(place == 0))
         self.block.put(CLOSED, float(place == self.travel.full))
         self.block.put(HELD, float(self.is_held))
@@ -104,7 +104,7 @@ class Gripper(Carrier):
 
     def position(self, now: Nanos) -> float:
         """How far the jaws are closed, mm."""
-        return self._spec.stroke * (self.travel.place(now) / self.travel.full)
+        return self._spec.stroke * (self.travel.grid_position(now) / self.travel.full)
 
 
 LETS_WORKPIECES_SLIP = Message("simulation.lets-workpieces-slip", "{name} lets workpieces slip")

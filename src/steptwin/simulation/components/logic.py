@@ -22,8 +22,8 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.drawing import Drawing
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.scheduler.wires import PinName, Wire
+from steptwin.simulation.toml.keypaths import Path
 from steptwin.simulation.toml.table import key, table
-from steptwin.simulation.toml.tomlplaces import Path
 from steptwin.simulation.toml.values import Terminal, name_value
 from steptwin.state import Stateful
 

@@ -11,8 +11,8 @@ from steptwin.simulation.logic.condition import SignalCondition
 from steptwin.simulation.logic.expression import parse_condition
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
+from steptwin.simulation.toml.keypaths import Path
 from steptwin.simulation.toml.reader import TomlText
-from steptwin.simulation.toml.tomlplaces import Path
 
 TIME = "time"
 """The signal that belongs to no controller and no element."""

@@ -67,7 +67,7 @@ class ShaftSpec(NamedSpec):
 
 
 class GearedShaft(Stateful):
-    """Turns with its axis, a moving part for cams: its place is in whole pulses of the axis."""
+    """Turns with its axis, a moving part for cams: its grid is that of the pulses of the axis."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("axis", "spec")
     __slots__ = (*FIXED, "_behind", "_held")
@@ -94,8 +94,8 @@ class GearedShaft(Stateful):
     def version(self) -> object:
         return self.axis.mechanism.version(), self._held, self._behind
 
-    def place(self, now: Nanos) -> int:
-        return self.axis.mechanism.place(now) - self._behind if self._held is None else self._held
+    def grid_position(self, now: Nanos) -> int:
+        return self.axis.mechanism.grid_position(now) - self._behind if self._held is None else self._held
 
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
         if self._held is not None:
@@ -107,9 +107,9 @@ class GearedShaft(Stateful):
         scheduler, mechanism = self.axis.scheduler, self.axis.mechanism
         scheduler.record(mechanism.controller, "edge", f"{self.spec.name}.{SLIPS}", float(slips))
         if slips:
-            self._held = self.place(now)
+            self._held = self.grid_position(now)
         elif self._held is not None:
-            self._behind = mechanism.place(now) - self._held
+            self._behind = mechanism.grid_position(now) - self._held
             self._held = None
         scheduler.notify(self.spec.name)
 
@@ -132,18 +132,18 @@ class GearedShaft(Stateful):
         """Pulses of the axis in a turn; negative where the shaft turns backwards."""
         return self.axis.scale.pulses_per_unit / exact_fraction(self.spec.ratio)
 
-    def place_of(self, degrees: float) -> Fraction:
-        """The place, not always whole, at an angle of the first turn."""
+    def grid_position_at(self, degrees: float) -> Fraction:
+        """The position on the grid, not always whole, at an angle of the first turn."""
         return (exact_fraction(degrees) - exact_fraction(self.spec.offset)) / TURN * self.pulses_per_turn
 
     def angle(self, now: Nanos) -> float:
         """Degrees, more than 360 after more than a turn."""
-        return float(self.place(now) / self.pulses_per_turn * TURN + exact_fraction(self.spec.offset))
+        return float(self.grid_position(now) / self.pulses_per_turn * TURN + exact_fraction(self.spec.offset))
 
     def zone(self, cam: CamSpec) -> Zone:
         """Places while a cam is on."""
         end = cam.end if cam.end > cam.begin else cam.end + TURN
-        low, high = sorted((self.place_of(cam.begin), self.place_of(end)))
+        low, high = sorted((self.grid_position_at(cam.begin), self.grid_position_at(end)))
         half = Fraction(1, 2)
         return Zone(floor(low + half), floor(high + half), 0, abs(self.pulses_per_turn))
 

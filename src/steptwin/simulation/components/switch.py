@@ -77,10 +77,10 @@ def put_switch(
     scheduler.add_part(component, (moved_by,) if isinstance(moved_by, str) else moved_by, drives=circuit.target.controller)
 
 
-def zone_of(spec: SwitchSpec, places: Callable[[float], int], period: Fraction | int | None = None) -> Zone:
-    """Where a switch is on. ``places`` gives places of its carriage for units, ``period`` those from zone to zone."""
+def zone_of(spec: SwitchSpec, to_grid: Callable[[float], int], period: Fraction | int | None = None) -> Zone:
+    """Where a switch is on. ``to_grid`` converts units to the grid of its carriage, ``period`` is there from zone to zone."""
     if spec.position is not None:
         half = 0.5 * spec.width
-        return Zone(places(spec.position - half), places(spec.position + half), places(spec.hysteresis), period)
-    low, high = (None if end is None else places(end) for end in (spec.above, spec.below))
-    return Zone(low, high, places(spec.hysteresis))
+        return Zone(to_grid(spec.position - half), to_grid(spec.position + half), to_grid(spec.hysteresis), period)
+    low, high = (None if end is None else to_grid(end) for end in (spec.above, spec.below))
+    return Zone(low, high, to_grid(spec.hysteresis))

@@ -10,7 +10,7 @@ from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis
-from steptwin.simulation.components.coordinate import PLACES, Coordinate, Pulled, pulled_to
+from steptwin.simulation.components.coordinate import GRID_PER_UNIT, Coordinate, Pulled, pulled_to
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
@@ -181,10 +181,10 @@ def _controllers(tool: Tool) -> tuple[str, ...]:
 
 
 def _put_switch(tool: Tool, name: str, spec: SwitchSpec, channel: str, context: ElementContext) -> None:
-    def places(units: float) -> int:
-        return round(exact_fraction(units) * PLACES)
+    def to_grid(units: float) -> int:
+        return round(exact_fraction(units) * GRID_PER_UNIT)
 
-    zone = zone_of(spec, places, None if spec.period is None else places(spec.period))
+    zone = zone_of(spec, to_grid, None if spec.period is None else to_grid(spec.period))
     put_switch(
         tool.axes[0].scheduler, tool.coordinates[name], (*_controllers(tool), tool.spec.name), zone, spec, channel, context
     )

@@ -23,7 +23,7 @@ MOST_PLACED = 1000
 _PIXELS = whole(0, MOST_PX)
 
 
-class DrawnPlace(NamedTuple):
+class DrawnPosition(NamedTuple):
     """``x`` and ``y`` of the upper left corner, from that of the panel. [pixels of CSS]"""
 
     of: str
@@ -40,17 +40,17 @@ def _corner(value: Any) -> tuple[int, int]:
 
 
 @table(f"[[{DRAWING}]]")
-class PlaceSpec(TableSpec):
+class DrawingSpec(TableSpec):
     of: str = key(text_value, f"an axis, an element, {' or '.join(map(repr, OTHERS))}")
     at: tuple[int, int] = key(
         _corner, "its upper left corner in the machine panel of the studio, [x, y] in pixels; the studio writes it"
     )
 
 
-def check_places(text: TomlText, places: Iterable[PlaceSpec], names: Iterable[str]) -> None:
+def check_drawing(text: TomlText, positions: Iterable[DrawingSpec], names: Iterable[str]) -> None:
     """Report places of what is not there, and second ones. ``names``: of axes and elements."""
     known, seen = {*names, *OTHERS}, set[str]()
-    for one in places:
+    for one in positions:
         of, path = one.of, (*one.path, "of")
         if of not in known:
             near = text.near(of, known)
@@ -64,16 +64,16 @@ _HEAD = re.compile(r"\s*\[\[\s*drawing\s*\]\]\s*(#.*)?$")
 _KEY = re.compile(r"\s*(of|at)\s*=")
 
 
-def arranged(text: str, places: Sequence[DrawnPlace]) -> str:
+def arranged(text: str, positions: Sequence[DrawnPosition]) -> str:
     """A description with these places instead of its own; all else stays as it is.
 
     Raises `Refusal` where its own are written in a way that is not recognized.
     """
     end = "\r\n" if "\r\n" in text else "\n"
     kept = "".join(_without(text.splitlines(keepends=True))).rstrip()
-    tables = [[f"[[{DRAWING}]]", f"of = {json.dumps(of, ensure_ascii=False)}", f"at = [{x}, {y}]"] for of, x, y in places]
+    tables = [[f"[[{DRAWING}]]", f"of = {json.dumps(of, ensure_ascii=False)}", f"at = [{x}, {y}]"] for of, x, y in positions]
     found = end.join([kept, *("" if not lines else end + end.join(lines) for lines in tables)]) + end
-    wanted = {**tomllib.loads(text), DRAWING: [{"of": of, "at": [x, y]} for of, x, y in places]}
+    wanted = {**tomllib.loads(text), DRAWING: [{"of": of, "at": [x, y]} for of, x, y in positions]}
     if _values({DRAWING: []}, found) != wanted:
         raise Refusal(f"the [[{DRAWING}]] tables of the description are written in another form: remove them first")
     return found

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from steptwin.simulation.components.elementspec import Reference
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.describe.spec import WorldSpec
-from steptwin.simulation.toml.tomlplaces import Path
+from steptwin.simulation.toml.keypaths import Path
 from steptwin.simulation.toml.values import NameOf
 
 

@@ -10,7 +10,7 @@ from steptwin.errors import Misuse
 from steptwin.simulation.components.element import AnyElement
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec
 from steptwin.simulation.components.registry import ELEMENTS
-from steptwin.simulation.describe.arrangement import DRAWING, DrawnPlace, PlaceSpec, check_places
+from steptwin.simulation.describe.arrangement import DRAWING, DrawingSpec, DrawnPosition, check_drawing
 from steptwin.simulation.describe.includes import PARAMETERS, USE, Includes, ReadFile, is_include, no_files
 from steptwin.simulation.describe.overrides import NO_OVERRIDES, Overrides, override
 from steptwin.simulation.describe.servicetables import SERVICE_TABLES, SERVICES
@@ -67,7 +67,7 @@ def describe(
             fix = toml.key_replacement((key,) if isinstance(data[key], dict) else (key, 0), key, known)
             toml.wrong((key,), "D004", f"the file has no [{key}]{near}", f"permitted: {', '.join(known)}", fix)
             toml.leave_out_all(key)
-    placed = [make_spec(toml, PlaceSpec, row, table) for row, table in _tables(toml, DRAWING)]
+    placed = [make_spec(toml, DrawingSpec, row, table) for row, table in _tables(toml, DRAWING)]
     world = read_table(toml, ("world",), data.get("world", {}), WorldTable.rows.keys)
     spec = WorldSpec(
         **world,
@@ -79,7 +79,7 @@ def describe(
         ),
         elements=ElementSpecs({element.name: tuple(_elements(toml, element)) for element in ELEMENTS.values()}),
         scripts=(*_scripts(toml, "event", EventSpec), *_scripts(toml, "script", ScriptSpec)),
-        drawing=tuple(DrawnPlace(one.of, *one.at) for one in placed),
+        drawing=tuple(DrawnPosition(one.of, *one.at) for one in placed),
         faults=tuple(_faults(toml)),
         text=toml,
         overrides=dict(overrides),
@@ -89,7 +89,7 @@ def describe(
         service.check(toml)
     named_elements = [one for element in ELEMENTS.values() for one in element.named(spec.elements[element.name])]
     _check_names(spec, named_elements)
-    check_places(toml, placed, [one.name for one in named_elements])
+    check_drawing(toml, placed, [one.name for one in named_elements])
     return spec if seed is None else replace(spec, seed=_seed(seed))
 
 

@@ -13,9 +13,9 @@ from typing import Any, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.simulation.kinds.registry import KINDS
+from steptwin.simulation.toml.keypaths import Path
 from steptwin.simulation.toml.reader import TomlText, WorldError, read_table
 from steptwin.simulation.toml.table import TableRows, TableSpec, key, table
-from steptwin.simulation.toml.tomlplaces import Path
 from steptwin.simulation.toml.values import NameOf, PinOf, name_value, text_value
 
 ReadFile: TypeAlias = Callable[[str], bytes]

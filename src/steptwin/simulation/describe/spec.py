@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from steptwin.controller import Nanos
 from steptwin.simulation.components.elementspec import ElementSpecs
-from steptwin.simulation.describe.arrangement import DrawnPlace
+from steptwin.simulation.describe.arrangement import DrawnPosition
 from steptwin.simulation.describe.overrides import Overrides
 from steptwin.simulation.describe.steptable import STEPS
 from steptwin.simulation.faults import Fault
@@ -71,7 +71,7 @@ class WorldSpec(WorldTable):
     controllers: tuple[ControllerSpec, ...]
     elements: ElementSpecs
     scripts: tuple[ScriptSpec, ...]
-    drawing: tuple[DrawnPlace, ...]
+    drawing: tuple[DrawnPosition, ...]
     faults: tuple[Fault | None, ...]
     """None for one with errors, which are in ``text``."""
     text: TomlText

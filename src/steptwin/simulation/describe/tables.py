@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import lru_cache
 
 from steptwin.simulation.components.registry import ELEMENTS
-from steptwin.simulation.describe.arrangement import DRAWING, PlaceSpec
+from steptwin.simulation.describe.arrangement import DRAWING, DrawingSpec
 from steptwin.simulation.describe.includes import USE, UseSpec
 from steptwin.simulation.describe.servicetables import SERVICE_TABLES, inner_tables
 from steptwin.simulation.describe.spec import EventSpec, ScriptSpec, WorldTable
@@ -37,7 +37,7 @@ def _tables_with(registered: tuple[int, ...]) -> Mapping[str, TableRows]:
     for element in ELEMENTS.values():
         found |= {element.name: element.rows, **element.inner}
     services = {name: table.rows for name, table in SERVICE_TABLES.items() if table.rows is not None}
-    return found | {"event": EventSpec.rows, "script": ScriptSpec.rows} | services | {DRAWING: PlaceSpec.rows}
+    return found | {"event": EventSpec.rows, "script": ScriptSpec.rows} | services | {DRAWING: DrawingSpec.rows}
 
 
 def _line_rows() -> TableRows:

@@ -9,8 +9,8 @@ from steptwin.simulation.faults.active import ActiveFault, Faults
 from steptwin.simulation.faults.controller import AxisLoad, Body, FaultyController, prepare_for_faults
 from steptwin.simulation.faults.fault import EXAMPLE, GRAMMAR, FaultMistake, parse, read, schema
 from steptwin.simulation.faults.kinds import KINDS
-from steptwin.simulation.faults.places import RequestRoute, check_place
 from steptwin.simulation.faults.port import FaultyPort, FaultySendingPort
+from steptwin.simulation.faults.routes import RequestRoute, check_route
 from steptwin.simulation.faults.table import Fault, FaultKind, Layer, LineProtocol, Occasion, Parameter
 
 __all__ = [
@@ -32,7 +32,7 @@ __all__ = [
     "Occasion",
     "Parameter",
     "RequestRoute",
-    "check_place",
+    "check_route",
     "parse",
     "prepare_for_faults",
     "read",

@@ -578,7 +578,7 @@ class LineKind(ABC, Generic[M, L]):
 
     @abstractmethod
     def traffic_log(self, line: L, prefix: str, sink: Callable[[FrameLine], None], /) -> TrafficLog:
-        """Log of the traffic on a line, for a function; ``prefix`` is put before the name of a place."""
+        """Log of the traffic on a line, for a function; ``prefix`` is put before the name of a client."""
 
     def writes(self, line: L, take: Callable[[LineWrite], None], /) -> Callable[[], None] | None:
         """Call a function with what programs write over a line, until the returned function is called; None where that is not
@@ -589,7 +589,7 @@ class LineKind(ABC, Generic[M, L]):
     def opened_by(self) -> Mapping[str, LinkKind]:
         """Links by the keys of ``[[line]]`` that can open it."""
         alike = {
-            key.name: LinkKind(self.links[key.like].place_kind, key.name, f"{self.links[key.like].protocol}, {key.name}")
+            key.name: LinkKind(self.links[key.like].client_kind, key.name, f"{self.links[key.like].protocol}, {key.name}")
             for key in LINK_KEYS.values()
             if key.name not in self.links and key.like in self.links
         }
@@ -603,9 +603,9 @@ AnyLineKind: TypeAlias = LineKind[Any, Any]
 class LinkKind:
     """Link that a key of ``[[line]]`` opens."""
 
-    place_kind: str
-    """The kind of its places on the line, one of `steptwin.simulation.kinds.lines.Line.kinds`."""
-    place: str
-    """The name of its places; numbered on links for any number of programs."""
+    client_kind: str
+    """The kind of its clients on the line, one of `steptwin.simulation.kinds.lines.Line.kinds`."""
+    client: str
+    """The name of its clients; numbered on links for any number of programs."""
     protocol: str
     """For people: ``Modbus RTU``."""

@@ -1,6 +1,7 @@
 """Lines of a world: controllers on a serial line or a network, and the programs connected to them.
 
-Each program has its own place on the line. Responses are collected at the moment they arrive, so that each has its time.
+Each program is a client of the line with its own end point. Responses are collected at the moment they arrive, so that each has
+its time.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from steptwin.state import Plain, Stateful
 from steptwin.wire.slave import FrameCallback, FrameDirection, SlaveDevice, SlavePort
 
 SCRIPTS = "script"
-"""The place of the world's own scripts on every line."""
+"""The name on each line of the client that the world's own scripts are."""
 
 MOST_RECEIVED = 1 << 16
 """Limit of received pieces kept for a program that does not fetch them; the oldest are dropped."""
@@ -32,11 +33,11 @@ MOST_RECEIVED = 1 << 16
 class FrameSubscriber(Protocol):
     """Observes the traffic of a line."""
 
-    def frame(self, now: Nanos, place: str, direction: FrameDirection, data: bytes) -> None:
-        """Take a frame, or characters; ``place`` is ``"chips"`` for characters that M1486 chips send."""
+    def frame(self, now: Nanos, client: str, direction: FrameDirection, data: bytes) -> None:
+        """Take a frame, or characters; ``client`` is ``"chips"`` for characters that M1486 chips send."""
         ...
 
-    def unframed(self, now: Nanos, place: str, count: int) -> None:
+    def unframed(self, now: Nanos, client: str, count: int) -> None:
         """Take the number of bytes that belong to no frame."""
         ...
 
@@ -61,7 +62,7 @@ class LineWrite(NamedTuple):
     """
 
     time: Nanos
-    place: str
+    client: str
     units: tuple[int, ...]
     words: str
     outcome: str
@@ -74,7 +75,7 @@ class TrafficLog(FrameSubscriber, Protocol):
         """Take a trace record of a controller on the line."""
         ...
 
-    def changes(self, place: str, data: bytes) -> Collection[int]:
+    def changes(self, client: str, data: bytes) -> Collection[int]:
         """The addresses of the controllers that a request or characters of a program may change."""
         ...
 
@@ -129,11 +130,11 @@ OTHER_KIND_OF_CONNECTION = Message(
 class Line(Stateful, ABC):
     """Base class of lines; a part of its scheduler."""
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_before", "_busy", "_faults", "_subscribers", "_scheduler", "_record", "name", "places")
+    FIXED: ClassVar[tuple[str, ...]] = ("_before", "_busy", "_faults", "_subscribers", "_scheduler", "_record", "name", "clients")
     __slots__ = (*FIXED,)
 
     kinds: ClassVar[tuple[str, ...]]
-    """Kinds of places; the first is that of scripts."""
+    """Kinds of clients; the first is that of scripts."""
     fault_kinds: ClassVar[Mapping[str, FaultLine]]
     is_shared: ClassVar[bool] = False
     """Whether every program on it receives all that is sent, requested or not."""
@@ -143,17 +144,17 @@ class Line(Stateful, ABC):
         self._record = record
         self._faults = faults
         self.name = name
-        self.places: dict[str, LineEndPoint] = {}
+        self.clients: dict[str, LineEndPoint] = {}
         self._subscribers: list[FrameSubscriber] = []
         self._before = LineTraffic()
         """Traffic of programs that have disconnected."""
         self._busy: dict[str, LineEndPoint] = {}
-        """Places that may send without a request, or later."""
+        """Clients that may send without a request, or later."""
 
     # ------------------------------------------------------------------ implemented by kinds of lines
 
     @abstractmethod
-    def _port(self, place: str, kind: str) -> Port:
+    def _port(self, client: str, kind: str) -> Port:
         """A new port for a program. Its state is copied by `_port_state`."""
 
     def _framed(self, port: Any) -> SlavePort | None:
@@ -186,28 +187,28 @@ class Line(Stateful, ABC):
     def is_timed(self) -> bool:
         """Whether characters take transmission time."""
 
-    # ------------------------------------------------------------------ places
+    # ------------------------------------------------------------------ clients
 
-    def connect(self, place: str, kind: str | None = None) -> LineEndPoint:
-        """The place of a program, made on first use. Raises `Misuse` for a kind the line does not have."""
-        found = self.places.get(place)
+    def connect(self, client: str, kind: str | None = None) -> LineEndPoint:
+        """The end point of a client, made on first use. Raises `Misuse` for a kind the line does not have."""
+        found = self.clients.get(client)
         if found is not None:
             return found
         kind = self.kinds[0] if kind is None else kind
         if kind not in self.kinds:
             raise Misuse(OTHER_KIND_OF_CONNECTION(name=self.name, kind=kind, names=list(self.kinds)))
-        port = self._port(place, kind)
+        port = self._port(client, kind)
         framed = self._framed(port)
         if sends_by_itself(port):
             faulty: FaultyPort = FaultySendingPort(
-                port, place, self._faults, self.fault_kinds[kind], line_name=self.name, is_read=place != SCRIPTS
+                port, client, self._faults, self.fault_kinds[kind], line_name=self.name, is_read=client != SCRIPTS
             )
             port.on_output = partial(self._scheduler.notify, self.name)
             is_busy = True
         else:
             faulty = FaultyPort(
                 port,
-                place,
+                client,
                 self._faults,
                 self.fault_kinds[kind],
                 framed=framed,
@@ -215,15 +216,15 @@ class Line(Stateful, ABC):
                 line_name=self.name,
             )
             is_busy = False
-        found = self.places[place] = LineEndPoint(kind, faulty, port, framed, talks=is_busy)
+        found = self.clients[client] = LineEndPoint(kind, faulty, port, framed, talks=is_busy)
         if is_busy:
-            self._busy[place] = found
+            self._busy[client] = found
         return found
 
-    def leave(self, place: str) -> None:
-        """Remove the place of a program that has disconnected."""
-        found = self.places.pop(place, None)
-        self._busy.pop(place, None)
+    def leave(self, client: str) -> None:
+        """Remove the end point of a client that has disconnected."""
+        found = self.clients.pop(client, None)
+        self._busy.pop(client, None)
         if found is not None:
             found.is_connected = False
             self._before = self._before.plus(self._traffic_of(found))
@@ -233,60 +234,60 @@ class Line(Stateful, ABC):
     def traffic(self) -> LineTraffic:
         """Traffic of all programs, scripts included."""
         traffic = self._before
-        for place in self.places.values():
-            traffic = traffic.plus(self._traffic_of(place))
+        for client in self.clients.values():
+            traffic = traffic.plus(self._traffic_of(client))
         return traffic
 
-    def _traffic_of(self, place: LineEndPoint) -> LineTraffic:
-        framed = place.framed
+    def _traffic_of(self, client: LineEndPoint) -> LineTraffic:
+        framed = client.framed
         if framed is None:
             return LineTraffic()
         return LineTraffic(framed.requests, framed.exceptions + framed.lost, framed.unframed)
 
-    def _count_unframed(self, name: str, place: LineEndPoint, now: Nanos) -> None:
+    def _count_unframed(self, name: str, client: LineEndPoint, now: Nanos) -> None:
         """Report bytes that belonged to no frame."""
-        if place.framed is None:
+        if client.framed is None:
             return
-        unframed = place.framed.unframed
-        if unframed > place.unframed:
+        unframed = client.framed.unframed
+        if unframed > client.unframed:
             for subscriber in self._subscribers:
-                subscriber.unframed(now, name, unframed - place.unframed)
-        place.unframed = unframed
+                subscriber.unframed(now, name, unframed - client.unframed)
+        client.unframed = unframed
 
-    def exchange(self, place: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
-        """Take bytes of the program at ``place``, connected as ``found``; the scheduler is at ``now``. Returns the immediate
+    def exchange(self, client: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
+        """Take bytes of ``client``, connected as ``found``; the scheduler is at ``now``. Returns the immediate
         answer; later answers go to `LineEndPoint.received`."""
         answer = found.port.exchange(data, now)
-        if place in self._busy or found.port.deadline() is not None:
-            self._busy[place] = found
+        if client in self._busy or found.port.deadline() is not None:
+            self._busy[client] = found
             self._scheduler.notify(self.name)
         if self._scheduler.is_step_exact or self._scheduler.hears_requests:
             self._scheduler.notify()
         if self._subscribers:
-            self._count_unframed(place, found, now)
+            self._count_unframed(client, found, now)
         return answer
 
-    def is_idle_read(self, place: LineEndPoint, data: bytes) -> bool:
+    def is_idle_read(self, client: LineEndPoint, data: bytes) -> bool:
         """Whether bytes of a program are a read without side effects, which need not be recorded for a replay."""
         return False
 
-    def exchange_unrecorded(self, place: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
+    def exchange_unrecorded(self, client: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
         """As `exchange`; subscribers see the frames, the trace does not."""
         record, self._record = self._record, None
         try:
-            return self.exchange(place, found, data, now)
+            return self.exchange(client, found, data, now)
         finally:
             self._record = record
 
-    def receive(self, place: str, data: bytes, now: Nanos) -> None:
-        """Take bytes of the program at ``place``; all answers go to `LineEndPoint.received`. The scheduler is at ``now``."""
-        found = self.connect(place)
-        answer = self.exchange(place, found, data, now)
+    def receive(self, client: str, data: bytes, now: Nanos) -> None:
+        """Take bytes of ``client``; all answers go to `LineEndPoint.received`. The scheduler is at ``now``."""
+        found = self.connect(client)
+        answer = self.exchange(client, found, data, now)
         if answer:
-            self._came(place, found, [(now, answer)])
+            self._came(client, found, [(now, answer)])
         self._scheduler.notify(self.name)
 
-    def _came(self, place: str, found: LineEndPoint, pieces: list[tuple[Nanos, bytes]]) -> None:
+    def _came(self, client: str, found: LineEndPoint, pieces: list[tuple[Nanos, bytes]]) -> None:
         found.received.extend(pieces)
         if found.on_output is not None:
             found.on_output()
@@ -294,30 +295,30 @@ class Line(Stateful, ABC):
     # ------------------------------------------------------------------ time
 
     def update(self, now: Nanos) -> None:
-        for name, place in tuple(self._busy.items()):
-            pieces = place.port.to_send(now)
+        for name, client in tuple(self._busy.items()):
+            pieces = client.port.to_send(now)
             if pieces:
-                self._came(name, place, pieces)
+                self._came(name, client, pieces)
             if self._subscribers:
-                self._count_unframed(name, place, now)
-            if not place.talks and place.port.deadline() is None:
+                self._count_unframed(name, client, now)
+            if not client.talks and client.port.deadline() is None:
                 self._busy.pop(name, None)
 
     def deadline(self) -> Nanos | None:
         if not self._busy:
             return None
-        deadlines = [due for place in self._busy.values() if (due := place.port.deadline()) is not None]
+        deadlines = [due for client in self._busy.values() if (due := client.port.deadline()) is not None]
         return min(deadlines, default=None)
 
     def stop_recording(self) -> None:
         """Record no frames from now on."""
         self._record = None
 
-    def _report(self, place: str, now: Nanos, direction: FrameDirection, data: bytes) -> None:
+    def _report(self, client: str, now: Nanos, direction: FrameDirection, data: bytes) -> None:
         if self._record is not None:
-            self._record(TraceRecord(now, self.name, "frame", f"{place}/{direction.value}", data))
+            self._record(TraceRecord(now, self.name, "frame", f"{client}/{direction.value}", data))
         for subscriber in self._subscribers:
-            subscriber.frame(now, place, direction, data)
+            subscriber.frame(now, client, direction, data)
 
     def subscribe_to_frames(self, subscriber: FrameSubscriber) -> None:
         """Call ``subscriber`` with every frame from now on."""
@@ -330,11 +331,11 @@ class Line(Stateful, ABC):
         self._watch_ports()
 
     def _watch_ports(self) -> None:
-        for name, place in self.places.items():
-            place.port.call_with_frames(self._frame_callback(name))
+        for name, client in self.clients.items():
+            client.port.call_with_frames(self._frame_callback(name))
 
-    def _frame_callback(self, place: str) -> FrameCallback | None:
-        """The callback of frames for the port at ``place``; None if frames are not observed, or the line has none."""
+    def _frame_callback(self, client: str) -> FrameCallback | None:
+        """The callback of frames for the port of ``client``; None if frames are not observed, or the line has none."""
 
         return None
 
@@ -345,27 +346,27 @@ class Line(Stateful, ABC):
     # ------------------------------------------------------------------ snapshots
 
     def copy_state(self) -> Plain:
-        places = tuple(
-            (name, place.kind, place.copy_state(), place.port.copy_state(), self._port_state(place))
-            for name, place in self.places.items()
+        clients = tuple(
+            (name, client.kind, client.copy_state(), client.port.copy_state(), self._port_state(client))
+            for name, client in self.clients.items()
         )
-        return super().copy_state(), places, tuple(self._busy)
+        return super().copy_state(), clients, tuple(self._busy)
 
     def set_state(self, plain: Plain) -> None:
-        own, places, busy = plain
-        kept = {name for name, *_ in places}
-        for name in [name for name in self.places if name not in kept]:
+        own, clients, busy = plain
+        kept = {name for name, *_ in clients}
+        for name in [name for name in self.clients if name not in kept]:
             self.leave(name)
-        for name, kind, state, faulty, port_state in places:
-            place = self.connect(name, kind)
-            place.set_state(state)
-            place.port.set_state(faulty)
-            self._set_port_state(place, port_state)
+        for name, kind, state, faulty, port_state in clients:
+            client = self.connect(name, kind)
+            client.set_state(state)
+            client.port.set_state(faulty)
+            self._set_port_state(client, port_state)
         super().set_state(own)  # at last: who connects may collect what is on the wire
-        self._busy = {name: self.places[name] for name in busy}  # in their order, which is that of simultaneous answers
+        self._busy = {name: self.clients[name] for name in busy}  # in their order, which is that of simultaneous answers
 
-    def _port_state(self, place: LineEndPoint) -> Plain:
-        return place.inner.copy_state()
+    def _port_state(self, client: LineEndPoint) -> Plain:
+        return client.inner.copy_state()
 
-    def _set_port_state(self, place: LineEndPoint, state: Plain) -> None:
-        place.inner.set_state(state)
+    def _set_port_state(self, client: LineEndPoint, state: Plain) -> None:
+        client.inner.set_state(state)

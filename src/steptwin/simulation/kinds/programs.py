@@ -1,7 +1,7 @@
 """The programs of controllers while they are executed: their statements, where they stand, their variables.
 
-One contract for all languages: traces, subscribers and the debugger ask for no more. A place is a statement of a text; texts are
-named as in `steptwin.simulation.kinds.programtexts`.
+One contract for all languages: traces, subscribers and the debugger ask for no more. A location is a statement of a text; texts
+are named as in `steptwin.simulation.kinds.programtexts`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
 from steptwin.statements import StatementHook
 
 
-class Place(NamedTuple):
+class StatementLocation(NamedTuple):
     """A statement of a text. ``number`` counts the statements of the text from 0."""
 
     text: str
@@ -34,10 +34,10 @@ class Statement:
 
 
 class Frame(NamedTuple):
-    """A place to which the execution has come, or to which it returns; ``name``: the label or interrupt before it."""
+    """A location to which the execution has come, or to which it returns; ``name``: the label or interrupt before it."""
 
     name: str
-    place: Place
+    location: StatementLocation
 
 
 class ResourceKind(enum.Enum):
@@ -104,8 +104,9 @@ class Programs(Protocol):
         """Numbers of the statements at labels and interrupts, by name."""
         ...
 
-    def add_hook(self, hook: StatementHook, places: Collection[Place] | None = None) -> None:
-        """Call ``hook`` before each statement (`steptwin.statements`), or before those at places, and at others by chance."""
+    def add_hook(self, hook: StatementHook, locations: Collection[StatementLocation] | None = None) -> None:
+        """Call ``hook`` before each statement (`steptwin.statements`), or before those at ``locations``, and at others by
+        chance."""
         ...
 
     def remove_hook(self, hook: StatementHook) -> None: ...
@@ -115,19 +116,19 @@ class Programs(Protocol):
         statements take no time."""
         ...
 
-    def place(self, number: int) -> Place | None:
-        """Place of a statement for which a hook was called, at that moment; None where it comes from no text."""
+    def location(self, number: int) -> StatementLocation | None:
+        """Location of a statement for which a hook was called, at that moment; None where it comes from no text."""
         ...
 
     def depth(self) -> int:
         """How many calls and interrupts have not returned yet."""
         ...
 
-    def comes_back(self, place: Place) -> bool:
+    def comes_back(self, location: StatementLocation) -> bool:
         """Whether what the statement calls returns to the one after it; True for what calls nothing."""
         ...
 
-    def use(self, place: Place) -> StatementUse: ...
+    def use(self, location: StatementLocation) -> StatementUse: ...
 
     def stack(self, now: Nanos) -> Sequence[Frame]:
         """The statement that is executed, or comes next, then those to which it returns; empty where no program runs."""
@@ -176,8 +177,8 @@ class StatementSubscription:
 
 def _reporting(name: str, programs: Programs, report: RecordSink) -> StatementHook:
     def hook(now: Nanos, number: int) -> None:
-        place = programs.place(number)
-        if place is not None:
-            report(TraceRecord(now, name, "statement", place.text, programs.statements(place.text)[place.number].line))
+        location = programs.location(number)
+        if location is not None:
+            report(TraceRecord(now, name, "statement", location.text, programs.statements(location.text)[location.number].line))
 
     return hook

@@ -31,7 +31,10 @@ class MovingPart(Protocol):
         """A value that changes whenever predictions become invalid."""
         ...
 
-    def place(self, now: Nanos) -> int: ...
+    def grid_position(self, now: Nanos) -> int:
+        """Position, in whole steps of the grid on which its zones are."""
+        ...
+
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
         """First moment > ``after`` at which it reaches or passes ``position`` in ``direction``; None if never."""
         ...
@@ -48,7 +51,7 @@ class CountedPosition:
     def version(self) -> object:
         return self._drive.revision
 
-    def place(self, now: Nanos) -> int:
+    def grid_position(self, now: Nanos) -> int:
         return self._drive.plan.count(now)
 
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
@@ -265,7 +268,7 @@ class Switch(Contact):
         self._version: object = None
         """Version of the carriage when its next change was computed; None before, `_RESTORED` after a restored snapshot."""
         self.zone = zone
-        self.on = not circuit.is_blank and zone.on(carriage.place(now), was_on=False)
+        self.on = not circuit.is_blank and zone.on(carriage.grid_position(now), was_on=False)
         self.rest_at(self.on is not normally_closed)
 
     def update(self, now: Nanos) -> None:
@@ -276,7 +279,7 @@ class Switch(Contact):
         self._version = version
         if is_same and (self._due is None or self._due > now):
             return
-        place = self._carriage.place(now)
+        place = self._carriage.grid_position(now)
         self.on = self.zone.on(place, was_on=self.on)
         self.change(self.on is not self.normally_closed, now)
         self._predict(place, now)

@@ -1,4 +1,4 @@
-"""Belts of conveyors: their drives and the workpieces on them. Positions are whole places: the resolution of a drive."""
+"""Belts of conveyors: their drives and the workpieces on them. Positions are whole steps of a grid: the resolution of a drive."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ class BeltDrive(Protocol):
     """The drive of a belt: a `steptwin.simulation.logic.contacts.MovingPart`."""
 
     def version(self) -> object: ...
-    def place(self, now: Nanos) -> int: ...
+    def grid_position(self, now: Nanos) -> int: ...
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None: ...
 
 
 class ConstantDrive(Stateful):
-    """A drive with a constant forward speed while it is switched on, without ramps. A place is 1 pm, so that 1 mm/s is one place
-    per nanosecond."""
+    """A drive with a constant forward speed while it is switched on, without ramps. A step of its grid is 1 pm, so that 1 mm/s is
+    one step per nanosecond."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("_divisor", "_speed", "stride")
     __slots__ = (*FIXED, "_base", "_begin", "runs")
@@ -36,17 +36,17 @@ class ConstantDrive(Stateful):
 
     def run(self, runs: bool, now: Nanos) -> None:
         if runs is not self.runs:
-            self._base, self._begin, self.runs = self.place(now), now, runs
+            self._base, self._begin, self.runs = self.grid_position(now), now, runs
 
     def version(self) -> object:
         return self._begin, self.runs
 
-    def place(self, now: Nanos) -> int:
+    def grid_position(self, now: Nanos) -> int:
         return self._base + (self._speed * (now - self._begin) // self._divisor if self.runs else 0)
 
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
         """As `MovingPart.reaches`."""
-        if not self.runs or direction < 0 or position <= self.place(after):
+        if not self.runs or direction < 0 or position <= self.grid_position(after):
             return None
         distance = (position - self._base) * self._divisor
         return self._begin - (-distance // self._speed)

@@ -190,7 +190,7 @@ class Mechanism(Stateful):
     def version(self) -> object:
         return self._scheduler.controllers[self.controller].axes[self.number - 1].revision, self._changes
 
-    def place(self, now: Nanos) -> int:
+    def grid_position(self, now: Nanos) -> int:
         return self.trajectory(now).load_at(now)
 
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
@@ -472,7 +472,7 @@ class RotorMark:
     def version(self) -> object:
         return self._mechanism.version()
 
-    def place(self, now: Nanos) -> int:
+    def grid_position(self, now: Nanos) -> int:
         return self._mechanism.at(now).rotor
 
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:

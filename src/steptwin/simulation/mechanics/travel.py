@@ -12,8 +12,8 @@ from steptwin.state import Stateful
 class Travel(Stateful):
     """A position from 0 to `full`, which can actuate switches (`steptwin.simulation.logic.contacts.MovingPart`).
 
-    The full travel takes ``forth`` ns to the upper end and ``back`` ns to the lower one. It has forth × back places, so
-    that both speeds are whole numbers of places per nanosecond.
+    The full travel takes ``forth`` ns to the upper end and ``back`` ns to the lower one. Its grid has forth × back steps, so
+    that both speeds are whole numbers of steps per nanosecond.
     """
 
     FIXED: ClassVar[tuple[str, ...]] = ("_back", "_forth", "full")
@@ -37,16 +37,16 @@ class Travel(Stateful):
         """Move to the upper end (+1), to the lower one (−1), or stop (0)."""
         if direction == self._direction:
             return
-        self._place = self.place(now)
+        self._place = self.grid_position(now)
         self._begin = now
         self._direction = direction
 
     def speed(self, direction: int) -> int:
-        """Places per nanosecond."""
+        """Steps of the grid per nanosecond."""
         return self._back if direction > 0 else self._forth
 
-    def place(self, now: Nanos) -> int:
-        """As `MovingPart.place`."""
+    def grid_position(self, now: Nanos) -> int:
+        """As `MovingPart.grid_position`."""
         moved = self._direction * self.speed(self._direction) * (now - self._begin)
         return min(max(self._place + moved, 0), self.full)
 
@@ -57,7 +57,11 @@ class Travel(Stateful):
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
         """As `MovingPart.reaches`."""
         distance = (position - self._place) * direction
-        if direction != self._direction or (position - self.place(after)) * direction <= 0 or not 0 <= position <= self.full:
+        if (
+            direction != self._direction
+            or (position - self.grid_position(after)) * direction <= 0
+            or not 0 <= position <= self.full
+        ):
             return None
         return self._begin - (-distance // self.speed(direction))
 
@@ -66,7 +70,7 @@ class Travel(Stateful):
         if self._direction == 0:
             return
         near, far = (0, self.full) if self._direction > 0 else (self.full, 0)
-        if self.place(now) == near:
+        if self.grid_position(now) == near:
             yield now + 1
         arrival = self.reaches(far, now, self._direction)
         if arrival is not None:

@@ -246,14 +246,14 @@ def pieces_of_profile(
 
 
 def pieces_of_travel(travel: Travel, now: Nanos) -> Iterator[Piece]:
-    """A cylinder, in places of its travel."""
+    """A cylinder, on the grid of its travel."""
     way = travel.direction
     end = travel.full if way > 0 else 0
     arrival = None if way == 0 else travel.reaches(end, now, way)
     if arrival is None:
-        yield StillPiece(now, None, float(travel.place(now)))
+        yield StillPiece(now, None, float(travel.grid_position(now)))
         return
-    yield SteadyPiece(now, arrival, travel.place, travel.speed(way) * float(SECOND))
+    yield SteadyPiece(now, arrival, travel.grid_position, travel.speed(way) * float(SECOND))
     yield StillPiece(arrival, None, float(end))
 
 

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple, TypeAlias, TypeVar
 from steptwin.diagnostics import Diagnostic, Fix, Severity, SourceText, Span, in_order, render
 from steptwin.errors import Misuse, SourceErrors
 from steptwin.nearmiss import NearMiss
+from steptwin.simulation.toml.keypaths import Path, UnsupportedToml, find_spans
 from steptwin.simulation.toml.names import Unknown, UnknownSignal, WrongTerminal
-from steptwin.simulation.toml.tomlplaces import Path, UnsupportedToml, find_places
 from steptwin.simulation.toml.values import Word
 
 T = TypeVar("T")
@@ -319,10 +319,10 @@ class TomlText:
 
 @lru_cache(maxsize=8)
 def _parsed(text: str) -> tuple[Mapping[Path, Span], dict[str, Any], Path | None]:
-    """The places and values of a text, and its first number that is too long. They are remembered, for a campaign reads one text
+    """The spans and values of a text, and its first number that is too long. They are remembered, for a campaign reads one text
     for each of its runs; nothing may change them."""
-    places, data = find_places(text), tomllib.loads(text)
-    return places, data, next(_long_numbers((), data), None) if _MANY_DIGITS.search(text) else None
+    spans, data = find_spans(text), tomllib.loads(text)
+    return spans, data, next(_long_numbers((), data), None) if _MANY_DIGITS.search(text) else None
 
 
 def _long_numbers(path: Path, value: object) -> Iterator[Path]:

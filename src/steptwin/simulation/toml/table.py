@@ -14,8 +14,8 @@ from dataclasses import MISSING, dataclass, field, fields, replace
 from typing import Any, ClassVar, TypedDict, TypeVar, Unpack, cast, dataclass_transform, overload
 
 from steptwin.errors import Misuse
+from steptwin.simulation.toml.keypaths import Path
 from steptwin.simulation.toml.reader import Key, Row, Table, TomlText, read_table
-from steptwin.simulation.toml.tomlplaces import Path
 from steptwin.tables import IncompleteTable
 
 T = TypeVar("T")

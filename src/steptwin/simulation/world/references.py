@@ -13,7 +13,7 @@ from steptwin.simulation.describe.steptable import STEPS
 from steptwin.simulation.faults import Fault
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.control import Seek
-from steptwin.simulation.toml.tomlplaces import Path
+from steptwin.simulation.toml.keypaths import Path
 from steptwin.simulation.world.actions import prepare
 from steptwin.simulation.world.inputs import FOR_SCRIPTS, ExternalInput
 from steptwin.simulation.world.model import Model

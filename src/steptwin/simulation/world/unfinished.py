@@ -8,7 +8,7 @@ from typing import NamedTuple
 from steptwin.controller import Nanos
 from steptwin.diagnostics import visible
 from steptwin.simulation.faults.active import HeldLevel
-from steptwin.simulation.kinds.programs import Place, Resource, ResourceKind
+from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementLocation
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.wiring import Connection, connections
 
@@ -27,10 +27,10 @@ def waiting(simulation: Simulation) -> Iterator[Waiting]:
         stack = programs.stack(simulation.now)
         if not stack:
             continue
-        use = programs.use(stack[0].place)
+        use = programs.use(stack[0].location)
         if use.waits and use.reads:
             states = ", ".join(state for resource in use.reads for state in _states(simulation, name, resource, drivers, held))
-            where = _statement(simulation, name, stack[0].place)
+            where = _statement(simulation, name, stack[0].location)
             yield Waiting(name, f"{where}: {states}" if states else where)
     events = {script.name for script in simulation.spec.scripts if script.when is not None or script.every is not None}
     for script in simulation.scripts:
@@ -40,9 +40,9 @@ def waiting(simulation: Simulation) -> Iterator[Waiting]:
                 yield Waiting(script.name, what)
 
 
-def _statement(simulation: Simulation, controller: str, place: Place) -> str:
+def _statement(simulation: Simulation, controller: str, location: StatementLocation) -> str:
     programs = simulation.programs[controller]
-    found, source = programs.statements(place.text)[place.number], programs.texts[place.text]
+    found, source = programs.statements(location.text)[location.number], programs.texts[location.text]
     return f"{source.name}:{found.line} {visible(source.text[found.start : found.end].strip())}"
 
 

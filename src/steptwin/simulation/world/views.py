@@ -60,7 +60,7 @@ class MechanicsView:
     @property
     def position(self) -> float:
         """True position of the load."""
-        return self._fitted.units(self._fitted.mechanism.place(self._now))
+        return self._fitted.units(self._fitted.mechanism.grid_position(self._now))
 
     @property
     def rotor(self) -> float:

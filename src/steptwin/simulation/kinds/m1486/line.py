@@ -48,32 +48,32 @@ class ChipLine(Line):
     def is_timed(self) -> bool:
         return next(iter(self.chain.chips.values())).is_timed
 
-    def _port(self, place: str, kind: str) -> Port:
+    def _port(self, client: str, kind: str) -> Port:
         return self.chain.port()
 
-    def exchange(self, place: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
+    def exchange(self, client: str, found: LineEndPoint, data: bytes, now: Nanos) -> bytes:
         if data:
-            self._report(place, now, FrameDirection.IN, data)
+            self._report(client, now, FrameDirection.IN, data)
             self._commands += data.count(b"\r")
-        return super().exchange(place, found, data, now)
+        return super().exchange(client, found, data, now)
 
     def recall(self, unit: int, now: Nanos) -> None:
         """Bytes that a fault holds up come to the chips at once, where a stop drops them."""
-        self.places[SCRIPTS].port.hasten(now)
+        self.clients[SCRIPTS].port.hasten(now)
 
     @property
     def traffic(self) -> LineTraffic:
         return LineTraffic(self._commands, self.chain.collisions)
 
-    def _came(self, place: str, found: LineEndPoint, pieces: list[tuple[Nanos, bytes]]) -> None:
-        if place == SCRIPTS:  # output is recorded here; scripts do not read it
+    def _came(self, client: str, found: LineEndPoint, pieces: list[tuple[Nanos, bytes]]) -> None:
+        if client == SCRIPTS:  # output is recorded here; scripts do not read it
             for moment, data in pieces:
                 self._report("chips", moment, FrameDirection.OUT, data)
         else:
-            super()._came(place, found, pieces)
+            super()._came(client, found, pieces)
 
-    def _port_state(self, place: LineEndPoint) -> Plain:
-        return tuple(place.inner.pending)
+    def _port_state(self, client: LineEndPoint) -> Plain:
+        return tuple(client.inner.pending)
 
-    def _set_port_state(self, place: LineEndPoint, state: Plain) -> None:
-        place.inner.pending = list(state)
+    def _set_port_state(self, client: LineEndPoint, state: Plain) -> None:
+        client.inner.pending = list(state)

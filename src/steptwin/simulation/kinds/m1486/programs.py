@@ -22,7 +22,7 @@ from steptwin.m1486.unit import MASK
 from steptwin.messages import Message
 from steptwin.simulation.kinds.m1486.memory import PLACE as TEXT
 from steptwin.simulation.kinds.m1486.statement_use import use_of
-from steptwin.simulation.kinds.programs import Frame, Place, Statement, StatementUse
+from steptwin.simulation.kinds.programs import Frame, Statement, StatementLocation, StatementUse
 from steptwin.statements import StatementHook
 
 BEGIN = "program"
@@ -49,9 +49,9 @@ class _Text:
         if source is not None:
             self._read(source)
         self.numbers: dict[int, list[int]] = {}
-        """Numbers of the commands that come to lie at a place, one after the other where a reset empties the memory."""
-        for number, place in enumerate(self.offsets):
-            self.numbers.setdefault(place, []).append(number)
+        """Numbers of the commands that come to lie at an offset, one after the other where a reset empties the memory."""
+        for number, offset in enumerate(self.offsets):
+            self.numbers.setdefault(offset, []).append(number)
         self._named = sorted((number, name) for name, number in self.labels.items())
 
     def _read(self, source: SourceText) -> None:
@@ -142,21 +142,25 @@ class ChipPrograms:
     def labels(self, text: str) -> Mapping[str, int]:
         return self._text.labels
 
-    def add_hook(self, hook: StatementHook, places: Collection[Place] | None = None) -> None:
+    def add_hook(self, hook: StatementHook, locations: Collection[StatementLocation] | None = None) -> None:
         offsets = self._text.offsets
-        numbers = None if places is None else frozenset(offsets[place.number] for place in places if place.number < len(offsets))
+        numbers = (
+            None
+            if locations is None
+            else frozenset(offsets[location.number] for location in locations if location.number < len(offsets))
+        )
         self._chip.program.add_hook(hook, numbers)
 
     def remove_hook(self, hook: StatementHook) -> None:
         self._chip.program.remove_hook(hook)
 
-    def place(self, number: int) -> Place | None:
+    def location(self, number: int) -> StatementLocation | None:
         text = self._text
         found = text.numbers.get(number)
         stored = None if found is None else decode(self._chip.memory.fetch(number))
         if found is None or stored is None:
             return None
-        there = (Place(TEXT, one) for one in found if text.commands[one] == stored.command)
+        there = (StatementLocation(TEXT, one) for one in found if text.commands[one] == stored.command)
         return next(there, None)
 
     def begun(self, now: Nanos) -> Sequence[int]:
@@ -174,28 +178,28 @@ class ChipPrograms:
     def point(self, name: str) -> str | None:
         return None
 
-    def comes_back(self, place: Place) -> bool:
+    def comes_back(self, location: StatementLocation) -> bool:
         return True
 
-    def use(self, place: Place) -> StatementUse:
-        return use_of(self._text.commands[place.number])
+    def use(self, location: StatementLocation) -> StatementUse:
+        return use_of(self._text.commands[location.number])
 
     def stack(self, now: Nanos) -> Sequence[Frame]:
         program = self._chip.program
-        present = self._place_in_progress() if self._is_in_progress(now) else self.place(program.pc)
-        back = None if program.back is None else self.place(program.back)
-        return [Frame(self._text.name(place.number), place) for place in (present, back) if place is not None]
+        present = self._location_in_progress() if self._is_in_progress(now) else self.location(program.pc)
+        back = None if program.back is None else self.location(program.back)
+        return [Frame(self._text.name(location.number), location) for location in (present, back) if location is not None]
 
     def _is_in_progress(self, now: Nanos) -> bool:
         """Whether the command before the place of the program is not over."""
         program = self._chip.program
         return program.waiting is not WaitReason.NOTHING or program.ready - now > program.statement_ns
 
-    def _place_in_progress(self) -> Place | None:
-        """Place in progress: what waits goes on at the command after it."""
+    def _location_in_progress(self) -> StatementLocation | None:
+        """Location in progress: what waits goes on at the command after it."""
         pc, text = self._chip.program.pc, self._text
         before = bisect_right(text.offsets, pc - 1) - 1
-        return self.place(text.offsets[before]) if before >= 0 and pc <= text.end else None
+        return self.location(text.offsets[before]) if before >= 0 and pc <= text.end else None
 
     def variables(self, now: Nanos) -> Mapping[str, float]:
         registers = {f"register{number}": float(self._chip.memory.register(number)) for number in GENERAL}

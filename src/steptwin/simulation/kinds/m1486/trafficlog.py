@@ -21,22 +21,22 @@ class ChipTrafficLog:
         self._log.sinks.append(lambda shown: sink(shown._replace(link=prefix + shown.link)))
         self._splitters: dict[str, LineSplitter] = {}
 
-    def frame(self, now: Nanos, place: str, direction: FrameDirection, data: bytes) -> None:
+    def frame(self, now: Nanos, client: str, direction: FrameDirection, data: bytes) -> None:
         if direction is FrameDirection.OUT:
             for byte in data:
                 self._log.sent(now, byte)
             return
-        splitter = self._splitters.get(place)
+        splitter = self._splitters.get(client)
         if splitter is None:
-            for gone in [name for name in self._splitters if name not in self._line.places]:
+            for gone in [name for name in self._splitters if name not in self._line.clients]:
                 del self._splitters[gone]
-            splitter = self._splitters[place] = LineSplitter(self._log, place)
+            splitter = self._splitters[client] = LineSplitter(self._log, client)
         splitter.take(data, now)
 
-    def unframed(self, now: Nanos, place: str, count: int) -> None:
+    def unframed(self, now: Nanos, client: str, count: int) -> None:
         """Every character is one of the line."""
 
-    def changes(self, place: str, data: bytes) -> Collection[int]:
+    def changes(self, client: str, data: bytes) -> Collection[int]:
         return self._line.units
 
     def recorded(self, record: TraceRecord) -> None:

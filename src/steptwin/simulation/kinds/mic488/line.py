@@ -74,27 +74,27 @@ class ModbusBus(Line):
         self._served = served(self.devices)
 
     def subscribe_to_writes(self, callback: Callable[[str, Nanos, int, bytes, bytes], None] | None) -> None:
-        """Call ``callback`` with the place and what `steptwin.wire.slave.WriteCallback` says, from now on; None ends that."""
+        """Call ``callback`` with the client and what `steptwin.wire.slave.WriteCallback` says, from now on; None ends that."""
         self._on_write = callback
-        for name, place in self.places.items():
-            if place.framed is not None:
-                place.framed.on_write = None if callback is None else partial(callback, name)
+        for name, client in self.clients.items():
+            if client.framed is not None:
+                client.framed.on_write = None if callback is None else partial(callback, name)
 
-    def is_idle_read(self, place: LineEndPoint, data: bytes) -> bool:
+    def is_idle_read(self, client: LineEndPoint, data: bytes) -> bool:
         # With timing a request takes the line and the controller; faults count requests.
-        is_free = self._timed is None and not self._faults.interfere and place.framed is place.inner
-        return is_free and place.framed is not None and place.framed.is_lone_read(data)
+        is_free = self._timed is None and not self._faults.interfere and client.framed is client.inner
+        return is_free and client.framed is not None and client.framed.is_lone_read(data)
 
     def recall(self, unit: int, now: Nanos) -> None:
         if self._master.recall(lambda frame: frame[0] in (unit, BROADCAST) and frame[1] not in READS, now):
             self.leave(SCRIPTS)  # what is on its way there is lost with the connection
         self._master.update(now)  # requests for others go on
 
-    def _came(self, place: str, found: LineEndPoint, pieces: list[tuple[Nanos, bytes]]) -> None:
-        if place == SCRIPTS:
+    def _came(self, client: str, found: LineEndPoint, pieces: list[tuple[Nanos, bytes]]) -> None:
+        if client == SCRIPTS:
             self._master.answered(b"".join(map(itemgetter(1), pieces)), pieces[-1][0])
         else:
-            super()._came(place, found, pieces)
+            super()._came(client, found, pieces)
 
     def update(self, now: Nanos) -> None:
         super().update(now)
@@ -108,31 +108,33 @@ class ModbusBus(Line):
     def units(self) -> tuple[int, ...]:
         return tuple(self.devices)
 
-    def _frame_callback(self, place: str) -> FrameCallback | None:
-        return partial(self._report, place) if self._has_subscribers else None
+    def _frame_callback(self, client: str) -> FrameCallback | None:
+        return partial(self._report, client) if self._has_subscribers else None
 
-    def _port(self, place: str, kind: str) -> Port:
-        port = self._slave_port(place, kind)
+    def _port(self, client: str, kind: str) -> Port:
+        port = self._slave_port(client, kind)
         if self._on_write is not None:
-            port.on_write = partial(self._on_write, place)
-        if self._seeing is not None and place != SCRIPTS and isinstance(port, RtuSlavePort | TimedRtuSlavePort):
+            port.on_write = partial(self._on_write, client)
+        if self._seeing is not None and client != SCRIPTS and isinstance(port, RtuSlavePort | TimedRtuSlavePort):
             return Com1Port(self._seeing, port)
         return port
 
-    def _slave_port(self, place: str, kind: str) -> RtuSlavePort | TimedRtuSlavePort | TcpSlavePort | TcpGatewayPort | ScriptPort:
-        callback = self._frame_callback(place)
+    def _slave_port(
+        self, client: str, kind: str
+    ) -> RtuSlavePort | TimedRtuSlavePort | TcpSlavePort | TcpGatewayPort | ScriptPort:
+        callback = self._frame_callback(client)
         if self._timed is None and kind == "tcp":
             return TcpSlavePort(self._served, on_frame=callback)
         if self._timed is not None and kind == "tcp":
             return TcpGatewayPort(self._timed[1], on_frame=callback)
-        if self._timed is not None and place == SCRIPTS:
+        if self._timed is not None and client == SCRIPTS:
             return ScriptPort(self._timed[1], on_frame=callback)
         usual = UART_GAP_NS if kind == "serial" else BURSTY_GAP_NS
         gap = usual if self._gap is None else self._gap
         on_pause = pause_callback(self.devices)
         if self._timed is not None:
             return TimedRtuSlavePort(self._timed[0], gap_ns=gap, on_frame=callback, on_pause=on_pause)
-        devices = self.devices if place == SCRIPTS else self._served
+        devices = self.devices if client == SCRIPTS else self._served
         wire = SerialLine(self._baud) if kind == "serial" else None
         return RtuSlavePort(devices, gap_ns=gap, line=wire, on_frame=callback, on_pause=on_pause)
 

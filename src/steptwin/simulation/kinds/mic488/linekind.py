@@ -58,12 +58,12 @@ class ModbusLines(LineKind[Mic488Device, ModbusBus]):
     def writes(self, line: ModbusBus, take: Callable[[LineWrite], None]) -> Callable[[], None]:
         log = FrameLog(line.devices)
 
-        def seen(place: str, now: Nanos, unit: int, request: bytes, response: bytes) -> None:
-            there = line.places.get(place)
+        def seen(client: str, now: Nanos, unit: int, request: bytes, response: bytes) -> None:
+            there = line.clients.get(client)
             words = log.request(unit, request, tcp=there is not None and there.kind == "tcp")
             units = (unit,) if unit in line.devices else line.units
             outcome = "" if not response else "refusal" if response[0] & REFUSED else "done"
-            take(LineWrite(now, place, units, words, outcome))
+            take(LineWrite(now, client, units, words, outcome))
 
         line.subscribe_to_writes(seen)
         return partial(line.subscribe_to_writes, None)

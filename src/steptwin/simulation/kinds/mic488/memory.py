@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from steptwin.diagnostics import Diagnostic, Severity, SourceText, render
 from steptwin.errors import SourceErrors
 from steptwin.mic488.device import Mic488Device
-from steptwin.mic488.present import place_of
+from steptwin.mic488.present import current_line
 from steptwin.mic488.program_banks import setup_of
 from steptwin.mic488.status import ProgramState
 from steptwin.simulation.kinds.mic488.build import table_for
@@ -26,7 +26,7 @@ PROGRAM, POSITIONS = "program", "positions"
 
 
 def program_texts(device: Mic488Device) -> Iterator[ProgramText]:
-    control, at = device.program, place_of(device)
+    control, at = device.program, current_line(device)
     for bank in range(device.firmware.banks):
         place, program = bank_text(bank), control.banks.programs.get(bank)
         source = SourceText(place, "") if program is None else program.source

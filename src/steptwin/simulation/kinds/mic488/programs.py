@@ -13,7 +13,7 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program_banks import LoadedProgram
 from steptwin.mic488.program_registers import ACCESS
 from steptwin.simulation.kinds.mic488.statement_use import use_of
-from steptwin.simulation.kinds.programs import Frame, Place, Statement, StatementUse
+from steptwin.simulation.kinds.programs import Frame, Statement, StatementLocation, StatementUse
 from steptwin.simulation.kinds.programtexts import bank_text
 from steptwin.statements import StatementHook
 from steptwin.wbc.dialect import Dialect
@@ -36,7 +36,7 @@ class WbcPrograms:
         self._device = device
         self._banks: dict[str, _Bank] = {}
         """Their content at the last request."""
-        self._places: dict[tuple[int, int], Place] = {}
+        self._locations: dict[tuple[int, int], StatementLocation] = {}
         """By bank and number."""
 
     @property
@@ -66,8 +66,8 @@ class WbcPrograms:
     def labels(self, text: str) -> Mapping[str, int]:
         return self._bank(text).labels
 
-    def add_hook(self, hook: StatementHook, places: Collection[Place] | None = None) -> None:
-        numbers = None if places is None else frozenset(place.number for place in places)
+    def add_hook(self, hook: StatementHook, locations: Collection[StatementLocation] | None = None) -> None:
+        numbers = None if locations is None else frozenset(location.number for location in locations)
         self._device.program.interpreter.add_hook(hook, numbers)
 
     def remove_hook(self, hook: StatementHook) -> None:
@@ -76,24 +76,24 @@ class WbcPrograms:
     def begun(self, now: Nanos) -> Sequence[int]:
         return ()  # the first statement is executed one statement time after power-on
 
-    def place(self, number: int) -> Place | None:
+    def location(self, number: int) -> StatementLocation | None:
         control = self._device.program
         if control.running is None:
             return None
         bank = control.running_bank
-        found = self._places.get((bank, number))
+        found = self._locations.get((bank, number))
         if found is None:
-            found = self._places[bank, number] = Place(bank_text(bank), number)
+            found = self._locations[bank, number] = StatementLocation(bank_text(bank), number)
         return found
 
     def depth(self) -> int:
         return len(self._device.program.interpreter.stack)
 
-    def comes_back(self, place: Place) -> bool:
-        return self._bank(place.text).comes_back(place.number)
+    def comes_back(self, location: StatementLocation) -> bool:
+        return self._bank(location.text).comes_back(location.number)
 
-    def use(self, place: Place) -> StatementUse:
-        return use_of(self._bank(place.text).program.steps, place.number)
+    def use(self, location: StatementLocation) -> StatementUse:
+        return use_of(self._bank(location.text).program.steps, location.number)
 
     def stack(self, now: Nanos) -> Sequence[Frame]:
         control = self._device.program
@@ -105,7 +105,7 @@ class WbcPrograms:
         interrupted, calls = (back[:1], back[1:]) if interpreter.handling else ([], back)
         # A JUMP that never comes back, such as the last one of a main loop, is no call (WBC-1 keeps its step nevertheless).
         numbers = [interpreter.place(now), *interrupted, *(step for step in calls if step == 0 or bank.comes_back(step - 1))]
-        return [Frame(bank.name(number), Place(text, number)) for number in numbers]
+        return [Frame(bank.name(number), StatementLocation(text, number)) for number in numbers]
 
     def variables(self, now: Nanos) -> Mapping[str, float]:
         return self._device.program.variables(now)

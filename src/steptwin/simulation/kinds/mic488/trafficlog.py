@@ -23,26 +23,26 @@ class ModbusTrafficLog:
         self._log.sinks.append(sink)
         self._callbacks: dict[str, FrameCallback] = {}
 
-    def frame(self, now: Nanos, place: str, direction: FrameDirection, data: bytes) -> None:
-        callback = self._callbacks.get(place)
+    def frame(self, now: Nanos, client: str, direction: FrameDirection, data: bytes) -> None:
+        callback = self._callbacks.get(client)
         if callback is None:
-            for gone in [name for name in self._callbacks if name not in self._line.places]:
+            for gone in [name for name in self._callbacks if name not in self._line.clients]:
                 del self._callbacks[gone]
-            callback = self._callbacks[place] = self._log.callback(self._prefix + place, tcp=self._is_tcp(place))
+            callback = self._callbacks[client] = self._log.callback(self._prefix + client, tcp=self._is_tcp(client))
         callback(now, direction, data)
 
-    def _is_tcp(self, place: str) -> bool:
-        there = self._line.places.get(place)
+    def _is_tcp(self, client: str) -> bool:
+        there = self._line.clients.get(client)
         return there is not None and there.kind == "tcp"
 
-    def changes(self, place: str, data: bytes) -> Collection[int]:
-        unit, function = (data[6], data[7]) if self._is_tcp(place) else (data[0], data[1])
+    def changes(self, client: str, data: bytes) -> Collection[int]:
+        unit, function = (data[6], data[7]) if self._is_tcp(client) else (data[0], data[1])
         if function not in WRITES:
             return ()
         return (unit,) if unit in self._line.units else self._line.units
 
-    def unframed(self, now: Nanos, place: str, count: int) -> None:
-        self._log.unframed(now, self._prefix + place, count)
+    def unframed(self, now: Nanos, client: str, count: int) -> None:
+        self._log.unframed(now, self._prefix + client, count)
 
     def recorded(self, record: TraceRecord) -> None:
         """Only frames are shown of what goes over the line."""

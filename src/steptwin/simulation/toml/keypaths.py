@@ -51,7 +51,7 @@ class UnsupportedToml(Misuse):
         super().__init__(message)
 
 
-def find_places(text: str) -> dict[Path, Span]:
+def find_spans(text: str) -> dict[Path, Span]:
     """Span by path: of a table its header, of a key the key with its value, of an item of an array the item.
 
     Raises `UnsupportedToml` for what is nested too deeply and for numbers that are too long.

@@ -49,7 +49,7 @@ FAULT_HAPPENS_ELSEWHERE = Message("simulation.fault-happens-elsewhere", "fault {
 UNKNOWN_UNIT_OF_A_FAULT = Message("simulation.unknown-unit-of-a-fault", "fault {name}: unit = {unit}: served are {names}")
 
 
-def check_place(fault: Fault, wires: Sequence[RequestRoute]) -> None:
+def check_route(fault: Fault, wires: Sequence[RequestRoute]) -> None:
     """Raises `Misuse` for a fault of bytes, frames or protocol that none of ``wires`` can show."""
     kind, link, unit = fault.kind, fault.get("link"), fault.get("unit")
     if kind.layer in (Layer.PHYSICS, Layer.ELEMENT):

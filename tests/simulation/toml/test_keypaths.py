@@ -10,7 +10,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from steptwin.simulation.toml.tomlplaces import LONGEST_SCALAR, MOST_NESTED, Path, UnsupportedToml, find_places
+from steptwin.simulation.toml.keypaths import LONGEST_SCALAR, MOST_NESTED, Path, UnsupportedToml, find_spans
 
 EXAMPLES = FilePath(__file__).parents[3] / "examples" / "worlds"
 SINGLE, MULTI = "'''", '"""'
@@ -63,7 +63,7 @@ def implied(data: object, spans: dict[Path, Any]) -> set[Path]:
 
 
 def check(text: str) -> None:
-    data, spans = tomllib.loads(text), find_places(text)
+    data, spans = tomllib.loads(text), find_spans(text)
     assert set(spans) | implied(data, spans) == paths(data)
     for path, span in spans.items():
         value: Any = data
@@ -118,15 +118,15 @@ def test_every_place_of_any_text(lines: list[str], end: str) -> None:
     try:
         tomllib.loads(text)
     except tomllib.TOMLDecodeError:
-        find_places(text)  # it ends
+        find_spans(text)  # it ends
         return
     check(text)
 
 
 def test_what_is_before_a_key_that_cannot_be_read_has_its_places() -> None:
-    assert set(find_places('a = 1\n"\\q" = 2\nb = 3\n')) == {("a",)}
-    assert set(find_places("a = 1\nb 2\nc = 3\n")) == {("a",)}
-    assert set(find_places("a = 1\n[b\nc = 3\n")) == {("a",)}
+    assert set(find_spans('a = 1\n"\\q" = 2\nb = 3\n')) == {("a",)}
+    assert set(find_spans("a = 1\nb 2\nc = 3\n")) == {("a",)}
+    assert set(find_spans("a = 1\n[b\nc = 3\n")) == {("a",)}
 
 
 @given(text=st.text(alphabet="a=[]{}\"'#\n.,1 \\", max_size=40))
@@ -134,7 +134,7 @@ def test_any_characters_are_gone_over_to_an_end(text: str) -> None:
     try:
         tomllib.loads(text)
     except tomllib.TOMLDecodeError:
-        find_places(text)
+        find_spans(text)
         return
     check(text)
 
@@ -153,7 +153,7 @@ def test_any_characters_are_gone_over_to_an_end(text: str) -> None:
 )
 def test_what_nobody_writes_is_refused_at_once(text: str) -> None:
     with pytest.raises(UnsupportedToml):
-        find_places(text)
+        find_spans(text)
 
 
 @pytest.mark.parametrize(("opening", "closing"), [("[", "]"), ("{a=", "}"), ("[{a=", "}]")])
@@ -163,6 +163,6 @@ def test_values_may_be_nested_so_deeply_and_no_deeper(opening: str, closing: str
     def nested(number: int) -> str:
         return f"a = {opening * number}1{closing * number}"
 
-    assert ("a",) in find_places(nested(levels))
+    assert ("a",) in find_spans(nested(levels))
     with pytest.raises(UnsupportedToml):
-        find_places(nested(levels + 1))
+        find_spans(nested(levels + 1))

@@ -14,7 +14,7 @@ from typing import Any, NoReturn, cast
 import pytest
 
 from steptwin.drivers import LineLost, tcp
-from steptwin.drivers.place import SerialChannel, SerialEndpoint, parse_line_address
+from steptwin.drivers.lineaddress import SerialChannel, SerialEndpoint, parse_line_address
 from steptwin.drivers.tcp import SocketChannel, TcpEndpoint, TimedSocketChannel
 from steptwin.errors import Misuse
 from steptwin.wire.line import SerialLine
