@@ -238,6 +238,6 @@ def test_a_log_of_commands_to_the_standard_output_is_not_renamed(tmp_path: Path)
     """It was, when it was full, and over a pipe the first command failed."""
     python = "from pathlib import Path; from steptwin.access.audit import Audit; "
     python += "from steptwin.files.auditfile import AuditFile\n"
-    python += "with AuditFile(Path('/dev/stdout'), 1) as file: file.add(type('E', (), {'plain': lambda self: {}})())"
+    python += "with AuditFile(Path('/dev/stdout'), 1) as file: file.add(type('E', (), {'to_json': lambda self: {}})())"
     done = subprocess.run([sys.executable, "-c", python], capture_output=True, check=True, cwd=tmp_path)
     assert done.stdout == b"{}\n"

@@ -206,7 +206,7 @@ def test_what_did_not_begin_overwrites_nothing(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("speed", "message"),
     [
-        ("-1", "permitted are 0 \\(stands\\), 0.001 to 1000"),
+        ("-1", "permitted are 0 \\(paused\\), 0.001 to 1000"),
         ("fast", "permitted are 0"),
         ("max", "line 'bus' has external clients"),
     ],

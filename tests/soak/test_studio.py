@@ -106,7 +106,7 @@ def test_a_long_session_takes_no_more_memory_than_a_short_one() -> None:
             studio.run(40)  # fewer requests than are permitted
             tab.read()
             tab.messages.clear()
-            tab.ok("unsubscribe", subscribe="x")
+            tab.ok("unsubscribe", subscription="x")
             tab.ok("unwatch", watch=watch)
             visitor = studio.open()
             visitor.ok("subscribe", id=n, kinds=["plan"])

@@ -290,13 +290,13 @@ def test_events_come_once_however_many_follows_want_them() -> None:
     numbers = [event["number"] for event in batch["events"]]
     assert numbers == sorted(set(numbers))
     assert {event["kind"] for event in batch["events"]} == {"plan", "edge"}
-    tab.ok("unsubscribe", subscribe="b")
+    tab.ok("unsubscribe", subscription="b")
     tab.ok("set", levels={"table.IN3": 1})
-    tab.ok("unsubscribe", subscribe="a")
+    tab.ok("unsubscribe", subscription="a")
     tab.ok("move", controller="table", axis=1, to=0)
     studio.run(100)
     assert "events" not in kinds(tab.read())
-    assert tab.error("unsubscribe", subscribe="a")[0] == "misuse"
+    assert tab.error("unsubscribe", subscription="a")[0] == "misuse"
 
 
 def test_what_waits_is_not_lost_when_another_follow_begins() -> None:

@@ -109,7 +109,7 @@ def test_hysteresis_keeps_a_switch_on() -> None:
         ((0, 1, -1), "hysteresis of -1"),
         ((0, 9, 0, 10), "zone of 10 imp, hysteresis included, repeats every 10 imp: it must be shorter"),
         ((0, 5, 2, 10), "zone of 10 imp, hysteresis included"),
-        ((0, None, 0, 10), "two ends"),
+        ((0, None, 0, 10), "needs both limits"),
     ],
 )
 def test_zones_that_cannot_be_are_misuse(arguments: tuple, message: str) -> None:
