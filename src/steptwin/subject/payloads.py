@@ -42,7 +42,7 @@ _JsonPlan: TypeAlias = Annotated[MotionPlan, JsonForm(_PLAN, read_plan, plan_to_
 
 
 class JsonPayload:
-    """What a payload is in JSON, by the annotations of its class (`steptwin.jsonvalues`)."""
+    """Payload of an event, written and read by the annotations of its class (`steptwin.jsonvalues`)."""
 
     __slots__ = ()
 

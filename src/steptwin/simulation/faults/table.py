@@ -149,7 +149,7 @@ class FaultKind:
     needs: Need | None = None
     check: Callable[[Any, Fault], None] | None = None
     faulty: FaultCategory | None = None
-    """What is faulty; without it the line, or of physics and elements an actuator."""
+    """Category of what is faulty; without it the line, or an actuator for faults of physics and elements."""
     tried: tuple[Mapping[str, FaultValue], ...] = field(default=({},), hash=False)
     """Parameters with which campaigns try it."""
 

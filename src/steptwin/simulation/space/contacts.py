@@ -126,7 +126,7 @@ class _Stretch:
             present[n].at(begin) if n in present else 0.0 if step.motion is None else step.motion.at(begin)
             for n, step in enumerate(pair.steps)
         ]
-        """Of all joints; those that move are replaced."""
+        """Positions of all joints; those that move are replaced."""
         turning = [n for n in self._pieces if pair.steps[n].turns]
         self._turns = bool(turning)
         self._common = self._ways_from(sum(step.is_back for step in pair.steps))
@@ -278,7 +278,7 @@ class _Stretch:
         return sum(self._bounds(n, self._begin, end, ways).bend for n in (0, 1))
 
     def _bounds(self, body: int, begin: Nanos, end: Nanos, ways: tuple[_Way, _Way] | None = None) -> _Bounds:
-        """Of a body, seen from the frame between them: from the body inwards, each joint adds its own."""
+        """Bounds of the motion of a body, seen from the frame between them: from the body inwards, each joint adds its own."""
         u, v, _ = self.pair.centres[body]
         speed, bend, far = 0.0, 0.0, length(u, v) + self.pair.outlines[body].reach
         for n, step in reversed((self._ways if ways is None else ways)[body]):

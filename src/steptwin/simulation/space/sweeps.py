@@ -26,7 +26,7 @@ class Sweep(NamedTuple):
 
 
 def sweep(body: Body, now: Nanos) -> Sweep:
-    """What a body may occupy from a moment on, as everything below it moves now."""
+    """Space that a body may occupy from a moment on, as everything below it moves now."""
     shape = body.shape
     half = shape.half if isinstance(shape, Box) else (shape.radius, shape.radius, shape.half)
     low = [float(c - h) for c, h in zip(body.centre, half, strict=True)]

@@ -40,7 +40,7 @@ from steptwin.tables import complete
 from steptwin.wire.rtu import encode_frame
 
 Action: TypeAlias = Callable[[Scripts], object]
-"""What was prepared; it is done at the moment of its preparation."""
+"""A prepared step; it is done at the moment of its preparation."""
 
 
 def prepare(model: Model, what: ExternalInput) -> Action:
