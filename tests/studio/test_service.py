@@ -111,6 +111,11 @@ def test_it_moves_what_an_independent_master_sees(start_studio: Start) -> None:
         assert points[0]["value"] == 2.5
         assert set(client.get("/api/state").json()["ok"]) == {"table", "drum"}
         assert client.get("/api/state", params={"controller": "drum"}).json()["ok"]
+        refused = client.get("/api/state", params={"machine": "drum"})
+        assert (refused.status_code, refused.json()["error"]["message"]) == (
+            400,
+            "/api/state: unknown parameter 'machine'; permitted: controller",
+        )
         assert client.get("/api/describe").json()["ok"]["name"] == "hall"
 
 

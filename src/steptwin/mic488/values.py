@@ -228,7 +228,7 @@ def encoded_words(
 
 
 def _format(item: RegisterItem, value: RegisterValue, data_type: DataType, unit: str) -> str:
-    return f"{item.name} = {value:g} {item.register.unit(data_type, unit)}".rstrip()
+    return f"{item.name} = {value:.12g} {item.register.unit(data_type, unit)}".rstrip()
 
 
 # ---------------------------------------------------------------------- reading with few frames

@@ -210,7 +210,7 @@ class _Reading(NamedTuple):
         file: dict[str, Any] = {"response_class": Response} if self.is_file else {}
         app.add_api_route(
             self.path,
-            self.endpoint,
+            self._answer,
             methods=["GET"],
             name=self.name,
             operation_id=self.name,
@@ -219,6 +219,17 @@ class _Reading(NamedTuple):
             responses={**RESPONSES, DONE: FILE_RESPONSE} if self.is_file else RESPONSES,
             **file,
         )
+
+    async def _answer(self, request: Request) -> Response:
+        """The answer; an error for unknown query parameters, which would change it unnoticed."""
+        known = [self.parameter["name"]] if self.parameter is not None and self.parameter["in"] == "query" else []
+        for name in request.query_params:
+            if name not in known:
+                return _response(
+                    failure(Misuse(f"{self.path}: unknown parameter {name!r}; permitted: {known[0] if known else 'none'}")),
+                    MISUSE,
+                )
+        return await self.endpoint(request)
 
 
 OWN = ("do", "id", "version")

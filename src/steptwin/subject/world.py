@@ -151,8 +151,10 @@ class WorldSubject:
         self._apply_input(step)
 
     def _write(self, step: steps.Write) -> None:
+        self.world.check_values(step)
+        requests = self.world.requests(step)  # before it is done, which may change DATA_TYPE
         self._apply_input(step)
-        for name, pdus in self.world.requests(step):
+        for name, pdus in requests:
             for pdu in pdus:
                 self._publish_stops(name, pdu)
 

@@ -6,7 +6,7 @@ import struct
 
 import pytest
 
-from steptwin.controller import SECOND
+from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse, Refusal
 from steptwin.files.world import World
 from steptwin.mic488.registermap import DataType
@@ -21,6 +21,23 @@ from steptwin.subject.world import WorldSubject
 from steptwin.wire.pdu import encode_request
 
 MOST = 2**31 - 1
+ON_A_LINE = """
+[[line]]
+name = "bus"
+kind = "modbus"
+
+[[mic488]]
+name = "a"
+line = "bus"
+unit = 1
+
+[mic488.M1]
+unit = "mm"
+gear = 640.0
+acc = 150.0
+dec = 150.0
+vel = 50.0
+"""
 
 
 def controller() -> World:
@@ -61,7 +78,7 @@ def test_what_is_refused_before_it_is_sent_is_what_a_controller_refuses(register
             value = real(around * (1 + step * 2.0**-23))
             answer = device.execute(encode_request(encoded(item, value, DataType.REAL)), 0)
             try:
-                Mic488Registers().requests(device, ((item.name, value),))
+                Mic488Registers().check_values(device, ((item.name, value),))
                 is_refused = False
             except Misuse:
                 is_refused = True
@@ -80,19 +97,46 @@ def test_each_way_to_a_position_that_is_too_far_has_one_answer(register: str) ->
     world = controller()
     subject = WorldSubject(world)
     values = (("a", f"M1_{register}", 2.0 * MOST + 2.0),)
-    expected = f"M1_{register} = 4.29497e+09 mm: permitted -4294967296…4294967294 mm"
+    expected = f"M1_{register} = 4294967296 mm: permitted -4294967296…4294967294 mm"
     move = Move("a", 1, to=values[0][2]) if register == "POS_ABS" else Move("a", 1, by=values[0][2])
     ways = [
         lambda: subject.do(move),
         lambda: subject.do(do.Write(values)),
-        lambda: check_step(world, do.Write(values)),
         lambda: check_step(world, do.Order(move)),
-        lambda: world.mic488["a"].write(values[0][1], values[0][2]),
     ]
     for way in ways:
         with pytest.raises(Misuse) as error:
             way()
         assert str(error.value) == expected
+
+
+def test_a_script_may_write_what_a_controller_ignores_now() -> None:
+    """When a description or a recording is read, DATA_TYPE is not yet what it will be."""
+    world = controller()
+    values = (("a", "M1_POS_ABS", 2.0 * MOST + 2.0),)
+    check_step(world, do.Write(values))
+    world.apply_input(do.Write(values))
+    world.run(until=0.5)
+    assert world.read("a.M1.position") == 0.0
+    world.apply_input(do.Write((("a", "DATA_TYPE", 1.0),)))
+    world.run(until=1.0)
+    world.apply_input(do.Write((("a", "M1_POS_ACT", float(MOST)),)))
+    world.run(until=1.5)
+    assert world.read("a.M1.position") == MOST / 0.5
+
+
+def test_a_write_is_encoded_with_the_data_type_of_its_moment() -> None:
+    """DATA_TYPE is changed by a request that is still on the line when time is advanced past it."""
+    world = World.from_toml(ON_A_LINE)
+    world.apply_input(do.Write((("a", "M1_EN", 1.0),)))
+    world.run(until=0.1)
+    world.fault("delay unit=1 for_ms=50 nth=1")
+    world.apply_input(do.Write((("a", "USER_REGISTER[1]", 1.0),)))
+    world.apply_input(do.Write((("a", "DATA_TYPE", 1.0),)))
+    world.advance(world.now + 100 * MILLISECOND)
+    world.apply_input(do.Write((("a", "M1_POS_ABS", 640.0),)))
+    world.run(until=3.0)
+    assert world.read("a.M1.position") == 1.0
 
 
 def test_when_a_motion_has_ended() -> None:

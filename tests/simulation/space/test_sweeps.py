@@ -31,6 +31,15 @@ def test_what_goes_on_for_ever_comes_anywhere_and_what_turns_stays_within_its_ra
     assert sweep(Body("body", moving(inf, turns=True), Box((10, 30, 40))), 0) == Sweep((89.0, -51.0, -51.0), (111.0, 51.0, 51.0))
 
 
+@pytest.mark.parametrize("turns", [0.0, 0.25, 0.1])
+def test_what_goes_on_for_ever_on_a_turntable_comes_anywhere_in_its_plane(turns: float) -> None:
+    table = Frame("table", FLOOR, (0, 0, 0), Joint(motion_of(Profile(0, 0, (), turns)), Direction(2, 1), turns=True))
+    slide = Profile(0, 0, (cruise(0.0, inf, 0.0, 1000.0),), 0.0)
+    found = sweep(Body("body", Frame("x", table, (0, 0, 0), Joint(motion_of(slide), Direction(0, 1))), Box((10, 20, 30))), 0)
+    assert (found.low[:2], found.high[:2]) == ((-inf, -inf), (inf, inf))
+    assert (found.low[2], found.high[2]) == (-31.0, 31.0)
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_all_corners_of_a_body_are_always_within_its_sweep(seed: int) -> None:
     for body in bodies_of(random_scene(seed)):

@@ -171,6 +171,7 @@ def _write(event: KeptEvent, at_s: float) -> Mapping[str, object]:
     if event.kind == "write":
         source, what = kept["source"], kept["words"]
     else:
-        fields = ", ".join(f"{name} = {value}" for name, value in kept["fields"].items() if name != "controller")
+        others = {name: value for name, value in kept["fields"].items() if name not in ("controller", "machine")}  # version 1
+        fields = ", ".join(f"{name} = {value}" for name, value in others.items())
         source, what = f"{kept['viewer']} ({kept['role']})", f"{kept['do']} {fields}".rstrip()
     return {"at_s": at_s, "source": source, "controller": event.machine, "what": what, "outcome": kept["outcome"]}

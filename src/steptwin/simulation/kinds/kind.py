@@ -199,6 +199,11 @@ class NamedRegisters(ABC, Generic[M]):
         """The PDUs that write values by name. Raises `Misuse` for what a register does not take."""
 
     @abstractmethod
+    def check_values(self, controller: M, values: NewValues, /) -> None:
+        """Raises `Misuse` for values that the controller would ignore now. Scripts and recordings write them all the same: when
+        they are read, the settings on which this depends are not those of later."""
+
+    @abstractmethod
     def dialect(self, controller: M, /) -> Hashable:
         """Settings on which requests depend besides names and values."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left, insort
-from math import frexp, inf, ldexp
+from math import frexp, inf, isfinite, ldexp
 from typing import NamedTuple, TypeAlias
 
 from steptwin.controller import Nanos
@@ -49,6 +49,9 @@ def _carry(joint: Joint, low: list[float], high: list[float], now: Nanos) -> Non
         high[axis] += most
         return
     u, v = (axis + 1) % 3, (axis + 2) % 3
+    if not all(map(isfinite, (low[u], low[v], high[u], high[v]))):  # without corners or a length
+        low[u], high[u], low[v], high[v] = -inf, inf, -inf, inf
+        return
     corners = [(x, y) for x in (low[u], high[u]) for y in (low[v], high[v])]
     if least == most:
         c, s = cosine(least), sine(least)

@@ -203,6 +203,7 @@ class Model:
         found: list[tuple[str, Sequence[bytes]]] = []
         for name, group in groupby(step.values, key=itemgetter(0)):
             registers, controller = self.registers(name), self.objects.controllers[name]
+            self.sync(name)  # a request that is due now may change the dialect
             values = tuple(map(itemgetter(1, 2), group))
             key = (name, registers.dialect(controller), values)
             if key not in self._encoded:
@@ -211,6 +212,12 @@ class Model:
                 self._encoded[key] = registers.requests(controller, values)
             found.append((name, self._encoded[key]))
         return found
+
+    def check_values(self, step: do.Write) -> None:
+        """Raises `Misuse` for values that their controllers would ignore now."""
+        for name, group in groupby(step.values, key=itemgetter(0)):
+            self.sync(name)
+            self.registers(name).check_values(self.objects.controllers[name], tuple(map(itemgetter(1, 2), group)))
 
     def programs_of(self, name: str) -> Programs:
         """The programs of a controller. Raises `Misuse` for a controller without."""

@@ -50,7 +50,7 @@ from steptwin.simulation.kinds.mic488.program_watch import ProgramWatch
 from steptwin.simulation.kinds.mic488.programs import WbcPrograms
 from steptwin.simulation.kinds.mic488.table import Mic488Spec
 from steptwin.simulation.kinds.mic488.view import Mic488View
-from steptwin.simulation.kinds.mic488.writes import encode_write
+from steptwin.simulation.kinds.mic488.writes import check_positions, encode_write
 from steptwin.simulation.kinds.programtexts import Destination, Downloading, ProgramText
 from steptwin.simulation.mechanics.channels import AxisChannel, plain_view
 from steptwin.simulation.mechanics.scale import FULL_STEPS, DriveScale, GivenScale, exact_fraction
@@ -91,6 +91,9 @@ class Mic488Encoders(EncoderInputs[Mic488Device]):
 class Mic488Registers(NamedRegisters[Mic488Device]):
     def requests(self, device: Mic488Device, values: NewValues) -> tuple[bytes, ...]:
         return encode_write(device, values)
+
+    def check_values(self, device: Mic488Device, values: NewValues) -> None:
+        check_positions(device, values)
 
     def dialect(self, device: Mic488Device) -> tuple[str, int]:
         return device.firmware.name, device.data_type
@@ -245,7 +248,10 @@ class Mic488Kind(ControllerKind[Mic488Spec, Mic488Device, Mic488View]):
         return _write(command, "EN", float(command.on))
 
     def move(self, device: Mic488Device, line: str | None, command: Move) -> do.Write:
-        return _write(command, "POS_REL", command.by or 0.0) if command.to is None else _write(command, "POS_ABS", command.to)
+        step = _write(command, "POS_REL", command.by or 0.0) if command.to is None else _write(command, "POS_ABS", command.to)
+        if 1 <= command.axis <= AXES:
+            check_positions(device, tuple((register, value) for _, register, value in step.values))
+        return step
 
     def home(self, device: Mic488Device, line: str | None, command: Home) -> do.Write:
         return _write(command, "HOME", command.velocity)

@@ -13,15 +13,11 @@ from steptwin.wire.pdu import MAX_WRITTEN_REGISTERS, ModbusRequest, WriteRegiste
 def encode_write(device: Mic488Device, values: NewValues) -> tuple[bytes, ...]:
     """The requests that write registers by name; neighbours go together. Raises `Misuse` for what one does not take."""
     requests: list[ModbusRequest] = []
-    data_type = DataType(device.data_type)
     for register, value in values:
         item = named(device.registers, register)
-        if item.register.axis is None:
-            request = encoded(item, value, data_type)
-        else:
-            axis = device.axes[item.register.axis - 1]
-            permits = permitted(item.register, data_type, axis.gear)
-            request = encoded(item, value, data_type, axis.config.unit_name, permits)
+        axis = item.register.axis
+        unit = "u" if axis is None else device.config.axes[axis - 1].unit_name
+        request = encoded(item, value, DataType(device.data_type), unit)
         last = requests[-1] if requests else None
         if (
             isinstance(request, WriteRegistersRequest)
@@ -33,3 +29,13 @@ def encode_write(device: Mic488Device, values: NewValues) -> tuple[bytes, ...]:
         else:
             requests.append(request)
     return tuple(map(encode_request, requests))
+
+
+def check_positions(device: Mic488Device, values: NewValues) -> None:
+    """Raises `Misuse` for a position that the controller would ignore, because its pulses do not fit a DINT."""
+    data_type = DataType(device.data_type)
+    for register, value in values:
+        item = named(device.registers, register)
+        if item.register.axis is not None:
+            axis = device.axes[item.register.axis - 1]
+            encoded(item, value, data_type, axis.config.unit_name, permitted(item.register, data_type, axis.gear))
