@@ -136,7 +136,7 @@ def test_a_saved_description_has_the_files_it_names_beside_it(tmp_path: Path, ca
     target = tmp_path / "there" / "machine.toml"
     served = Served(kind="mic488", line=ModbusOptions(tcp="127.0.0.1:0"), twin=TwinOptions(save_world=target))
     serve_mic488(served, Mic488Options(config=config))
-    assert capsys.readouterr().out == f"wrote {tmp_path / 'there' / 'controller.cfg'}\nwrote {target}\n"
+    assert capsys.readouterr().out == f"wrote {tmp_path / 'there' / 'machine.cfg'}\nwrote {target}\n"
     with World.load(target) as world:
         assert world.mic488["mic488"].device.axes[0].config.gear == 50.0
         assert world.objects.line_of["mic488"][1] == 9  # the address of the configuration

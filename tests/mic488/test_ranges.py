@@ -17,7 +17,7 @@ from steptwin.mic488.ranges import FINITE, POSITIVE, ValueRange
         (ValueRange(-2.5), "≥ -2.5", (-2.5, 1e300), (-2.6,)),
         (ValueRange(high=64000), "≤ 64000", (-1e300, 64000.0), (64000.1,)),
         (ValueRange(1, 247), "1…247", (1.0, 247.0), (0.9, 247.1)),
-        (ValueRange(0, 0.123456, above=True), "> 0, ≤ 0.1235", (0.001, 0.123456), (0.0, 0.1235)),
+        (ValueRange(0, 0.123456, above=True), "> 0, ≤ 0.123456", (0.001, 0.123456), (0.0, 0.1235)),
         (ValueRange(-1e15, 1e300), "-1e+15…1e+300", (-1e15, 1e300), (-1.1e15, 1.1e300)),
     ],
 )

@@ -38,7 +38,7 @@ class Rig:
         return answer["ok"]
 
     def state(self) -> Any:
-        return self.ok("digital_shadow_state", controller="mic488")
+        return self.ok("shadow_state", controller="mic488")
 
     def samples(self) -> list[list[float | None]]:
         return self.state()["axes"][0]["samples"]
@@ -54,7 +54,7 @@ class Rig:
 def rig(start_studio: Callable[..., Process], serve: Callable[..., Any], tmp_path: Path) -> Iterator[Rig]:
     (tmp_path / "machine.cfg").write_text(CONFIG)
     twin = serve("--config", str(tmp_path / "machine.cfg"))
-    place = f"tcp://127.0.0.1:{twin.tcp_port},config={tmp_path / 'controller.cfg'}"
+    place = f"tcp://127.0.0.1:{twin.tcp_port},config={tmp_path / 'machine.cfg'}"
     found = Rig(start_studio("--itself", "--device", place), twin.tcp_port)
     yield found
     found.close()
@@ -63,7 +63,7 @@ def rig(start_studio: Callable[..., Process], serve: Callable[..., Any], tmp_pat
 def test_a_device_that_does_as_the_twin(rig: Rig) -> None:
     rig.master.reals(10040, 12.5)  # a setting that the configuration has not
     rig.ok("enable", controller="mic488", axis=1)
-    rig.ok("digital_shadow", controller="mic488")
+    rig.ok("shadow", controller="mic488")
     rig.ok("move", controller="mic488", axis=1, to=20)
     rig.until_at(20.0)
     rig.ok("move", controller="mic488", axis=1, by=-3)
@@ -85,7 +85,7 @@ def test_a_device_that_does_as_the_twin(rig: Rig) -> None:
 
 def test_a_parameter_that_the_twin_has_not(rig: Rig) -> None:
     rig.ok("enable", controller="mic488", axis=1)
-    rig.ok("digital_shadow", controller="mic488")
+    rig.ok("shadow", controller="mic488")
     rig.ok("move", controller="mic488", axis=1, to=2)
     rig.until_at(2.0)
     before = rig.samples()[-1][0]
@@ -104,7 +104,7 @@ def test_a_parameter_that_the_twin_has_not(rig: Rig) -> None:
         "the register",
     )
     assert rig.state()["axes"][0]["first"]["what"] == "M1"
-    rig.ok("digital_shadow", controller="mic488", on=False)
+    rig.ok("shadow", controller="mic488", on=False)
     assert rig.state() is None
 
 
@@ -119,7 +119,7 @@ def test_a_jog_is_taken_over(rig: Rig) -> None:
                 return answer
 
     rig.ok("enable", controller="mic488", axis=1)
-    rig.ok("digital_shadow", controller="mic488")
+    rig.ok("shadow", controller="mic488")
     rig.ok("release_control")
     tell(do="hello", version=2)
     lease = tell(do="jog", controller="mic488", axis=1, velocity=10)["ok"]["lease"]
@@ -137,14 +137,14 @@ def test_a_jog_is_taken_over(rig: Rig) -> None:
 def test_where_there_is_no_twin(rig: Rig, serve: Callable[..., Any], serve_m1486: Callable[..., Any]) -> None:
     other = serve()
     rig.ok("connect", address=f"tcp://127.0.0.1:{other.tcp_port}", name="bare")
-    refused = rig.ask("digital_shadow", controller="bare")["error"]["message"]
+    refused = rig.ask("shadow", controller="bare")["error"]["message"]
     assert refused.endswith("a twin needs the configuration of the controller: connect it with config=FILE")
     rig.ok("connect", address=f"tcp://127.0.0.1:{serve_m1486().tcp_port},kind=m1486", name="chip")
-    assert "no twin beside an M1486" in rig.ask("digital_shadow", controller="chip")["error"]["message"]
+    assert "no twin beside an M1486" in rig.ask("shadow", controller="chip")["error"]["message"]
     rig.ok("enable", controller="mic488", axis=1)
     rig.ok("move", controller="mic488", axis=1, to=40)
-    assert "a twin can be made at rest: M1 runs" in rig.ask("digital_shadow", controller="mic488")["error"]["message"]
-    assert "no device is called 'mic'; there are mic488" in rig.ask("digital_shadow", controller="mic")["error"]["message"]
+    assert "a twin can be made at rest: M1 runs" in rig.ask("shadow", controller="mic488")["error"]["message"]
+    assert "no device is called 'mic'; there are mic488" in rig.ask("shadow", controller="mic")["error"]["message"]
 
 
 def test_the_settings_as_a_text(rig: Rig) -> None:

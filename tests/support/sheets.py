@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 from steptwin.datasheet import Datasheet
@@ -12,7 +12,9 @@ from steptwin.jsonvalues import to_json
 
 def line(item: Any) -> str:
     """Every field of a row that is not empty, in the order of its definition."""
-    return json.dumps(_filled(to_json(item)), ensure_ascii=False, default=str)
+    values = {field.name: getattr(item, field.name) for field in fields(item)} if is_dataclass(item) else item
+    plain = {name: value if isinstance(value, range) else to_json(value) for name, value in values.items()}
+    return json.dumps(_filled(plain), ensure_ascii=False, default=str)
 
 
 def _filled(value: Any) -> Any:

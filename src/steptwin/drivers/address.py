@@ -1,6 +1,6 @@
 """Device addresses as text: an address, and options behind commas.
 
-``/dev/ttyUSB0``, ``/dev/ttyUSB0,baud=9600,unit=2,config=controller.cfg``, ``tcp://127.0.0.1:5020``; for an M1486
+``/dev/ttyUSB0``, ``/dev/ttyUSB0,baud=9600,unit=2,config=machine.cfg``, ``tcp://127.0.0.1:5020``; for an M1486
 ``/dev/ttyUSB0,kind=m1486``, ``tcp://127.0.0.1:5022,chip=7``.
 """
 

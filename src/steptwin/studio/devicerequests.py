@@ -54,7 +54,7 @@ class ReadSettings:
 
 
 @request(
-    "digital_shadow",
+    "shadow",
     KEEP,
     "Begin the digital shadow of a device at rest, a twin that gets the same commands from then on, or end it. It only "
     "reads from the device.",
@@ -65,7 +65,7 @@ class SetDigitalShadow:
     on: Annotated[bool, Meaning("Whether there is to be one.")] = True
 
 
-@request("digital_shadow_state", LOOK, "How a device and its digital shadow differ; null without one.", or_null(_SHADOW))
+@request("shadow_state", LOOK, "How a device and its digital shadow differ; null without one.", or_null(_SHADOW))
 @dataclass(frozen=True, slots=True)
 class ReadDigitalShadow:
     controller: _Device

@@ -53,7 +53,7 @@ class Unit:
         assert data_type is DataType.REAL
         return {item: self.values[item[:-1]] for item in items}
 
-    def shown(self, item: str, value: float, data_type: DataType) -> tuple[float, str]:
+    def in_units(self, item: str, value: float, data_type: DataType) -> tuple[float, str]:
         return value, "mm"
 
     def unit_name(self, axis: int) -> str:
