@@ -111,7 +111,7 @@ def test_a_twin_is_put_beside_a_device(studio: Studio, serve: Callable[..., Any]
     client.close()
     assert serious(page) == []
     page.screenshot(path=PICTURES / "devices-shadow.png")
-    button(page, "Remove the twin beside mic488").click()
+    button(page, "End the digital shadow of mic488").click()
     expect(beside).to_have_count(0)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -13,8 +14,9 @@ from steptwin.jsonvalues import to_json
 def line(item: Any) -> str:
     """Every field of a row that is not empty, in the order of its definition."""
     values = {field.name: getattr(item, field.name) for field in fields(item)} if is_dataclass(item) else item
-    plain = {name: value if isinstance(value, range) else to_json(value) for name, value in values.items()}
-    return json.dumps(_filled(plain), ensure_ascii=False, default=str)
+    if isinstance(values, Mapping):
+        values = {name: value if isinstance(value, range) else to_json(value) for name, value in values.items()}
+    return json.dumps(_filled(values), ensure_ascii=False, default=str)
 
 
 def _filled(value: Any) -> Any:

@@ -35,6 +35,8 @@ class Warm:
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
         self._channel: socket.socket | None = None
+        self._one_at_a_time = threading.Lock()
+        """For tests that start processes in several threads: an answer is that to the request before it."""
 
     @staticmethod
     def can(command: object, environment: Mapping[str, str]) -> bool:
@@ -45,6 +47,10 @@ class Warm:
 
     def fork(self, arguments: Sequence[str], directory: str, environment: Mapping[str, str], descriptors: Sequence[int]) -> int:
         """The number of a child of this process."""
+        with self._one_at_a_time:
+            return self._fork(arguments, directory, environment, descriptors)
+
+    def _fork(self, arguments: Sequence[str], directory: str, environment: Mapping[str, str], descriptors: Sequence[int]) -> int:
         if self._channel is None:
             # What a child leaves behind becomes a child of this process.
             assert ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0) == 0

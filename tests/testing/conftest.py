@@ -7,6 +7,7 @@ from textwrap import dedent
 
 import pytest
 
+import steptwin.campaign.properties.evaluate
 import steptwin.testing  # noqa: F401  else every run imports it anew, for pytester forgets what a run has imported
 
 

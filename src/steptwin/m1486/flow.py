@@ -23,7 +23,7 @@ from steptwin.m1486.syntax import ChipCommand
 from steptwin.m1486.variants import Variant
 from steptwin.tables import complete
 
-MOST_SNAPSHOTS = 32
+MOST_STATES = 32
 """Enough for a line group of five lines; more settings at one place are merged."""
 _MAIN = -1
 """The number of the call for commands outside every call."""
@@ -129,7 +129,7 @@ class _Point:
             if state in self.states:
                 return None
             self.states.add(state)
-            if len(self.states) <= MOST_SNAPSHOTS:
+            if len(self.states) <= MOST_STATES:
                 return state
             self.merged = reduce(_join, self.states)
         else:
@@ -294,7 +294,7 @@ def _is_wrong_multiple(spec: CommandSpec, number: int | None, state: Settings) -
 
 
 def _readings(state: Settings, lines: range) -> Iterable[Settings]:
-    if 2 ** len(lines) > MOST_SNAPSHOTS:
+    if 2 ** len(lines) > MOST_STATES:
         return (state._replace(variable=None),)
     return (state._replace(variable=reading) for reading in range(2 ** len(lines)))
 

@@ -229,7 +229,7 @@ class ArcSection(NamedTuple):
 
 
 def _angle_q(curve: Circular, half: int, position: float) -> float:
-    """The angle within ``half`` (as in `CircularPart`) at which the axis is at ``position``; beyond a turning point, that point.
+    """The angle within ``half`` at which the axis is at ``position``; beyond a turning point, that point.
 
     `steptwin.motion.pulses` does the same operations in the same order.
     """

@@ -245,7 +245,7 @@ class Subject(Protocol):
     def do(self, wanted: Command, /) -> Result: ...
 
     def subscribe(self, what: Filter, bound: int) -> Subscription:
-        """Events from now on, at most ``bound`` of them waiting. `Following.close` ends it."""
+        """Events from now on, at most ``bound`` of them waiting. `Subscription.close` ends it."""
         ...
 
 
