@@ -195,6 +195,9 @@ RESULT_FILE = _parameter(
 )
 
 
+UNKNOWN_PARAMETER = Message("studio.unknown-parameter", "{path}: unknown parameter {name!r}; permitted: {permitted}")
+
+
 class _Reading(NamedTuple):
     """A route that is read."""
 
@@ -225,10 +228,8 @@ class _Reading(NamedTuple):
         known = [self.parameter["name"]] if self.parameter is not None and self.parameter["in"] == "query" else []
         for name in request.query_params:
             if name not in known:
-                return _response(
-                    failure(Misuse(f"{self.path}: unknown parameter {name!r}; permitted: {known[0] if known else 'none'}")),
-                    MISUSE,
-                )
+                problem = UNKNOWN_PARAMETER(path=self.path, name=name, permitted=", ".join(map(str, known)) or "none")
+                return _response(failure(Misuse(problem)), MISUSE)
         return await self.endpoint(request)
 
 
