@@ -5,7 +5,8 @@ export const t = texts(
     title: "Recordings",
     now: "What is recorded now",
     recording: "Recording",
-    recordingMeaning: "What came from outside since the beginning. Run again, it gives the same machine at every moment.",
+    recordingMeaning:
+      "What came from outside since the beginning. Run again, it gives the same machine at every moment.",
     past: "Past",
     pastMeaning: "What can be looked back at: each moment of it, in all panels.",
     trace: "Trace",
