@@ -9,7 +9,7 @@ from typing import Any
 
 import httpx
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, WebSocket, expect
 from pymodbus.client import ModbusTcpClient
 from studio_page import PICTURES, button, show
 from tests.conftest import until
@@ -154,6 +154,12 @@ def test_the_settings_as_a_text(rig: Rig) -> None:
 
 def test_the_difference_is_drawn(rig: Rig, browser: Browser, tmp_path: Path) -> None:
     page = browser.new_page(viewport={"width": 1280, "height": 900})
+    asked: list[str] = []
+
+    def opened(socket: WebSocket) -> None:
+        socket.on("framesent", lambda frame: asked.append(str(frame)))
+
+    page.on("websocket", opened)
     page.goto(rig.studio.url)
     show(page, "Devices")
     with page.expect_download() as download:
@@ -172,6 +178,9 @@ def test_the_difference_is_drawn(rig: Rig, browser: Browser, tmp_path: Path) -> 
     rig.until_at(20.0)
     expect(region.get_by_role("row", name="M1_VMAX 10 40")).to_be_visible()
     page.screenshot(path=PICTURES / "shadow.png")
+    asked.clear()
+    page.wait_for_timeout(2000)
+    assert 1 <= sum("shadow_state" in frame for frame in asked) <= 6, "it is asked for twice a second"
     button(page, "End the digital shadow of mic488").click()
     expect(region).to_have_count(0)
     page.close()
