@@ -20,6 +20,8 @@ from steptwin.studio import viewersession
 from steptwin.studio.hub import MOST_VIEWERS
 from steptwin.studio.requests import ALL
 from steptwin.studio.viewersession import ViewerSession
+from steptwin.subject.commands import VERSION, StopAxes
+from steptwin.subject.dispatch import command_of
 
 
 def kinds(messages: list[dict[str, Any]]) -> list[str]:
@@ -464,3 +466,15 @@ def test_a_role_holds_over_rest_too() -> None:
     assert rest(studio.rest(Role.VIEWER), studio, "enable", controller="table", axis=1)["error"]["code"] == "refusal"
     assert rest(studio.rest(Role.VIEWER), studio, "enable")["error"]["code"] == "misuse"
     assert rest(studio.rest(Role.VIEWER), studio, "stop_all")["ok"]["controllers"]
+
+
+def test_a_stop_of_version_1_stops_and_nothing_else_of_it_is_done() -> None:
+    """It names its controller `machine`; a hello with version 2 does not come before each stop, and never over REST."""
+    tab = Studio().open()
+    assert tab.ok("stop", machine="table", axis=1) == tab.ok("stop", controller="table", axis=1)
+    assert command_of({"do": "stop", "machine": "table"}) == StopAxes("table")
+    refused = [
+        tab.ask("move", machine="table", axis=1, to=1.0),
+        tab.ask("stop", machine="table", version=VERSION),
+    ]
+    assert all("no field 'machine'; fields are controller" in one["error"]["message"] for one in refused)

@@ -209,10 +209,3 @@ def test_the_schema_has_what_the_table_has() -> None:
         assert set(request["properties"]) == {"do", "id", "version", *(field.name for field in row.fields)}
         assert request["required"] == ["do", *(field.name for field in row.fields if field.is_required)]
         assert request["additionalProperties"] is False
-
-
-def test_a_stop_of_version_1_stops() -> None:
-    """It names its controller `machine`; anything else of that version is refused with the fields there are."""
-    assert read_command("stop", {"machine": "table", "axis": 2}) == command.StopAxes("table", 2)
-    with pytest.raises(Misuse, match="no field 'machine'; fields are controller"):
-        read_command("move", {"machine": "table", "axis": 2, "to": 1.0})

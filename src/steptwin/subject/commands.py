@@ -259,8 +259,6 @@ def read_command(name: object, given: Mapping[str, object]) -> Command:
     if found is None:
         hint = NearMiss().hint(name, COMMANDS) if isinstance(name, str) else ""
         raise Misuse(UNKNOWN_COMMAND(name=format_short(name), hint=hint, names=list(COMMANDS)))
-    if found.kind is StopAxes and "machine" in given and "controller" not in given:
-        given = {("controller" if key == "machine" else key): value for key, value in given.items()}  # a stop of version 1 stops
     return found.read(given)
 
 

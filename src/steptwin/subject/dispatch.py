@@ -106,6 +106,8 @@ def fields_of(message: Mapping[str, object]) -> dict[str, object]:
     fields = dict(message)
     for name in ("do", "id", "version"):
         fields.pop(name, None)
+    if message.get("do") == "stop" and "version" not in message and "machine" in fields and "controller" not in fields:
+        fields["controller"] = fields.pop("machine")  # a stop of version 1 stops, whatever it is called
     return fields
 
 
