@@ -170,13 +170,22 @@ PARTS = (
         "[axis.encoder]\ncounts_per_rev = 2000\nindex = true\noffset = 10\n"
         '[[event]]\nat = \'20 ms\'\nsteps = [{ write = { "c.M3_EN" = 1 } }, { write = { "c.M3_POS_ABS" = 40000.0 } }]\n'
     ),
+    (
+        "[[axis]]\nname = 'l'\ndrive = 'c.M4'\npitch = 5.0\npulses_per_rev = 3200\npower = 'kp.no'\nbacklash = 0.3\n"
+        "[axis.motor]\ntorque = [[0, 0.5], [600, 0.4], [900, 0.1]]\ninertia = 0.00004\nload = 0.2\nfriction = 0.03\n"
+        "when_off = 'free'\n"
+        "[[relay]]\nname = 'kp'\ncoil = 'c.OUT1'\npull_in = '6 ms'\ndrop_out = '4 ms'\n"
+        "[[event]]\nat = '20 ms'\nsteps = [{ write = { 'c.M4_EN' = 1, 'c.M4_ACC' = 90000.0, 'c.M4_VEL_ABS' = 30000.0 } }, "
+        "{ write = { 'c.M4_POS_ABS' = 20000.0 } }]\n"
+        "[[event]]\nat = '700 ms'\nsteps = [{ write = { \"c.M4_POS_ABS\" = -20000.0 } }]\n"
+    ),
 )
 """Every element of the product is in one of them, or in the base."""
 
 
 OUTPUTS = {
     "r": ("no", "nc"), "ga": ("out",), "la": ("out",), "ti": ("out",), "d": ("out",), "n": ("out",),
-    "z": ("extended", "retracted"),
+    "z": ("extended", "retracted"), "kp": ("no", "nc"),
     "u": ("held",), "ja": ("opened", "closed", "held"), "b": ("released",), "g": ("skewed",), "k": ("hit",), "p": ("good",),
 }  # fmt: skip
 """Terminals of elements that give a level, by the names of `PARTS`."""
@@ -185,6 +194,7 @@ SIGNALS = {
     "q": ("count", "fed"),
     "u": ("pressure",), "f": ("position",), "t": ("position", "settled"), "tl": ("x", "y"), "g": ("position",), "s": ("angle",),
     "ja": ("position",), "n": ("count",), "o": ("mass",), "m": ("share",),
+    "l": ("position", "lost"),
 }  # fmt: skip
 JOINTS = {
     "transducer": '[[transducer]]\nname = "{}"\nof = "{signal}"\nto = "c.{analog}"\npoints = [[0, 0], [90, 9]]\n',

@@ -27,6 +27,8 @@ from steptwin.simulation.toml.names import Unknown, WrongTerminal
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table, table_in, tables_in
 from steptwin.simulation.toml.values import (
+    OUTPUT,
+    OUTPUT_PIN,
     Terminal,
     axis_number,
     flag,
@@ -68,6 +70,9 @@ class AxisSpec(NamedSpec):
     inverted: bool = key(flag, "whether positive pulses go down", default=False)
     travel: tuple[float, float] | None = key(pair, "hard stops, in its unit", default=None)
     start: float = key(number(), "where it stands when the world begins, in its unit", default=0.0)
+    power: Terminal | None = key(
+        OUTPUT_PIN, "output that gives its motor power, such as a contact; its controller counts on without", default=None
+    )
     backlash: float = key(number(0.0), "play between motor and load, in its unit", default=0.0)
     switches: tuple[SwitchSpec, ...] = tables_in("switch", SwitchSpec)
     encoder: EncoderSpec | None = table_in("encoder", EncoderSpec)
@@ -117,6 +122,8 @@ class BuiltAxis:
 
 def _refers(spec: AxisSpec, described: ElementSpecs) -> Iterator[Reference]:
     yield Reference(spec.drive[0], spec.drive[0], (*spec.path, "drive"))
+    if spec.power is not None:
+        yield Reference(spec.drive[0], spec.power[0], (*spec.path, "power"))
     for switch in spec.switches:
         yield Reference(spec.drive[0], switch.target[0], (*switch.path, "to"))
     if spec.encoder is not None and spec.encoder.follows is not None:
@@ -131,8 +138,9 @@ def _build(spec: AxisSpec, context: ElementContext) -> BuiltAxis:
     controller = spec.drive[0]
     scheduler = context.scheduler(controller)
     number, scale, build = context.memo.once(spec.path, lambda: _checked(spec, context))
-    mechanism = Mechanism(scheduler, controller, number, build, spec.name)
-    scheduler.add_part(mechanism, (controller,), spec.name)
+    power = None if spec.power is None else context.terminal(spec.power, OUTPUT)
+    mechanism = Mechanism(scheduler, controller, number, build, spec.name, power)
+    scheduler.add_part(mechanism, (controller, *(() if power is None else (power.controller,))), spec.name)
     fitted = BuiltAxis(spec, scheduler, mechanism, scale)
     for n, switch in enumerate(spec.switches, start=1):
         context.text.unless_wrong(switch.path, partial(_put_switch, fitted, switch, channel_of(spec.name, n), context))
@@ -161,6 +169,7 @@ def _checked(spec: AxisSpec, context: ElementContext) -> tuple[int, Scale, Build
         period_p=scale.period_p,
         motor=None if spec.motor is None else motor_of(spec.motor, scale),
         coasts_unpowered=spec.motor is not None and spec.motor.when_off == "free",
+        may_lose_power=spec.power is not None,
     )
     if build.coasts_unpowered and build.motor is not None:
         build.motor.check_coasting()

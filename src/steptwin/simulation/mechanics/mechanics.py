@@ -21,6 +21,7 @@ from steptwin.simulation.mechanics.motor import NO_BURDEN, Burden
 from steptwin.simulation.mechanics.rotorhold import RotorHold
 from steptwin.simulation.mechanics.trajectory import Build, LoadSection, MechanicalState, Trajectory
 from steptwin.simulation.scheduler.scheduler import Scheduler
+from steptwin.simulation.scheduler.wires import PinName
 from steptwin.state import Plain, Stateful
 
 _OUTDATED = -1
@@ -81,14 +82,29 @@ LEAVES_UPPER = Message(
 LEAVES_LOWER = Message(
     "simulation.leaves-lower-stop", "{axis} no longer pushes against its lower hard stop, {pulses} pulses behind"
 )
+HAS_NO_POWER = Message("simulation.axis-has-no-power", "{axis} has no power")
+HAS_POWER_AGAIN = Message("simulation.axis-has-power-again", "{axis} has power again")
 STANDS = Message("simulation.stands-behind", "{axis} stands, {pulses} pulses behind")
+
+
+NO_POWER = "no power"
+"""What blocks a rotor that stands without current; no element is called so."""
 
 
 class Mechanism(Stateful):
     """The mechanics of axis ``number`` (from 1) of a controller in ``scheduler``: a part of the scheduler, and a carriage for
     switches."""
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_encoders", "_scheduler", "_name", "_revision", "build", "controller", "number")
+    FIXED: ClassVar[tuple[str, ...]] = (
+        "_encoders",
+        "_name",
+        "_power",
+        "_revision",
+        "_scheduler",
+        "build",
+        "controller",
+        "number",
+    )
     __slots__ = (
         *FIXED,
         "_blockers",
@@ -102,6 +118,7 @@ class Mechanism(Stateful):
         "_due",
         "_falls",
         "_hold",
+        "_is_powered",
         "_reported",
         "_reported_trajectory",
         "_rest_due",
@@ -112,8 +129,18 @@ class Mechanism(Stateful):
         "_stop_due",
     )
 
-    def __init__(self, scheduler: Scheduler, controller: str, number: int, build: Build, name: str = "axis") -> None:
+    def __init__(
+        self,
+        scheduler: Scheduler,
+        controller: str,
+        number: int,
+        build: Build,
+        name: str = "axis",
+        power: PinName | None = None,
+    ) -> None:
+        """``power``: the output that gives its motor power; None: it always has some."""
         self._scheduler = scheduler
+        self._power = power
         self._name = name
         self.controller = controller
         self.number = number
@@ -142,6 +169,7 @@ class Mechanism(Stateful):
         """Where the rotor was when they changed, and what it carried until then."""
         self._hold = None if build.motor is None or not build.may_coast else RotorHold(build, build.motor, scheduler.now)
         """None for a rotor that always goes with its field, or stands."""
+        self._is_powered = True
         self._falls = False
         self._rest_due: Nanos | None = None
         """When a coasting rotor that moves comes to rest."""
@@ -200,6 +228,8 @@ class Mechanism(Stateful):
 
     def update(self, now: Nanos) -> None:
         if not self._simple:
+            if self._power is not None:
+                self._switch(self._scheduler.level(self._power) != 0.0, now)
             drive = self._drive
             if drive.revision != self._revision or (self._hold is not None and self._hold.is_switched(drive, now)):
                 self._renew(drive, now)
@@ -335,6 +365,27 @@ class Mechanism(Stateful):
             self._scheduler.record(self.controller, "event", "fall", text, *facts)
         self._rest_due = coasting.end if coasting is not None and falls else None
 
+    @property
+    def has_current(self) -> bool:
+        """Whether the motor has current: its controller has switched it on, and nothing has taken its power."""
+        return self._is_powered and self._drive.is_energised
+
+    def _switch(self, is_powered: bool, now: Nanos) -> None:
+        """Give the motor power or take it away; its controller does not notice."""
+        if is_powered is self._is_powered:
+            return
+        state = self.at(now)
+        self._is_powered = is_powered
+        text = (HAS_POWER_AGAIN if is_powered else HAS_NO_POWER)(axis=self._name)
+        facts = ("axis", self.number), ("element", self._name), ("on", is_powered)
+        self._scheduler.record(self.controller, "event", "power", text, *facts)
+        if self._hold is None or not self.build.coasts_unpowered:
+            self.block(not is_powered, now, by=NO_POWER)
+            return
+        self._hold.is_powered = is_powered
+        self._renew(self._drive, now, state)
+        self._scheduler.notify(self.controller)
+
     def brake(self, torque: float, now: Nanos) -> None:
         """Let a brake act on the rotor with ``torque`` N·m."""
         if torque == self._brake:
@@ -367,7 +418,7 @@ class Mechanism(Stateful):
 
     def pulls(self, now: Nanos) -> bool:
         """Whether the motor follows its field, or would: it has current, has not stalled, and nothing blocks it."""
-        return self._drive.is_energised and not self._blocked and not self.at(now).stalled
+        return self.has_current and not self._blocked and not self.at(now).stalled
 
     def next_stall(self, now: Nanos) -> Nanos | None:
         """First moment after ``now`` at which the motor stalls or synchronises again."""

@@ -25,7 +25,7 @@ class RotorHold(Stateful):
     """Whether the field holds its rotor, from moment to moment."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("_build", "_motor")
-    __slots__ = (*FIXED, "_on_since", "_overruns", "due", "has_current", "is_coasting")
+    __slots__ = (*FIXED, "_on_since", "_overruns", "due", "has_current", "is_coasting", "is_powered")
 
     def __init__(self, build: Build, motor: StepperMotor, now: Nanos) -> None:
         self._build = build
@@ -34,6 +34,8 @@ class RotorHold(Stateful):
         """Since when there has been current."""
         self._overruns = False
         """Whether the rotor runs on after a stop of its field."""
+        self.is_powered = True
+        """Whether the motor has power, so that a drive that is energised gives it current."""
         self.has_current = True
         self.is_coasting = False
         """Whether the field does not hold it: there is no current or too little, or the rotor is too fast."""
@@ -42,7 +44,8 @@ class RotorHold(Stateful):
 
     def is_switched(self, drive: Drive, now: Nanos) -> bool:
         """Whether current has been switched, or something is due."""
-        return drive.is_energised is not self.has_current or (self.due is not None and self.due <= now)
+        has_current = drive.is_energised and self.is_powered
+        return has_current is not self.has_current or (self.due is not None and self.due <= now)
 
     @property
     def why(self) -> Message:
@@ -71,9 +74,10 @@ class RotorHold(Stateful):
         led = profile_of(before.plan) if before.coasting is None else before.coasting
         moves = before.leads(now) and not stands
         speed = led.velocity(now) if moves else 0.0
-        if drive.is_energised and not self.has_current:
+        has_current = drive.is_energised and self.is_powered
+        if has_current and not self.has_current:
             self._on_since = now
-        self.has_current, due, self.due = drive.is_energised, self.due, None
+        self.has_current, due, self.due = has_current, self.due, None
         runs_on = self._overruns and self.has_current and not is_new and not stands and due is not None and now < due
         self._overruns = runs_on
         if runs_on:

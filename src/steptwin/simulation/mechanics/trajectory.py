@@ -58,6 +58,8 @@ class Build:
     motor: StepperMotor | None = None
     coasts_unpowered: bool = False
     """Whether the load moves the rotor while no current does."""
+    may_lose_power: bool = False
+    """Whether something besides the controller can take the current from the motor."""
 
     @property
     def may_coast(self) -> bool:
@@ -67,7 +69,8 @@ class Build:
     @property
     def ideal(self) -> bool:
         """Whether the load is always at the position of the field."""
-        return self.low is None and self.high is None and self.play == 0 and self.motor is None
+        is_free = self.low is None and self.high is None and self.play == 0
+        return is_free and self.motor is None and not self.may_lose_power
 
 
 class MechanicalState(NamedTuple):

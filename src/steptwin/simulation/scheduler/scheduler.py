@@ -266,7 +266,7 @@ class Scheduler:
         self.check(wire.target)
         self._join()
         if not self.is_blank:
-            self.drive(wire.target, wire.transmitted(self._level(wire.source)))
+            self.drive(wire.target, wire.transmitted(self.level(wire.source)))
         self.wires.add(wire)
         self.notify(wire.target.controller)
 
@@ -289,7 +289,8 @@ class Scheduler:
         if name.pin not in pins:
             raise Misuse(NO_SUCH_PIN(controller=name.controller, pin=name.pin, names=list(pins)))
 
-    def _level(self, name: PinName) -> float:
+    def level(self, name: PinName) -> float:
+        """The present level of a pin of a controller, or of a terminal of an element."""
         block = self.terminal_blocks.get(name.controller)
         return self.controllers[name.controller].pin(name.pin) if block is None else block.levels[name.pin]
 
