@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from steptwin.jsonvalues import to_json
 from steptwin.messages import Message, MessageText, text_of
 
 REPORT = Message("diagnostics.report", "{lines:\n}")
@@ -162,24 +163,32 @@ def _blank_fix(text: str) -> MessageText:
     return START_A_NEW_LINE() if "\n" in text else A_BLANK()
 
 
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A diagnostic with its place in the text; lines and columns count from 1."""
+
+    line: int
+    column: int
+    end_line: int
+    end_column: int
+    severity: Severity
+    code: str
+    message: str
+    hint: str | None
+
+
+def findings(source: SourceText, diagnostics: Sequence[Diagnostic]) -> tuple[Finding, ...]:
+    places = [(*source.position(one.span.start), *source.position(one.span.end)) for one in diagnostics]
+    return tuple(
+        [Finding(*at, one.severity, one.code, one.message, one.hint) for at, one in zip(places, diagnostics, strict=True)]
+    )
+
+
 def diagnostics_to_json(source: SourceText, diagnostics: Sequence[Diagnostic]) -> list[dict[str, object]]:
-    """The diagnostics as plain data: file, line, column, end_line, end_column, severity, code, message, hint, fix."""
+    """The diagnostics as plain data: file, the fields of `Finding`, fix."""
     rows: list[dict[str, object]] = []
-    for d in diagnostics:
-        line, column = source.position(d.span.start)
-        end_line, end_column = source.position(d.span.end)
-        row: dict[str, object] = {
-            "file": source.name,
-            "line": line,
-            "column": column,
-            "end_line": end_line,
-            "end_column": end_column,
-            "severity": d.severity.value,
-            "code": d.code,
-            "message": d.message,
-            "hint": d.hint,
-            "fix": None,
-        }
+    for d, finding in zip(diagnostics, findings(source, diagnostics), strict=True):
+        row: dict[str, object] = {"file": source.name, **to_json(finding), "fix": None}
         if d.fix:
             fl, fc = source.position(d.fix.span.start)
             el, ec = source.position(d.fix.span.end)

@@ -1,7 +1,8 @@
 """Values in JSON, made from annotations: how a value of a type is written, read and described.
 
-A dataclass is an object with its fields, an enumeration its value, a tuple a list. ``Annotated`` says what a type does not: a
-text is the description of a field, a `JsonForm` another form of its values.
+A dataclass and a named tuple are objects with their fields, an enumeration is its value, a tuple a list. ``Annotated`` says what
+a type does not: a text is the description of a field, a `JsonForm` another form of its values, `UNWRITTEN` that JSON has no such
+member.
 """
 
 from __future__ import annotations
@@ -9,18 +10,18 @@ from __future__ import annotations
 import enum
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
-from functools import cache
+from functools import cache, partial
 from types import NoneType, UnionType
 from typing import Annotated, Any, TypeAlias, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from steptwin.messages import read_message_text
+from steptwin.messages import read_message_text, with_messages
 
 T = TypeVar("T")
 Schema: TypeAlias = Mapping[str, object]
 _Change: TypeAlias = "Callable[[Any], Any] | None"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class JsonForm:
     """``schema`` of the values; ``to_json`` writes one, ``read`` is its reverse. None: it is the same in JSON."""
 
@@ -34,13 +35,17 @@ def to_json(value: Any) -> Any:
     kind = type(value)
     if kind in _PLAIN:
         return value
-    if is_dataclass(kind):
+    if _has_fields(kind):
         return _form_of_class(kind).to_json(value)  # pyrefly: ignore[not-callable]
     if isinstance(value, enum.Enum):
         return value.value
     if isinstance(value, Mapping):
         return {str(key): to_json(item) for key, item in value.items()}
-    return [to_json(item) for item in value] if isinstance(value, tuple) else value
+    return [to_json(item) for item in value] if isinstance(value, tuple | list) else value
+
+
+def _has_fields(kind: Any) -> bool:
+    return is_dataclass(kind) or hasattr(kind, "_fields")
 
 
 def read(kind: type[T], data: Any) -> T:
@@ -94,6 +99,11 @@ def with_sentences(properties: Mapping[str, object], *texts: str, lists: Iterabl
 Moment: TypeAlias = Annotated[int, JsonForm(MOMENT, int, str)]
 """Whole nanoseconds, which are decimal text in JSON."""
 Hexadecimal: TypeAlias = Annotated[bytes, JsonForm(TEXT, bytes.fromhex, bytes.hex)]
+_SENTENCE = JsonForm(TEXT)
+Sentence: TypeAlias = Annotated[str, _SENTENCE]
+"""The text of a message, which the page shows in its language: `steptwin.messages.with_messages`."""
+UNWRITTEN = JsonForm({})
+"""The annotation of a field that is no member in JSON."""
 
 _PLAIN: Mapping[object, JsonForm] = {
     str: JsonForm(TEXT),
@@ -119,13 +129,13 @@ def form_of(hint: Any) -> JsonForm:
         return _PLAIN[hint]
     if origin in (Union, UnionType):
         return _either([form_of(one) for one in inner], is_optional=NoneType in inner and len(inner) == 2)
-    if origin is tuple:
-        return _list(form_of(inner[0]))
+    if origin in (tuple, list):
+        return _list(form_of(inner[0]), origin)
     if origin is Mapping:
         return _table(inner[0], form_of(inner[1]))
     if isinstance(hint, type) and issubclass(hint, enum.Enum):
         return JsonForm({"enum": [one.value for one in hint]}, hint, lambda value: value.value)
-    if isinstance(hint, type) and is_dataclass(hint):
+    if _has_fields(hint):
         return _form_of_class(hint)
     raise TypeError(f"{hint} has no form in JSON")
 
@@ -144,11 +154,11 @@ def _unless_none(change: _Change) -> _Change:
     return None if change is None else lambda value: None if value is None else change(value)
 
 
-def _list(item: JsonForm) -> JsonForm:
+def _list(item: JsonForm, kind: Any) -> JsonForm:
     one, write = item.read, item.to_json
     return JsonForm(
         list_of(item.schema),
-        tuple if one is None else lambda values: tuple(map(one, values)),
+        kind if one is None else lambda values: kind(map(one, values)),
         list if write is None else lambda values: list(map(write, values)),
     )
 
@@ -172,16 +182,21 @@ def _same(value: Any) -> Any:
 @cache
 def _form_of_class(kind: Any) -> JsonForm:
     hints = get_type_hints(kind, include_extras=True)
-    forms = {one.name: form_of(hints[one.name]) for one in fields(kind)}
+    names = [one.name for one in fields(kind)] if is_dataclass(kind) else kind._fields
+    forms = {name: form for name in names if (form := form_of(hints[name])) is not UNWRITTEN}
+    texts = [name for name, form in forms.items() if form is _SENTENCE]
+    lists = [name for name in forms if hints[name] == tuple[Sentence, ...]]
+    shape_of = partial(with_sentences, lists=lists) if texts or lists else members
     reads = [(name, form.read) for name, form in forms.items()]
     writes = [(name, form.to_json) for name, form in forms.items()]
 
     def write(value: Any) -> dict[str, Any]:
-        return {name: getattr(value, name) if to is None else to(getattr(value, name)) for name, to in writes}
+        found = {name: getattr(value, name) if to is None else to(getattr(value, name)) for name, to in writes}
+        return with_messages(found) if texts or lists else found
 
     def read_fields(data: Mapping[str, Any]) -> Any:
         if "messages" in data:
             data = {**data, **{name: read_message_text(data, name) for name in data["messages"]}}
         return kind(**{name: data[name] if of is None else of(data[name]) for name, of in reads if name in data})
 
-    return JsonForm(members({name: form.schema for name, form in forms.items()}), read_fields, write)
+    return JsonForm(shape_of({name: form.schema for name, form in forms.items()}, *texts), read_fields, write)

@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from steptwin.calc import Calculator, Mic488Model, calculator_of, curve, to_json
+from steptwin.calc import Calculator, Mic488Model, calculator_of
 from steptwin.errors import Misuse
+from steptwin.jsonvalues import to_json
 from steptwin.m1486.datasheet import datasheet_of as chip_sheet
 from steptwin.m1486.variants import variant
 from steptwin.mic488.datasheet import datasheet_of
@@ -17,7 +18,7 @@ RESULT = Calculator(Mic488Model("mm", 640)).calculate({"distance": 150, "velocit
 
 
 def test_the_curve_ends_where_the_move_does() -> None:
-    points = curve(RESULT)
+    points = RESULT.curve
     assert points[0] == (0, 0, 0)
     assert points[-1] == pytest.approx((2.7, 150, 0))
     assert max(point.velocity for point in points) == pytest.approx(60)

@@ -145,8 +145,8 @@ def test_a_description_that_is_a_link_is_not_written(tmp_path: Path) -> None:
         WorldArrangement(read_world(file.name, WORLD), ["table.M1"], file).save((DrawnPosition("table.M1", 10, 20),))
         for file in (link, real)
     ]
-    assert [one["file"] for one in saved] == [None, str(real)]
-    assert real.read_text() == saved[0]["text"] == saved[1]["text"] != WORLD
+    assert [one.file for one in saved] == [None, str(real)]
+    assert real.read_text() == saved[0].text == saved[1].text != WORLD
 
 
 # ---------------------------------------------------------------------- ways in

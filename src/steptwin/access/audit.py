@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
-from steptwin.access.roles import Role
+from steptwin.access.roles import ROLES, Role
 from steptwin.controller import Nanos
+from steptwin.jsonvalues import JsonForm, Moment
 
 MOST_ENTRIES = 10_000
 LONGEST_FIELDS = 1000
@@ -33,25 +34,20 @@ class CommandLog(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """``at`` is the wall clock as text (ISO 8601). ``outcome``: done, misuse, refusal, failure, internal; sent where there is no
-    answer."""
+    """A command of a client, and its outcome; ``sent`` where there is no answer."""
 
-    at: str
-    time: Nanos
+    at: Annotated[str, "Wall clock, ISO 8601."]
+    time_ns: Moment
     viewer: str
-    role: str
+    role: Annotated[str, JsonForm({"enum": ["none", *ROLES]})]
     do: str
     fields: Mapping[str, object]
-    outcome: str
+    outcome: Annotated[str, JsonForm({"enum": ["done", "misuse", "refusal", "failure", "internal", "sent"]})]
 
     def __str__(self) -> str:
         return (
             f"{self.viewer}: {' '.join([self.do, *(f'{name}={value}' for name, value in self.fields.items())])}: {self.outcome}"
         )
-
-    def to_json(self) -> dict[str, object]:
-        head = {"at": self.at, "time_ns": str(self.time), "viewer": self.viewer, "role": self.role}
-        return {**head, "do": self.do, "fields": dict(self.fields), "outcome": self.outcome}
 
 
 def _short(value: object) -> object:

@@ -19,8 +19,6 @@ from steptwin.calc.contract import (
     MovePhase,
     MoveQuantity,
     RequiredSetting,
-    curve,
-    to_json,
 )
 from steptwin.calc.m1486 import M1486Model
 from steptwin.calc.mic488 import Mic488Model
@@ -44,11 +42,9 @@ __all__ = [
     "RequiredSetting",
     "UnitScale",
     "calculator_of",
-    "curve",
     "range_text",
     "read_lead",
     "read_quantity",
-    "to_json",
     "unit_of",
 ]
 

@@ -24,6 +24,7 @@ from steptwin.calc.contract import (
     MovePhase,
     MoveQuantity,
     RequiredSetting,
+    curve,
 )
 from steptwin.calc.solving import is_same, solve
 from steptwin.calc.units import Dimension
@@ -231,9 +232,8 @@ class Calculator:
                 for one in self.model.quantities
                 if one.code
             ),
+            curve=curve(profile, self.quantities[DISTANCE].pulses, speed_pulses),
             profile=profile,
-            pulses=self.quantities[DISTANCE].pulses,
-            speed_pulses=speed_pulses,
         )
 
     def _parts(self, profile: Profile) -> list[MovePhase]:

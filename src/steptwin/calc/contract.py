@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Annotated, NamedTuple, Protocol
 
 from steptwin.calc.units import Dimension
 from steptwin.datasheet import Limits
-from steptwin.messages import MessageText, with_messages
+from steptwin.jsonvalues import NUMBER, UNWRITTEN, JsonForm, Sentence
+from steptwin.messages import MessageText
 from steptwin.motion import Profile
 
 DISTANCE, VELOCITY, ACCELERATION, DECELERATION = "distance", "velocity", "acceleration", "deceleration"
@@ -23,24 +24,21 @@ class MoveQuantity:
 
     name: str
     meaning: str
-    dimension: Dimension
+    dimension: Annotated[Dimension, UNWRITTEN]
     unit: str
     """``mm/s``."""
-    pulses: float = 1.0
-    """Pulses (per s, per s²) in one of its unit."""
+    pulses: Annotated[float, "Pulses (per s, per s²) in one of its unit."] = 1.0
     limits: Limits
     """Permitted range of its size; a distance may also be negative."""
     choices: tuple[int, ...] = ()
     """All that is permitted, where it is a choice; it cannot be calculated then."""
     default: float | None = None
-    same_as: str | None = None
-    """The quantity whose value it has where none is given."""
-    code: str = ""
-    """Name of the register or letter of the command that sets it. Empty: it is given with each motion."""
-    back: str = ""
+    same_as: Annotated[str | None, "The quantity whose value it has where none is given."] = None
+    code: Annotated[str, "Register or command that sets it; empty where it is given with a motion."] = ""
+    back: Annotated[str, UNWRITTEN] = ""
     """The same, for a negative value; ``code`` where there is no difference."""
-    detail: str = ""
-    """The fact of the controller's state that it is (`steptwin.controllerstate`)."""
+    detail: Annotated[str, "The fact of the state that it is."] = ""
+    """See `steptwin.controllerstate`."""
     source: str
     """Section of the manual, or id of an assumption."""
 
@@ -48,8 +46,8 @@ class MoveQuantity:
 class Formula(NamedTuple):
     """A formula of the result."""
 
-    name: str
-    text: str
+    name: Sentence
+    text: Sentence
     source: str
 
 
@@ -103,55 +101,6 @@ class RequiredSetting(NamedTuple):
     unit: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Calculation:
-    """A move: the values that the controller accepts, and the resulting times."""
-
-    title: str
-    found: str | None
-    """The quantity that was calculated, None where all were given."""
-    exact: float | None
-    """Its value before it was rounded to what the controller takes."""
-    values: Mapping[str, float]
-    units: Mapping[str, str]
-    times: Mapping[str, float]
-    """``time`` and the times of acceleration, constant velocity and deceleration [s]."""
-    peak: float
-    """Highest velocity that is reached."""
-    reaches: bool
-    """Whether that is the velocity that was asked for."""
-    parts: tuple[MovePhase, ...]
-    formulas: tuple[Formula, ...]
-    notes: tuple[str, ...]
-    settings: tuple[RequiredSetting, ...]
-    profile: Profile
-    """In pulses, from 0 on."""
-    pulses: float
-    """Pulses in the unit of distance."""
-    speed_pulses: float
-    """Pulses/s in the unit of velocity."""
-
-
-def to_json(result: Calculation) -> dict[str, object]:
-    """As JSON has values; ``curve`` has points of the profile (`curve`)."""
-    found = {
-        "title": result.title,
-        "found": result.found,
-        "exact": result.exact,
-        "values": dict(result.values),
-        "units": dict(result.units),
-        "times": dict(result.times),
-        "peak": result.peak,
-        "reaches": result.reaches,
-        "parts": [part._asdict() for part in result.parts],
-        "formulas": [with_messages(formula._asdict()) for formula in result.formulas],
-        "notes": list(result.notes),
-        "settings": [setting._asdict() for setting in result.settings],
-        "curve": [list(point) for point in curve(result)],
-    }
-    return with_messages(found)
-
-
 class CurvePoint(NamedTuple):
     """A moment of a move, in the units of its quantities."""
 
@@ -160,19 +109,55 @@ class CurvePoint(NamedTuple):
     velocity: float
 
 
+_CURVE = JsonForm(
+    {
+        "type": "array",
+        "items": {"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 3},
+        "description": "Time [s], position, velocity.",
+    },
+    to_json=lambda points: list(map(list, points)),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Calculation:
+    """A move: the values that the controller accepts, and the resulting times."""
+
+    title: str
+    found: str | None
+    """The quantity that was calculated, None where all were given."""
+    exact: Annotated[float | None, "Of what was found, before it was made what the controller takes."]
+    values: Mapping[str, float]
+    units: Mapping[str, str]
+    times: Mapping[str, float]
+    """``time`` and the times of acceleration, constant velocity and deceleration [s]."""
+    peak: float
+    """Highest velocity that is reached."""
+    reaches: Annotated[bool, "Whether the peak is the velocity."]
+    """The one that was asked for."""
+    parts: tuple[MovePhase, ...]
+    formulas: tuple[Formula, ...]
+    notes: tuple[Sentence, ...]
+    settings: tuple[RequiredSetting, ...]
+    curve: Annotated[tuple[CurvePoint, ...], _CURVE]
+    """Points to draw: the ends of all parts, and some between them where the curve bends."""
+    profile: Annotated[Profile, UNWRITTEN]
+    """In pulses, from 0 on."""
+
+
 POINTS_IN_PART = 24
 """Enough for a picture; the last point of a part is the first of the next."""
 
 
-def curve(result: Calculation) -> list[CurvePoint]:
-    """Points to draw: the ends of all parts, and some between them where the curve bends."""
+def curve(profile: Profile, pulses: float, speed_pulses: float) -> tuple[CurvePoint, ...]:
+    """Points of a profile. ``pulses``: in the unit of distance; ``speed_pulses``: pulses/s in the unit of velocity."""
     points = [CurvePoint(0.0, 0.0, 0.0)]
     begin = 0.0
-    for segment in result.profile.segments:
+    for segment in profile.segments:
         steps = POINTS_IN_PART if segment.c2 else 1
         for step in range(steps + 1):
             t = segment.end_s if step == steps else begin + (segment.end_s - begin) * step / steps
-            points.append(CurvePoint(t, segment.position(t) / result.pulses, segment.velocity(t) / result.speed_pulses))
+            points.append(CurvePoint(t, segment.position(t) / pulses, segment.velocity(t) / speed_pulses))
         begin = segment.end_s
-    points.append(CurvePoint(begin, result.profile.final_p / result.pulses, 0.0))
-    return points
+    points.append(CurvePoint(begin, profile.final_p / pulses, 0.0))
+    return tuple(points)

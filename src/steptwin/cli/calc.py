@@ -192,7 +192,7 @@ def _values(calculator: Calculator, scale: UnitScale, given: Mapping[str, object
 def _print_json(result: Calculation, scale: UnitScale) -> None:
     from json import dumps
 
-    from steptwin.calc import to_json
+    from steptwin.jsonvalues import to_json
 
     typer.echo(dumps({**to_json(result), "pulses_per_unit": dict(scale.pulses)}, ensure_ascii=False, indent=2))
 

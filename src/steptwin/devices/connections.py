@@ -11,6 +11,7 @@ from typing import Any
 from steptwin.controller import Nanos
 from steptwin.devices.composite import THERE_ARE, CompositeSubject
 from steptwin.devices.device import ConnectedDevice, DeviceSurroundings
+from steptwin.devices.digitalshadow import ShadowState
 from steptwin.diagnostics import SourceText
 from steptwin.drivers.exchange import ExchangeCounts, NoAnswer
 from steptwin.drivers.kind import DeviceAddress, DriverKind
@@ -102,7 +103,7 @@ class DeviceConnections:
         else:
             device.end_shadow()
 
-    def shadow_of(self, controller: str, after: Nanos) -> Mapping[str, object] | None:
+    def shadow_of(self, controller: str, after: Nanos) -> ShadowState | None:
         return self._connected(controller).device.shadow_state(after)
 
     def traffic(self) -> dict[str, ExchangeCounts]:

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from steptwin.controller import SECOND, Nanos
-from steptwin.devices.digitalshadow import DigitalShadow, Known
+from steptwin.devices.digitalshadow import DigitalShadow, Known, ShadowState
 from steptwin.devices.jog import LeasedJog
 from steptwin.diagnostics import SourceText
 from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart, RawEffect
@@ -336,8 +336,8 @@ class ConnectedDevice:
     def end_shadow(self) -> None:
         self._shadow = None
 
-    def shadow_state(self, after: Nanos) -> Mapping[str, object] | None:
-        return None if self._shadow is None else self._shadow.to_json(after)
+    def shadow_state(self, after: Nanos) -> ShadowState | None:
+        return None if self._shadow is None else self._shadow.state(after)
 
     async def _compare(self, shadow: DigitalShadow) -> None:
         """Not while a command is executed, of which the twin knows nothing yet."""

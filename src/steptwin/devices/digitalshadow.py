@@ -10,14 +10,15 @@ of its end, so it is not compared until then, and the twin takes that place over
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from math import isclose
-from typing import NamedTuple
+from typing import Annotated, NamedTuple, TypeAlias
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.datasheet import AxisDescription, Datasheet, PinDirection
 from steptwin.errors import SteptwinError
+from steptwin.jsonvalues import NUMBER, JsonForm, Moment, or_null
 from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.description import read_world
 from steptwin.simulation.script import steps
@@ -51,15 +52,49 @@ class AxisSample(NamedTuple):
 
 
 class Deviation(NamedTuple):
-    """Since when a value is another one. ``what``: an axis or a register."""
+    """Since when a value is another one."""
 
-    at: Nanos
-    what: str
+    at_ns: Annotated[Moment, "Since when, from the beginning of the digital shadow, as decimal text [ns]"]
+    what: Annotated[str, "An axis or a register."]
     device: float
     twin: float
 
-    def to_json(self) -> dict[str, object]:
-        return {"at_ns": str(self.at), "what": self.what, "device": self.device, "twin": self.twin}
+
+_Sample: TypeAlias = Annotated[
+    tuple[float | None, ...],
+    JsonForm(
+        {
+            "type": "array",
+            "items": or_null(NUMBER),
+            "minItems": 4,
+            "maxItems": 4,
+            "description": "Time from the beginning [s], position of the device, of the twin, tolerance; null: not compared.",
+        },
+        tuple,
+        list,
+    ),
+]
+
+
+class ShadowAxis(NamedTuple):
+    """Differences of an axis of a device from that of its digital shadow."""
+
+    axis: int
+    name: str
+    unit: str
+    first: Deviation | None
+    samples: tuple[_Sample, ...]
+
+
+class ShadowState(NamedTuple):
+    """Differences of a device from its digital shadow."""
+
+    controller: str
+    axes: tuple[ShadowAxis, ...]
+    registers: Annotated[tuple[Deviation, ...], "Those that differ now."]
+    compared: Annotated[int, "Registers that are compared at rest."]
+    first: Annotated[Deviation | None, "The first difference of all."]
+    problems: Annotated[tuple[str, ...], "Commands that the twin refused."]
 
 
 @dataclass(slots=True)
@@ -199,7 +234,7 @@ class DigitalShadow:
                 self._registers.pop(name, None)
             else:
                 before = self._registers.get(name)
-                found = Deviation(ended - self.begin if before is None else before.at, name, device, twin)
+                found = Deviation(ended - self.begin if before is None else before.at_ns, name, device, twin)
                 self._registers[name] = found
                 self._note(found)
 
@@ -207,18 +242,11 @@ class DigitalShadow:
         if self.first is None:
             self.first = found
 
-    # ------------------------------------------------------------------ as JSON
-
-    def to_json(self, after: Nanos) -> dict[str, object]:
+    def state(self, after: Nanos) -> ShadowState:
         """With samples later than ``after``, from the beginning of the digital shadow."""
-        return {
-            "controller": self.name,
-            "axes": [_to_json(axis, after) for axis in self._axes.values()],
-            "registers": [found.to_json() for found in self._registers.values()],
-            "compared": len(self._twin.compared),
-            "first": None if self.first is None else self.first.to_json(),
-            "problems": list(self.problems),
-        }
+        axes = tuple([_state(axis, after) for axis in self._axes.values()])
+        registers, compared = tuple(self._registers.values()), len(self._twin.compared)
+        return ShadowState(self.name, axes, registers, compared, self.first, tuple(self.problems))
 
 
 def _stops(wanted: Command) -> bool:
@@ -227,12 +255,6 @@ def _stops(wanted: Command) -> bool:
     return isinstance(wanted, command.StopAxes | command.StopAll)
 
 
-def _to_json(axis: _ComparedAxis, after: Nanos) -> dict[str, object]:
-    late: Sequence[tuple[Nanos, AxisSample]] = [one for one in axis.samples if one[0] > after]
-    return {
-        "axis": axis.sheet.number,
-        "name": axis.sheet.name,
-        "unit": axis.sheet.unit,
-        "first": None if axis.first is None else axis.first.to_json(),
-        "samples": [[at / SECOND, *sample] for at, sample in late],
-    }
+def _state(axis: _ComparedAxis, after: Nanos) -> ShadowAxis:
+    samples = tuple([(at / SECOND, *sample) for at, sample in axis.samples if at > after])
+    return ShadowAxis(axis.sheet.number, axis.sheet.name, axis.sheet.unit, axis.first, samples)

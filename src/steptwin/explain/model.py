@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from steptwin.controller import Nanos
 from steptwin.diagnostics import SourceText
@@ -57,7 +57,7 @@ class MemoryUse(NamedTuple):
 
     what: str
     used: int
-    most: int | None
+    most: Annotated[int | None, "Null: the memory of the other parts limits it."]
     unit: str
 
 

@@ -15,6 +15,7 @@ from typing import Self, TextIO
 from steptwin.access.audit import Audit, Entry
 from steptwin.errors import Misuse
 from steptwin.files.writing import is_written_directly
+from steptwin.jsonvalues import to_json
 from steptwin.system import reason
 
 MOST_BYTES = 8 << 20
@@ -58,7 +59,7 @@ class AuditFile:
     def add(self, entry: Entry) -> None:
         if self._file is None:
             return
-        self._file.write(json.dumps(entry.to_json(), ensure_ascii=False) + "\n")
+        self._file.write(json.dumps(to_json(entry), ensure_ascii=False) + "\n")
         self._file.flush()
         if self._most < inf and self._file.tell() > self._most:
             self._file.close()

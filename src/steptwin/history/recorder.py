@@ -16,6 +16,7 @@ from steptwin.gateways.contract import GatewaySubject
 from steptwin.gateways.points import CLOCK, CLOCK_POINTS, GatewayPoint, PointType, PointValue, points_of, whole_state
 from steptwin.gateways.sampling import Sample, Sampler
 from steptwin.history.rows import EventRow, KeptValue, PlanRow, PointRow, RowBatch, RunHead, SampleRow
+from steptwin.jsonvalues import to_json
 from steptwin.motion.planjson import plan_to_json
 from steptwin.subject.contract import ControllerDescription
 from steptwin.subject.events import Event
@@ -272,9 +273,10 @@ class Recorder:
 
     def log(self, entry: Entry) -> None:
         """Keep a command, with who gave it and what became of it."""
-        content = json.dumps(entry.to_json(), ensure_ascii=False, separators=(",", ":"))
+        content = json.dumps(to_json(entry), ensure_ascii=False, separators=(",", ":"))
         controller = str(entry.fields.get("controller") or "")
-        self._batch.events.append(EventRow(entry.time, self._clock.wall_us(), 0, controller, COMMAND, None, str(entry), content))
+        row = EventRow(entry.time_ns, self._clock.wall_us(), 0, controller, COMMAND, None, str(entry), content)
+        self._batch.events.append(row)
 
     def lost(self, batches: Iterable[RowBatch]) -> None:
         """These could not be kept: a later one says so."""

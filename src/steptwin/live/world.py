@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple, Protocol
@@ -214,11 +213,6 @@ class LiveWorld:
         if not self.world.keeps_inputs:
             return None
         return RecordedExtent(self.now, len(self.world.inputs), self._recorded_bytes, is_full=False)
-
-    def traffic(self) -> list[dict[str, object]]:
-        """Traffic of each line: the programs that are connected, and what has been sent, as JSON."""
-        connected = Counter(port.line for port in self.ports)
-        return [{"line": name, "clients": connected[name], **line.traffic._asdict()} for name, line in self.world.lines.items()]
 
     # ------------------------------------------------------------------ time
 

@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Protocol, TypeAlias
 
 from steptwin.access.roles import KEEP, LOOK
 from steptwin.controller import Nanos
-from steptwin.fields import TIME, Meaning, Schema, whole
-from steptwin.jsonvalues import MOMENT, TEXT, WHOLE, list_of, members
+from steptwin.fields import TIME, Meaning, whole
+from steptwin.jsonvalues import Moment
 from steptwin.studio.requesttype import request
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """An open branch."""
+
+    branch: int
+    from_ns: Annotated[Moment, "Where it began. Virtual time, as decimal text [ns]"]
+    url: Annotated[str, "Of its page; the token there is the one of here."]
 
 
 class Branches(Protocol):
     """Branches of one world. Awaits only `steptwin.later.Later`."""
 
-    def to_json(self) -> Sequence[Mapping[str, object]]:
-        """As `_BRANCH`."""
-        ...
+    def list(self) -> Sequence[Branch]: ...
 
-    async def start(self, moment: Nanos | None) -> Mapping[str, object]:
+    async def start(self, moment: Nanos | None) -> Branch:
         """Raises `Misuse` for a moment that is not kept, `Refusal`, and `LineFailure` where it does not start."""
         ...
 
@@ -29,16 +36,7 @@ class Branches(Protocol):
         ...
 
 
-_BRANCH: Schema = members(
-    {
-        "branch": WHOLE,
-        "from_ns": {**MOMENT, "description": "Where it began. Virtual time, as decimal text [ns]"},
-        "url": {**TEXT, "description": "Of its page; the token there is the one of here."},
-    }
-)
-
-
-@request("branches", LOOK, "The branches of the world that are open.", list_of(_BRANCH))
+@request("branches", LOOK, "The branches of the world that are open.", tuple[Branch, ...])
 @dataclass(frozen=True, slots=True)
 class ListBranches:
     pass
@@ -49,7 +47,7 @@ class ListBranches:
     KEEP,
     "Begin another world, without ports, in the state of a moment of the past. It is a studio of its own, in which time "
     "stands at first. Nothing changes in the world here.",
-    _BRANCH,
+    Branch,
 )
 @dataclass(frozen=True, slots=True)
 class StartBranch:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from steptwin.calc import TIMES, Calculator, DriveMechanics, MoveQuantity, calculator_of, to_json
+from steptwin.calc import TIMES, Calculation, Calculator, DriveMechanics, calculator_of
 from steptwin.errors import Refusal
 from steptwin.messages import Message
 from steptwin.studio.controllers import Sheets
+from steptwin.studio.toolrequests import MoveQuantities
 
 NO_CALCULATOR = Message(
     "studio.no-calculator",
@@ -20,18 +21,14 @@ class Calculations:
     def __init__(self, sheets: Sheets) -> None:
         self._sheets = sheets
 
-    def quantities(self, controller: str, axis: int) -> Mapping[str, object]:
+    def quantities(self, controller: str, axis: int) -> MoveQuantities:
         """Quantities of a move of an axis. Raises `Misuse` for another controller, `Refusal` where there is no calculator."""
         calculator = self._calculator(controller, axis)
-        return {
-            "title": calculator.model.title,
-            "quantities": [_quantity(one) for one in calculator.model.quantities],
-            "times": [_quantity(one) for one in TIMES],
-        }
+        return MoveQuantities(calculator.model.title, calculator.model.quantities, TIMES)
 
-    def calculate(self, controller: str, axis: int, given: Mapping[str, float], find: str | None) -> Mapping[str, object]:
+    def calculate(self, controller: str, axis: int, given: Mapping[str, float], find: str | None) -> Calculation:
         """See `steptwin.calc.Calculator.calculate`."""
-        return to_json(self._calculator(controller, axis).calculate(given, find))
+        return self._calculator(controller, axis).calculate(given, find)
 
     def _calculator(self, controller: str, axis: int) -> Calculator:
         found = calculator_of(self._sheets.of(controller), axis)
@@ -43,19 +40,3 @@ class Calculations:
 def gear(motor_steps: float, microsteps: float, ratio: float, lead: float | None) -> Mapping[str, float]:
     """Pulses in each unit. Raises `Misuse`."""
     return dict(DriveMechanics(motor_steps=motor_steps, microsteps=microsteps, ratio=ratio, lead=lead).scale().pulses)
-
-
-def _quantity(one: MoveQuantity) -> Mapping[str, object]:
-    return {
-        "name": one.name,
-        "meaning": one.meaning,
-        "unit": one.unit,
-        "pulses": one.pulses,
-        "limits": {"low": one.limits.low, "high": one.limits.high, "is_low_excluded": one.limits.is_low_excluded},
-        "choices": list(one.choices),
-        "default": one.default,
-        "same_as": one.same_as,
-        "code": one.code,
-        "detail": one.detail,
-        "source": one.source,
-    }

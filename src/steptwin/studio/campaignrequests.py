@@ -2,22 +2,67 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Protocol, TypeAlias
 
 from steptwin.access.roles import KEEP, LOOK
 from steptwin.fields import Meaning
-from steptwin.jsonvalues import FLAG, NUMBER, TEXT, WHOLE, list_of, members, or_null
 from steptwin.studio.requesttype import request
+
+
+@dataclass(frozen=True, slots=True)
+class PropertyResult:
+    """Outcome of a property in all runs."""
+
+    name: str
+    failed: Annotated[int, "Runs in which it did not hold."]
+    robustness: Annotated[float | None, "The least one: how far from violated, -1 to 1; negative where it was violated."]
+
+
+@dataclass(frozen=True, slots=True)
+class FailureCause:
+    """Runs that fail in the same way."""
+
+    what: Annotated[str, "What failed."]
+    where: Annotated[str | None, "The simplest case that fails so, in words."]
+    runs: int
+    recording: Annotated[str | None, "The simplest run that fails in this way, among the files of the results."]
+    timeline: Annotated[str | None, "Of that run."]
+
+
+@dataclass(frozen=True, slots=True)
+class CampaignResult:
+    """The result of a campaign that has ended."""
+
+    runs: int
+    failed: int
+    pass_rate: float | None
+    interval: Annotated[tuple[float, ...], "Of the pass rate, 95 %."]
+    properties: tuple[PropertyResult, ...]
+    causes: tuple[FailureCause, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CampaignState:
+    """A campaign and its progress."""
+
+    campaign: Annotated[str, "Path of its file from the folder of the description."]
+    name: str
+    results: Annotated[str, "Path of the folder of its results, for GET /api/campaigns/RESULTS/report.html."]
+    error: Annotated[str | None, "Why its file cannot be read, or why it did not run."]
+    is_running: Annotated[bool, "Whether this studio runs it at present."] = False
+    done: Annotated[int, "Runs whose results are there."] = 0
+    failed: Annotated[int, "Those of them that failed."] = 0
+    total: Annotated[int | None, "How many runs it has, where its file says so."]
+    changed: Annotated[str | None, "When its results changed last: wall clock, ISO 8601."] = None
+    result: Annotated[CampaignResult | None, "Of the last one that ended; its report is among the files."] = None
 
 
 class Campaigns(Protocol):
     """Campaigns of one description of a world. Awaits only `steptwin.later.Later`."""
 
-    async def to_json(self) -> Sequence[Mapping[str, object]]:
-        """As `_CAMPAIGN`."""
-        ...
+    async def list(self) -> Sequence[CampaignState]: ...
 
     async def run(self, campaign: str) -> None:
         """Raises `Misuse` where there is no such campaign, `Refusal` while one runs."""
@@ -32,51 +77,6 @@ class Campaigns(Protocol):
         ...
 
 
-_PROPERTY = members(
-    {
-        "name": TEXT,
-        "failed": {**WHOLE, "description": "Runs in which it did not hold."},
-        "robustness": {
-            "type": ["number", "null"],
-            "description": "The least one: how far from violated, -1 to 1; negative where it was violated.",
-        },
-    }
-)
-_CAUSE = members(
-    {
-        "what": {**TEXT, "description": "What failed."},
-        "where": {**or_null(TEXT), "description": "The simplest case that fails so, in words."},
-        "runs": WHOLE,
-        "recording": {**or_null(TEXT), "description": "The simplest run that fails in this way, among the files of the results."},
-        "timeline": {**or_null(TEXT), "description": "Of that run."},
-    }
-)
-_RESULT = members(
-    {
-        "runs": WHOLE,
-        "failed": WHOLE,
-        "pass_rate": {"type": ["number", "null"]},
-        "interval": {**list_of(NUMBER), "description": "Of the pass rate, 95 %."},
-        "properties": list_of(_PROPERTY),
-        "causes": list_of(_CAUSE),
-    }
-)
-_CAMPAIGN = members(
-    {
-        "campaign": {**TEXT, "description": "Path of its file from the folder of the description."},
-        "name": TEXT,
-        "results": {**TEXT, "description": "Path of the folder of its results, for GET /api/campaigns/RESULTS/report.html."},
-        "error": {**or_null(TEXT), "description": "Why its file cannot be read, or why it did not run."},
-        "is_running": {**FLAG, "description": "Whether this studio runs it at present."},
-        "done": {**WHOLE, "description": "Runs whose results are there."},
-        "failed": {**WHOLE, "description": "Those of them that failed."},
-        "total": {**or_null(WHOLE), "description": "How many runs it has, where its file says so."},
-        "changed": {**or_null(TEXT), "description": "When its results changed last: wall clock, ISO 8601."},
-        "result": {**or_null(_RESULT), "description": "Of the last one that ended; its report is among the files."},
-    }
-)
-
-
 _Name: TypeAlias = Annotated[str, Meaning("As in the answer to campaigns.")]
 
 
@@ -84,7 +84,7 @@ _Name: TypeAlias = Annotated[str, Meaning("As in the answer to campaigns.")]
     "campaigns",
     LOOK,
     "The campaigns of this world: files with a table [campaign] in the folder of its description or just below it.",
-    list_of(_CAMPAIGN),
+    tuple[CampaignState, ...],
 )
 @dataclass(frozen=True, slots=True)
 class ListCampaigns:

@@ -7,36 +7,17 @@ from typing import Annotated, TypeAlias
 
 from steptwin.access.roles import KEEP, LOOK
 from steptwin.controller import Nanos
-from steptwin.fields import TIME, Meaning, Schema
-from steptwin.jsonvalues import MOMENT, NUMBER, TEXT, WHOLE, list_of, members, or_null
+from steptwin.devices.digitalshadow import ShadowState
+from steptwin.fields import TIME, Meaning
 from steptwin.studio.requesttype import request
 
-_DIFFERENCE = members(
-    {
-        "at_ns": {**MOMENT, "description": "Since when, from the beginning of the digital shadow, as decimal text [ns]"},
-        "what": {**TEXT, "description": "An axis or a register."},
-        "device": NUMBER,
-        "twin": NUMBER,
-    }
-)
-_SAMPLE: Schema = {
-    "type": "array",
-    "items": or_null(NUMBER),
-    "minItems": 4,
-    "maxItems": 4,
-    "description": "Time from the beginning [s], position of the device, of the twin, tolerance; null: not compared.",
-}
-_AXIS = members({"axis": WHOLE, "name": TEXT, "unit": TEXT, "first": or_null(_DIFFERENCE), "samples": list_of(_SAMPLE)})
-_SHADOW = members(
-    {
-        "controller": TEXT,
-        "axes": list_of(_AXIS),
-        "registers": {**list_of(_DIFFERENCE), "description": "Those that differ now."},
-        "compared": {**WHOLE, "description": "Registers that are compared at rest."},
-        "first": {**or_null(_DIFFERENCE), "description": "The first difference of all."},
-        "problems": {**list_of(TEXT), "description": "Commands that the twin refused."},
-    }
-)
+
+@dataclass(frozen=True, slots=True)
+class DeviceSettings:
+    """The settings of a device as text."""
+
+    controller: str
+    text: str
 
 
 _Device: TypeAlias = Annotated[str, Meaning("Of a device.")]
@@ -46,7 +27,7 @@ _Device: TypeAlias = Annotated[str, Meaning("Of a device.")]
     "settings",
     KEEP,
     "What can be read and written in a device, as the text that is kept before the first write.",
-    members({"controller": TEXT, "text": TEXT}),
+    DeviceSettings,
 )
 @dataclass(frozen=True, slots=True)
 class ReadSettings:
@@ -65,7 +46,7 @@ class SetDigitalShadow:
     on: Annotated[bool, Meaning("Whether there is to be one.")] = True
 
 
-@request("shadow_state", LOOK, "How a device and its digital shadow differ; null without one.", or_null(_SHADOW))
+@request("shadow_state", LOOK, "How a device and its digital shadow differ; null without one.", ShadowState | None)
 @dataclass(frozen=True, slots=True)
 class ReadDigitalShadow:
     controller: _Device

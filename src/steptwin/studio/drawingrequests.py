@@ -2,31 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Protocol, TypeAlias
 
 from steptwin.access.roles import LOOK, SERVICE
 from steptwin.fields import LONGEST_TEXT, Meaning, Schema, ValueType, check_text, whole, wrong
-from steptwin.jsonvalues import TEXT, members, or_null
+from steptwin.jsonvalues import JsonForm
 from steptwin.simulation.describe.arrangement import MOST_PLACED, MOST_PX, DrawnPosition
 from steptwin.studio.requesttype import request
+
+_PIXELS: Schema = {"type": "integer", "minimum": 0, "maximum": MOST_PX}
+_CORNER: Schema = {"type": "array", "items": _PIXELS, "minItems": 2, "maxItems": 2}
+
+
+def _to_json(places: Sequence[DrawnPosition]) -> dict[str, list[int]]:
+    return {of: [x, y] for of, x, y in places}
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """Positions of axes and elements in the machine panel."""
+
+    places: Annotated[Sequence[DrawnPosition], JsonForm({"type": "object", "additionalProperties": _CORNER}, to_json=_to_json)]
+    file: Annotated[str | None, "Of the description; null: it is in none."]
+
+
+@dataclass(frozen=True, slots=True)
+class SavedDrawing:
+    """The description of a world with its arrangement."""
+
+    file: Annotated[str | None, "What has been written; null: it cannot be written."]
+    name: Annotated[str, "For a file."]
+    text: Annotated[str, "The description with these places."]
 
 
 class Arrangement(Protocol):
     """Arrangement of one world."""
 
-    def to_json(self) -> Mapping[str, object]:
-        """As `_DRAWING`."""
+    def drawing(self) -> Drawing: ...
+
+    def save(self, places: Sequence[DrawnPosition]) -> SavedDrawing:
+        """Raises `Misuse` for what is not there, `Refusal` where the description cannot be changed."""
         ...
-
-    def save(self, places: Sequence[DrawnPosition]) -> Mapping[str, object]:
-        """As `_SAVED`. Raises `Misuse` for what is not there, `Refusal` where the description cannot be changed."""
-        ...
-
-
-_PIXELS: Schema = {"type": "integer", "minimum": 0, "maximum": MOST_PX}
-_CORNER: Schema = {"type": "array", "items": _PIXELS, "minItems": 2, "maxItems": 2}
 
 
 def _places(value: Any) -> tuple[DrawnPosition, ...]:
@@ -51,17 +69,7 @@ PLACES = ValueType(
         "propertyNames": {"minLength": 1, "maxLength": LONGEST_TEXT},
     },
     _places,
-    lambda places: {of: [x, y] for of, x, y in places},
-)
-
-_FILE: Schema = {**or_null(TEXT), "description": "Of the description; null: it is in none."}
-_DRAWING = members({"places": {"type": "object", "additionalProperties": _CORNER}, "file": _FILE})
-_SAVED = members(
-    {
-        "file": {**_FILE, "description": "What has been written; null: it cannot be written."},
-        "name": {**TEXT, "description": "For a file."},
-        "text": {**TEXT, "description": "The description with these places."},
-    }
+    _to_json,
 )
 
 
@@ -69,7 +77,7 @@ _SAVED = members(
     "drawing",
     LOOK,
     "Where the page draws axes and elements: x and y of the upper left corner in pixels, by name. Empty: by itself.",
-    _DRAWING,
+    Drawing,
 )
 @dataclass(frozen=True, slots=True)
 class ReadDrawing:
@@ -80,7 +88,7 @@ class ReadDrawing:
     "save_drawing",
     SERVICE._replace(control=False),
     "Write these places into the description of the world, as [[drawing]], in the place of those there.",
-    _SAVED,
+    SavedDrawing,
 )
 @dataclass(frozen=True, slots=True)
 class SaveDrawing:

@@ -31,6 +31,8 @@ from steptwin.studio.requests import (
     OF_SERVICES,
     OF_TIME_TRAVEL,
     REQUESTS,
+    LeaseTerm,
+    WorldTraffic,
     permit_of,
 )
 from steptwin.studio.servicerequests import WorldServices
@@ -186,11 +188,11 @@ class Hub:
             raise Refusal(NO_FILE_FOR_CAMPAIGNS())
         return self.around.campaigns
 
-    def traffic(self) -> dict[str, object]:
+    def traffic(self) -> WorldTraffic:
         """Raises `Refusal` where there is no world."""
         if self.around.traffic is None:
             raise Refusal(NO_WORLD_WITH_LINES())
-        return {"time_ns": str(self.around.moment().time), "lines": self.around.traffic()}
+        return WorldTraffic(self.around.moment().time, self.around.traffic())
 
     # ------------------------------------------------------------------ viewers
 
@@ -256,7 +258,7 @@ class Hub:
 
     # ------------------------------------------------------------------ jogs
 
-    async def begin_jog(self, viewer: Viewer, wanted: command.Jog) -> dict[str, object]:
+    async def begin_jog(self, viewer: Viewer, wanted: command.Jog) -> LeaseTerm:
         """Raises `Misuse` and `Refusal`."""
         speed = self.around.moment().speed
         if speed > FASTEST_JOG:
@@ -275,7 +277,7 @@ class Hub:
         self._say_leases()
         return self._lasting(lease)
 
-    def renew(self, viewer: Viewer, number: int) -> dict[str, object]:
+    def renew(self, viewer: Viewer, number: int) -> LeaseTerm:
         """Raises `Refusal` for a jog that has ended."""
         lease = self._lease(viewer, number)
         try:
@@ -297,10 +299,10 @@ class Hub:
             raise Refusal(LEASE_HAS_ENDED(number=number))
         return lease
 
-    def _lasting(self, lease: Lease) -> dict[str, object]:
+    def _lasting(self, lease: Lease) -> LeaseTerm:
         """In milliseconds of the wall clock."""
         lasts_ms = lease.held.lasts_ns / MILLISECOND / max(self.around.moment().speed, 1.0)
-        return {"lease": lease.number, "lasts_ms": min(int(lasts_ms), LONGEST_LEASE_MS)}
+        return LeaseTerm(lease.number, min(int(lasts_ms), LONGEST_LEASE_MS))
 
     def _drop(self, leases: Sequence[Lease]) -> None:
         for lease in leases:

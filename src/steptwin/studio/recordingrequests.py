@@ -2,24 +2,77 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Protocol, TypeAlias
 
 from steptwin.access.roles import KEEP, LOOK
 from steptwin.fields import Meaning
-from steptwin.jsonvalues import FLAG, MOMENT, TEXT, WHOLE, list_of, members, or_null
+from steptwin.jsonvalues import JsonForm, Moment
 from steptwin.studio.requesttype import request
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingFile:
+    """A saved recording."""
+
+    name: Annotated[str, "Of the file, without .json."]
+    bytes: int
+    saved: Annotated[str, "Wall clock, ISO 8601."]
+    until_ns: Moment
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingState:
+    """Extent of a recording, and its limits."""
+
+    until_ns: Moment
+    inputs: int
+    most_inputs: int
+    bytes: int
+    most_bytes: int
+    is_full: Annotated[bool, "Whether it has ended for want of room."]
+    file: Annotated[str | None, "Where it is written at the end of the studio."]
+
+
+@dataclass(frozen=True, slots=True)
+class PastState:
+    """Extent of the past that is kept."""
+
+    from_ns: Moment
+    states: int
+    inputs: int
+    most_inputs: int
+
+
+@dataclass(frozen=True, slots=True)
+class TraceState:
+    """A trace, which is kept in a ring or in a file."""
+
+    kind: Annotated[str, JsonForm({"enum": ["none", "ring", "file"]})]
+    file: str | None
+    records: int | None
+    most_records: int | None
+    from_ns: Annotated[Moment | None, "Of the oldest record of a ring."]
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingsOfWorld:
+    """Recordings of a world."""
+
+    recording: Annotated[RecordingState | None, "Inputs from outside since the beginning; null: none is recorded."]
+    past: Annotated[PastState | None, "What show_moment can show."]
+    trace: Annotated[TraceState, "What happened, as --trace keeps it."]
+    folder: Annotated[str, "Where recordings are saved."]
+    saved: Annotated[tuple[RecordingFile, ...], "Sessions there, the newest first."]
+    formats: Annotated[tuple[str, ...], "What GET /api/recordings/NAME.FORMAT makes of them."]
 
 
 class Recordings(Protocol):
     """Recordings of one world. Awaits only `steptwin.later.Later`."""
 
-    async def to_json(self) -> Mapping[str, object]:
-        """As `_RECORDINGS`."""
-        ...
+    async def list(self) -> RecordingsOfWorld: ...
 
-    async def save(self, name: str | None) -> Mapping[str, object]:
+    async def save(self, name: str | None) -> RecordingFile:
         """Raises `Misuse`, and `Refusal` where there is a file of that name."""
         ...
 
@@ -37,64 +90,35 @@ class Recordings(Protocol):
         ...
 
 
-_SAVED = members(
-    {
-        "name": {**TEXT, "description": "Of the file, without .json."},
-        "bytes": WHOLE,
-        "saved": {**TEXT, "description": "Wall clock, ISO 8601."},
-        "until_ns": MOMENT,
-    }
-)
-_RECORDING = members(
-    {
-        "until_ns": MOMENT,
-        "inputs": WHOLE,
-        "most_inputs": WHOLE,
-        "bytes": WHOLE,
-        "most_bytes": WHOLE,
-        "is_full": {**FLAG, "description": "Whether it has ended for want of room."},
-        "file": {**or_null(TEXT), "description": "Where it is written at the end of the studio."},
-    }
-)
-_PAST = members({"from_ns": MOMENT, "states": WHOLE, "inputs": WHOLE, "most_inputs": WHOLE})
-_TRACE = members(
-    {
-        "kind": {"enum": ["none", "ring", "file"]},
-        "file": or_null(TEXT),
-        "records": or_null(WHOLE),
-        "most_records": or_null(WHOLE),
-        "from_ns": {**or_null(MOMENT), "description": "Of the oldest record of a ring."},
-    }
-)
-_RECORDINGS = members(
-    {
-        "recording": {**or_null(_RECORDING), "description": "Inputs from outside since the beginning; null: none is recorded."},
-        "past": {**or_null(_PAST), "description": "What show_moment can show."},
-        "trace": {**_TRACE, "description": "What happened, as --trace keeps it."},
-        "folder": {**TEXT, "description": "Where recordings are saved."},
-        "saved": {**list_of(_SAVED), "description": "Sessions there, the newest first."},
-        "formats": {**list_of(TEXT), "description": "What GET /api/recordings/NAME.FORMAT makes of them."},
-    }
-)
-
-
-@request("recordings", LOOK, "What is recorded of the world, and which recordings are saved.", _RECORDINGS)
+@request("recordings", LOOK, "What is recorded of the world, and which recordings are saved.", RecordingsOfWorld)
 @dataclass(frozen=True, slots=True)
 class ReadRecordings:
     pass
 
 
-@request("save_recording", KEEP, "Save the recording up to now as a file beside the world. Nothing changes in the world.", _SAVED)
+@request(
+    "save_recording",
+    KEEP,
+    "Save the recording up to now as a file beside the world. Nothing changes in the world.",
+    RecordingFile,
+)
 @dataclass(frozen=True, slots=True)
 class SaveRecording:
     name: Annotated[str | None, Meaning("Of the file, without .json; the world and the time of day without.")] = None
+
+
+@dataclass(frozen=True, slots=True)
+class ViewAddress:
+    """The address of a page."""
+
+    url: str
 
 
 @request(
     "view_recording",
     KEEP,
     "Open a saved recording as a page of its own, as steptwin studio FILE --view does; at a loopback address only.",
-    members({"url": TEXT}),
+    ViewAddress,
 )
 @dataclass(frozen=True, slots=True)
 class ViewRecording:

@@ -6,20 +6,22 @@ A request is as at the control endpoint: ``{"do": NAME, FIELD: VALUE, ..., "id":
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias, get_args
 
+from steptwin.access.audit import Entry
 from steptwin.access.commands import PERMITS
 from steptwin.access.roles import ACT, LOOK, ROLES, SERVICE, TAKE, Permit
 from steptwin.controller import Nanos
 from steptwin.datatypes import format_short
 from steptwin.errors import Misuse
-from steptwin.fields import PROGRAM, TIME, Meaning, RequestType, Schema, choices, number, whole
-from steptwin.jsonvalues import FLAG, MOMENT, TEXT, WHOLE, list_of, members, or_null
+from steptwin.explain.model import MemoryUse
+from steptwin.fields import PROGRAM, TIME, Meaning, RequestType, choices, number, whole
+from steptwin.jsonvalues import TEXT, JsonForm, Moment, list_of, members
 from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
-from steptwin.simulation.kinds.registry import KINDS as CONTROLLERS
+from steptwin.simulation.world.worldprograms import ShownProgram, ShownProgramText
 from steptwin.studio.branchrequests import BranchRequest
 from steptwin.studio.campaignrequests import CampaignRequest
 from steptwin.studio.devicerequests import DeviceRequest
@@ -27,7 +29,7 @@ from steptwin.studio.drawingrequests import DrawingRequest
 from steptwin.studio.recordingrequests import RecordingRequest
 from steptwin.studio.requesttype import ViewerRequestType, declared, request
 from steptwin.studio.servicerequests import ServiceRequest
-from steptwin.studio.toolrequests import FINDING, ToolRequest
+from steptwin.studio.toolrequests import ToolRequest
 from steptwin.studio.workrequests import WorkRequest
 from steptwin.subject.commands import COMMANDS
 from steptwin.subject.payloads import KINDS
@@ -38,37 +40,89 @@ MOST_ENTRIES = 1000
 """Most entries of the audit log in one answer."""
 
 
-LEASE: Schema = members({"lease": WHOLE, "lasts_ms": {**WHOLE, "description": "Renew it in a third of this. [ms]"}})
-"""The answer to jog."""
+@dataclass(frozen=True, slots=True)
+class LeaseTerm:
+    """The answer to jog."""
 
-_PROGRAM: Mapping[str, object] = {
-    "controller": TEXT,
-    "place": {**TEXT, "description": "Unlike all others of the controller, such as program 0."},
-    "name": {**TEXT, "description": "Of the file."},
-    "language": {"enum": [language.name for kind in CONTROLLERS.values() for language in kind.languages]},
-    "suffix": {**TEXT, "description": "Of files in this language."},
-    "has_statements": {**FLAG, "description": "Whether it is a program, in whose statements a debugger stops."},
-    "is_typed": {**FLAG, "description": "Whether a text is typed over the line of the controller, as at a terminal."},
-    "address": {**TEXT, "description": "At the editor server."},
-    "empty": {**FLAG, "description": "Whether nothing is there yet."},
-    "running": FLAG,
-    "line": {
-        "anyOf": [WHOLE, {"type": "null"}],
-        "description": "Of the present statement, from 1, while it runs or is paused; null where that is not known.",
-    },
-}
+    lease: int
+    lasts_ms: Annotated[int, "Renew it in a third of this. [ms]"]
 
-_EVENT: Schema = {"$ref": "#/$defs/(event)"}
-_MOST: Schema = {**or_null(WHOLE), "description": "Null: the memory of the other parts limits it."}
-_LINE = members(
-    {
-        "line": TEXT,
-        "clients": {**WHOLE, "description": "Network connections, and serial ports and pseudo terminals that are open."},
-        "requests": {**WHOLE, "description": "Whole requests; of characters, lines."},
-        "errors": {**WHOLE, "description": "Exceptions and lost requests; of characters, those lost on the wire."},
-        "unframed": {**WHOLE, "description": "Bytes that belonged to no frame."},
-    }
-)
+
+@dataclass(frozen=True, slots=True)
+class EnteredViewer:
+    """The viewer of a connection."""
+
+    viewer: int
+    name: str
+    role: Annotated[str, JsonForm({"enum": list(ROLES)})]
+
+
+@dataclass(frozen=True, slots=True)
+class WatchedPoint:
+    point: str
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class Watch:
+    """A number of points whose values are sent."""
+
+    watch: int
+    points: Annotated[tuple[WatchedPoint, ...], "In the order of their indices."]
+
+
+@dataclass(frozen=True, slots=True)
+class KeptMoment:
+    """A moment of the past that is shown, and the oldest that is kept."""
+
+    time_ns: Moment
+    from_ns: Moment
+
+
+_EVENTS: TypeAlias = Annotated[Sequence[Mapping[str, object]], JsonForm(list_of({"$ref": "#/$defs/(event)"}))]
+
+
+@dataclass(frozen=True, slots=True)
+class PastEvents:
+    """Events between two moments of the past."""
+
+    from_ns: Moment
+    to_ns: Moment
+    state: Annotated[
+        Mapping[str, object],
+        JsonForm({"type": "object", "additionalProperties": {"$ref": "#/$defs/(state)"}}),
+        "As in hello.",
+    ]
+    faults: Annotated[Sequence[Mapping[str, object]], JsonForm(list_of({"type": "object"}))]
+    plans: _EVENTS
+    events: _EVENTS
+
+
+_Port: TypeAlias = Annotated[Mapping[str, object], JsonForm(members({"address": TEXT, "what": TEXT}))]
+
+
+@dataclass(frozen=True, slots=True)
+class ConnectedDevice:
+    controller: str
+
+
+@dataclass(frozen=True, slots=True)
+class LineUse:
+    """Traffic of a line since its beginning."""
+
+    line: str
+    clients: Annotated[int, "Network connections, and serial ports and pseudo terminals that are open."]
+    requests: Annotated[int, "Whole requests; of characters, lines."]
+    errors: Annotated[int, "Exceptions and lost requests; of characters, those lost on the wire."]
+    unframed: Annotated[int, "Bytes that belonged to no frame."]
+
+
+@dataclass(frozen=True, slots=True)
+class WorldTraffic:
+    """Traffic of all lines up to a moment."""
+
+    time_ns: Moment
+    lines: tuple[LineUse, ...]
 
 
 _Lease: TypeAlias = Annotated[int, Meaning("The number in the answer to jog.", whole(1, 2**53))]
@@ -78,7 +132,7 @@ _Lease: TypeAlias = Annotated[int, Meaning("The number in the answer to jog.", w
     "hello",
     LOOK,
     "The first request of a connection. Its answer is followed by the whole state.",
-    members({"viewer": WHOLE, "name": TEXT, "role": {"enum": list(ROLES)}}),
+    EnteredViewer,
     is_of_connection=True,
 )
 @dataclass(frozen=True, slots=True)
@@ -98,16 +152,7 @@ class Resync:
     "watch",
     LOOK,
     "Values of points, sent whenever they have changed.",
-    members(
-        {
-            "watch": WHOLE,
-            "points": {
-                "type": "array",
-                "items": members({"point": TEXT, "unit": TEXT}),
-                "description": "In the order of their indices.",
-            },
-        }
-    ),
+    Watch,
     is_of_connection=True,
 )
 @dataclass(frozen=True, slots=True)
@@ -134,7 +179,7 @@ class ReleaseControl:
     pass
 
 
-@request("renew", ACT, "A jog goes on for as long as its lease lasts from now.", LEASE)
+@request("renew", ACT, "A jog goes on for as long as its lease lasts from now.", LeaseTerm)
 @dataclass(frozen=True, slots=True)
 class Renew:
     lease: _Lease
@@ -152,7 +197,7 @@ class LetGo:
     "Show a moment of the past to this viewer while the world goes on. The message past and values of all watches follow. "
     "Until the present is shown again, state, read, pins, encoders, faults and programs are of that moment, and nothing can "
     "be changed but by stop.",
-    or_null(members({"time_ns": MOMENT, "from_ns": MOMENT})),
+    KeptMoment | None,
     is_of_connection=True,
 )
 @dataclass(frozen=True, slots=True)
@@ -165,16 +210,7 @@ class ShowMoment:
     LOOK,
     "What happened between two moments of the past, at most a minute apart. plans, state and faults are those of the first "
     "moment. Of more than 10000 events the last ones, without these; from_ns is then the moment of the first event.",
-    members(
-        {
-            "from_ns": MOMENT,
-            "to_ns": MOMENT,
-            "state": {"type": "object", "additionalProperties": {"$ref": "#/$defs/(state)"}, "description": "As in hello."},
-            "faults": {"type": "array", "items": {"type": "object"}},
-            "plans": list_of(_EVENT),
-            "events": list_of(_EVENT),
-        }
-    ),
+    PastEvents,
 )
 @dataclass(frozen=True, slots=True)
 class ReadPastEvents:
@@ -200,7 +236,7 @@ class GoBack:
     "programs",
     LOOK,
     "The program memories of controllers: each place, and what is there.",
-    list_of(members(_PROGRAM)),
+    tuple[ShownProgram, ...],
 )
 @dataclass(frozen=True, slots=True)
 class ListPrograms:
@@ -211,7 +247,7 @@ class ListPrograms:
     "program_text",
     LOOK,
     "One of these texts, with what the checker of its language finds in it.",
-    members({**_PROGRAM, "text": TEXT, "diagnostics": list_of(FINDING)}),
+    ShownProgramText,
 )
 @dataclass(frozen=True, slots=True)
 class ReadProgram:
@@ -223,7 +259,7 @@ class ReadProgram:
     "program_memory",
     LOOK,
     "What a text would take of the program memory at a place, and what is permitted. Empty for a text with errors.",
-    list_of(members({"what": TEXT, "used": WHOLE, "most": _MOST, "unit": TEXT})),
+    tuple[MemoryUse, ...],
 )
 @dataclass(frozen=True, slots=True)
 class ReadMemory:
@@ -236,7 +272,7 @@ class ReadMemory:
     "ports",
     LOOK,
     "The serial ports of the computer on which the studio runs, and the pseudo terminals of running twins.",
-    list_of(members({"address": TEXT, "what": TEXT})),
+    tuple[_Port, ...],
 )
 @dataclass(frozen=True, slots=True)
 class ListPorts:
@@ -247,7 +283,7 @@ class ListPorts:
     "connect",
     SERVICE,
     "A device becomes a controller here. Nothing moves by it, and no setting is changed.",
-    members({"controller": TEXT}),
+    ConnectedDevice,
 )
 @dataclass(frozen=True, slots=True)
 class Connect:
@@ -265,7 +301,7 @@ class Disconnect:
     "traffic",
     LOOK,
     "How much each line of the world has carried since its beginning. Counted at present, also while the past is shown.",
-    members({"time_ns": MOMENT, "lines": list_of(_LINE)}),
+    WorldTraffic,
 )
 @dataclass(frozen=True, slots=True)
 class ReadTraffic:
@@ -276,20 +312,7 @@ class ReadTraffic:
     "audit",
     SERVICE._replace(control=False),
     "Who did what, the newest last.",
-    {
-        "type": "array",
-        "items": members(
-            {
-                "at": {**TEXT, "description": "Wall clock, ISO 8601."},
-                "time_ns": {**TEXT, "description": "Virtual time, as decimal text [ns]"},
-                "viewer": TEXT,
-                "role": {"enum": list(ROLES)},
-                "do": TEXT,
-                "fields": {"type": "object"},
-                "outcome": {"enum": ["done", "misuse", "refusal", "failure", "internal"]},
-            }
-        ),
-    },
+    tuple[Entry, ...],
 )
 @dataclass(frozen=True, slots=True)
 class ReadAudit:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 
 from steptwin.fields import Field
+from steptwin.jsonvalues import shape
 from steptwin.studio.messages import MESSAGES
-from steptwin.studio.requests import LEASE, OF_CONNECTION, REQUESTS, permit_of
+from steptwin.studio.requests import OF_CONNECTION, REQUESTS, LeaseTerm, permit_of
 from steptwin.subject.commands import COMMANDS, VERSION
 from steptwin.subject.schema import DIALECT, definitions, request_schema
 
@@ -50,7 +51,7 @@ def _of_subject(name: str) -> tuple[str, tuple[Field, ...]]:
 
 def answer_schemas() -> dict[str, object]:
     """Schemas of the answers to requests; those of other commands of a subject are described in words."""
-    return {"jog": LEASE, **{row.name: row.answer for row in REQUESTS.values()}}
+    return {"jog": shape(LeaseTerm), **{row.name: row.answer.schema for row in REQUESTS.values()}}
 
 
 def text() -> str:

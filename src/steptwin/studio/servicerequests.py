@@ -2,117 +2,142 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Protocol, TypeAlias
 
 from steptwin.access.roles import LOOK
 from steptwin.controller import SECOND
 from steptwin.durations import LONGEST_NS
-from steptwin.fields import Meaning, Schema, number, whole
-from steptwin.jsonvalues import FLAG, NUMBER, TEXT, WHOLE, list_of, members, or_null
+from steptwin.fields import Meaning, number, whole
+from steptwin.jsonvalues import JsonForm
 from steptwin.studio.requesttype import request
+
+_Value: TypeAlias = Annotated[object, JsonForm({"type": ["number", "string", "null"]}), "Null: not known."]
+
+
+@dataclass(frozen=True, slots=True)
+class GatewayClient:
+    """A program that uses a gateway."""
+
+    name: str
+    place: Annotated[str, "Where it is, as far as that is known."]
+    role: str
+    follows: Annotated[tuple[str, ...], "Values that it is sent when they change, by the names of the protocol."]
+
+
+@dataclass(frozen=True, slots=True)
+class ShownGateway:
+    """A gateway of the world, and who uses it."""
+
+    kind: Annotated[str, "The name of its table: opcua, history."]
+    protocol: str
+    place: Annotated[str, "Its address."]
+    is_up: bool
+    text: Annotated[str, "Its state in words, such as why it is not up."]
+    shown: Annotated[int | None, "How many values it shows; null where that number is not fixed."]
+    has_clients: Annotated[bool, "Whether it knows its clients; those of a broker or database only that knows."]
+    clients: tuple[GatewayClient, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class HistoryRun:
+    """A run that has been kept."""
+
+    run: int
+    subject: str
+    is_virtual: Annotated[bool, "Whether its moments are virtual ones, of twins."]
+    began: Annotated[str, "Wall clock, ISO 8601."]
+    length_s: float
+    is_over: Annotated[bool, "False while it goes on, and where its process was killed."]
+
+
+@dataclass(frozen=True, slots=True)
+class HistoryPoint:
+    """A point whose values have been kept."""
+
+    point: str
+    unit: str
+    is_text: bool
+
+
+@dataclass(frozen=True, slots=True)
+class HistoryContents:
+    """Runs and points of a history."""
+
+    database: str
+    runs: tuple[HistoryRun, ...]
+    points: tuple[HistoryPoint, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class HistorySeries:
+    """Values of a point."""
+
+    point: str
+    unit: str
+    is_text: bool
+    is_motion: Annotated[bool, "Whether values change between moments, too; otherwise each holds until the next."]
+    is_thinned: Annotated[bool, "Whether it has been read in equal steps, because there are too many values."]
+    at_s: Annotated[tuple[float, ...], "Since the begin of the run."]
+    values: tuple[_Value, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class HistoryInterval:
+    """Values of points in an interval of a run."""
+
+    run: int
+    from_s: float
+    to_s: float
+    series: tuple[HistorySeries, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class HistoryDifference:
+    """A point that differs between two runs."""
+
+    point: str
+    unit: str
+    most: Annotated[float | None, "How far the two are apart at most; null for texts and unknown values."]
+    at_s: Annotated[float, "Since the begin of the interval."]
+    values: tuple[_Value, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class HistoryWrite:
+    """A write of a program, or a command of a client."""
+
+    at_s: Annotated[float, "Since the begin of the run."]
+    source: Annotated[str, "Who it was: an address, the owner of a certificate, a viewer, a client of a gateway, script."]
+    controller: Annotated[str, "The controller, or the line; empty for what is about neither."]
+    what: Annotated[str, "What was written or commanded, in words."]
+    outcome: Annotated[str, "done, misuse, refusal, failure, internal; sent or empty where there is no answer."]
 
 
 class WorldServices(Protocol):
     """History of one world. Awaits only `steptwin.later.Later`."""
 
-    def gateways(self) -> Sequence[Mapping[str, object]]:
-        """As `_GATEWAY`."""
+    def gateways(self) -> Sequence[ShownGateway]: ...
+
+    async def history(self) -> HistoryContents | None:
+        """None without a history. Raises `LineFailure` where its database does not answer."""
         ...
 
-    async def history(self) -> Mapping[str, object] | None:
-        """As `_HISTORY`; None without a history. Raises `LineFailure` where its database does not answer."""
-        ...
-
-    async def values(self, points: Sequence[str], run: int, begin_s: float, end_s: float | None) -> Mapping[str, object]:
-        """As `_VALUES`. Raises `Misuse`, `Refusal`, `LineFailure`."""
+    async def values(self, points: Sequence[str], run: int, begin_s: float, end_s: float | None) -> HistoryInterval:
+        """Raises `Misuse`, `Refusal`, `LineFailure`."""
         ...
 
     async def compare(
         self, points: Sequence[str], runs: tuple[int, int], begin_s: float, end_s: float | None
-    ) -> Sequence[Mapping[str, object]]:
-        """As `_DIFFERENCE`. Raises as `values`."""
+    ) -> Sequence[HistoryDifference]:
+        """Raises as `values`."""
         ...
 
-    async def writes(self, run: int, begin_s: float, end_s: float | None) -> Sequence[Mapping[str, object]]:
-        """As `_WRITE`, the last `MOST_WRITES`. Raises as `values`."""
+    async def writes(self, run: int, begin_s: float, end_s: float | None) -> Sequence[HistoryWrite]:
+        """The last `MOST_WRITES`. Raises as `values`."""
         ...
 
-
-_NUMBER_OR_NULL: Schema = {"type": ["number", "null"]}
-_VALUE: Schema = {"type": ["number", "string", "null"], "description": "Null: not known."}
-
-
-_CLIENT = members(
-    {
-        "name": TEXT,
-        "place": {**TEXT, "description": "Where it is, as far as that is known."},
-        "role": TEXT,
-        "follows": {**list_of(TEXT), "description": "Values that it is sent when they change, by the names of the protocol."},
-    }
-)
-_GATEWAY = members(
-    {
-        "kind": {**TEXT, "description": "The name of its table: opcua, history."},
-        "protocol": TEXT,
-        "place": {**TEXT, "description": "Its address."},
-        "is_up": FLAG,
-        "text": {**TEXT, "description": "Its state in words, such as why it is not up."},
-        "shown": {"type": ["integer", "null"], "description": "How many values it shows; null where that number is not fixed."},
-        "has_clients": {**FLAG, "description": "Whether it knows its clients; those of a broker or database only that knows."},
-        "clients": list_of(_CLIENT),
-    }
-)
-_RUN = members(
-    {
-        "run": WHOLE,
-        "subject": TEXT,
-        "is_virtual": {**FLAG, "description": "Whether its moments are virtual ones, of twins."},
-        "began": {**TEXT, "description": "Wall clock, ISO 8601."},
-        "length_s": NUMBER,
-        "is_over": {**FLAG, "description": "False while it goes on, and where its process was killed."},
-    }
-)
-_POINT = members({"point": TEXT, "unit": TEXT, "is_text": FLAG})
-_HISTORY = members({"database": TEXT, "runs": list_of(_RUN), "points": list_of(_POINT)})
-_SERIES = members(
-    {
-        "point": TEXT,
-        "unit": TEXT,
-        "is_text": FLAG,
-        "is_motion": {
-            **FLAG,
-            "description": "Whether values change between moments, too; otherwise each holds until the next.",
-        },
-        "is_thinned": {**FLAG, "description": "Whether it has been read in equal steps, because there are too many values."},
-        "at_s": {**list_of(NUMBER), "description": "Since the begin of the run."},
-        "values": list_of(_VALUE),
-    }
-)
-_VALUES = members({"run": WHOLE, "from_s": NUMBER, "to_s": NUMBER, "series": list_of(_SERIES)})
-_DIFFERENCE = members(
-    {
-        "point": TEXT,
-        "unit": TEXT,
-        "most": {**_NUMBER_OR_NULL, "description": "How far the two are apart at most; null for texts and unknown values."},
-        "at_s": {**NUMBER, "description": "Since the begin of the interval."},
-        "values": list_of(_VALUE),
-    }
-)
-
-_WRITE = members(
-    {
-        "at_s": {**NUMBER, "description": "Since the begin of the run."},
-        "source": {
-            **TEXT,
-            "description": "Who it was: an address, the owner of a certificate, a viewer, a client of a gateway, script.",
-        },
-        "controller": {**TEXT, "description": "The controller, or the line; empty for what is about neither."},
-        "what": {**TEXT, "description": "What was written or commanded, in words."},
-        "outcome": {**TEXT, "description": "done, misuse, refusal, failure, internal; sent or empty where there is no answer."},
-    }
-)
 
 MOST_POINTS = 8
 """That are read at once."""
@@ -125,7 +150,7 @@ _Begin: TypeAlias = Annotated[float, Meaning("Begin of the interval, since that 
 _End: TypeAlias = Annotated[float | None, Meaning("End of the interval; that of the run without.", _SECONDS, unit="s")]
 
 
-@request("gateways", LOOK, "The gateways of the world, and who uses them.", list_of(_GATEWAY))
+@request("gateways", LOOK, "The gateways of the world, and who uses them.", tuple[ShownGateway, ...])
 @dataclass(frozen=True, slots=True)
 class ReadGateways:
     pass
@@ -135,7 +160,7 @@ class ReadGateways:
     "history",
     LOOK,
     "Runs and points that the history beside the world has kept; null where there is none.",
-    or_null(_HISTORY),
+    HistoryContents | None,
 )
 @dataclass(frozen=True, slots=True)
 class ReadHistory:
@@ -147,7 +172,7 @@ class ReadHistory:
     LOOK,
     "Values of points in an interval of a run that has been kept, for a picture: of motions the ends of their parts, and about "
     "800 positions between; at most 4000 of each point.",
-    _VALUES,
+    HistoryInterval,
 )
 @dataclass(frozen=True, slots=True)
 class ReadHistoryValues:
@@ -161,7 +186,7 @@ class ReadHistoryValues:
     "compare_history",
     LOOK,
     "The points that differ between the same interval of two runs, the greatest difference first.",
-    list_of(_DIFFERENCE),
+    tuple[HistoryDifference, ...],
 )
 @dataclass(frozen=True, slots=True)
 class CompareHistory:
@@ -176,7 +201,7 @@ class CompareHistory:
     "history_writes",
     LOOK,
     f"What programs have written over lines and clients have commanded in an interval of a run; the last {MOST_WRITES}.",
-    list_of(_WRITE),
+    tuple[HistoryWrite, ...],
 )
 @dataclass(frozen=True, slots=True)
 class ReadHistoryWrites:

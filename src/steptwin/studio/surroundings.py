@@ -10,14 +10,17 @@ from typing import Any, NamedTuple, Protocol
 from steptwin.access.audit import Audit
 from steptwin.access.tokens import AccessGate
 from steptwin.controller import Nanos
+from steptwin.devices.digitalshadow import ShadowState
 from steptwin.diagnostics import SourceText
 from steptwin.studio.branchrequests import Branches
 from steptwin.studio.campaignrequests import Campaigns
 from steptwin.studio.drawingrequests import Arrangement
 from steptwin.studio.programs import ProgramTexts
 from steptwin.studio.recordingrequests import Recordings
+from steptwin.studio.requests import LineUse
 from steptwin.studio.servicerequests import WorldServices
 from steptwin.studio.timetravel import TimeTravel
+from steptwin.studio.workrequests import Work
 from steptwin.subject.contract import AsyncSubject, Result
 
 
@@ -82,8 +85,8 @@ class Connections(Protocol):
         """Begin the digital shadow of a device, or end it. Raises as `settings`."""
         ...
 
-    def shadow_of(self, controller: str, after: Nanos) -> Mapping[str, object] | None:
-        """See `steptwin.studio.devicerequests`. Raises `Misuse`."""
+    def shadow_of(self, controller: str, after: Nanos) -> ShadowState | None:
+        """None without a digital shadow. Raises `Misuse`."""
         ...
 
 
@@ -98,8 +101,9 @@ class LongWork(Protocol):
         """Begin the checks of a device. Raises `Refusal` while another work is running."""
         ...
 
-    def to_json(self) -> dict[str, object] | None:
-        """Work that was begun last, as JSON."""
+    @property
+    def last(self) -> Work | None:
+        """The work that was begun last."""
         ...
 
     def cancel(self) -> None: ...
@@ -131,6 +135,6 @@ class Surroundings:
     """None without a world."""
     campaigns: Campaigns | None = None
     """None without a world whose description is in a file."""
-    traffic: Callable[[], Sequence[Mapping[str, object]]] | None = None
+    traffic: Callable[[], tuple[LineUse, ...]] | None = None
     """None without a world."""
     on_internal: Callable[[Exception], object] = lambda error: None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.devices.worldmember import present_of
@@ -12,6 +12,7 @@ from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.later import Later
 from steptwin.messages import Message
 from steptwin.studio.programs import ProgramTexts
+from steptwin.studio.requests import KeptMoment, PastEvents
 from steptwin.studio.watches import Watched
 from steptwin.subject.commands import Command, Encoders, ListFaults, ReadPins, ReadPoints, ReadState
 from steptwin.subject.contract import PlannedSubject, Result
@@ -91,7 +92,7 @@ class ShownMoment:
         """Whether it is the past."""
         return self._view is not None
 
-    async def go(self, moment: Nanos, watches: Mapping[int, Watched]) -> dict[str, object]:
+    async def go(self, moment: Nanos, watches: Mapping[int, Watched]) -> KeptMoment:
         """Show a moment. Raises `Misuse`, and `Refusal` if no past is kept."""
         if self._time_travel is None:
             raise Refusal(NO_PAST_TO_SHOW())
@@ -106,7 +107,7 @@ class ShownMoment:
         self._view = view
         self.is_changed = True
         self.unsent = set(watches)
-        return {"time_ns": str(view.now), "from_ns": str(self._time_travel.begin)}
+        return KeptMoment(view.now, self._time_travel.begin)
 
     def leave(self) -> None:
         """Back to the present."""
@@ -140,7 +141,7 @@ class ShownMoment:
         (await self._there()).go_back()
         self.leave()
 
-    async def events(self, begin: Nanos, end: Nanos, kinds: tuple[str, ...] | None) -> dict[str, object]:
+    async def events(self, begin: Nanos, end: Nanos, kinds: tuple[str, ...] | None) -> PastEvents:
         """Events between two moments, whichever is shown. Raises `Misuse`, and `Refusal` if no past is kept."""
         time_travel = self._time_travel
         if time_travel is None:
@@ -150,9 +151,9 @@ class ShownMoment:
             raise Misuse(PAST_TOO_LONG(from_s=begin / SECOND, to_s=end / SECOND, most_s=LONGEST_PAST // SECOND))
         present, batch = await time_travel.events(begin, end, filter_of(kinds), MOST_PAST_EVENTS, _present)
         if batch.missed:  # what held at the begin says nothing of the first event that is left
-            begin, present = batch.events[0].time, {"state": {}, "faults": [], "plans": []}
+            begin, present = batch.events[0].time, dict[str, Any](state={}, faults=[], plans=[])
         events = [event.to_json() for event in batch.events]
-        return {"from_ns": str(begin), "to_ns": str(end), **present, "events": events}
+        return PastEvents(begin, end, **present, events=events)
 
     # ------------------------------------------------------------------ what the viewer is sent
 
@@ -176,7 +177,7 @@ class ShownMoment:
         return json.dumps([[index, _value(view, point)] for index, point in enumerate(points)], separators=(",", ":"))
 
 
-def _present(subject: PlannedSubject) -> dict[str, object]:
+def _present(subject: PlannedSubject) -> dict[str, Any]:
     plans = [plan.to_json() for plan in subject.plans(filter_of(["plan"]))]
     return {**present_of(subject), "plans": plans}
 

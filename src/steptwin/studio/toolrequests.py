@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, TypeAlias
 
 from steptwin.access.roles import LOOK
-from steptwin.calc import Formula, MovePhase, RequiredSetting
+from steptwin.calc import Calculation, MoveQuantity
 from steptwin.configuration import Section
 from steptwin.controller import Nanos
-from steptwin.datasheet import Limits
-from steptwin.diagnostics import Severity
+from steptwin.diagnostics import Finding
 from steptwin.errors import Misuse
 from steptwin.fields import (
     HEX,
@@ -28,7 +27,7 @@ from steptwin.fields import (
     read_fields,
     wrong,
 )
-from steptwin.jsonvalues import FLAG, NUMBER, TEXT, WHOLE, list_of, members, or_null, shape, with_sentences
+from steptwin.jsonvalues import NUMBER, TEXT, JsonForm, members
 from steptwin.messages import Message
 from steptwin.studio.requesttype import request
 from steptwin.wire.pcapng import CapturedFrame
@@ -43,70 +42,36 @@ _NUMBERS: Schema = {"type": "object", "additionalProperties": NUMBER}
 _TEXTS: Schema = {"type": "object", "additionalProperties": TEXT}
 
 
-_QUANTITY = members(
-    {
-        "name": TEXT,
-        "meaning": TEXT,
-        "unit": TEXT,
-        "pulses": {**NUMBER, "description": "Pulses (per s, per s²) in one of its unit."},
-        "limits": shape(Limits),
-        "choices": list_of(WHOLE),
-        "default": or_null(NUMBER),
-        "same_as": {**or_null(TEXT), "description": "The quantity whose value it has where none is given."},
-        "code": {**TEXT, "description": "Register or command that sets it; empty where it is given with a motion."},
-        "detail": {**TEXT, "description": "The fact of the state that it is."},
-        "source": TEXT,
-    }
-)
-_QUANTITIES = members({"title": TEXT, "quantities": list_of(_QUANTITY), "times": list_of(_QUANTITY)})
-_MOVE = with_sentences(
-    {
-        "title": TEXT,
-        "found": or_null(TEXT),
-        "exact": {**or_null(NUMBER), "description": "Of what was found, before it was made what the controller takes."},
-        "values": _NUMBERS,
-        "units": _TEXTS,
-        "times": _NUMBERS,
-        "peak": NUMBER,
-        "reaches": {**FLAG, "description": "Whether the peak is the velocity."},
-        "parts": list_of(members({name: TEXT if name == "name" else NUMBER for name in MovePhase._fields})),
-        "formulas": list_of(with_sentences(dict.fromkeys(Formula._fields, TEXT), "name", "text")),
-        "notes": list_of(TEXT),
-        "settings": list_of(members({name: NUMBER if name == "value" else TEXT for name in RequiredSetting._fields})),
-        "curve": {
-            "type": "array",
-            "items": {"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 3},
-            "description": "Time [s], position, velocity.",
-        },
-    },
-    lists=("notes",),
-)
-FINDING = members(
-    {
-        **dict.fromkeys(("line", "column", "end_line", "end_column"), WHOLE),
-        "severity": {"enum": [one.value for one in Severity]},
-        "code": TEXT,
-        "message": TEXT,
-        "hint": or_null(TEXT),
-    }
-)
-_FORM = members(
-    {
-        "name": {**TEXT, "description": "Of the file."},
-        "text": TEXT,
-        "sections": list_of(shape(Section)),
-        "diagnostics": list_of(FINDING),
-        "is_file": {
-            **FLAG,
-            "description": "false: no file; the text has what the registers of the controller show, and no more.",
-        },
-        "points": {
-            **_NUMBERS,
-            "description": "What points get from keys of the text, in the units that the controller has now. Without those that "
-            "cannot be converted into them.",
-        },
-    }
-)
+@dataclass(frozen=True, slots=True)
+class MoveQuantities:
+    """The quantities of a move of an axis, and the times of which one may be given."""
+
+    title: str
+    quantities: tuple[MoveQuantity, ...]
+    times: tuple[MoveQuantity, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ConfigurationForm:
+    """A configuration file as a form."""
+
+    name: Annotated[str, "Of the file."]
+    text: str
+    sections: tuple[Section, ...]
+    diagnostics: tuple[Finding, ...]
+    is_file: Annotated[bool, "false: no file; the text has what the registers of the controller show, and no more."]
+    points: Annotated[
+        Mapping[str, float],
+        "What points get from keys of the text, in the units that the controller has now. Without those that cannot be converted "
+        "into them.",
+    ]
+
+
+@dataclass(frozen=True, slots=True)
+class CaptureFile:
+    """A capture file, in base64."""
+
+    data: Annotated[str, JsonForm({"type": "string", "contentEncoding": "base64"})]
 
 
 def _file(value: Any) -> str:
@@ -180,7 +145,7 @@ _RATIO = number(0.0, 1e6)
     "calculator",
     LOOK,
     "The quantities of a move of an axis, and the times of which one may be given in place of a quantity.",
-    _QUANTITIES,
+    MoveQuantities,
 )
 @dataclass(frozen=True, slots=True)
 class ReadQuantities:
@@ -192,7 +157,7 @@ class ReadQuantities:
     "calculate",
     LOOK,
     "A move from rest to rest, as the controller would plan it: its times, or with one time the quantity that is left out.",
-    _MOVE,
+    Calculation,
 )
 @dataclass(frozen=True, slots=True)
 class Calculate:
@@ -202,7 +167,7 @@ class Calculate:
     find: Annotated[str | None, Meaning("What a time determines; the one that is left out without.")] = None
 
 
-@request("gear", LOOK, "Pulses in each unit (GEAR), from the mechanics.", _NUMBERS)
+@request("gear", LOOK, "Pulses in each unit (GEAR), from the mechanics.", Mapping[str, float])
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConvertGear:
     motor_steps: Annotated[float, Meaning("Full steps in a revolution of the motor.", _RATIO)] = 200.0
@@ -218,7 +183,7 @@ class ConvertGear:
     LOOK,
     "The configuration of a controller as a form: sections, settings with meaning, unit and range, what is wrong. It is "
     "that of its file; without one, what its registers show.",
-    _FORM,
+    ConfigurationForm,
 )
 @dataclass(frozen=True, slots=True)
 class ReadConfiguration:
@@ -230,14 +195,19 @@ class ReadConfiguration:
     LOOK,
     "A capture file (pcapng) for Wireshark, of frames as events have them. Modbus TCP is in packets of TCP, serial lines "
     "are as captures of an RTAC.",
-    members({"data": {**TEXT, "contentEncoding": "base64"}}),
+    CaptureFile,
 )
 @dataclass(frozen=True, slots=True)
 class MakeCapture:
     frames: Annotated[Sequence[CapturedFrame], Meaning("In their order.", _FRAMES)]
 
 
-@request("edit_configuration", LOOK, "The form of a text of such a file, with other values in it. Nothing is written.", _FORM)
+@request(
+    "edit_configuration",
+    LOOK,
+    "The form of a text of such a file, with other values in it. Nothing is written.",
+    ConfigurationForm,
+)
 @dataclass(frozen=True, slots=True)
 class EditConfiguration:
     controller: ControllerName

@@ -18,6 +18,7 @@ from steptwin.access.rate import RateLimit
 from steptwin.access.roles import LOOK, Permit, Role
 from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse, Refusal, SteptwinError
+from steptwin.jsonvalues import to_json
 from steptwin.later import Later, start
 from steptwin.messages import NONE, Message
 from steptwin.studio import branchrequests as branch
@@ -187,23 +188,23 @@ class ViewerSession:
         own = self._ACTIONS.get(type(wanted))
         if own is not None:
             value = own(self, wanted)
-            return self._hub.subject.result_of(await value if isawaitable(value) else value)
+            return self._hub.subject.result_of(to_json(await value if isawaitable(value) else value))
         if type(wanted) in OF_A_MOMENT and self._shown_moment.is_past:
             return await self._shown_moment.do(wanted)
         action = self._of_subject.get(type(wanted))
         return await (self._hub.subject.do(wanted) if action is None else action(wanted, identity))
 
-    async def _connect(self, wanted: ask.Connect) -> object:
-        return {"controller": await self._hub.around.connections.connect(wanted.address, wanted.name)}
+    async def _connect(self, wanted: ask.Connect) -> ask.ConnectedDevice:
+        return ask.ConnectedDevice(await self._hub.around.connections.connect(wanted.address, wanted.name))
 
-    async def _read_settings(self, wanted: device.ReadSettings) -> object:
-        return {"controller": wanted.controller, "text": await self._hub.around.connections.settings(wanted.controller)}
+    async def _read_settings(self, wanted: device.ReadSettings) -> device.DeviceSettings:
+        return device.DeviceSettings(wanted.controller, await self._hub.around.connections.settings(wanted.controller))
 
-    async def _view_recording(self, wanted: recording.ViewRecording) -> object:
-        return {"url": await self._hub.recordings.view(wanted.name)}
+    async def _view_recording(self, wanted: recording.ViewRecording) -> recording.ViewAddress:
+        return recording.ViewAddress(await self._hub.recordings.view(wanted.name))
 
     async def _jog(self, wanted: command.Jog) -> Result:
-        return self._hub.subject.result_of(await self._hub.begin_jog(self.viewer, wanted))
+        return self._hub.subject.result_of(to_json(await self._hub.begin_jog(self.viewer, wanted)))
 
     async def _do(self, wanted: Wanted, identity: Identity) -> Result:
         name = wanted.name
@@ -250,7 +251,7 @@ class ViewerSession:
 
     # ------------------------------------------------------------------ identity of the viewer
 
-    def _hello(self, wanted: ask.Hello) -> object:
+    def _hello(self, wanted: ask.Hello) -> ask.EnteredViewer:
         if self.has_entered:
             raise Misuse(SECOND_HELLO())
         try:
@@ -263,7 +264,7 @@ class ViewerSession:
         viewer = Viewer(self.viewer.number, name, role)
         self._hub.join(viewer)
         self.viewer, self.has_entered, self._needs_hello = viewer, True, True
-        return {"viewer": viewer.number, "name": name, "role": role.title}
+        return ask.EnteredViewer(viewer.number, name, role.title)
 
     def _resync(self, _: ask.Resync) -> None:
         self._needs_hello = True
@@ -313,7 +314,7 @@ class ViewerSession:
 
     # ------------------------------------------------------------------ what it is sent
 
-    def _watch(self, wanted: ask.WatchPoints) -> object:
+    def _watch(self, wanted: ask.WatchPoints) -> ask.Watch:
         if len(self._watches) >= MOST_WATCHES:
             raise Misuse(TOO_MANY_WATCHES(most=MOST_WATCHES))
         if sum(len(one.values.points) for one in self._watches.values()) + len(wanted.points) > MOST_WATCHED:
@@ -323,7 +324,7 @@ class ViewerSession:
         self._watches[number] = self._hub.watches.add(number, readings, wanted.rate)
         if self._shown_moment.is_past:
             self._shown_moment.unsent.add(number)
-        return {"watch": number, "points": [{"point": one.point, "unit": one.unit} for one in readings]}
+        return ask.Watch(number, tuple([ask.WatchedPoint(one.point, one.unit) for one in readings]))
 
     def _unwatch(self, wanted: ask.Unwatch) -> None:
         watched = self._watches.pop(wanted.watch, None)
@@ -474,22 +475,22 @@ class ViewerSession:
             ask.Connect: _connect,
             ask.Disconnect: lambda self, wanted: self._hub.around.connections.disconnect(wanted.controller),
             ask.ReadTraffic: lambda self, _: self._hub.traffic(),
-            ask.ReadAudit: lambda self, wanted: [entry.to_json() for entry in self._hub.around.audit.last(wanted.most)],
+            ask.ReadAudit: lambda self, wanted: self._hub.around.audit.last(wanted.most),
             tool.ReadConfiguration: lambda self, wanted: self._hub.configurations.read(wanted.controller),
             tool.EditConfiguration: lambda self, one: self._hub.configurations.edit(one.controller, one.text, one.changes),
             tool.ReadQuantities: lambda self, wanted: self._hub.calculations.quantities(wanted.controller, wanted.axis),
             tool.Calculate: lambda self, one: self._hub.calculations.calculate(one.controller, one.axis, one.given, one.find),
             tool.ConvertGear: lambda _, one: gear(one.motor_steps, one.microsteps, one.ratio, one.lead),
-            tool.MakeCapture: lambda _, one: {"data": b64encode(b"".join(capture(one.frames))).decode("ascii")},
+            tool.MakeCapture: lambda _, one: tool.CaptureFile(b64encode(b"".join(capture(one.frames))).decode("ascii")),
             device.ReadSettings: _read_settings,
             device.ReadDigitalShadow: lambda self, wanted: self._hub.around.connections.shadow_of(
                 wanted.controller, wanted.after
             ),
             device.SetDigitalShadow: lambda self, wanted: self._hub.around.connections.shadow(wanted.controller, on=wanted.on),
-            recording.ReadRecordings: lambda self, _: self._hub.recordings.to_json(),
+            recording.ReadRecordings: lambda self, _: self._hub.recordings.list(),
             recording.SaveRecording: lambda self, wanted: self._hub.recordings.save(wanted.name),
             recording.ViewRecording: _view_recording,
-            branch.ListBranches: lambda self, _: self._hub.branches.to_json(),
+            branch.ListBranches: lambda self, _: self._hub.branches.list(),
             branch.StartBranch: lambda self, wanted: self._hub.branches.start(wanted.moment),
             branch.EndBranch: lambda self, wanted: self._hub.branches.end(wanted.branch),
             services.ReadGateways: lambda self, _: self._hub.services.gateways(),
@@ -499,14 +500,14 @@ class ViewerSession:
             services.CompareHistory: lambda self, one: self._hub.services.compare(
                 one.points, (one.run, one.other), one.from_s, one.to_s
             ),
-            campaign.ListCampaigns: lambda self, _: self._hub.campaigns.to_json(),
+            campaign.ListCampaigns: lambda self, _: self._hub.campaigns.list(),
             campaign.RunCampaign: lambda self, wanted: self._hub.campaigns.run(wanted.campaign),
             campaign.EndCampaign: lambda self, wanted: self._hub.campaigns.end(wanted.campaign),
-            drawing.ReadDrawing: lambda self, _: self._hub.arrangement.to_json(),
+            drawing.ReadDrawing: lambda self, _: self._hub.arrangement.drawing(),
             drawing.SaveDrawing: lambda self, wanted: self._hub.arrangement.save(wanted.places),
             work.Scan: lambda self, one: self._hub.around.work.scan(one.places, one.kind, one.units, one.baud, one.timeout),
             work.Verify: lambda self, wanted: self._hub.around.work.verify(wanted.address, write=wanted.write),
-            work.ReadWork: lambda self, _: self._hub.around.work.to_json(),
+            work.ReadWork: lambda self, _: self._hub.around.work.last,
             work.CancelWork: lambda self, _: self._hub.around.work.cancel(),
         },
     )

@@ -3,68 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
-from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 from steptwin.errors import Refusal, SteptwinError
 from steptwin.eventloop import later, result_of
 from steptwin.later import Later
 from steptwin.messages import Message
-
-
-class Cancelled(Exception):
-    """The work was cancelled."""
-
-
-@dataclass(slots=True)
-class Work:
-    """Work in progress, and its results. Written by its thread, read by the event loop."""
-
-    kind: str
-    doing: str = ""
-    step: int = 0
-    steps: int = 0
-    is_running: bool = True
-    is_cancelled: bool = False
-    tried: list[str] = field(default_factory=list)
-    found: list[dict[str, str]] = field(default_factory=list)
-    problems: list[str] = field(default_factory=list)
-    report: dict[str, object] | None = None
-
-    def to_json(self) -> dict[str, object]:
-        return {
-            "work": self.kind,
-            "is_running": self.is_running,
-            "doing": self.doing,
-            "step": self.step,
-            "steps": self.steps,
-            "tried": list(self.tried),
-            "found": list(self.found),
-            "problems": list(self.problems),
-            "report": self.report,
-        }
-
-    def check(self, id_: str, number: int, count: int) -> None:
-        """Progress of checks."""
-        self.doing, self.step, self.steps = id_, number, count
-
-    @contextlib.contextmanager
-    def search(self, title: str, total: int, form: str) -> Generator[Callable[[int], object]]:
-        """Progress of a search on a line."""
-        self.doing, self.step, self.steps = title, 0, total
-        if self.is_cancelled:
-            raise Cancelled
-
-        def tried(number: int) -> None:
-            if self.is_cancelled:
-                raise Cancelled
-            self.step += 1
-            self.doing = f"{title} {number:{form}}"
-
-        yield tried
-        self.tried.append(title)
+from steptwin.studio.workrequests import Cancelled, Work
 
 
 class Worker(Protocol):
@@ -101,8 +47,9 @@ class DeviceWork:
 
         self._begin("verify", checks)
 
-    def to_json(self) -> dict[str, object] | None:
-        return None if self._work is None else self._work.to_json()
+    @property
+    def last(self) -> Work | None:
+        return self._work
 
     def cancel(self) -> None:
         if self._work is not None:
@@ -110,7 +57,7 @@ class DeviceWork:
 
     def _begin(self, kind: str, do: Callable[[Work], None]) -> None:
         if self._work is not None and self._work.is_running:
-            raise Refusal(WORK_IS_RUNNING(kind=self._work.kind))
+            raise Refusal(WORK_IS_RUNNING(kind=self._work.work))
         work = self._work = Work(kind)
         self._running = later(asyncio.to_thread(self._run, work, do))
 

@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import contextlib
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass, field
 from typing import Annotated, TypeAlias
 
 from steptwin.access.roles import LOOK, SERVICE
 from steptwin.fields import Meaning, number
-from steptwin.jsonvalues import FLAG, TEXT, WHOLE, list_of, members, or_null
+from steptwin.jsonvalues import FLAG, TEXT, UNWRITTEN, WHOLE, JsonForm, list_of, members, shape
 from steptwin.studio.requesttype import request
+from steptwin.verify.check import CheckResult
 
-_FOUND = members({"device": {**TEXT, "description": "As connect takes it."}, "what": TEXT})
-_PROBE = members({"what": TEXT, "expected": TEXT, "came": TEXT, "holds": FLAG})
-_RESULT = members(
-    {
-        "id": {**TEXT, "description": "Of the assumption."},
-        "outcome": {"enum": ["confirmed", "refuted", "not checked"]},
-        "what": TEXT,
-        "why": {**TEXT, "description": "It was not checked."},
-        "probes": list_of(_PROBE),
-    }
-)
 _REPORT = members(
     {
         "format": TEXT,
@@ -30,22 +22,57 @@ _REPORT = members(
         "permitted": TEXT,
         "is_complete": FLAG,
         "counts": {"type": "object", "additionalProperties": WHOLE},
-        "results": list_of(_RESULT),
+        "results": list_of(shape(CheckResult)),
     }
 )
-_WORK = members(
-    {
-        "work": {"enum": ["scan", "verify"]},
-        "is_running": FLAG,
-        "doing": {**TEXT, "description": "What is tried at present."},
-        "step": WHOLE,
-        "steps": WHOLE,
-        "tried": list_of(TEXT),
-        "found": list_of(_FOUND),
-        "problems": list_of(TEXT),
-        "report": or_null(_REPORT),
-    }
-)
+
+
+@dataclass(frozen=True, slots=True)
+class FoundOnLine:
+    """A device that a search has found."""
+
+    device: Annotated[str, "As connect takes it."]
+    what: str
+
+
+class Cancelled(Exception):
+    """The work was cancelled."""
+
+
+@dataclass(slots=True)
+class Work:
+    """A search or checks in progress, and the results. Written by its thread, read by the event loop."""
+
+    work: Annotated[str, JsonForm({"enum": ["scan", "verify"]})]
+    is_running: bool = True
+    doing: Annotated[str, "What is tried at present."] = ""
+    step: int = 0
+    steps: int = 0
+    tried: list[str] = field(default_factory=list)
+    found: list[FoundOnLine] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
+    report: Annotated[Mapping[str, object], JsonForm(_REPORT)] | None = None
+    is_cancelled: Annotated[bool, UNWRITTEN] = False
+
+    def check(self, id_: str, number: int, count: int) -> None:
+        """Progress of checks."""
+        self.doing, self.step, self.steps = id_, number, count
+
+    @contextlib.contextmanager
+    def search(self, title: str, total: int, form: str) -> Generator[Callable[[int], object]]:
+        """Progress of a search on a line."""
+        self.doing, self.step, self.steps = title, 0, total
+        if self.is_cancelled:
+            raise Cancelled
+
+        def tried(number: int) -> None:
+            if self.is_cancelled:
+                raise Cancelled
+            self.step += 1
+            self.doing = f"{title} {number:{form}}"
+
+        yield tried
+        self.tried.append(title)
 
 
 @request(
@@ -72,7 +99,7 @@ class Verify:
     write: Annotated[bool, Meaning("Permit checks that write settings and put them back.")] = False
 
 
-@request("work", LOOK, "The search or the checks that were begun last.", or_null(_WORK))
+@request("work", LOOK, "The search or the checks that were begun last.", Work | None)
 @dataclass(frozen=True, slots=True)
 class ReadWork:
     pass

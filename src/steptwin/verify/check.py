@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
-from typing import Generic, NamedTuple, TypeAlias, TypeVar
+from typing import Annotated, Generic, NamedTuple, TypeAlias, TypeVar
 
 from steptwin.errors import LineFailure
 
@@ -93,15 +93,11 @@ class Check(Generic[T]):
 class CheckResult:
     """Result for one assumption: ``why`` it was not checked, or its ``probes``."""
 
-    id: str
+    id: Annotated[str, "Of the assumption."]
     outcome: CheckOutcome
     what: str
     probes: tuple[Probe, ...] = ()
-    why: str = ""
-
-    def to_json(self) -> dict[str, object]:
-        probes = [{"what": p.what, "expected": p.expected, "came": p.came, "holds": p.holds} for p in self.probes]
-        return {"id": self.id, "outcome": str(self.outcome), "what": self.what, "why": self.why, "probes": probes}
+    why: Annotated[str, "It was not checked."] = ""
 
 
 class NotRestored(LineFailure):

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from steptwin.jsonvalues import to_json
 from steptwin.verify.check import CheckOutcome, CheckResult
 
 FORMAT = "steptwin verification 1"
@@ -41,7 +42,7 @@ class Report:
             "permitted": self.permitted,
             "is_complete": self.is_complete,
             "counts": dict(self.counts),
-            "results": [result.to_json() for result in self.results],
+            "results": [to_json(result) for result in self.results],
         }
 
     def json_text(self) -> str:

@@ -68,7 +68,7 @@ def test_a_program_runs_from_its_next_start_on() -> None:
     there.run(for_="1 s")
     assert there.read("table.USER_REGISTER[4]:real") == 9.0
     text = WorldPrograms(there).text("table", "program 0")
-    assert (text["name"], text["text"]) == ("a.prg", "M1 = ON\nPABS M1 5\n$R4 = 9\nEND\n")
+    assert (text.name, text.text) == ("a.prg", "M1 = ON\nPABS M1 5\n$R4 = 9\nEND\n")
 
 
 def test_names_of_positions_are_those_of_the_table_of_the_bank() -> None:
@@ -80,7 +80,7 @@ def test_names_of_positions_are_those_of_the_table_of_the_bank() -> None:
     start(there)
     there.run(for_="2 s")
     assert there.read("table.USER_REGISTER[6]:real") == 1.0
-    assert WorldPrograms(there).text("table", "positions 0")["text"] == "HOME;1;2;3;4\nPICK;5;x;x;x\n"
+    assert WorldPrograms(there).text("table", "positions 0").text == "HOME;1;2;3;4\nPICK;5;x;x;x\n"
 
 
 @pytest.mark.parametrize(
@@ -122,8 +122,8 @@ def test_snapshots_and_copies_have_what_was_downloaded() -> None:
     second = there.snapshot()
     there.restore(first)
     programs = WorldPrograms(there)
-    assert programs.text("table", "program 0")["text"] == FILES["a.prg"].decode()
-    assert programs.text("drum", "program")["empty"] is True
+    assert programs.text("table", "program 0").text == FILES["a.prg"].decode()
+    assert programs.text("drum", "program").empty is True
     start(there)
     there.run(for_="1 s")
     assert there.read("table.USER_REGISTER[0]:real") > 5.0
@@ -131,8 +131,8 @@ def test_snapshots_and_copies_have_what_was_downloaded() -> None:
     for one in (there, pickle.loads(pickle.dumps(there))):
         assert one.read("table.USER_REGISTER[2]:real") == 3.0
         assert one.now == SECOND // 2
-        assert WorldPrograms(one).text("table", "program 0")["line"] == 3
-        assert WorldPrograms(one).text("drum", "program")["running"] is True
+        assert WorldPrograms(one).text("table", "program 0").line == 3
+        assert WorldPrograms(one).text("drum", "program").running is True
 
 
 def test_a_session_has_what_was_downloaded() -> None:
@@ -151,7 +151,7 @@ def test_a_program_is_typed_to_a_chip_and_runs_then() -> None:
     there.run(for_="500 ms")
     assert there.read("drum.position") == 640.0
     text = WorldPrograms(there).text("drum", "program")
-    assert (text["text"], text["running"], text["empty"]) == ("f640 ; a full turn\nr\nw1000\n", True, False)
+    assert (text.text, text.running, text.empty) == ("f640 ; a full turn\nr\nw1000\n", True, False)
     there.apply_input(Download("drum", "program", "[\nb640\nr\n]\n"))
     there.run(for_="1 s")
     assert there.read("drum.position") == 0.0
@@ -167,7 +167,7 @@ def test_a_chip_that_moves_on_and_on_is_stopped_with_its_ramp_first() -> None:
     there.run(for_="5 s")
     assert there.read("drum.moving") == 0.0
     assert 0 < there.read("drum.position") - before < 6400
-    assert WorldPrograms(there).text("drum", "program")["text"] == "w1\n"
+    assert WorldPrograms(there).text("drum", "program").text == "w1\n"
 
 
 def test_an_eeprom_takes_its_time_and_keeps_the_program() -> None:
@@ -241,10 +241,10 @@ def test_the_texts_of_all_controllers() -> None:
     """Banks 0 to 5 of the MIC488 with firmware 1.70 (MIC-28), the one program of each chip."""
     rows = WorldPrograms(configured()).list()
     places = [*(f"program {bank}" for bank in range(6)), *(f"positions {bank}" for bank in range(6))]
-    assert [(row["controller"], row["place"]) for row in rows] == [
+    assert [(row.controller, row.place) for row in rows] == [
         *(("table", place) for place in places), ("drum", "program"), ("feeder", "program"), ("alone", "program"),
     ]  # fmt: skip
-    assert [(row["place"], row["name"]) for row in rows if not row["empty"]] == [("program 0", "a.prg"), ("positions 0", "p.csv")]
+    assert [(row.place, row.name) for row in rows if not row.empty] == [("program 0", "a.prg"), ("positions 0", "p.csv")]
 
 
 def test_files_of_an_editor_server_are_a_description_of_their_own() -> None:
@@ -272,22 +272,22 @@ def test_files_of_an_editor_server_are_a_description_of_their_own() -> None:
 def test_what_a_text_takes_of_the_memory_of_its_place() -> None:
     description = '[[m1486]]\nname = "c"\nprogram = "p"\n'
     texts = WorldPrograms(World.from_toml(description, {"p": b"[\nf64\nr\n]\n"}))
-    (place,) = (str(one["place"]) for one in texts.list())
+    (place,) = (one.place for one in texts.list())
     (part,) = texts.memory("c", place, "[\nf64\nr\n]\n")
-    assert (part["what"], part["most"], part["unit"]) == ("command memory", 254, "bytes")
+    assert (part.what, part.most, part.unit) == ("command memory", 254, "bytes")
     (longer,) = texts.memory("c", place, "[\nf64\nr\nf64\nr\n]\n")
-    assert [one["used"] for one in (part, longer)] == [5, 10]
+    assert [one.used for one in (part, longer)] == [5, 10]
     (wrong,) = texts.memory("c", place, "[\n")
-    assert wrong["used"] == 0
+    assert wrong.used == 0
     assert texts.memory("c", place, "[\nhello\n]\n") == []  # no commands
     assert texts.memory("c", place, "x3\nf64\n") == []  # for another chip
     (own,) = texts.memory("c", place, "x3\nf64\nxf\nf64\nr\n")
-    assert own["used"] == 5
+    assert own.used == 5
 
 
 def test_what_positions_take_of_the_memory() -> None:
     texts = WorldPrograms(world())
-    used = [texts.memory("table", "positions 0", rows)[0]["used"] for rows in ("A;1;2;3;4\n", "A;1;2;3;4\nB;1;2;3;4\n")]
+    used = [texts.memory("table", "positions 0", rows)[0].used for rows in ("A;1;2;3;4\n", "A;1;2;3;4\nB;1;2;3;4\n")]
     assert used == [1, 2]
 
 
@@ -341,10 +341,10 @@ def test_a_text_runs_only_as_long_as_it_is_what_the_chip_has() -> None:
     there = World.from_toml(text, {"p": b"[\n@1\nw1000\nj1\n]\n"})
     there.run(for_="1 s")
     programs = WorldPrograms(there)
-    assert (programs.text("one", "program")["running"], programs.text("one", "program")["empty"]) == (True, False)
+    assert (programs.text("one", "program").running, programs.text("one", "program").empty) == (True, False)
     for number in (1, 2):
         there.apply_input(do.Send("l", f"x{number}\rk\r\\\r[\r@1\rw2000\rj1\r]\r".encode()))
         there.run(for_="1 s")
     assert there.m1486["two"].chip.memory.begin is not None
     found = [programs.text(name, "program") for name in ("one", "two")]
-    assert [(one["running"], one["empty"]) for one in found] == [(False, False), (False, True)]
+    assert [(one.running, one.empty) for one in found] == [(False, False), (False, True)]

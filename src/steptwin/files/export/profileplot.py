@@ -7,7 +7,7 @@ from typing import IO
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from steptwin.calc import Calculation, curve
+from steptwin.calc import Calculation
 from steptwin.files.export.plot import POSITION_COLOR, STYLE, VELOCITY_COLOR
 
 _SIZE_IN = (8.0, 4.5)
@@ -15,7 +15,7 @@ _SIZE_IN = (8.0, 4.5)
 
 def write_profile_plot(result: Calculation, file: IO[bytes], form: str) -> None:
     """``form`` is png or svg."""
-    points = curve(result)
+    points = result.curve
     moments = [point.time_s for point in points]
     with rc_context(STYLE):
         figure = Figure(figsize=_SIZE_IN, layout="constrained")

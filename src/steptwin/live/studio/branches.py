@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import pickle
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
@@ -21,6 +21,7 @@ from steptwin.live.world import LiveWorld
 from steptwin.messages import NONE, Message
 from steptwin.simulation.scheduler.trace import Mark
 from steptwin.simulation.world.snapshot import SimulationSnapshot
+from steptwin.studio.branchrequests import Branch
 
 MOST_BRANCHES = 4
 MODULE = "steptwin.live.studio.branch"
@@ -39,11 +40,7 @@ class BranchStart:
 
 class _OpenBranch(NamedTuple):
     process: Process
-    begin: Nanos
-    url: str
-
-    def to_json(self, number: int) -> Mapping[str, object]:
-        return {"branch": number, "from_ns": str(self.begin), "url": self.url}
+    shown: Branch
 
 
 BRANCH_FROM_ELSEWHERE = Message(
@@ -71,15 +68,15 @@ class WorldBranches:
         self._starting = 0
         self._numbers = count(1)
 
-    def to_json(self) -> Sequence[Mapping[str, object]]:
-        return [branch.to_json(number) for number, branch in self._running().items()]
+    def list(self) -> Sequence[Branch]:
+        return [branch.shown for branch in self._running().values()]
 
     def _running(self) -> dict[int, _OpenBranch]:
         """Without those that have ended by themselves."""
         self._open = {number: branch for number, branch in self._open.items() if branch.process.poll() is None}
         return self._open
 
-    async def start(self, moment: Nanos | None) -> Mapping[str, object]:
+    async def start(self, moment: Nanos | None) -> Branch:
         if self._own is None:
             raise Refusal(BRANCH_FROM_ELSEWHERE())
         if len(self._running()) + self._starting >= MOST_BRANCHES:
@@ -93,7 +90,7 @@ class WorldBranches:
         finally:
             self._starting -= 1
         self._open[number] = branch
-        return branch.to_json(number)
+        return branch.shown
 
     def _begin(self, own: StudioOptions, number: int, snapshot: SimulationSnapshot) -> _OpenBranch:
         """Blocks until its page is there. Its trace and its inputs begin anew: nothing of the past is recorded there."""
@@ -101,7 +98,7 @@ class WorldBranches:
         name = f"{spec.name}, branch {number} from {snapshot.now // MILLISECOND / 1000:.3f} s"
         begun = BranchStart(own, ready, name, spec.text.source.name, replace(snapshot, inputs=(), trace=Mark(())))
         process = self._processes.start(MODULE, given=pickle.dumps(begun))
-        return _OpenBranch(process, snapshot.now, self._processes.url(process, ready, BRANCH(number=number)))
+        return _OpenBranch(process, Branch(number, snapshot.now, self._processes.url(process, ready, BRANCH(number=number))))
 
     async def end(self, branch: int) -> None:
         found = self._running().pop(branch, None)

@@ -7,7 +7,7 @@ import json
 import tomllib
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -21,6 +21,7 @@ from steptwin.files.textfiles import read_text
 from steptwin.inputfiles import MOST_DESCRIPTION_BYTES, read_recorded
 from steptwin.live.studio.processes import ChildProcesses, Process, last_words
 from steptwin.messages import NONE, Message
+from steptwin.studio.campaignrequests import CampaignResult, CampaignState, FailureCause, PropertyResult
 
 TABLE = "campaign"
 MOST_FILES = 500
@@ -65,18 +66,11 @@ class FolderCampaigns:
 
     # ------------------------------------------------------------------ requests
 
-    async def to_json(self) -> Sequence[Mapping[str, object]]:
+    async def list(self) -> Sequence[CampaignState]:
         running = self._present()
-        found = await later(asyncio.to_thread(lambda: [(name, *_contents(one)) for name, one in self._known().items()]))
+        found = await later(asyncio.to_thread(lambda: [_state(name, one) for name, one in self._known().items()]))
         return [
-            {
-                "campaign": name,
-                "results": str(PurePosixPath(name).with_suffix(SUFFIX)),
-                **data,
-                "error": error or self._errors.get(name),
-                "is_running": name == running,
-            }
-            for name, data, error in found
+            replace(one, error=one.error or self._errors.get(one.campaign), is_running=one.campaign == running) for one in found
         ]
 
     async def run(self, campaign: str) -> None:
@@ -150,30 +144,29 @@ class FolderCampaigns:
         return str(path)
 
 
-def _contents(known: _CampaignFile) -> tuple[dict[str, object], str | None]:
-    """As `steptwin.studio.campaignrequests` has it, and what is wrong with it."""
+def _state(campaign: str, known: _CampaignFile) -> CampaignState:
+    """As its files show it."""
     total = known.table.get("runs")
     database = known.results / RESULTS
-    data: dict[str, object] = {
-        "name": str(known.table.get("name", known.file.stem)),
-        "done": 0,
-        "failed": 0,
-        "total": total if isinstance(total, int) else None,
-        "changed": None,
-        "result": None,
-    }
+    state = CampaignState(
+        campaign=campaign,
+        name=str(known.table.get("name", known.file.stem)),
+        results=str(PurePosixPath(campaign).with_suffix(SUFFIX)),
+        error=known.error,
+        total=total if isinstance(total, int) else None,
+    )
     if known.error is not None or not known.results.is_dir():
-        return data, known.error
-    data["result"] = _result(known.results / REPORT)
+        return state
+    state = replace(state, result=_result(known.results / REPORT))
     try:
         if database.is_file():
             from steptwin.campaign.store import counted
 
-            data["done"], data["failed"] = counted(database)
-            data["changed"] = _changed(database)
+            done, failed = counted(database)
+            return replace(state, done=done, failed=failed, changed=_changed(database))
     except (SteptwinError, ImportError) as error:
-        return data, str(error)
-    return data, None
+        return replace(state, error=str(error))
+    return state
 
 
 def _changed(database: Path) -> str:
@@ -182,25 +175,16 @@ def _changed(database: Path) -> str:
     return datetime.fromtimestamp(at, UTC).isoformat(timespec="seconds")
 
 
-def _result(report: Path) -> dict[str, object] | None:
+def _result(report: Path) -> CampaignResult | None:
     """Result of a campaign that has ended; None where it has not."""
     with suppress(SteptwinError, LookupError, TypeError, ValueError, AttributeError):
         data = json.loads(read_recorded(report))
-        return {
-            "runs": data["runs"],
-            "failed": data["failed"],
-            "pass_rate": data["pass_rate"],
-            "interval": data["interval"],
-            "properties": [
-                {"name": name, "failed": one["failed"], "robustness": one["robustness"]}
-                for name, one in data["properties"].items()
-            ],
-            "causes": [_cause(one) for one in data["causes"][:MOST_CAUSES]],
-        }
+        properties = [PropertyResult(name, one["failed"], one["robustness"]) for name, one in data["properties"].items()]
+        causes = tuple(map(_cause, data["causes"][:MOST_CAUSES]))
+        return CampaignResult(data["runs"], data["failed"], data["pass_rate"], tuple(data["interval"]), tuple(properties), causes)
     return None
 
 
-def _cause(one: Mapping[str, Any]) -> dict[str, object]:
+def _cause(one: Mapping[str, Any]) -> FailureCause:
     files = one["files"]
-    head = {"what": one["what"], "where": one["where"], "runs": one["count"]}
-    return {**head, "recording": files.get("session"), "timeline": files.get("timeline")}
+    return FailureCause(one["what"], one["where"], one["count"], files.get("session"), files.get("timeline"))

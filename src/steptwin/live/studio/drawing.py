@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from steptwin.errors import Misuse
@@ -11,6 +11,7 @@ from steptwin.files.textfiles import read_text, write_bytes
 from steptwin.messages import Message
 from steptwin.simulation.describe.arrangement import OTHERS, DrawnPosition, arranged
 from steptwin.simulation.describe.spec import WorldSpec
+from steptwin.studio.drawingrequests import Drawing, SavedDrawing
 
 NO_PLACE_OF = Message("live.no-place-of", "places: no axis or element is called {name!r}; there are {names}")
 
@@ -25,24 +26,23 @@ class WorldArrangement:
         self._file = file
         self._places: Sequence[DrawnPosition] = spec.drawing
 
-    def to_json(self) -> Mapping[str, object]:
-        places = {of: [x, y] for of, x, y in self._places}
-        return {"places": places, "file": None if self._file is None else str(self._file)}
+    def drawing(self) -> Drawing:
+        return Drawing(self._places, None if self._file is None else str(self._file))
 
-    def save(self, places: Sequence[DrawnPosition]) -> Mapping[str, object]:
+    def save(self, places: Sequence[DrawnPosition]) -> SavedDrawing:
         if strange := [place.of for place in places if place.of not in self._known]:
             raise Misuse(NO_PLACE_OF(name=strange[0], names=sorted(self._known)))
         name = f"{self._spec.name if self._file is None else self._file.stem}.toml"
         if self._file is None:
             text = arranged(self._spec.text.source.text, places)
             self._places = places
-            return {"file": None, "name": name, "text": text}
+            return SavedDrawing(None, name, text)
         now = read_text(self._file)  # it may have been changed since
         text = arranged(now.source.text, places)
         try:
             write_bytes(path_in_folder(self._file.parent, self._file.name), now.to_bytes(text))
         except Misuse:
-            return {"file": None, "name": name, "text": text}
+            return SavedDrawing(None, name, text)
         finally:
             self._places = places
-        return {"file": str(self._file), "name": name, "text": text}
+        return SavedDrawing(str(self._file), name, text)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import asyncio
 import subprocess
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from steptwin.live.studio.processes import ChildProcesses, Process, last_words
 from steptwin.live.world import MOST_INPUT_BYTES, MOST_INPUTS, LiveWorld
 from steptwin.messages import Message, text_of
 from steptwin.simulation.world import snapshotlog
+from steptwin.studio.recordingrequests import PastState, RecordingFile, RecordingsOfWorld, RecordingState, TraceState
 
 EXPORT_S = 300.0
 """Longest duration of an export."""
@@ -56,21 +57,16 @@ class WorldRecordings:
 
     # ------------------------------------------------------------------ requests
 
-    async def to_json(self) -> Mapping[str, object]:
+    async def list(self) -> RecordingsOfWorld:
         saved = await later(asyncio.to_thread(saved_recordings, self._folder))
-        return {
-            "recording": self._recorded(),
-            "past": self._past(),
-            "trace": self._trace(),
-            "folder": str(self._folder),
-            "saved": [_to_json(one) for one in saved],
-            "formats": [name for name, form in FORMATS.items() if not form.missing],
-        }
+        files = tuple([RecordingFile(*one) for one in saved])
+        formats = tuple([name for name, form in FORMATS.items() if not form.missing])
+        return RecordingsOfWorld(self._recorded(), self._past(), self._trace(), str(self._folder), files, formats)
 
-    async def save(self, name: str | None) -> Mapping[str, object]:
+    async def save(self, name: str | None) -> RecordingFile:
         path = path_in_folder(self._folder, path_of(self._folder, name or f"{self._stem}-{datetime.now(UTC):%Y%m%d-%H%M%S}").name)
         self._realtime.enter()
-        return _to_json(await later(asyncio.to_thread(_save, self._live.recording(), path)))
+        return RecordingFile(*await later(asyncio.to_thread(_save, self._live.recording(), path)))
 
     def place(self, file: str) -> str:
         path = path_in_folder(self._folder, file)
@@ -105,38 +101,23 @@ class WorldRecordings:
 
     # ------------------------------------------------------------------ what is recorded
 
-    def _recorded(self) -> Mapping[str, object] | None:
+    def _recorded(self) -> RecordingState | None:
         recorded = self._live.recorded
         if recorded is None:
             return None
-        return {
-            "until_ns": str(recorded.until),
-            "inputs": recorded.inputs,
-            "most_inputs": MOST_INPUTS,
-            "bytes": recorded.size,
-            "most_bytes": MOST_INPUT_BYTES,
-            "is_full": recorded.is_full,
-            "file": None if self._file is None else str(self._file),
-        }
+        file = None if self._file is None else str(self._file)
+        until, inputs, size, is_full = recorded
+        return RecordingState(until, inputs, MOST_INPUTS, size, MOST_INPUT_BYTES, is_full, file)
 
-    def _past(self) -> Mapping[str, object] | None:
+    def _past(self) -> PastState | None:
         past = self._live.snapshots
-        if past is None:
-            return None
-        limits = {"inputs": past.kept_inputs, "most_inputs": snapshotlog.MOST_INPUTS}
-        return {"from_ns": str(past.begin), "states": len(past), **limits}
+        return None if past is None else PastState(past.begin, len(past), past.kept_inputs, snapshotlog.MOST_INPUTS)
 
-    def _trace(self) -> Mapping[str, object]:
+    def _trace(self) -> TraceState:
         ring, file = self._live.ring, self._live.trace_file
-        kind = "ring" if ring is not None else "none" if file is None else "file"
-        begin = None if ring is None else ring.begin
-        return {
-            "kind": kind,
-            "file": None if file is None else str(file),
-            "records": None if ring is None else len(ring),
-            "most_records": None if ring is None else ring.size,
-            "from_ns": None if begin is None else str(begin),
-        }
+        if ring is not None:
+            return TraceState("ring", None if file is None else str(file), len(ring), ring.size, ring.begin)
+        return TraceState("none", None, None, None, None) if file is None else TraceState("file", str(file), None, None, None)
 
     async def close(self) -> None:
         await asyncio.to_thread(self._processes.close)
@@ -197,7 +178,3 @@ def _save(recording: recordings.Recording, path: Path) -> SavedRecording:
         raise Refusal(FILE_IS_THERE(path=path))
     recordings.save(recording, path)
     return read_saved(path)
-
-
-def _to_json(saved: SavedRecording) -> Mapping[str, object]:
-    return {"name": saved.name, "bytes": saved.size, "saved": saved.saved, "until_ns": str(saved.until)}

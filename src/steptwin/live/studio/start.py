@@ -7,6 +7,7 @@ import asyncio
 import socket
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -25,6 +26,7 @@ from steptwin.devices.device import DeviceSurroundings
 from steptwin.devices.worldmember import WorldMember
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
+from steptwin.explain.model import MemoryUse
 from steptwin.files.auditfile import AuditFile, wall_clock
 from steptwin.files.export.tracefile import read_kept
 from steptwin.files.loader import is_recording
@@ -57,8 +59,9 @@ from steptwin.simulation.describe.description import read_world
 from steptwin.simulation.describe.includes import given_files
 from steptwin.simulation.toml.addresses import Address, is_loopback, parse_address
 from steptwin.simulation.world.snapshotlog import SnapshotLog
-from steptwin.simulation.world.worldprograms import WorldPrograms, configuration_text
+from steptwin.simulation.world.worldprograms import ShownProgram, ShownProgramText, WorldPrograms, configuration_text
 from steptwin.studio.hub import Hub
+from steptwin.studio.requests import LineUse
 from steptwin.studio.service import StudioService
 from steptwin.studio.surroundings import PresentMoment, Surroundings
 from steptwin.studio.work import DeviceWork
@@ -235,7 +238,7 @@ class _Page:
             services=None if beside is None else LiveServices(running.gateways),
             campaigns=campaigns,
             arrangement=_arrangement(live, None if beside is None else beside.world),
-            traffic=live.traffic,
+            traffic=partial(_traffic, live),
         )
         await self._serve(server, subject, moment, around)
 
@@ -364,18 +367,23 @@ TEXTS_OF_A_DEVICE = Message("live.texts-of-a-device", "{controller} is a device:
 class _NoPrograms:
     """Programs of devices, whose texts are not known."""
 
-    def list(self) -> Sequence[Mapping[str, object]]:
+    def list(self) -> Sequence[ShownProgram]:
         return ()
 
     def files(self) -> Mapping[str, bytes]:
         return {}
 
-    def memory(self, controller: str, place: str, text: str) -> Sequence[Mapping[str, object]]:
+    def memory(self, controller: str, place: str, text: str) -> Sequence[MemoryUse]:
         self.text(controller, place)
         return ()
 
-    def text(self, controller: str, place: str) -> Mapping[str, object]:
+    def text(self, controller: str, place: str) -> ShownProgramText:
         raise Misuse(TEXTS_OF_A_DEVICE(controller=controller))
+
+
+def _traffic(live: LiveWorld) -> tuple[LineUse, ...]:
+    connected = Counter(port.line for port in live.ports)
+    return tuple([LineUse(name, connected[name], *line.traffic) for name, line in live.world.lines.items()])
 
 
 def _ports() -> Sequence[Mapping[str, object]]:

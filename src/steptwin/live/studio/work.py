@@ -11,7 +11,7 @@ from steptwin.live.ports import serial_ports, twin_ports
 from steptwin.live.scanning import found_at, kinds_named, numbers_of
 from steptwin.live.twins import find_device
 from steptwin.messages import Message
-from steptwin.studio.work import Work
+from steptwin.studio.workrequests import FoundOnLine, Work
 from steptwin.verify.run import verify
 
 NOTHING_TO_SEARCH = Message("live.nothing-to-search", "this computer has no serial port, and no twin is running")
@@ -31,7 +31,7 @@ class LineWork:
                 raise Misuse(NOTHING_TO_SEARCH())
             for place in wanted:
                 rows = found_at(place, kinds, numbers, bauds, timeout, progress=work.search, report=work.problems.append)
-                work.found += [{"device": row.device, "what": row.found.what} for row in rows]
+                work.found += [FoundOnLine(row.device, row.found.what) for row in rows]
 
         return search
 

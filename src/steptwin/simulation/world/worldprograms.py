@@ -3,18 +3,47 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, TypeVar
 
-from steptwin.diagnostics import SourceText, diagnostics_to_json
+from steptwin.diagnostics import Finding, SourceText, findings
 from steptwin.errors import Misuse
+from steptwin.explain.model import MemoryUse
+from steptwin.jsonvalues import JsonForm
 from steptwin.messages import NONE, Message
 from steptwin.simulation.kinds.kind import ControllerSpec
 from steptwin.simulation.kinds.programtexts import ProgramText, TextLanguage
+from steptwin.simulation.kinds.registry import KINDS
 from steptwin.simulation.world.model import Model
 
-FINDING = ("line", "column", "end_line", "end_column", "severity", "code", "message", "hint")
-"""Fields of a diagnostic as plain values (`steptwin.diagnostics.diagnostics_to_json`)."""
+P = TypeVar("P")
+_LANGUAGES = JsonForm({"enum": [language.name for kind in KINDS.values() for language in kind.languages]})
+
+
+@dataclass(frozen=True, slots=True)
+class ShownProgram:
+    """A place in the program memory of a controller."""
+
+    controller: str
+    place: Annotated[str, "Unlike all others of the controller, such as program 0."]
+    name: Annotated[str, "Of the file."]
+    language: Annotated[str, _LANGUAGES]
+    suffix: Annotated[str, "Of files in this language."]
+    has_statements: Annotated[bool, "Whether it is a program, in whose statements a debugger stops."]
+    is_typed: Annotated[bool, "Whether a text is typed over the line of the controller, as at a terminal."]
+    address: Annotated[str, "At the editor server."]
+    empty: Annotated[bool, "Whether nothing is there yet."]
+    running: bool
+    line: Annotated[int | None, "Of the present statement, from 1, while it runs or is paused; null where that is not known."]
+
+
+@dataclass(frozen=True, slots=True)
+class ShownProgramText(ShownProgram):
+    """A place with the text there, and what the checker of its language finds in it."""
+
+    text: str
+    diagnostics: tuple[Finding, ...]
 
 
 def address_of(controller: str, place: str, language: TextLanguage) -> str:
@@ -61,24 +90,24 @@ def configuration_text(model: Model, controller: str) -> SourceText | None:
 
 
 class WorldPrograms:
-    """Programs of a world, as plain values."""
+    """Programs of a world."""
 
     def __init__(self, model: Model) -> None:
         self._model = model
 
-    def list(self) -> Sequence[Mapping[str, object]]:
-        """The texts of all controllers."""
-        return [_to_json(name, text) for name in self._model.controllers for text in program_texts(self._model, name)]
+    def list(self) -> Sequence[ShownProgram]:
+        """The places of all controllers."""
+        names = self._model.controllers
+        return [_shown(ShownProgram, name, text) for name in names for text in program_texts(self._model, name)]
 
-    def text(self, controller: str, place: str) -> Mapping[str, object]:
-        """One of them, with what its checker finds. Raises `Misuse`."""
+    def text(self, controller: str, place: str) -> ShownProgramText:
+        """One of them. Raises `Misuse`."""
         text = text_at(self._model, controller, place)
-        findings = [{key: row[key] for key in FINDING} for row in diagnostics_to_json(text.source, text.check())]
-        return {**_to_json(controller, text), "text": text.source.text, "diagnostics": findings}
+        return _shown(ShownProgramText, controller, text, text.source.text, findings(text.source, text.check()))
 
-    def memory(self, controller: str, place: str, text: str) -> Sequence[Mapping[str, object]]:
+    def memory(self, controller: str, place: str, text: str) -> Sequence[MemoryUse]:
         """Use of the memory at a place by a text; empty for one with errors. Raises `Misuse`."""
-        return [part._asdict() for part in text_at(self._model, controller, place).memory(text)]
+        return text_at(self._model, controller, place).memory(text)
 
     def files(self) -> Mapping[str, bytes]:
         """Files that an editor server needs, by address: texts, configurations, and a description of their controllers."""
@@ -123,17 +152,7 @@ def _name(controller: str, text: ProgramText) -> str:
     return address_of(controller, text.place, text.language).removeprefix("steptwin:///")
 
 
-def _to_json(controller: str, text: ProgramText) -> Mapping[str, object]:
-    return {
-        "controller": controller,
-        "place": text.place,
-        "name": text.source.name,
-        "language": text.language.name,
-        "suffix": text.language.suffix,
-        "has_statements": text.language.has_statements,
-        "is_typed": text.language.is_typed,
-        "address": address_of(controller, text.place, text.language),
-        "empty": text.is_empty,
-        "running": text.is_running,
-        "line": text.line,
-    }
+def _shown(kind: Callable[..., P], controller: str, text: ProgramText, *rest: object) -> P:
+    of = text.language
+    language = of.name, of.suffix, of.has_statements, of.is_typed, address_of(controller, text.place, of)
+    return kind(controller, text.place, text.source.name, *language, text.is_empty, text.is_running, text.line, *rest)
