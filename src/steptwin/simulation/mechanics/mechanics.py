@@ -325,9 +325,16 @@ class Mechanism(Stateful):
             coasting, state = self._hold.motion(
                 drive, before, state, now, is_new=is_new, burden=self._carried, stands=self._blocked or rests
             )
-        vibration = before.vibration(now)
         self._trajectory = Trajectory(
-            self._loaded(), plan, now, state, blocked=self._blocked, jump=jump, coasting=coasting, vibration=vibration
+            self._loaded(),
+            plan,
+            now,
+            state,
+            blocked=self._blocked,
+            jump=jump,
+            coasting=coasting,
+            vibration=before.vibration(now),
+            needed=before.needs(now),
         )
         self._changes += 1
         if self._encoders:

@@ -139,9 +139,8 @@ class StepperMotor:
         begins = [begin_s, *self._corners(s, begin_s, end_s, *band)] if end_s < inf else [begin_s]
         for t0, t1 in zip(begins, [*begins[1:], end_s], strict=True):
             middle = 0.5 * (t0 + t1) if t1 < inf else t0
-            u, speed = middle - s.anchor_s, abs(s.velocity(middle))
-            need = self.needs(sign * (2.0 * s.c2 + 6.0 * s.c3 * u), sign * s.direction)
-            yield MotionPhase(t0, t1, speed, self._use(speed, need))
+            speed = abs(s.velocity(middle))
+            yield MotionPhase(t0, t1, speed, self._use(speed, self.need_at(s, middle, sign)))
 
     def _use(self, speed: float, need: float) -> float:
         """The share of its torque that is needed, at most 1."""
@@ -152,13 +151,19 @@ class StepperMotor:
         """Torque required for an acceleration (pulses/s²) while moving in ``direction``."""
         return self.inertia * acceleration + self.friction * direction + self.load
 
+    def need_at(self, s: Any, t_s: float, sign: int) -> float:
+        """Torque required at a moment of a segment."""
+        if isinstance(s, Segment):
+            acceleration = 2.0 * s.c2 + 6.0 * s.c3 * (t_s - s.anchor_s)
+        else:
+            acceleration = (s.velocity(t_s + _NEAR_S) - s.velocity(t_s - _NEAR_S)) / (2.0 * _NEAR_S)
+        return self.needs(sign * acceleration, sign * s.direction)
+
     def lack(self, s: Any, t_s: float, sign: int) -> str:
         """In words, what the motion needs at a moment of a segment and the motor does not have; empty if it has it."""
         if not isinstance(s, Segment):
             return ""
-        speed = abs(s.velocity(t_s))
-        acceleration = 2.0 * s.c2 + 6.0 * s.c3 * (t_s - s.anchor_s)
-        need, has = abs(self.needs(sign * acceleration, sign * s.direction)), max(self.torque(speed), 0.0)
+        need, has = abs(self.need_at(s, t_s, sign)), max(self.torque(abs(s.velocity(t_s))), 0.0)
         if need < has * (1.0 - _SAME):
             return ""
         if need <= has * (1.0 + _SAME):
@@ -219,8 +224,7 @@ class StepperMotor:
         looks = 0 if end_s == inf else int((end_s - begin_s) / LOOK_S)
         for n in range(looks + 1):
             t = begin_s + n * LOOK_S
-            acceleration = (s.velocity(t + _NEAR_S) - s.velocity(t - _NEAR_S)) / (2.0 * _NEAR_S)
-            yield t, abs(s.velocity(t)), self.needs(sign * acceleration, sign * s.direction)
+            yield t, abs(s.velocity(t)), self.need_at(s, t, sign)
 
     def catches(self, s: Any, begin_s: float, end_s: float, sign: int) -> float | None:
         """First moment from ``begin_s`` on and before ``end_s`` at which a stopped rotor synchronises with the field.

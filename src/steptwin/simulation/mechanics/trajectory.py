@@ -36,6 +36,7 @@ from steptwin.motion import Profile, Segment
 from steptwin.motion.divisions import Plan, profile_of
 from steptwin.points import turning_points_of
 from steptwin.simulation.mechanics.motor import StepperMotor
+from steptwin.simulation.mechanics.pullout import Pullout
 from steptwin.simulation.mechanics.resonance import ResonanceInterval, resonance_intervals
 
 UNFOLLOWED = Message("simulation.no-longer-follows", "it no longer follows its field")
@@ -112,6 +113,9 @@ class LoadSection(NamedTuple):
 
 STALLS_BY_RESONANCE = Message("simulation.stalls-by-resonance", "{axis} stalls by resonance")
 STALLS = Message("simulation.stalls", "{axis} stalls: {why}")
+NEEDS_AT_ONCE = Message(
+    "simulation.needs-at-once", "the motion needs {need:.3g} N·m at once, more than the rotor can follow of {has:.3g} N·m"
+)
 
 
 class Trajectory:
@@ -122,11 +126,15 @@ class Trajectory:
 
     __slots__ = (
         "_amplitude",
+        "_given",
         "_laid",
+        "_needed",
         "_now",
         "_resonance_intervals",
+        "_settles_s",
         "_shaken",
         "_state",
+        "_surprised",
         "begin",
         "blocked",
         "build",
@@ -145,8 +153,10 @@ class Trajectory:
         jump: float = 0.0,
         coasting: Profile | None = None,
         vibration: float = 0.0,
+        needed: float | None = None,
     ) -> None:
-        """``jump``: by how much (pulses/s) the speed of the field changes at once at ``begin``. ``vibration`` in full steps."""
+        """``jump``: by how much (pulses/s) the speed of the field changes at once at ``begin``. ``vibration`` in full steps.
+        ``needed``: the torque that the motion needed until then, N·m; None: as at rest."""
         self.build = build
         self.plan = plan
         self.begin = begin
@@ -154,6 +164,11 @@ class Trajectory:
         self.coasting = coasting
         self._laid: list[TrajectorySection] = []
         motor = build.motor
+        self._given = self._needed = needed if needed is not None or motor is None else motor.load
+        self._settles_s = -inf
+        """Until then the rotor is known to keep the field, s of the profile."""
+        self._surprised: dict[Nanos, MessageText] = {}
+        """Why it loses the field where the torque would suffice if it did not rise at once."""
         self._resonance_intervals: list[ResonanceInterval] = []
         self._amplitude = vibration if motor is None or motor.resonance is None else max(vibration, motor.resonance.least)
         self._shaken: list[Nanos] = []
@@ -280,7 +295,19 @@ class Trajectory:
         if motor is None or part >= len(profile.segments):
             return STALLS(axis=axis, why=UNFOLLOWED())
         lack = motor.lack(profile.segments[part], (now - profile.start) / SECOND, self.build.sign)
-        return STALLS(axis=axis, why=lack or UNFOLLOWED())
+        return STALLS(axis=axis, why=lack or self._surprised.get(now) or UNFOLLOWED())
+
+    def needs(self, now: Nanos) -> float | None:
+        """The torque that the motion needs just before ``now``, N·m; None where no field leads the rotor."""
+        motor, profile = self.build.motor, profile_of(self.plan)
+        if motor is None or self.coasting is not None or self._section(now).stalled:
+            return None
+        if now <= self.begin:
+            return self._given
+        part = bisect_left(profile.ends, now - profile.start)
+        if now <= profile.start or part >= len(profile.segments):
+            return motor.load
+        return motor.need_at(profile.segments[part], (now - profile.start) / SECOND, self.build.sign)
 
     def load_sections(self) -> tuple[LoadSection, ...]:
         """Where the load is, with as few entries as possible; for a drive at rest the distance of the load from it."""
@@ -320,10 +347,10 @@ class Trajectory:
             self._lay_at_distance(profile)
             return
         at = profile.start
-        for s, end in zip(profile.segments, profile.ends, strict=True):
+        for part, end in enumerate(profile.ends):
             until = None if end == inf else profile.start + int(end)
             if until is None or until > begin:
-                self._segment(s, max(at, begin), until)
+                self._segment(part, max(at, begin), until)
             at = at if until is None else until
         if profile.end is not None:
             rest = max(profile.end, begin)
@@ -372,10 +399,11 @@ class Trajectory:
                 TrajectorySection(max(coasting.end, self.begin), 1, False, rest, False, rest + away, stalled, behind)
             )
 
-    def _segment(self, s: Segment, begin: Nanos, end: Nanos | None) -> None:
-        """Lay the sections while the field goes one way."""
+    def _segment(self, part: int, begin: Nanos, end: Nanos | None) -> None:
+        """Lay the sections while the field goes one way, in one segment of its profile."""
+        start, s = profile_of(self.plan).start, profile_of(self.plan).segments[part]
         direction = s.direction * self.build.sign
-        motor, start = self.build.motor, profile_of(self.plan).start
+        motor = self.build.motor
         if self.blocked:
             self._stand(begin, direction)
             return
@@ -383,25 +411,26 @@ class Trajectory:
             self._follow(begin, end, direction)
             return
         end_s = inf if end is None else (end - start) / SECOND
-        now, caught = begin, None
+        now, caught, lost = begin, None, None
         is_steady = isinstance(s, Segment) and s.c2 == s.c3 == 0.0
         while True:
             before, now_s = now, (now - start) / SECOND
             if self._now.stalled:
                 found = motor.catches(s, now_s, end_s, self.build.sign)
-                if found is None:
+                if found is None or max(now, start + ceil(found * SECOND)) == lost:
                     self._stand(now, direction)
                     return
                 now = caught = max(now, start + ceil(found * SECOND))
                 if now > before:
                     self._stand(before, direction)
                 self._catch(now)
+                self._needed = None
             else:
-                found = self._loses(motor, s, now_s, end_s)
+                found = self._loses(motor, part, now_s, end_s)
                 if found is None:
                     self._follow(now, end, direction)
                     return
-                now = max(now, start + ceil(found * SECOND))
+                now = lost = max(now, start + ceil(found * SECOND))
                 if now != caught:
                     self._follow(before, now, direction)
                 self._now = self._now._replace(stalled=True)
@@ -410,9 +439,10 @@ class Trajectory:
                     self._stand(now, direction)
                     return
 
-    def _loses(self, motor: StepperMotor, s: Segment, now_s: float, end_s: float) -> float | None:
+    def _loses(self, motor: StepperMotor, part: int, now_s: float, end_s: float) -> float | None:
         """When the rotor loses the field in a segment, because it is too weak or vibrates too much."""
-        weak = motor.loses(s, now_s, end_s, self.build.sign)
+        s = profile_of(self.plan).segments[part]
+        weak = self._is_too_weak(motor, part, now_s, end_s)
         resonance = motor.resonance
         if resonance is None:
             return weak
@@ -430,6 +460,34 @@ class Trajectory:
         elif self._resonance_intervals:
             self._amplitude = self._resonance_intervals[-1].at(end_s, least) if end_s < inf else least
         return weak
+
+    def _is_too_weak(self, motor: StepperMotor, part: int, now_s: float, end_s: float) -> float | None:
+        """When the rotor loses the field in a segment because its torque does not suffice, or changes too much at once."""
+        profile = profile_of(self.plan)
+        s = profile.segments[part]
+        if motor.inertia == 0.0 or not isinstance(s, Segment):
+            return motor.loses(s, now_s, end_s, self.build.sign)
+        if now_s >= s.end_s:
+            return None  # it has no nanosecond of its own
+        pullout = Pullout(motor, self.build.period_p, self.build.sign, profile)
+        before, self._needed = self._needed, pullout.need(s, now_s if end_s == inf else min(end_s, s.end_s))
+        if before is not None and now_s >= self._settles_s:
+            settled = pullout.after_step(part, now_s, before)
+            if settled is None:
+                moment = max(self.begin, profile.start + ceil(now_s * SECOND))
+                self._surprised[moment] = NEEDS_AT_ONCE(need=abs(pullout.need(s, now_s)), has=pullout.torque(s, now_s))
+                return now_s
+            self._settles_s = settled
+        while max(now_s, self._settles_s) < min(s.end_s, end_s):
+            lost = motor.loses(s, max(now_s, self._settles_s), end_s, self.build.sign)
+            if lost is None:
+                return None
+            settled = pullout.after_lack(part, lost)
+            if settled is None or settled <= lost:
+                return lost
+            self._settles_s = settled
+        self._needed = None
+        return None
 
     def _follow(self, begin: Nanos, end: Nanos | None, direction: int) -> None:
         """The rotor goes with the field until a stop holds it, the load when its play is used up."""
