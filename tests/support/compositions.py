@@ -111,6 +111,12 @@ PARTS = (
     ),
     "[[gantry]]\nname = 'g'\naxis = 'x'\nother = 'y'\nlimit = 3\nmass = 4\nfriction_force = 20\n",
     "[[collision]]\nname = 'k'\nwhen = 'abs(x.position - y.position) > 6'\neffect = 'jam'\nreset = 'c.OUT1'\n",
+    (
+        "[[cylinder]]\nname = 'rod'\nextend = 'c.OUT1'\nstroke = 50\non = 'x'\nalong = '-z'\n"
+        "[[body]]\nname = 'hb'\non = 'rod'\ndiameter = 20\nheight = 30\n"
+        "[[body]]\nname = 'hw'\non = 'y'\nat = [30, 3, -25]\nsize = [20, 10, 20]\n"
+        "[[collision]]\nname = 'hc'\nbetween = ['hb', 'hw']\neffect = 'jam'\nreset = 'c.OUT2'\n"
+    ),
     "[[transducer]]\nname = 'v'\nof = 'x.position'\nto = 'c.AIN1'\npoints = [[0, 0], [80, 8]]\nresolution = 0.1\n",
     (
         "[[supply]]\nname = 'p'\nfeeds = 'c'\nrise = '20 ms'\n"

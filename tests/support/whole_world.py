@@ -77,6 +77,19 @@ points = [[-50, 1.0], [302, 9.0]]
 [[collision]]
 name = "bump"
 when = "x.position > 10 and clamp.position > 1"
+[[body]]
+name = "nose"
+on = "x"
+at = [0, 0, -10]
+size = [20, 20, 10]
+[[body]]
+name = "wall"
+when = "table.OUT1"
+at = [40, 0, -20]
+size = [10, 10, 30]
+[[collision]]
+name = "nudge"
+between = ["nose", "wall"]
 [[axis]]
 name = "left"
 drive = "table.M3"

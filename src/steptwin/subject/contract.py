@@ -18,6 +18,7 @@ from steptwin.messages import read_message_text, with_messages
 from steptwin.subject.commands import VERSION, Command
 from steptwin.subject.controls import ControlDescription
 from steptwin.subject.events import Event
+from steptwin.subject.scene import NO_SCENE, SceneDescription
 from steptwin.subject.subscriptions import Filter, Subscription
 
 GOOD, UNKNOWN = "good", "unknown"
@@ -187,6 +188,7 @@ class Description:
     lines: tuple[LineDescription, ...] = ()
     commands: tuple[str, ...] = ()
     """Names of the supported commands."""
+    scene: SceneDescription = NO_SCENE
     version: int = VERSION
 
     def to_json(self) -> dict[str, object]:

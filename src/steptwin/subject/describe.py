@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from steptwin.simulation.components.axis import AXIS, MECHANICS
+from steptwin.simulation.components.body import BODY
 from steptwin.simulation.components.button import BUTTON
+from steptwin.simulation.components.frames import Mounted
+from steptwin.simulation.components.mount import MoverSpec
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.mechanics.drawing import Drawing, SensorZone
+from steptwin.simulation.space.frames import NM_PER_MM
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.wiring import connections, terminal_name
 from steptwin.subject.commands import COMMANDS
@@ -24,6 +28,7 @@ from steptwin.subject.contract import (
     SwitchDescription,
 )
 from steptwin.subject.controls import controls_of
+from steptwin.subject.scene import BodyDescription, FrameDescription, JointDescription, SceneDescription
 
 
 def describe(world: Simulation) -> Description:
@@ -38,6 +43,7 @@ def describe(world: Simulation) -> Description:
         tuple(_connections(world)),
         tuple(LineDescription(line.name, line.kind, world.lines[line.name].baud) for line in world.spec.lines),
         tuple(COMMANDS),
+        _scene(world),
     )
 
 
@@ -77,6 +83,25 @@ def _element(world: Simulation, kind: str, name: str) -> ElementDescription:
     function_of = ELEMENTS[kind].function
     function = None if function_of is None else function_of(world.objects.elements[kind][name])
     return ElementDescription(name, kind, inputs, outputs, parts, drawing, function)
+
+
+def _scene(world: Simulation) -> SceneDescription:
+    frames = world.objects.frames
+    return SceneDescription(
+        tuple(_frame(name, one) for name, one in frames.items()),
+        tuple(
+            BodyDescription(one.name, one.size, one.diameter, one.height, one.color, one.when)
+            for one in world.spec.elements.of(BODY)
+        ),
+    )
+
+
+def _frame(name: str, mounted: Mounted) -> FrameDescription:
+    spec, place = mounted.spec, mounted.place
+    joints = tuple(JointDescription(f"{name}.{one.signal}", str(one.along), one.turns, one.per_unit) for one in mounted.movements)
+    x, y, z = (one / NM_PER_MM for one in place.origin)
+    along = str(spec.towards()) if isinstance(spec, MoverSpec) and not joints else None
+    return FrameDescription(name, str(spec.path[0]), place.on, (x, y, z), along, joints)
 
 
 def _connections(world: Simulation) -> Iterator[ConnectionDescription]:

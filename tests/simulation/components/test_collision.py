@@ -204,3 +204,150 @@ def test_a_controller_with_the_name_of_a_signal_is_no_quantity() -> None:
     text = TEXT.replace("left.position + 42.5", "idle + 42.5")
     with pytest.raises(WorldError, match="when: 'idle' is not a quantity of a controller or an element"):
         World.from_toml(f'[[mic488]]\nname = "idle"\n{text}')
+
+
+# ---------------------------------------------------------------------- bodies in space
+
+
+BODIES = """
+[[mic488]]
+name = "a"
+[mic488.M1]
+unit = "mm"
+gear = 640.0
+acc = 100.0
+dec = 100.0
+vel = 50.0
+mot_resol = 3200
+[[axis]]
+name = "x"
+drive = "a.M1"
+pitch = 5.0
+at = [0, 0, 500]
+[[cylinder]]
+name = "z"
+extend = "a.OUT1"
+stroke = 100.0
+extend_time = "250 ms"
+on = "x"
+along = "-z"
+[[body]]
+name = "head"
+on = "z"
+at = [0, 0, -30]
+size = [40, 40, 30]
+[[body]]
+name = "post"
+at = [200, 0, 300]
+size = [20, 20, 140]
+[[body]]
+name = "bench"
+at = [0, 0, 350]
+size = [1000, 300, 20]
+"""
+JAMS = """
+[[collision]]
+name = "crash"
+between = ["x", "post"]
+effect = "jam"
+reset = "a.OUT2"
+"""
+
+
+def lowered(text: str, target: float = 400.0, after: float = 0.0) -> World:
+    """It moves to the target, and lowers its head then."""
+    world = World.from_toml(text)
+    view = world.mic488["a"]
+    view.write("M1_EN", 1)
+    view.write("M1_POS_ABS", target)
+    world.run(until=after)
+    view.write("OUT1", 1)
+    return world
+
+
+def test_bodies_touch_at_the_exact_moment() -> None:
+    """The head, 40 mm long, comes to the post, 20 mm long, at 170 mm; they touch where they overlap by half a nanometre."""
+    world = lowered(BODIES + JAMS)
+    world.run(until=20.0)
+    (touch,) = [record for record in world.trace.of("event") if record.subject == "collision"]
+    assert touch.value == "crash: head and post touch"
+    # 12.5 mm in 0.5 s, then 50 mm/s.
+    assert touch.time == pytest.approx((0.5 + (170.0 - 12.5) / 50.0) * SECOND + 0.5e-6 / 50.0 * SECOND, abs=2)
+    assert world.axis["x"].position == 170.0
+    assert world.axis["x"].lost == (230 * 640)
+    assert world.read("crash.hit") == 1
+
+
+def test_what_is_above_a_body_goes_past_it() -> None:
+    world = lowered(BODIES + JAMS, after=10.0)
+    world.run(until=12.0)
+    assert not hits(world)
+    assert world.axis["x"].position == 400.0
+
+
+def test_a_cylinder_stands_on_what_it_meets_and_goes_on_when_it_is_reset() -> None:
+    """Its head comes to the bench, 370 mm high, after 100 mm; it is 500 mm up and 30 mm high: 0.25 s · 100/100."""
+    text = BODIES.replace("at = [0, 0, 350]", "at = [0, 0, 370]") + JAMS.replace('["x", "post"]', '["head", "bench"]')
+    world = lowered(text, target=20.0, after=3.0)
+    world.run(until=5.0)
+    ((moment, what),) = hits(world)
+    assert (what, moment) == ("crash: head and bench touch", pytest.approx(3.0 + 0.25 * 80 / 100, abs=1e-8))
+    assert world.read("z.position") == pytest.approx(80.0, abs=1e-5)
+    assert world.read("z.extended") == world.read("z.retracted") == 0
+    world.mic488["a"].write("OUT1", 0)
+    world.run(until=6.0)
+    assert world.read("z.position") == pytest.approx(80.0, abs=1e-5)  # it jams until it is reset
+    world.mic488["a"].write("OUT2", 1)
+    world.run(until=7.0)
+    assert world.read("z.retracted") == 1
+    assert [text for _, text in hits(world)][1:] == ["crash: apart again"]
+
+
+def test_all_bodies_but_some_are_compared() -> None:
+    every = '[[collision]]\nname = "crash"\nall = true\n'
+    world = lowered(BODIES.replace("at = [0, 0, 350]", "at = [0, 0, 351]") + every)
+    world.run(until=10.0)
+    assert [text for _, text in hits(world)] == ["crash: head and bench touch", "crash: head and post touch"]
+    assert world.read("crash.count") == 2
+    world = lowered(BODIES.replace("at = [0, 0, 350]", "at = [0, 0, 351]") + every + 'except = [["x", "bench"]]\n')
+    world.run(until=10.0)
+    assert [text for _, text in hits(world)] == ["crash: head and post touch", "crash: apart again"]
+
+
+def test_a_body_is_only_there_while_its_condition_holds() -> None:
+    """A post that is put there while the head is within it, and taken away before the head is out."""
+    text = BODIES.replace('name = "post"', 'name = "post"\nwhen = "time > 4 and time < 4.5"') + JAMS.replace("jam", "report")
+    world = lowered(text)
+    world.run(until=10.0)
+    assert hits(world) == [(4.000000001, "crash: head and post touch"), (4.5, "crash: apart again")]
+
+
+@pytest.mark.parametrize(
+    ("more", "problem"),
+    [
+        ('[[collision]]\nname = "c"', "a collision needs one of when, between and all"),
+        ('[[collision]]\nname = "c"\nbetween = ["x", "post"]\nall = true', "between and all exclude each other"),
+        ('[[collision]]\nname = "c"\nbetween = ["x"]', "expected a list of at least two names"),
+        ('[[collision]]\nname = "c"\nbetween = ["x", "pots"]', "nothing is called 'pots' (did you mean 'post'?)"),
+        (
+            '[[body]]\nname = "hat"\non = "z"\nsize = [1, 1, 1]\n[[collision]]\nname = "c"\nbetween = ["head", "hat"]',
+            "nothing moves these bodies against each other",
+        ),
+        (
+            '[[collision]]\nname = "c"\nbetween = ["y", "post"]\n[[axis]]\nname = "y"\ndrive = "a.M2"\npitch = 5.0\nalong = "+y"',
+            "'y' is no [[body]], and carries none",
+        ),
+        (
+            '[[body]]\nname = "wall"\nat = [0, 0, 480]\nsize = [10, 10, 10]\n[[collision]]\nname = "c"\nall = true',
+            "'head' and 'wall' overlap when the world begins",
+        ),
+    ],
+)
+def test_what_cannot_be_compared_is_refused(more: str, problem: str) -> None:
+    with pytest.raises(WorldError) as error:
+        World.from_toml(BODIES + more)
+    assert problem in str(error.value)
+
+
+def test_contacts_of_bodies_can_be_restored(tmp_path: Path) -> None:
+    check_it_can_be_restored(lowered(BODIES + JAMS), World.from_toml(BODIES + JAMS), 3.0, 8.0, tmp_path)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial
@@ -15,14 +15,17 @@ from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.components.encoder import EncoderSpec
 from steptwin.simulation.components.motor import MotorSpec, motor_of
+from steptwin.simulation.components.mount import UPRIGHT, Movement, MoverSpec
 from steptwin.simulation.components.switch import SwitchSpec, channel_of, put_switch, zone_of
 from steptwin.simulation.kinds.kind import EncoderInputs
 from steptwin.simulation.logic.contacts import Switch, Zone
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.mechanics import EncoderBuild, Mechanism, RotorMark
-from steptwin.simulation.mechanics.scale import GivenScale, Scale, exact_fraction, scale_of
+from steptwin.simulation.mechanics.scale import LENGTHS, TURNS, GivenScale, Scale, exact_fraction, scale_of
 from steptwin.simulation.mechanics.trajectory import Build, Trajectory
 from steptwin.simulation.scheduler.scheduler import Scheduler, Source
+from steptwin.simulation.space.frames import NM_PER_MM
+from steptwin.simulation.space.pieces import Motion, gear_of, geared, pieces_of_trajectory
 from steptwin.simulation.toml.names import Unknown, WrongTerminal
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table, table_in, tables_in
@@ -46,7 +49,7 @@ MECHANICS = ("position", "lost", "stalled")
 
 
 @table("[[axis]]")
-class AxisSpec(NamedSpec):
+class AxisSpec(NamedSpec, MoverSpec):
     name: str = key(name_value, "how scripts and conditions name it")
     drive: Terminal = key(pin_name, "what drives it: an axis of a controller, such as table.M1")
     kind: str = key(word("linear", "rotary"), "what moves", default="linear")
@@ -74,6 +77,9 @@ class AxisSpec(NamedSpec):
         OUTPUT_PIN, "output that gives its motor power, such as a contact; its controller counts on without", default=None
     )
     backlash: float = key(number(0.0), "play between motor and load, in its unit", default=0.0)
+    mm_per_unit: float | None = key(
+        number(0.0, above=True), "mm that it moves what is on it per unit, where its unit is no length", default=None, order=2
+    )
     switches: tuple[SwitchSpec, ...] = tables_in("switch", SwitchSpec)
     encoder: EncoderSpec | None = table_in("encoder", EncoderSpec)
     motor: MotorSpec | None = table_in("motor", MotorSpec)
@@ -272,10 +278,58 @@ def _signals(fitted: BuiltAxis) -> Mapping[str, SignalOf]:
     return dict(zip(MECHANICS, (position, lost, stalled), strict=True))
 
 
+def mm_per_unit(axis: BuiltAxis) -> Fraction:
+    """mm in a unit of an axis. Raises `Misuse` where that is not known."""
+    given, metres = axis.spec.mm_per_unit, LENGTHS.get(axis.scale.unit)
+    if given is not None and metres is None:
+        return exact_fraction(given)
+    if given is not None:
+        raise Misuse(f"mm_per_unit = {given:g}: {axis.spec.name!r} is in {axis.scale.unit}, which is a length already")
+    if metres is None:
+        raise Misuse(f"{axis.spec.name!r} counts in {axis.scale.unit}: what is on it needs its mm_per_unit")
+    return metres * 1000
+
+
+def nm_per_pulse(axis: BuiltAxis) -> Fraction:
+    """nm of a linear axis in a pulse of its drive."""
+    return mm_per_unit(axis) * NM_PER_MM / axis.scale.pulses_per_unit
+
+
+def degrees_per_unit(axis: BuiltAxis) -> Fraction:
+    """Degrees in a unit of a rotary axis. Raises `Misuse` where its unit is no angle."""
+    revs = TURNS.get(axis.scale.unit)
+    if revs is None:
+        raise Misuse(f"{axis.spec.name!r} counts in {axis.scale.unit}: what is on it turns by {' or '.join(TURNS)}")
+    return revs * 360
+
+
+def load_motion(axis: BuiltAxis, per_pulse: Fraction) -> Motion:
+    """The motion of the load of an axis, ``per_pulse`` of the result for a pulse."""
+    mechanism = axis.mechanism
+    gear = gear_of(per_pulse)
+    return Motion(mechanism.version, lambda now: geared(pieces_of_trajectory(mechanism.trajectory(now), now), gear))
+
+
+def moved_by(axis: BuiltAxis) -> tuple[str, str]:
+    """What changes the motion of an axis."""
+    return axis.mechanism.controller, axis.spec.name
+
+
+def _moves(spec: AxisSpec, axis: BuiltAxis) -> Sequence[Movement]:
+    blocks, sources = (axis.mechanism.block,), moved_by(axis)
+    if spec.kind == "rotary":
+        degrees = degrees_per_unit(axis)
+        motion = load_motion(axis, degrees / 90 / axis.scale.pulses_per_unit)
+        return (Movement("position", motion, spec.towards(UPRIGHT), float(degrees), blocks, sources, turns=True),)
+    motion = load_motion(axis, nm_per_pulse(axis))
+    return (Movement("position", motion, spec.towards(), float(mm_per_unit(axis)), blocks, sources),)
+
+
 AXIS: Element[AxisSpec, BuiltAxis] = Element(
     spec=AxisSpec,
     refers=_refers,
     build=_build,
     connect=_connect,
     signals=_signals,
+    moves=_moves,
 )

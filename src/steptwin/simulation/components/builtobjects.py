@@ -8,6 +8,7 @@ from typing import Any, cast
 
 from steptwin.motioncontroller import MotionController
 from steptwin.simulation.components.elementspec import B, ElementSpecs, ElementTable, NamedSpec, S
+from steptwin.simulation.components.frames import Frames
 from steptwin.simulation.faults import Faults
 from steptwin.simulation.kinds.kind import AnyKind, Terminals
 from steptwin.simulation.kinds.lines import Line
@@ -44,12 +45,17 @@ class BuiltObjects:
     """Place in the description of what drives an input."""
     circuits: dict[PinName, Circuit] = field(default_factory=dict)
     """The contacts of the inputs that have some."""
+    frames: Frames = field(init=False)
+    """Places in space."""
     elements: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Built elements with names: by the name of the kind, then by their own."""
     signals_of: dict[str, Callable[[], Mapping[str, SignalOf]]] = field(default_factory=dict)
     """Signals of built elements with names."""
     supplied: dict[str, str] = field(default_factory=dict)
     """The power supplies of controllers that have one."""
+
+    def __post_init__(self) -> None:
+        self.frames = Frames(self.described)
 
     def built(self, element: ElementTable[S, B]) -> Mapping[str, B]:
         """The built elements of a kind, by name."""

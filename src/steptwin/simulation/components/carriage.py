@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from math import floor
 from typing import ClassVar
@@ -11,10 +11,11 @@ from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.motion.elastic import Response, Spring
-from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis
+from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, mm_per_unit, moved_by, nm_per_pulse
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
+from steptwin.simulation.components.mount import Movement, MoverSpec
 from steptwin.simulation.components.switch import SwitchSpec, channel_of, put_switch, zone_of
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
@@ -23,13 +24,14 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.channels import SPRING_SHARE, MovedChannel
 from steptwin.simulation.mechanics.drawing import rail
 from steptwin.simulation.mechanics.loadmotion import load_intervals
+from steptwin.simulation.space.pieces import Motion, gear_of, geared, pieces_of_response
 from steptwin.simulation.toml.table import key, table, tables_in
 from steptwin.simulation.toml.values import NameOf, name_value, number
 from steptwin.state import Plain, Stateful
 
 
 @table("[[carriage]]")
-class CarriageSpec(NamedSpec):
+class CarriageSpec(NamedSpec, MoverSpec):
     """``frequency`` in Hz; ``damping`` is the damping ratio."""
 
     name: str = key(name_value, "how conditions and faults name it")
@@ -37,6 +39,10 @@ class CarriageSpec(NamedSpec):
     frequency: float = key(number(0.1, 10_000.0), "Hz at which it swings while the axis stands")
     damping: float = key(number(0.001, 0.99), "damping ratio: 1 would not swing", default=0.05)
     switches: tuple[SwitchSpec, ...] = tables_in("switch", SwitchSpec)
+
+    @property
+    def mounted_as(self) -> str:
+        return self.axis
 
 
 class Carriage(Stateful):
@@ -109,6 +115,12 @@ class Carriage(Stateful):
         return self.axis.spec.name, MovedChannel(
             spec.name, "position", scale.unit, per_pulse, spring=(spec.frequency, spec.damping)
         )
+
+    @property
+    def motion(self) -> Motion:
+        """In nm. Raises `Misuse` where the unit of its axis is none of a place."""
+        gear = gear_of(nm_per_pulse(self.axis))
+        return Motion(self.version, lambda now: geared(pieces_of_response(self._response, now), gear))
 
     # ------------------------------------------------------------------ signals
 
@@ -185,6 +197,15 @@ def _signals(carriage: Carriage) -> Mapping[str, SignalOf]:
     }
 
 
+def _moves(spec: CarriageSpec, carriage: Carriage) -> Sequence[Movement]:
+    axis = carriage.axis
+    if axis.spec.kind == "rotary":
+        raise Misuse(f"{spec.axis!r} is rotary: only carriages of linear axes have a place in space")
+    sources = (*moved_by(axis), spec.name)
+    towards = spec.towards(axis.spec.towards())
+    return (Movement("position", carriage.motion, towards, float(mm_per_unit(axis)), (axis.mechanism.block,), sources),)
+
+
 CARRIAGE: Element[CarriageSpec, Carriage] = Element(
     spec=CarriageSpec,
     refers=_refers,
@@ -192,6 +213,7 @@ CARRIAGE: Element[CarriageSpec, Carriage] = Element(
     signals=_signals,
     drawing=lambda carriage: rail(carriage.axis.spec.travel, tuple(one.zone for one in carriage.spec.switches)),
     moved=lambda carriage: (carriage.moved,),
+    moves=_moves,
     faults=(
         FaultKind(
             "slack-belt",

@@ -1,33 +1,69 @@
-"""``[[collision]]``: where parts of a machine touch, as a condition over its signals; what touches is reported, or jams."""
+"""``[[collision]]``: where parts of a machine touch: bodies in space, or a condition over signals. It is reported, or jams."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
+from itertools import combinations, product
+from typing import Any
 
+from steptwin.errors import Misuse
+from steptwin.messages import Message
 from steptwin.simulation.components.axis import AXIS
+from steptwin.simulation.components.body import BODY, body_of
+from steptwin.simulation.components.bodycontact import BodyContact
 from steptwin.simulation.components.carriage import CARRIAGE
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.components.follower import FOLLOWER
+from steptwin.simulation.components.frames import sources_of
 from steptwin.simulation.components.gantry import GANTRY
 from steptwin.simulation.components.logic import STUCK, Joint, TerminalComponentSpec, with_terminals
+from steptwin.simulation.components.mount import Movement
 from steptwin.simulation.components.quantity import TIME, check_condition, condition_of, owners_of
 from steptwin.simulation.components.shaft import SHAFT
 from steptwin.simulation.components.tool import TOOL
-from steptwin.simulation.components.touch import HIT, JAM, REPORT, RESET, Touch
+from steptwin.simulation.components.touch import HIT, JAM, REPORT, RESET, Contact, Touch
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.mechanics import Mechanism
+from steptwin.simulation.space.contacts import Pair
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
-from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, text_value, word
+from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, flag, name_value, permitting, text_value, word
+
+
+@permitting("list of at least two names")
+def _names(value: Any) -> tuple[str, ...]:
+    if not isinstance(value, list) or len(value) < 2:
+        raise Misuse(f"{value!r}: expected a list of at least two names")
+    return tuple(map(name_value, value))
+
+
+@permitting("list of pairs of names, such as [['cup', 'table']]")
+def _pairs(value: Any) -> tuple[tuple[str, str], ...]:
+    if not isinstance(value, list) or not all(isinstance(one, list) and len(one) == 2 for one in value):
+        raise Misuse(f"{value!r}: expected a list of pairs of names")
+    return tuple((name_value(one), name_value(other)) for one, other in value)
 
 
 @table("[[collision]]")
 class CollisionSpec(TerminalComponentSpec):
-    when: str = key(text_value, "the condition under which parts touch, such as 'x.position > 300 and z.position < 50'")
-    effect: str = key(word(REPORT, JAM), "report, or jam: the axes in the condition, or of what is in it, stand", default=REPORT)
-    reset: Terminal | None = key(OUTPUT_PIN, "output connected to RESET, which frees jammed axes", default=None)
+    when: str | None = key(
+        text_value, "the condition under which parts touch, such as 'x.position > 300 and z.position < 50'", default=None
+    )
+    between: tuple[str, ...] = key(
+        _names,
+        "bodies, or elements with the bodies on them: those of one touch those of another",
+        default=(),
+        excludes=("when",),
+    )
+    all: bool = key(flag, "whether all bodies touch each other", default=False, excludes=("when", "between"))
+    apart_from: tuple[tuple[str, str], ...] = key(
+        _pairs, "pairs of names, as in between, that are not compared", default=(), name="except", excludes=("when",)
+    )
+    effect: str = key(word(REPORT, JAM), "report, or jam: what moves the parts that touch stands", default=REPORT)
+    reset: Terminal | None = key(OUTPUT_PIN, "output connected to RESET, which frees what is jammed", default=None)
 
     @property
     def terminals(self) -> Terminals:
@@ -41,18 +77,85 @@ class CollisionSpec(TerminalComponentSpec):
     @property
     def owners(self) -> tuple[str, ...]:
         """Controllers and elements whose signals are in the condition."""
-        return owners_of(self.when)
+        return () if self.when is None else owners_of(self.when)
 
     def others(self, described: ElementSpecs) -> Iterator[tuple[str, str]]:
         yield from (("when", owner) for owner in self.owners if owner != TIME)
+        yield from (("between", name) for name in self.between)
+        if self.all:
+            yield from (("all", body.name) for body in described.of(BODY))
+        yield from (("except", name) for pair in self.apart_from for name in pair)
 
     def check(self, text: TomlText) -> None:
-        check_condition(text, self.path, self.name, self.when)
+        if self.when is not None:
+            check_condition(text, self.path, self.name, self.when)
+        elif not self.between and not self.all:
+            text.wrong(self.path, "D007", "a collision needs one of when, between and all")
+
+
+AXES_TOUCH = Message("simulation.axes-touch", "{zone}: {axes} touch")
+PARTS_TOUCH = Message("simulation.parts-touch", "{zone}: parts touch")
+BODIES_TOUCH = Message("simulation.bodies-touch", "{zone}: {one} and {other} touch")
 
 
 def _make(spec: CollisionSpec, context: ElementContext) -> Touch:
-    block = context.terminal_block(spec.name)
-    return Touch(block, spec.effect == JAM, condition_of(spec.when, block, context), dict(_axes_of(spec, context)))
+    block, jams = context.terminal_block(spec.name), spec.effect == JAM
+    if spec.when is None:
+        bodies = _Bodies(spec, context)
+        return Touch(block, jams, bodies.contacts, bodies.depends_on)
+    axes = dict(_axes_of(spec, context))
+    text = partial(AXES_TOUCH, zone=spec.name, axes=" and ".join(axes)) if axes else partial(PARTS_TOUCH, zone=spec.name)
+    blocks = tuple(mechanism.block for mechanism in axes.values())
+    return Touch(block, jams, [Contact(condition_of(spec.when, block, context), blocks, text)])
+
+
+class _Bodies:
+    """The bodies of a collision, in the order of the description. Raises `Misuse` where they do not fit."""
+
+    def __init__(self, spec: CollisionSpec, context: ElementContext) -> None:
+        self._spec = spec
+        self._context = context
+        self._described = {one.name: one for one in context.objects.described.of(BODY)}
+        self._bodies = {name: body_of(one, context.frames) for name, one in self._described.items()}
+        self._moved: list[Movement] = []
+        self.contacts = tuple(self._contact(*pair) for pair in self._pairs())
+        if not self.contacts:
+            raise Misuse("nothing moves these bodies against each other")
+
+    @property
+    def depends_on(self) -> tuple[str, ...]:
+        """Names of what changes whether they touch."""
+        owners = (owner for one in self._described.values() for owner in one.owners)
+        return tuple(dict.fromkeys((self._spec.name, *sources_of(self._moved), *owners)))
+
+    def _on(self, name: str) -> list[str]:
+        """The bodies that something carries, and itself if it is one."""
+        frame = self._context.frames[name].frame
+        found = [other for other, body in self._bodies.items() if any(one is frame for one in body.frame.line())]
+        if not found:
+            raise Misuse(f"{name!r} is no [[body]], and carries none")
+        return found
+
+    def _pairs(self) -> Iterator[tuple[str, str]]:
+        spec = self._spec
+        groups: Sequence[Sequence[str]] = [[name] for name in self._bodies] if spec.all else [*map(self._on, spec.between)]
+        those = {frozenset(pair) for one, other in combinations(groups, 2) for pair in product(one, other)}
+        those -= {frozenset(pair) for one, other in spec.apart_from for pair in product(self._on(one), self._on(other))}
+        for one, other in combinations(self._bodies, 2):
+            if frozenset((one, other)) in those and not Pair(self._bodies[one], self._bodies[other]).is_constant:
+                yield one, other
+
+    def _contact(self, one: str, other: str) -> Contact:
+        bodies, context = (self._bodies[one], self._bodies[other]), self._context
+        pair, moved = Pair(*bodies), context.frames.between(bodies[0].frame, bodies[1].frame)
+        self._moved += moved
+        block = context.terminal_block(self._spec.name)
+        whens = [when for name in (one, other) if (when := self._described[name].when) is not None]
+        if not whens and not context.memo.is_checked and pair.overlap(block.scheduler.now):
+            raise Misuse(f"{one!r} and {other!r} overlap when the world begins")
+        blocks = tuple(dict.fromkeys(drive for movement in moved for drive in movement.blocks))
+        text = partial(BODIES_TOUCH, zone=self._spec.name, one=one, other=other)
+        return Contact(BodyContact(pair, [condition_of(when, block, context) for when in whens]), blocks, text)
 
 
 def _axes_of(spec: CollisionSpec, context: ElementContext) -> Iterator[tuple[str, Mechanism]]:

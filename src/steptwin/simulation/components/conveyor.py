@@ -423,6 +423,7 @@ CONVEYOR = with_terminals(
     make=_make,
     signals=_signals,
     drawing=_drawing,
+    moves=lambda spec, conveyor: (),
     connect=_connect,
     faults=(
         STUCK_INPUT,

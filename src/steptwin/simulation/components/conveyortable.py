@@ -10,6 +10,7 @@ from steptwin.errors import Misuse
 from steptwin.simulation.components.beltsensor import SensorSpec
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.components.logic import Joint, TerminalComponentSpec
+from steptwin.simulation.components.mount import MoverSpec
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import TableSpec, key, table, tables_in
@@ -36,7 +37,7 @@ def _mark_places(value: Any) -> tuple[float, ...]:
 
 
 @table("[[conveyor]]")
-class ConveyorSpec(TerminalComponentSpec):
+class ConveyorSpec(TerminalComponentSpec, MoverSpec):
     length: float = key(number(0.0, above=True), "mm")
     speed: float | None = key(number(0.0, above=True), "mm/s while RUN is on", default=None)
     run: Terminal | None = key(OUTPUT_PIN, "with speed: output connected to RUN; without it a wire may be", default=None)
@@ -53,6 +54,7 @@ class ConveyorSpec(TerminalComponentSpec):
     )
     mark_width: float = key(number(0.0, above=True), "length of a mark, mm", default=2.0)
     next: str | None = key(NameOf("conveyor"), "the conveyor on which workpieces go on", default=None)
+    width: float = key(number(0.0, above=True), "mm across, in space; its top face is at its origin", default=100.0, order=2)
     sensors: tuple[SensorSpec, ...] = tables_in("sensor", SensorSpec)
     stops: tuple[StopSpec, ...] = tables_in("stop", StopSpec)
 

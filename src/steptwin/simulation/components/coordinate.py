@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import ceil, floor, sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.motion.elastic import DriveInterval
 from steptwin.points import FARTHEST_NS
+from steptwin.simulation.components.axis import BuiltAxis, nm_per_pulse
 from steptwin.simulation.mechanics.loadmotion import load_intervals
-
-if TYPE_CHECKING:
-    from steptwin.simulation.components.axis import BuiltAxis
+from steptwin.simulation.mechanics.scale import exact_fraction
+from steptwin.simulation.space.pieces import Motion, Piece, StillPiece, gear_of, geared, pieces_of_trajectory, summed
 
 GRID_PER_UNIT = 10**6
 """Steps of the grid in a unit: nanometres of a millimetre."""
@@ -39,6 +39,21 @@ class Coordinate:
         """In units of the axes."""
         one, other = (pulled_to(axis, its, now) for axis, its in zip(self._axes, self._pulled, strict=True))
         return self._shares[0] * one + self._shares[1] * other
+
+    @property
+    def motion(self) -> Motion:
+        """In nm. Raises `Misuse` where the units of the axes are none of a place."""
+        factors = [exact_fraction(share) * nm_per_pulse(axis) for share, axis in zip(self._shares, self._axes, strict=True)]
+        per_unit = nm_per_pulse(self._axes[0]) * self._axes[0].scale.pulses_per_unit
+
+        def moved(n: int, now: Nanos) -> Iterator[Piece]:
+            axis, its, share = self._axes[n], self._pulled[n], self._shares[n]
+            if its.held is not None:
+                return iter((StillPiece(now, None, float(per_unit) * share * its.held),))
+            gear = gear_of(factors[n], -float(per_unit) * share * its.behind)
+            return geared(pieces_of_trajectory(axis.mechanism.trajectory(now), now), gear)
+
+        return Motion(self.version, lambda now: summed([moved(n, now) for n in range(len(factors))]))
 
     def version(self) -> object:
         return *(axis.mechanism.version() for axis in self._axes), *self._pulled

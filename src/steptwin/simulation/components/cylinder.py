@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import partial
 from math import floor
@@ -13,6 +13,7 @@ from steptwin.messages import Message
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import Reference
 from steptwin.simulation.components.logic import STUCK, Joint, TerminalComponent, TerminalComponentSpec, with_terminals
+from steptwin.simulation.components.mount import Movement, MoverSpec, to_nm
 from steptwin.simulation.components.switch import SwitchSpec, channel_of, put_switch, zone_of
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
@@ -22,6 +23,7 @@ from steptwin.simulation.mechanics.drawing import ROD, Drawing
 from steptwin.simulation.mechanics.scale import exact_fraction
 from steptwin.simulation.mechanics.travel import Travel
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
+from steptwin.simulation.space.pieces import Gear, Motion, geared, pieces_of_travel
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table, tables_in
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, number, positive_time, time_value, word
@@ -31,7 +33,7 @@ SINGLE, DOUBLE = "single", "double"
 
 
 @table("[[cylinder]]")
-class CylinderSpec(TerminalComponentSpec):
+class CylinderSpec(TerminalComponentSpec, MoverSpec):
     valve: str = key(word(SINGLE, DOUBLE), "single: one coil and a spring; double: two coils", default=SINGLE)
     extend: Terminal | None = key(OUTPUT_PIN, "output connected to the coil EXTEND; without it a wire may be", default=None)
     retract: Terminal | None = key(OUTPUT_PIN, "valve double: output connected to the coil RETRACT", default=None)
@@ -71,7 +73,7 @@ class Cylinder(TerminalComponent):
     """
 
     FIXED: ClassVar[tuple[str, ...]] = ("_spec",)
-    __slots__ = (*FIXED, "_due", "_spool", "_wanted", "has_air", "is_jammed", "travel")
+    __slots__ = (*FIXED, "_blockers", "_due", "_spool", "_wanted", "has_air", "is_jammed", "travel")
 
     def __init__(self, block: TerminalBlock, spec: CylinderSpec) -> None:
         super().__init__(block)
@@ -82,6 +84,8 @@ class Cylinder(TerminalComponent):
         """When the spool of the valve moves."""
         self.has_air = True
         self.is_jammed = False
+        self._blockers: tuple[str, ...] = ()
+        """Names of what it has run against and stands at."""
         self.travel = Travel(spec.extend_time, spec.retract_time, is_forth=starts_out, now=block.scheduler.now)
 
     def update(self, now: Nanos) -> None:
@@ -115,11 +119,19 @@ class Cylinder(TerminalComponent):
 
     def _force(self) -> int:
         """Where the piston is driven: without air a spring returns it, where there is one."""
-        if self.is_jammed:
+        if self.is_jammed or self._blockers:
             return 0
         if not self.has_air:
             return -1 if self._spec.valve == SINGLE else 0
         return self._spool
+
+    def obstruct(self, blocked: bool, now: Nanos, by: str) -> None:
+        """Let it stand until nothing blocks it any more."""
+        others = tuple(name for name in self._blockers if name != by)
+        self._blockers = (*others, by) if blocked else others
+        if blocked:
+            self.travel.send(0, now)
+        self.block.scheduler.notify(self.block.name)
 
     def deadline(self) -> Nanos | None:
         moments = (*self.travel.turning_points(self.block.scheduler.now), *(() if self._due is None else (self._due,)))
@@ -188,11 +200,19 @@ def _signals(cylinder: Cylinder) -> Mapping[str, SignalOf]:
     return {"position": SignalOf((source,), cylinder.position, travel.turning_points, travel.version, unit="mm", bounds=bounds)}
 
 
+def _moves(spec: CylinderSpec, cylinder: Cylinder) -> Sequence[Movement]:
+    travel = cylinder.travel
+    gear = Gear(float(to_nm(spec.stroke)), float(travel.full))
+    motion = Motion(travel.version, lambda now: geared(pieces_of_travel(travel, now), gear))
+    return (Movement("position", motion, spec.towards(), 1.0, (cylinder.obstruct,), (spec.name,)),)
+
+
 CYLINDER = with_terminals(
     CylinderSpec,
     make=lambda spec, context: Cylinder(context.terminal_block(spec.name), spec),
     signals=_signals,
     drawing=lambda cylinder: cylinder.drawing,
+    moves=_moves,
     faults=(
         *STUCK,
         FaultKind(

@@ -13,6 +13,7 @@ from typing import Any, TypeAlias, cast
 
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import B, ElementSpecs, ElementTable, NamedSpec, Reference, S
+from steptwin.simulation.components.mount import Movement
 from steptwin.simulation.faults.table import FaultKind, Layer
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
@@ -43,6 +44,9 @@ class Element(ElementTable[S, B]):
     """The word that says what it does among those of its kind, such as ``and``."""
     moved: Callable[[B], Iterable[tuple[str, MovedChannel]]] | None = None
     """The channels of its motion, each of which follows from that of an axis, by name."""
+    moves: Callable[[S, B], Sequence[Movement]] | None = None
+    """How it moves what is on it, in space, outermost first. An element that has a place and moves nothing: none of them. Raises
+    `Misuse` where its unit is none of a place."""
     faults: tuple[FaultKind, ...] = ()
     """Its faults (`Layer.ELEMENT`), which act on the built object."""
     is_named: bool = field(init=False)

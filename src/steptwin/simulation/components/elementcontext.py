@@ -6,6 +6,7 @@ from steptwin.errors import Misuse
 from steptwin.motioncontroller import MotionController
 from steptwin.simulation.components.buildmemo import BuildMemo
 from steptwin.simulation.components.builtobjects import BuiltObjects
+from steptwin.simulation.components.frames import Frames
 from steptwin.simulation.kinds.kind import AnyKind
 from steptwin.simulation.logic.contacts import Circuit
 from steptwin.simulation.scheduler.chance import Chance
@@ -28,6 +29,11 @@ class ElementContext:
         self._seed = seed
         self._joins: dict[PinName, str | None] = {}
         """``join`` of each input with contacts."""
+
+    @property
+    def frames(self) -> Frames:
+        """All elements with a place in space, once every element is built."""
+        return self.objects.frames
 
     # ------------------------------------------------------------------ controllers and schedulers
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Generic, NamedTuple, TypeVar, cast
 
+from steptwin.simulation.components.mount import MountSpec
 from steptwin.simulation.toml.keypaths import Path
 from steptwin.simulation.toml.table import TableSpec, table
 
@@ -38,6 +39,12 @@ class ElementSpecs(dict[str, tuple[TableSpec, ...]]):
     def of(self, element: ElementTable[S, Any]) -> tuple[S, ...]:
         """Those of one kind."""
         return cast("tuple[S, ...]", self[element.name])
+
+    @property
+    def mounts(self) -> dict[str, MountSpec]:
+        """Those that may have a place in space, by name."""
+        every = (one for specs in self.values() for one in specs)
+        return {one.name: one for one in every if isinstance(one, MountSpec) and isinstance(one, NamedSpec) and one.name}
 
 
 class Reference(NamedTuple):

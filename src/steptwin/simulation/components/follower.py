@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import partial
 from math import floor
@@ -11,10 +11,11 @@ from typing import ClassVar
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.simulation.components.axis import AXIS, turning_points_of_axis
+from steptwin.simulation.components.axis import AXIS, moved_by, turning_points_of_axis
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
+from steptwin.simulation.components.mount import Movement, MoverSpec
 from steptwin.simulation.components.shaft import SHAFT, TURN, GearedShaft
 from steptwin.simulation.components.switch import SwitchSpec, channel_of, put_switch, zone_of
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
@@ -24,7 +25,9 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.cam import Cam
 from steptwin.simulation.mechanics.channels import LIFT_SHARE, STUCK, MovedChannel
 from steptwin.simulation.mechanics.drawing import ROD, Drawing
-from steptwin.simulation.mechanics.scale import exact_fraction
+from steptwin.simulation.mechanics.scale import LENGTHS, exact_fraction
+from steptwin.simulation.space.frames import NM_PER_MM
+from steptwin.simulation.space.pieces import Motion, Piece, StillPiece, gear_of, geared, pieces_of_cam
 from steptwin.simulation.toml.names import Unknown
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table, tables_in
@@ -36,7 +39,7 @@ GRID_PER_UNIT = 10**6
 
 
 @table("[[follower]]")
-class FollowerSpec(NamedSpec):
+class FollowerSpec(NamedSpec, MoverSpec):
     name: str = key(name_value, "how conditions and faults name it")
     shaft: str = key(NameOf("shaft"), "the shaft that its cam disc is on")
     points: tuple[tuple[float, float], ...] = key(
@@ -105,6 +108,17 @@ class Follower(Stateful):
             if place is not None and (due := self.shaft.reaches(place, after, heading)) is not None:
                 found.append(due)
         return min(found, default=None)
+
+    def motion(self, nm_per_unit: Fraction) -> Motion:
+        """In nm, at any place between the pulses of its axis."""
+
+        def pieces(now: Nanos) -> Iterator[Piece]:
+            if self._held is not None:
+                yield StillPiece(now, None, float(self._held * nm_per_unit))
+                return
+            yield from geared(pieces_of_cam(self._cam, self.shaft.pieces(now)), gear_of(self._share * nm_per_unit))
+
+        return Motion(self.version, pieces)
 
     # ------------------------------------------------------------------ signals and faults
 
@@ -233,6 +247,15 @@ def _signals(follower: Follower) -> Mapping[str, SignalOf]:
     return {"position": SignalOf(source, follower.position, follower.turning_points, follower.version, spec.unit, bounds)}
 
 
+def _moves(spec: FollowerSpec, follower: Follower) -> Sequence[Movement]:
+    metres = LENGTHS.get(spec.unit)
+    if metres is None:
+        raise Misuse(f"{spec.name!r} is lifted by {spec.unit}: in space a lift is in {', '.join(LENGTHS)}")
+    mm, axis = metres * 1000, follower.shaft.axis
+    sources = (*moved_by(axis), spec.shaft, spec.name)
+    return (Movement("position", follower.motion(mm * NM_PER_MM), spec.towards(), float(mm), (axis.mechanism.block,), sources),)
+
+
 FOLLOWER: Element[FollowerSpec, Follower] = Element(
     spec=FollowerSpec,
     refers=_refers,
@@ -240,6 +263,7 @@ FOLLOWER: Element[FollowerSpec, Follower] = Element(
     signals=_signals,
     drawing=lambda follower: follower.drawing,
     moved=lambda follower: (follower.moved,),
+    moves=_moves,
     faults=(
         FaultKind(
             "stuck-follower",

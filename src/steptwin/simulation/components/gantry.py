@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import ClassVar
 
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.simulation.components.axis import BuiltAxis, find_axis
+from steptwin.simulation.components.axis import BuiltAxis, find_axis, mm_per_unit, moved_by
 from steptwin.simulation.components.coordinate import Coordinate, Pulled
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.components.logic import STUCK, Joint, TerminalComponentSpec, with_terminals
-from steptwin.simulation.components.touch import JAM, REPORT, RESET, Touch
+from steptwin.simulation.components.mount import Movement, MoverSpec
+from steptwin.simulation.components.touch import JAM, REPORT, RESET, Contact, Touch
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.faults.table import number
@@ -37,7 +37,7 @@ SHARES = {SKEW: (1.0, -1.0), "position": (0.5, 0.5)}
 
 
 @table("[[gantry]]")
-class GantrySpec(TerminalComponentSpec):
+class GantrySpec(TerminalComponentSpec, MoverSpec):
     """``limit`` in the unit of its axes, ``mass`` in kg, ``friction_force`` in N."""
 
     axis: str = key(NameOf("axis"), "the axis that moves one end")
@@ -47,6 +47,10 @@ class GantrySpec(TerminalComponentSpec):
     friction_force: float = key(number_value(0.0), "N against its motion; each motor moves half", default=0.0)
     effect: str = key(word(REPORT, JAM), "of too much skew: report, or jam (both axes stand)", default=JAM)
     reset: Terminal | None = key(OUTPUT_PIN, "output connected to RESET, which frees jammed axes", default=None)
+
+    @property
+    def mounted_as(self) -> str:
+        return self.axis
 
     @property
     def terminals(self) -> Terminals:
@@ -82,7 +86,8 @@ class Gantry(Touch):
         self.ends = ends
         self.signals = dict(_moving(ends))
         skewed = SignalCondition(f"abs({SKEW}) > {spec.limit!r}", self.signals.__getitem__)
-        super().__init__(block, spec.effect == JAM, skewed, {end.spec.name: end.mechanism for end in ends})
+        contact = Contact(skewed, tuple(end.mechanism.block for end in ends), self.touching)
+        super().__init__(block, spec.effect == JAM, [contact])
         beam = Loading(mass=spec.mass, friction_force=spec.friction_force)
         self._loads = tuple(burden_of(beam, end.scale, "gantry") for end in ends)
         """The whole beam, for each motor."""
@@ -98,6 +103,7 @@ class Gantry(Touch):
         return SKEWED
 
     def touching(self) -> str:
+        """Text of what happens when its ends are too far apart."""
         skew = self.signals[SKEW].value(self.block.scheduler.now)
         return ENDS_ARE_SKEWED(name=self.block.name, skew=skew, unit=self.unit)
 
@@ -164,7 +170,7 @@ def _make(spec: GantrySpec, context: ElementContext) -> Gantry:
     if one.scale.unit != other.scale.unit:
         raise Misuse(f"{spec.axis!r} is in {one.scale.unit} and {spec.other!r} in {other.scale.unit}: a gantry has one unit")
     for name, gantry in context.objects.built(GANTRY).items():
-        if taken := [end.spec.name for end in (one, other) if gantry.is_moved_by(end.mechanism)]:
+        if taken := [end.spec.name for end in (one, other) if any(one.mechanism is end.mechanism for one in gantry.ends)]:
             raise Misuse(f"axis {taken[0]!r} moves the gantry {name!r} already")
     return Gantry(block, spec, (one, other))
 
@@ -173,11 +179,21 @@ def _signals(gantry: Gantry) -> Mapping[str, SignalOf]:
     return {**gantry.signals, "count": SignalOf((gantry.block.source,), lambda now: float(gantry.count))}
 
 
-_GANTRY = with_terminals(
+def _moves(spec: GantrySpec, gantry: Gantry) -> Sequence[Movement]:
+    one, other = gantry.ends
+    motion = Coordinate(gantry.ends, SHARES["position"], (Pulled(), Pulled())).motion
+    blocks, sources = (one.mechanism.block, other.mechanism.block), (*moved_by(one), *moved_by(other))
+    towards = spec.towards(one.spec.towards())
+    return (Movement("position", motion, towards, float(mm_per_unit(one)), blocks, sources),)
+
+
+GANTRY = with_terminals(
     GantrySpec,
     make=_make,
     signals=_signals,
     drawing=lambda gantry: gantry.drawing,
+    moved=lambda gantry: (gantry.moved,),
+    moves=_moves,
     faults=(
         *STUCK,
         FaultKind(
@@ -190,4 +206,3 @@ _GANTRY = with_terminals(
         ),
     ),
 )
-GANTRY = replace(_GANTRY, moved=lambda gantry: (gantry.moved,))

@@ -6,7 +6,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import NamedTuple, TypeVar
+from typing import Generic, NamedTuple, TypedDict, TypeVar, Unpack
 
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
@@ -14,11 +14,13 @@ from steptwin.messages import Message
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
+from steptwin.simulation.components.mount import Movement
 from steptwin.simulation.faults import ActiveFault, Fault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.faults.table import FaultCategory, Parameter, ParameterForm, whole
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.mechanics.channels import MovedChannel
 from steptwin.simulation.mechanics.drawing import Drawing
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.scheduler.wires import PinName, Wire
@@ -159,6 +161,15 @@ STUCK = (STUCK_OUTPUT, STUCK_INPUT)
 # ---------------------------------------------------------------------- an element
 
 
+class _Rest(TypedDict, Generic[S, P], total=False):
+    """As in `Element`."""
+
+    connect: Callable[[S, P, ElementContext], None]
+    drawing: Callable[[P], Drawing]
+    moved: Callable[[P], Iterable[tuple[str, MovedChannel]]]
+    moves: Callable[[S, P], Sequence[Movement]]
+
+
 def with_terminals(
     spec: type[S],
     *,
@@ -167,13 +178,11 @@ def with_terminals(
     faults: Sequence[FaultKind] = (),
     refers: Callable[[S], Iterable[Reference]] = lambda spec: (),
     fit: Callable[[S, P, ElementContext], None] = lambda spec, component, context: None,
-    connect: Callable[[S, P, ElementContext], None] | None = None,
-    drawing: Callable[[P], Drawing] | None = None,
+    **rest: Unpack[_Rest[S, P]],
 ) -> Element[S, P]:
     """An element with a name and terminals. Each terminal is a signal, each output a channel.
 
-    ``signals`` and ``refers`` are those besides. ``fit`` adds the parts of tables in its table. ``connect`` and ``drawing`` are
-    as in `Element`.
+    ``signals`` and ``refers`` are those besides. ``fit`` adds the parts of tables in its table.
     """
 
     def all_references(found: S, described: ElementSpecs) -> Iterator[Reference]:
@@ -192,11 +201,10 @@ def with_terminals(
         spec=spec,
         refers=all_references,
         build=build,
-        connect=connect,
         terminals=lambda found: found.terminals,
         signals=lambda component: {**_terminal_signals(component.block), **signals(component)},
-        drawing=drawing,
         faults=tuple(faults),
+        **rest,
     )
 
 

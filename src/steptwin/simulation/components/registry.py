@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 from steptwin.errors import Misuse
 from steptwin.simulation.components.axis import AXIS
+from steptwin.simulation.components.body import BODY
 from steptwin.simulation.components.brake import BRAKE
 from steptwin.simulation.components.button import BUTTON
 from steptwin.simulation.components.carriage import CARRIAGE
@@ -84,6 +85,7 @@ for _one in (
     TOOL,
     GANTRY,
     TRANSDUCER,
+    BODY,
     COLLISION,
     SUPPLY,
     LOAD,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import partial
 from math import floor
@@ -11,11 +11,12 @@ from typing import Any, ClassVar
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, turning_points_of_axis
+from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, moved_by, turning_points_of_axis
 from steptwin.simulation.components.contact import ContactSpec
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
+from steptwin.simulation.components.mount import UPRIGHT, Movement, MoverSpec
 from steptwin.simulation.components.switch import channel_of, put_switch
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
@@ -24,6 +25,7 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.channels import SLIPS, MovedChannel
 from steptwin.simulation.mechanics.drawing import DIAL, Drawing, SensorZone
 from steptwin.simulation.mechanics.scale import exact_fraction
+from steptwin.simulation.space.pieces import Gear, Motion, Piece, StillPiece, gear_of, geared, pieces_of_trajectory
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table, tables_in
 from steptwin.simulation.toml.values import NameOf, name_value, number, permitting
@@ -58,7 +60,7 @@ class CamSpec(ContactSpec):
 
 
 @table("[[shaft]]")
-class ShaftSpec(NamedSpec):
+class ShaftSpec(NamedSpec, MoverSpec):
     name: str = key(name_value, "how conditions and faults name it")
     axis: str = key(NameOf("axis"), "the axis that turns it")
     ratio: float = key(_ratio, "turns of the shaft per unit of the axis; negative: backwards")
@@ -125,6 +127,20 @@ class GearedShaft(Stateful):
         """Degrees."""
         return float(self._behind / self.pulses_per_turn * TURN)
 
+    def pieces(self, now: Nanos) -> Iterator[Piece]:
+        """Pulses of its axis, as far as it has followed it."""
+        if self._held is not None:
+            yield StillPiece(now, None, float(self._held))
+            return
+        load = pieces_of_trajectory(self.axis.mechanism.trajectory(now), now)
+        yield from geared(load, Gear(1.0, 1.0, float(-self._behind))) if self._behind else load
+
+    @property
+    def motion(self) -> Motion:
+        """In quarter turns."""
+        gear = gear_of(4 / self.pulses_per_turn, float(exact_fraction(self.spec.offset) / 90))
+        return Motion(self.version, lambda now: geared(self.pieces(now), gear))
+
     # ------------------------------------------------------------------ gear
 
     @property
@@ -186,6 +202,12 @@ def _slip(active: ActiveFault, shaft: GearedShaft, begins: bool, now: Nanos) -> 
     return COUPLING_SLIPS(name=name) if begins else COUPLING_GRIPS(name=name, behind=shaft.behind)
 
 
+def _moves(spec: ShaftSpec, shaft: GearedShaft) -> Sequence[Movement]:
+    axis = shaft.axis
+    sources = (*moved_by(axis), spec.name)
+    return (Movement("angle", shaft.motion, spec.towards(UPRIGHT), 1.0, (axis.mechanism.block,), sources, turns=True),)
+
+
 SHAFT: Element[ShaftSpec, GearedShaft] = Element(
     spec=ShaftSpec,
     refers=_refers,
@@ -193,6 +215,7 @@ SHAFT: Element[ShaftSpec, GearedShaft] = Element(
     signals=_signals,
     drawing=lambda shaft: Drawing(DIAL, float(TURN), ("angle",), sensors=tuple(one.zone for one in shaft.spec.cams)),
     moved=lambda shaft: (shaft.moved,),
+    moves=_moves,
     faults=(
         FaultKind(
             "slipping-coupling",

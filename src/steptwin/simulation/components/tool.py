@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, ClassVar
 
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis
+from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, mm_per_unit, moved_by
 from steptwin.simulation.components.coordinate import GRID_PER_UNIT, Coordinate, Pulled, pulled_to
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
+from steptwin.simulation.components.mount import FORWARD, MountSpec, Movement, direction
 from steptwin.simulation.components.switch import SwitchSpec, put_switch, zone_of
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
@@ -22,6 +23,7 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.channels import SLIPS, MovedChannel
 from steptwin.simulation.mechanics.drawing import PLANE, Drawing, rail
 from steptwin.simulation.mechanics.scale import exact_fraction
+from steptwin.simulation.space.frames import Direction, Y
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table, tables_in
 from steptwin.simulation.toml.values import NameOf, name_value, number, pair, permitting
@@ -41,8 +43,18 @@ def _shares(value: Any) -> tuple[float, float]:
     return one, other
 
 
+@permitting("two directions, such as ['+x', '+y']")
+def _directions(value: Any) -> tuple[Direction, Direction]:
+    if not isinstance(value, list) or len(value) != 2:
+        raise Misuse(f"{value!r}: expected two directions, such as ['+x', '+y']")
+    one, other = map(direction, value)
+    if one.axis == other.axis:
+        raise Misuse(f"{value!r}: a plane has two directions that are across each other")
+    return one, other
+
+
 @table("[[tool]]")
-class ToolSpec(NamedSpec):
+class ToolSpec(NamedSpec, MountSpec):
     """``x`` and ``y``: the shares of ``axis`` and ``other`` in each coordinate."""
 
     name: str = key(name_value, "how conditions and faults name it")
@@ -56,6 +68,9 @@ class ToolSpec(NamedSpec):
     )
     x_travel: tuple[float, float] | None = key(pair, "where its x may be, in the unit of the axes: it is drawn so", default=None)
     y_travel: tuple[float, float] | None = key(pair, "where its y may be, in the unit of the axes: it is drawn so", default=None)
+    along: tuple[Direction, Direction] = key(
+        _directions, "directions in space of its x and its y", default=(FORWARD, Direction(Y, 1)), order=2
+    )
     x_switches: tuple[SwitchSpec, ...] = tables_in("x_switch", SwitchSpec, "[[tool.x_switch]]")
     y_switches: tuple[SwitchSpec, ...] = tables_in("y_switch", SwitchSpec, "[[tool.y_switch]]")
 
@@ -209,6 +224,16 @@ def _slip(active: ActiveFault, tool: Tool, begins: bool, now: Nanos) -> str:
     return TOOL_BELT_GRIPS(belt=belt, name=name, behind=behind, unit=tool.unit)
 
 
+def _moves(spec: ToolSpec, tool: Tool) -> Sequence[Movement]:
+    mm = float(mm_per_unit(tool.axes[0]))
+    blocks = tuple(axis.mechanism.block for axis in tool.axes)
+    sources = tuple(dict.fromkeys((*moved_by(tool.axes[0]), *moved_by(tool.axes[1]), spec.name)))
+    return tuple(
+        Movement(name, its.motion, along, mm, blocks, sources)
+        for (name, its), along in zip(tool.coordinates.items(), spec.along, strict=True)
+    )
+
+
 TOOL: Element[ToolSpec, Tool] = Element(
     spec=ToolSpec,
     refers=_refers,
@@ -216,6 +241,7 @@ TOOL: Element[ToolSpec, Tool] = Element(
     signals=_signals,
     drawing=lambda tool: tool.drawing,
     moved=lambda tool: tool.moved,
+    moves=_moves,
     faults=(
         FaultKind(
             "slipping-belt",

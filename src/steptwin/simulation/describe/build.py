@@ -147,10 +147,18 @@ class _Builder:
             element, spec = later.pop(turn)
             self._build_elements(element, [spec])
         if not self.spec.text.findings:
+            self._place_elements()
+        if not self.spec.text.findings:
             self.context.close_circuits()
             for number, scheduler in enumerate(self.objects.schedulers):
                 if order := self.blueprint.memo.once(("order", number), scheduler.order):
                     scheduler.arrange(order)
+
+    def _place_elements(self) -> None:
+        """Give elements their places in space, after all were built."""
+        frames, text = self.objects.frames, self.spec.text
+        for name in () if self.blueprint.memo.is_checked else frames:
+            text.unless_wrong(frames.described[name].path, partial(frames.__getitem__, name))
 
     def _waits(self, element: AnyElement, spec: TableSpec) -> bool:
         """Whether it is over a signal of an element that is not built yet."""
@@ -174,6 +182,8 @@ class _Builder:
             self.objects.elements.setdefault(element.name, {})[named.name] = found
             if element.signals is not None:
                 self.objects.signals_of[named.name] = partial(element.signals, found)
+            if element.moves is not None:
+                self.objects.frames.add(named.name, partial(element.moves, named, found))
             if element.faults:
                 scheduler = self._scheduler_of(element, named)
                 failing = FaultyElement(scheduler, named.name, self.objects.faults, element.faults, found)

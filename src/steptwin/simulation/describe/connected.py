@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from steptwin.simulation.components.elementspec import Reference
+from steptwin.simulation.components.elementspec import NamedSpec, Reference
+from steptwin.simulation.components.mount import MountSpec
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.describe.spec import WorldSpec
 from steptwin.simulation.toml.keypaths import Path
@@ -27,8 +28,20 @@ def connected_names(spec: WorldSpec, controllers: Iterable[str]) -> list[list[st
         return name
 
     placed = _placed(spec)
+
+    def owner(name: str) -> str | None:
+        """What shares its scheduler with it; None for what stands on the floor."""
+        seen: set[str] = set()
+        found: str | None = name
+        while found is not None and found not in connected and found in placed and found not in seen:
+            seen.add(found)
+            found = placed[found]
+        return found
+
     for reference in _connections(spec):
-        one, other = (placed.get(name, name) for name in reference[:2])
+        one, other = owner(reference.one), owner(reference.other)
+        if other is None:
+            continue
         if other not in connected:
             _report(spec, reference.path, other, connected)
         elif one in connected:
@@ -44,7 +57,10 @@ def _report(spec: WorldSpec, path: Path, name: str, connected: Iterable[str]) ->
     text, element = spec.text, _element_named_by(path)
     if text.may_be_broken(name):
         return
-    if element is None:
+    if path[-1] == "on":
+        what, there = "no element with a place in space", list(spec.elements.mounts)
+        known = there
+    elif element is None:
         what, there = "nothing", list(connected)
         elements = (one.name for element in ELEMENTS.values() for one in element.named(spec.elements[element.name]))
         known = [*there, *elements]
@@ -63,10 +79,11 @@ def _element_named_by(path: Path) -> str | None:
     return read.element if isinstance(read, NameOf) else None
 
 
-def _placed(spec: WorldSpec) -> Mapping[str, str]:
-    """For each element without terminals of its own the first thing that it refers to, in whose scheduler it is."""
+def _placed(spec: WorldSpec) -> Mapping[str, str | None]:
+    """For each element without terminals of its own the first thing that it refers to, in whose scheduler it is; None for one
+    that refers to nothing."""
     return {
-        one.name: next(iter(element.refers(one, spec.elements))).one
+        one.name: next((found.one for found in element.refers(one, spec.elements)), None)
         for element in ELEMENTS.values()
         if element.terminals is None
         for one in element.named(spec.elements[element.name])
@@ -80,3 +97,5 @@ def _connections(spec: WorldSpec) -> Iterator[Reference]:
     for element in ELEMENTS.values():
         for one in spec.elements[element.name]:
             yield from element.refers(one, spec.elements)
+            if isinstance(one, MountSpec) and isinstance(one, NamedSpec) and one.on is not None:
+                yield Reference(one.name, one.on, (*one.path, "on"))

@@ -12,6 +12,7 @@ from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.describe.arrangement import DRAWING, DrawingSpec, DrawnPosition, check_drawing
 from steptwin.simulation.describe.includes import PARAMETERS, USE, Includes, ReadFile, is_include, no_files
+from steptwin.simulation.describe.mounts import check_mounts
 from steptwin.simulation.describe.overrides import NO_OVERRIDES, Overrides, override
 from steptwin.simulation.describe.servicetables import SERVICE_TABLES, SERVICES
 from steptwin.simulation.describe.spec import SEED, EventSpec, ScriptSpec, WorldSpec, WorldTable
@@ -89,6 +90,7 @@ def describe(
         service.check(toml)
     named_elements = [one for element in ELEMENTS.values() for one in element.named(spec.elements[element.name])]
     _check_names(spec, named_elements)
+    check_mounts(toml, spec.elements, named_elements)
     check_drawing(toml, placed, [one.name for one in named_elements])
     return spec if seed is None else replace(spec, seed=_seed(seed))
 

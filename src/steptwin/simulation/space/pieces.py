@@ -9,6 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from math import inf
 from typing import Any, NamedTuple, TypeAlias
 
@@ -156,6 +157,11 @@ class Gear(NamedTuple):
     up: float
     down: float = 1.0
     shift: float = 0.0
+
+
+def gear_of(factor: Fraction, shift: float = 0.0) -> Gear:
+    up, down = factor.as_integer_ratio()
+    return Gear(float(up), float(down), shift)
 
 
 @dataclass(frozen=True, slots=True)

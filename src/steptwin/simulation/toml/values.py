@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from math import isnan
-from typing import Any, Generic, TypeAlias, TypeVar
+from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
 
 from steptwin.controller import SECOND
 from steptwin.durations import duration
@@ -256,6 +256,16 @@ class NameOf:
     @property
     def permitted(self) -> str:
         return f"name of a {self.element}" if self.element[0] not in "aeiou" else f"name of an {self.element}"
+
+    def __call__(self, value: Any) -> str:
+        return name_value(value)
+
+
+@dataclass(frozen=True, slots=True)
+class FrameName:
+    """The name of an element that has a frame, which carries others."""
+
+    permitted: ClassVar[str] = "name of an element with a place in space"
 
     def __call__(self, value: Any) -> str:
         return name_value(value)

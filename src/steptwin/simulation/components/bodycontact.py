@@ -1,0 +1,45 @@
+"""Two bodies that may touch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from steptwin.controller import Nanos
+from steptwin.simulation.logic.condition import SignalCondition
+from steptwin.simulation.space.contacts import NEVER, Pair
+
+
+class BodyContact:
+    """A `steptwin.simulation.components.touch.Meeting`: they overlap while both are there.
+
+    Between two changes of the plans a moment is searched for once, and kept.
+    """
+
+    __slots__ = ("_found", "_overlap", "_version", "_whens", "pair")
+
+    def __init__(self, pair: Pair, whens: Sequence[SignalCondition]) -> None:
+        """``whens``: conditions under which they are there."""
+        self.pair = pair
+        self._whens = tuple(whens)
+        self.forget()
+
+    def forget(self) -> None:
+        self._version: object = None
+        self._overlap, self._found = False, NEVER
+        for when in self._whens:
+            when.forget()
+
+    def _search(self, now: Nanos) -> None:
+        version, due = self.pair.version(), self._found.at
+        if version != self._version or (due is not None and due <= now):
+            self._version = version
+            self._overlap, self._found = self.pair.overlap(now), self.pair.next_change(now)
+
+    def holds(self, now: Nanos) -> bool:
+        self._search(now)
+        return self._overlap and all(when.holds(now) for when in self._whens)
+
+    def change(self, now: Nanos) -> Nanos | None:
+        self._search(now)
+        changes = (self._found.at, *(when.change(now) for when in self._whens))
+        return min((due for due in changes if due is not None), default=None)

@@ -1,0 +1,53 @@
+"""The machine in space, as a viewer draws it: frames that carry each other, and the bodies on them. Lengths in mm, z is up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, TypeAlias
+
+Point: TypeAlias = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class JointDescription:
+    """A motion of a frame, along an axis of what carries it, or about one."""
+
+    signal: Annotated[str, "Signal of its position: it is at the origin of its frame while that is 0"]
+    along: Annotated[str, "Direction: +x, -z ..."]
+    turns: bool
+    per_unit: Annotated[float, "For a unit of the signal [mm, degrees]"]
+
+
+@dataclass(frozen=True, slots=True)
+class FrameDescription:
+    """The frame of an element. What is on it is moved by its joints, the first of which is outermost."""
+
+    name: str
+    kind: Annotated[str, "The table of the element: axis, cylinder, conveyor ..."]
+    on: Annotated[str | None, "The element that carries it; none: the floor"]
+    at: Annotated[Point, "Its origin there, while its joints are at 0 [mm]"]
+    along: Annotated[str | None, "Direction of an element that moves workpieces, not what is on it"]
+    joints: tuple[JointDescription, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class BodyDescription:
+    """A box or an upright cylinder that stands on the origin of the frame of its name, with the middle of its lower face."""
+
+    name: str
+    size: Annotated[Point | None, "Of a box, along x, y and z [mm]"]
+    diameter: float | None
+    height: float | None
+    color: Annotated[str | None, "#RRGGBB"]
+    when: Annotated[str | None, "The condition under which it is there"]
+
+
+@dataclass(frozen=True, slots=True)
+class SceneDescription:
+    """All elements that have a place in space."""
+
+    frames: tuple[FrameDescription, ...] = ()
+    bodies: tuple[BodyDescription, ...] = ()
+
+
+NO_SCENE = SceneDescription()
