@@ -83,7 +83,7 @@ def test_closed_followers_get_nothing_more_and_nobody_is_followed_then() -> None
     subscription.close()
     subscribers.publish(event(2))
     assert subscription.take().events == [event(1)]
-    assert not subscribers
+    assert not subscribers.all
     assert changes == [frozenset({"edge"}), frozenset()]
 
 

@@ -8,7 +8,7 @@ from why_worlds import CHIP, CHIP_PROGRAM, LINE, PROGRAM, WAITS
 from steptwin.controller import MILLISECOND
 from steptwin.errors import Misuse
 from steptwin.files.world import World
-from steptwin.simulation.kinds.mic488.writes import encode_write
+from steptwin.simulation.kinds.mic488.writes import REGISTERS
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.inputs import Bytes, Download
 from steptwin.simulation.world.snapshotlog import SnapshotLog
@@ -128,7 +128,7 @@ def test_a_gate_shows_which_input_and_the_end_of_a_pulse_what_began_it() -> None
 def test_a_write_of_a_client(timing: str) -> None:
     world = line(timing)
     world.run(1.0)
-    (pdu,) = encode_write(world.mic488["other"].device, (("OUT3", 1.0),))
+    (pdu,) = REGISTERS.requests(world.mic488["other"].device, (("OUT3", 1.0),), is_command=False)
     world.apply_input(Bytes("bus", "hmi", "rtu", encode_frame(2, pdu)))
     world.run(2.0)
     effect, cause = world.why("other.OUT3").links
@@ -140,8 +140,8 @@ def test_a_write_of_a_client(timing: str) -> None:
 def test_a_read_or_a_write_to_another_controller_is_no_cause() -> None:
     world = line()
     world.run(1.0)
-    (to_other,) = encode_write(world.mic488["other"].device, (("OUT3", 1.0),))
-    (to_table,) = encode_write(world.mic488["table"].device, (("OUT3", 1.0),))
+    (to_other,) = REGISTERS.requests(world.mic488["other"].device, (("OUT3", 1.0),), is_command=False)
+    (to_table,) = REGISTERS.requests(world.mic488["table"].device, (("OUT3", 1.0),), is_command=False)
     read = bytes.fromhex("03 00 00 00 01")
     for unit, pdu in ((2, to_other), (1, to_table), (2, read)):
         world.apply_input(Bytes("bus", "hmi", "rtu", encode_frame(unit, pdu)))

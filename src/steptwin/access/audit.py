@@ -59,10 +59,10 @@ def _short(value: object) -> object:
 class Audit:
     """``clock`` gives the wall clock as text; ``sink`` is the first of `subscribers`, to keep entries elsewhere."""
 
-    def __init__(self, clock: Callable[[], str], sink: Callable[[Entry], None] = lambda _: None) -> None:
+    def __init__(self, clock: Callable[[], str], sink: Callable[[Entry], None] | None = None) -> None:
         self._entries: deque[Entry] = deque(maxlen=MOST_ENTRIES)
         self._clock = clock
-        self.subscribers = [sink]
+        self.subscribers = [] if sink is None else [sink]
         """Called with every entry."""
 
     def add(self, viewer: Acting, time: Nanos, do: str, fields: Mapping[str, object], outcome: str) -> None:

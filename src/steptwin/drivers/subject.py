@@ -269,7 +269,7 @@ class AsyncDeviceSubject:
 
     async def poll(self) -> None:
         """Poll once, if there are subscribers, and make events of the changes. Raises `LineFailure`."""
-        if self.subscribers:
+        if self.subscribers.all:
             for payload in await self._device.look(self.subscribers.kinds):
                 self.publish(payload)
 

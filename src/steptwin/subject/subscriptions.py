@@ -94,15 +94,12 @@ class Subscriptions:
     """All subscribers of a subject. ``on_change`` is called when the set of subscribed kinds has changed."""
 
     def __init__(self, on_change: Callable[[], None] = lambda: None) -> None:
-        self._all: list[Subscription] = []
+        self.all: list[Subscription] = []
         self._on_change = on_change
         self.kinds: frozenset[str] = frozenset()
         """Kinds that at least one subscriber selects."""
         self._by_kind: dict[str, list[Subscription]] = {}
         """Who selects them."""
-
-    def __bool__(self) -> bool:
-        return bool(self._all)
 
     def subscribe(self, what: Filter, bound: int) -> Subscription:
         subscription = Subscription(what, bound, self.remove)
@@ -110,7 +107,7 @@ class Subscriptions:
         return subscription
 
     def add(self, subscription: Subscription) -> None:
-        self._all.append(subscription)
+        self.all.append(subscription)
         self._changed()
 
     def publish(self, event: Event) -> None:
@@ -119,11 +116,11 @@ class Subscriptions:
                 subscription.add(event)
 
     def remove(self, subscription: Subscription) -> None:
-        if subscription in self._all:
-            self._all.remove(subscription)
+        if subscription in self.all:
+            self.all.remove(subscription)
             self._changed()
 
     def _changed(self) -> None:
-        self.kinds = frozenset().union(*(subscription.filter.kinds for subscription in self._all))
-        self._by_kind = {kind: [one for one in self._all if kind in one.filter.kinds] for kind in self.kinds}
+        self.kinds = frozenset().union(*(subscription.filter.kinds for subscription in self.all))
+        self._by_kind = {kind: [one for one in self.all if kind in one.filter.kinds] for kind in self.kinds}
         self._on_change()

@@ -136,13 +136,13 @@ class WorldSubject:
 
     def _begin(self) -> int:
         """Process all due events first, so that the command is not their cause."""
-        if self.subscribers:
+        if self.subscribers.all:
             self.world.sync_all()
         return self.numbering.command(self.world.now)
 
     def _end(self) -> Nanos:
         """Process its effects at the same moment, so that the command is their cause."""
-        if self.subscribers:
+        if self.subscribers.all:
             self.world.sync_all()
         self.numbering.done()
         return self.world.now
@@ -151,8 +151,7 @@ class WorldSubject:
         self._apply_input(step)
 
     def _write(self, step: steps.Write) -> None:
-        self.world.check_values(step)
-        requests = self.world.requests(step)  # before it is done, which may change DATA_TYPE
+        requests = self.world.requests(step, is_command=True)  # before it is done, which may change DATA_TYPE
         self._apply_input(step)
         for name, pdus in requests:
             for pdu in pdus:
@@ -311,7 +310,7 @@ class WorldSubject:
         self.publish(self.world.now, WORLD, pace)
 
     def publish(self, time: Nanos, controller: str, payload: Payload) -> None:
-        if self.subscribers:
+        if self.subscribers.all:
             self.subscribers.publish(self.numbering.event(time, controller, payload))
 
     def _recorded(self, record: TraceRecord) -> None:
@@ -337,7 +336,7 @@ class WorldSubject:
         """Subscribe to the world only while it has subscribers, to frames and statements only while they are wanted."""
         self.on_subscribed()
         watchers = self.world.trace.subscribers
-        if bool(self.subscribers) is not self._is_watching:
+        if bool(self.subscribers.all) is not self._is_watching:
             self._is_watching = not self._is_watching
             if self._is_watching:
                 watchers.append(self._recorded)

@@ -12,7 +12,7 @@ from steptwin.files.world import World
 from steptwin.mic488.registermap import DataType
 from steptwin.mic488.values import encoded, named
 from steptwin.simulation.kinds.kind import MotionEnds
-from steptwin.simulation.kinds.mic488.kind import Mic488Registers
+from steptwin.simulation.kinds.mic488.writes import REGISTERS
 from steptwin.simulation.kinds.registry import M1486, MIC488
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.control import ControllerCommand, ControlProgram, Enable, Halt, Home, Jog, Move, Seek, StopAxes
@@ -78,7 +78,7 @@ def test_what_is_refused_before_it_is_sent_is_what_a_controller_refuses(register
             value = real(around * (1 + step * 2.0**-23))
             answer = device.execute(encode_request(encoded(item, value, DataType.REAL)), 0)
             try:
-                Mic488Registers().check_values(device, ((item.name, value),))
+                REGISTERS.requests(device, ((item.name, value),), is_command=True)
                 is_refused = False
             except Misuse:
                 is_refused = True

@@ -195,13 +195,13 @@ class NamedRegisters(ABC, Generic[M]):
     """Registers that scripts write by name."""
 
     @abstractmethod
-    def requests(self, controller: M, values: NewValues, /) -> tuple[bytes, ...]:
-        """The PDUs that write values by name. Raises `Misuse` for what a register does not take."""
+    def requests(self, controller: M, values: NewValues, /, *, is_command: bool) -> tuple[bytes, ...]:
+        """The PDUs that write values by name; neighbours go together.
 
-    @abstractmethod
-    def check_values(self, controller: M, values: NewValues, /) -> None:
-        """Raises `Misuse` for values that the controller would ignore now. Scripts and recordings write them all the same: when
-        they are read, the settings on which this depends are not those of later."""
+        Raises `Misuse` for what a register does not take, of a command also for values that the controller would ignore now.
+        Scripts and recordings write those all the same: when they are read, the settings on which this depends are not those of
+        later.
+        """
 
     @abstractmethod
     def dialect(self, controller: M, /) -> Hashable:

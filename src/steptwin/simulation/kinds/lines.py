@@ -281,11 +281,10 @@ class Line(Stateful, ABC):
 
     def receive(self, client: str, data: bytes, now: Nanos) -> None:
         """Take bytes of ``client``; all answers go to `LineEndPoint.received`. The scheduler is at ``now``."""
-        found = self.connect(client)
+        found = self.clients.get(client) or self.connect(client)
         answer = self.exchange(client, found, data, now)
         if answer:
             self._came(client, found, [(now, answer)])
-        self._scheduler.notify(self.name)
 
     def _came(self, client: str, found: LineEndPoint, pieces: list[tuple[Nanos, bytes]]) -> None:
         found.received.extend(pieces)

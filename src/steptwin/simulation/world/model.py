@@ -198,26 +198,21 @@ class Model:
             raise kind.lacks(name, "vision registers")
         return kind.vision
 
-    def requests(self, step: do.Write) -> list[tuple[str, Sequence[bytes]]]:
-        """The PDUs of a write for one controller after the other. Raises `Misuse` for values that a register does not accept."""
+    def requests(self, step: do.Write, *, is_command: bool = False) -> list[tuple[str, Sequence[bytes]]]:
+        """The PDUs of a write for one controller after the other. Raises `Misuse` for values that a register does not accept, of
+        a command also for those that its controller would ignore now."""
         found: list[tuple[str, Sequence[bytes]]] = []
         for name, group in groupby(step.values, key=itemgetter(0)):
             registers, controller = self.registers(name), self.objects.controllers[name]
             self.sync(name)  # a request that is due now may change the dialect
             values = tuple(map(itemgetter(1, 2), group))
             key = (name, registers.dialect(controller), values)
-            if key not in self._encoded:
+            if is_command or key not in self._encoded:
                 if len(self._encoded) >= MOST_REMEMBERED:
                     self._encoded.clear()
-                self._encoded[key] = registers.requests(controller, values)
+                self._encoded[key] = registers.requests(controller, values, is_command=is_command)
             found.append((name, self._encoded[key]))
         return found
-
-    def check_values(self, step: do.Write) -> None:
-        """Raises `Misuse` for values that their controllers would ignore now."""
-        for name, group in groupby(step.values, key=itemgetter(0)):
-            self.sync(name)
-            self.registers(name).check_values(self.objects.controllers[name], tuple(map(itemgetter(1, 2), group)))
 
     def programs_of(self, name: str) -> Programs:
         """The programs of a controller. Raises `Misuse` for a controller without."""

@@ -7,7 +7,7 @@ from typing import overload
 from steptwin.errors import Misuse
 from steptwin.simulation.kinds.kind import MotionEnds
 from steptwin.simulation.script.control import ControllerCommand, Halt, Home, Move, Seek
-from steptwin.simulation.script.steps import Step
+from steptwin.simulation.script.steps import Step, Write
 from steptwin.simulation.world.model import Model
 
 
@@ -25,7 +25,10 @@ def ordered(model: Model, command: ControllerCommand | Seek) -> Step | Halt:
     model.sync(name)
     controller.advance(model.now)
     on = model.objects.line_of.get(name)
-    return kind.step_of(controller, None if on is None else on[0].name, command)
+    step = kind.step_of(controller, None if on is None else on[0].name, command)
+    if isinstance(step, Write):
+        model.requests(step, is_command=True)  # they are kept there for its execution
+    return step
 
 
 def motion_ends(model: Model, name: str, axis: int, seek: Seek | None = None) -> MotionEnds:

@@ -23,7 +23,6 @@ from steptwin.mic488.program_banks import load
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE
 from steptwin.mic488.slave import slave
 from steptwin.mic488.status import AxisStatus, ProgramState
-from steptwin.mic488.values import halted
 from steptwin.mic488.vision import VisionReceiver, VisionRecord
 from steptwin.points import LivePoint
 from steptwin.simulation.faults import AxisLoad
@@ -33,8 +32,6 @@ from steptwin.simulation.kinds.kind import (
     EncoderInputs,
     LineUnit,
     MotionEnds,
-    NamedRegisters,
-    NewValues,
     RunningWorld,
     SeenRecord,
     Terminals,
@@ -50,7 +47,7 @@ from steptwin.simulation.kinds.mic488.program_watch import ProgramWatch
 from steptwin.simulation.kinds.mic488.programs import WbcPrograms
 from steptwin.simulation.kinds.mic488.table import Mic488Spec
 from steptwin.simulation.kinds.mic488.view import Mic488View
-from steptwin.simulation.kinds.mic488.writes import check_positions, encode_write
+from steptwin.simulation.kinds.mic488.writes import REGISTERS
 from steptwin.simulation.kinds.programtexts import Destination, Downloading, ProgramText
 from steptwin.simulation.mechanics.channels import AxisChannel, plain_view
 from steptwin.simulation.mechanics.scale import FULL_STEPS, DriveScale, GivenScale, exact_fraction
@@ -58,7 +55,6 @@ from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.control import ControlProgram, Enable, Halt, Home, Jog, Move, Seek, StopAxes
 from steptwin.wbc.interpreter import STATEMENT_TIME
-from steptwin.wire.pdu import ModbusException, decode_request
 
 PROGRAM = {"stop": 0, "start": 1, "pause": 2}
 """PROGRAM_CTRL by action."""
@@ -88,26 +84,6 @@ class Mic488Encoders(EncoderInputs[Mic488Device]):
         check_turn(axis, counts)
 
 
-class Mic488Registers(NamedRegisters[Mic488Device]):
-    def requests(self, device: Mic488Device, values: NewValues) -> tuple[bytes, ...]:
-        return encode_write(device, values)
-
-    def check_values(self, device: Mic488Device, values: NewValues) -> None:
-        check_positions(device, values)
-
-    def dialect(self, device: Mic488Device) -> tuple[str, int]:
-        return device.firmware.name, device.data_type
-
-    def execute(self, device: Mic488Device, pdu: bytes, now: Nanos) -> bytes:
-        return device.execute(pdu, now)
-
-    def ended_by(self, device: Mic488Device, pdu: bytes) -> tuple[int, ...]:
-        try:
-            return halted(device.registers, decode_request(pdu))
-        except ModbusException:
-            return ()
-
-
 class Mic488Vision(Vision[Mic488Spec, Mic488Device]):
     def address(self, spec: Mic488Spec) -> str | None:
         return spec.vision
@@ -129,7 +105,7 @@ class Mic488Kind(ControllerKind[Mic488Spec, Mic488Device, Mic488View]):
     )
     state = state_of
     encoders = Mic488Encoders()
-    registers = Mic488Registers()
+    registers = REGISTERS
     vision = Mic488Vision()
     languages = (memory.WBC, memory.TABLES)
     dialect_keys = ("firmware",)
@@ -248,10 +224,7 @@ class Mic488Kind(ControllerKind[Mic488Spec, Mic488Device, Mic488View]):
         return _write(command, "EN", float(command.on))
 
     def move(self, device: Mic488Device, line: str | None, command: Move) -> do.Write:
-        step = _write(command, "POS_REL", command.by or 0.0) if command.to is None else _write(command, "POS_ABS", command.to)
-        if 1 <= command.axis <= AXES:
-            check_positions(device, tuple((register, value) for _, register, value in step.values))
-        return step
+        return _write(command, "POS_REL", command.by or 0.0) if command.to is None else _write(command, "POS_ABS", command.to)
 
     def home(self, device: Mic488Device, line: str | None, command: Home) -> do.Write:
         return _write(command, "HOME", command.velocity)
@@ -283,7 +256,7 @@ class Mic488Kind(ControllerKind[Mic488Spec, Mic488Device, Mic488View]):
         stops = tuple((f"M{axis}_STOP", 1.0) for axis in axes)
         values = stops if wanted.program is None else (("PROGRAM_CTRL", float(PROGRAM[wanted.program])),)
         device.advance(now)
-        for pdu in encode_write(device, values):
+        for pdu in REGISTERS.requests(device, values, is_command=False):
             slave(device.firmware.name, lenient=False).answer(device, pdu)
 
     # ------------------------------------------------------------------ its programs
