@@ -137,6 +137,7 @@ NOT_FIXED = {
     "C011": "the file is of another kind",
     "D001": "the text cannot be read at this place",
     "D010": "the error is in another file, which has its own fix",
+    "D011": "the number is in a data sheet",
 }
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from steptwin.files.world import World
+from steptwin.simulation.world.check import diagnose
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 ENDS = {
@@ -22,6 +23,11 @@ ENDS = {
 
 def example(name: str) -> World:
     return World.load(EXAMPLES / name / f"{name}.toml")
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.rglob("*.toml")), ids=lambda path: path.stem)
+def test_nothing_in_it_is_wrong_or_doubtful(path: Path) -> None:
+    assert not diagnose(path.name, path.read_text(encoding="utf-8"), lambda name: (path.parent / name).read_bytes()).findings
 
 
 @pytest.mark.parametrize("name", ENDS)

@@ -6,12 +6,19 @@ from typing import Any
 
 from steptwin.controller import MILLISECOND, Nanos
 from steptwin.errors import Misuse
+from steptwin.messages import Message
 from steptwin.simulation.mechanics.motor import StepperMotor
 from steptwin.simulation.mechanics.resonance import Resonance
 from steptwin.simulation.mechanics.scale import Loading, Scale, burden_of
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import TableSpec, key, table
 from steptwin.simulation.toml.values import flag, number, pair, permitting, points, time_value, whole, word
+
+NO_START_SPEED = Message(
+    "simulation.no-start-speed",
+    "a motor without start_speed follows every jump of the speed, and is caught only at rest once it has lost its field",
+)
+START_SPEED_HINT = Message("simulation.start-speed-hint", "the data sheet has it: pull-in speed, or maximum starting frequency")
 
 _not_negative = number(0.0)
 _rate = number(0.001, 10_000.0)
@@ -63,6 +70,8 @@ class MotorSpec(TableSpec):
     )
 
     def check(self, text: TomlText) -> None:
+        if self.start_speed is None:
+            text.warn(self.path, "D011", NO_START_SPEED(), START_SPEED_HINT())
         if self.torque[0][0] != 0.0 or any(torque < 0.0 for _, torque in self.torque):
             text.wrong((*self.path, "torque"), "D003", "a torque curve begins at 0 rev/min and is never negative")
         moves = self.inertia or self.mass

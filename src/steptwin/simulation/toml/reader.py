@@ -70,6 +70,8 @@ class TomlText:
         self.controllers = tuple(controllers)
         self.named = (*named, *controllers)
         self.findings: list[Diagnostic] = []
+        """Errors."""
+        self.warnings: list[Diagnostic] = []
         self._in_files: list[str] = []
         """Errors in files that the description names, rendered."""
         self._near = NearMiss()
@@ -121,11 +123,20 @@ class TomlText:
             return
         if adopted is not None:
             path = adopted.use
+        self.wrong_at(self._span(path), code, message, hint, fix)
+
+    def warn(self, path: Path, code: str, message: str, hint: str | None = None) -> None:
+        """The value at ``path``, or what holds it, is permitted but doubtful; of another text it is shown at its use."""
+        adopted = self._adopted.get(path[:2])
+        span = self._span(path if adopted is None else adopted.use)
+        self.warnings.append(Diagnostic(code, Severity.WARNING, span, message, hint))
+
+    def _span(self, path: Path) -> Span:
         if (*path, 0) in self._spans and path not in self._spans:
             path = *path, 0
         while path and path not in self._spans:
             path = path[:-1]
-        self.wrong_at(self._spans.get(path, Span(0, 0)), code, message, hint, fix)
+        return self._spans.get(path, Span(0, 0))
 
     def unless_wrong(self, path: Path, action: Callable[[], T]) -> T | None:
         """Result of ``action`` for the table at ``path``; None if that has an error already, or now. Errors are reported at the

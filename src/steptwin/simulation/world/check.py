@@ -1,4 +1,4 @@
-"""All errors in the description of a world and in the files that it names."""
+"""All errors and warnings in the description of a world and in the files that it names."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def diagnose(name: str, text: str, read: Callable[[str], bytes]) -> Diagnosis:
                 spec.text.wrong(key, "D009", str(error))
         blueprint = Blueprint(spec, files)
         Simulation(blueprint, keep_trace=False, keep_inputs=False)
-        found: Sequence[Diagnostic] = in_order(spec.text.findings)
+        found: Sequence[Diagnostic] = in_order([*spec.text.findings, *spec.text.warnings])
     except WorldError as error:
         found = error.findings
     return Diagnosis([_short(finding) for finding in found], () if blueprint is None else blueprint.findings)
