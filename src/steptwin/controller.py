@@ -97,7 +97,7 @@ class SendingPort(Port, Protocol):
 
 
 def sends_by_itself(port: Port) -> TypeGuard[SendingPort]:
-    """Whether a port is a `SendingPort`. `isinstance` would look at every attribute, in each branch of a world."""
+    """Whether a port is a `SendingPort`. `isinstance` would search for every attribute, in each branch of a world."""
     return hasattr(port, "on_output")
 
 

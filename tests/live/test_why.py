@@ -181,7 +181,7 @@ def test_a_question_that_is_too_long_leaves_what_is_known(run: Run, monkeypatch:
         rig.begin_time_travel()
         await asyncio.sleep(1)
         rig.do("press", button="go")
-        with pytest.raises(Misuse, match="more than 3 records and statements since 0 s: too many to look at"):
+        with pytest.raises(Misuse, match="more than 3 records and statements since 0 s: too many to search"):
             await asyncio.gather(asyncio.sleep(1), rig.why("OUT1"))
         rig.close()
 

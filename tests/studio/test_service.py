@@ -286,7 +286,7 @@ def test_others_reach_it_only_where_that_is_permitted_and_with_a_token(start_stu
         (("--tokens", "t", "--open-to-local-users"), "--open-to-local-users and --tokens exclude each other"),
         (("--view",), "--view shows one recording (.json)"),
         (("--view", "machine.toml"), "machine.toml: --view shows a recording (.json)"),
-        (("--view", "s.json", "--speed", "2"), "--speed is not for a recording that is only looked at"),
+        (("--view", "s.json", "--speed", "2"), "--speed is not for a recording that is only viewed"),
     ],
 )
 def test_options_that_do_not_go_together_are_named(options: tuple[str, ...], message: str, tmp_path: Path) -> None:

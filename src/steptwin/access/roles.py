@@ -38,6 +38,6 @@ ACT = Permit(Role.OPERATOR, control=True)
 TAKE = Permit(Role.OPERATOR)
 """Takes control, which cannot need it."""
 KEEP = Permit(Role.OPERATOR)
-"""Writes a file to look at later, and changes nothing at the machine."""
+"""Writes a file for later, and changes nothing at the machine."""
 SERVICE = Permit(Role.ENGINEER, control=True)
 """Reaches below the commands of an operator, or outside of the subject."""

@@ -50,6 +50,6 @@ def command(
             group.refuse("devices without a world: give a MACHINE.toml too")
     if page.view:
         for group in (live, options):
-            group.refuse("a recording that is only looked at")
+            group.refuse("a recording that is only viewed")
     if not run_studio(page, UpOptions(world=world, ready_file=ready_file, live=live, run=options, log=log)):
         raise typer.Exit(1)

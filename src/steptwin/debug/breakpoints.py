@@ -94,7 +94,7 @@ class Breakpoint:
 
 
 class Watch:
-    """A data breakpoint: what it looks at, and whether it is hit. Raises `Misuse` for a condition that is none, and for unknown
+    """A data breakpoint: its value, and whether it is hit. Raises `Misuse` for a condition that is none, and for unknown
     names."""
 
     def __init__(self, number: int, asked: DataPoint, calculate: ResolveExpression) -> None:

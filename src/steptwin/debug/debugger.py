@@ -112,7 +112,7 @@ class Debugger:
 
     @property
     def view(self) -> Simulation:
-        """The world as it is where the debugger stands; to look at only."""
+        """The world as it is where the debugger stands; it may be read only."""
         return self._lookahead.world if self._is_past else self._world
 
     @property

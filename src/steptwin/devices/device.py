@@ -280,7 +280,7 @@ class ConnectedDevice:
     async def _report_ignored(self, request: steps.Request, before: frozenset[int]) -> None:
         """As a twin does it. ``before``: the axes that would have ignored it just before. Those that still do have ignored it: a
         program of the device, or another master, may have switched the drives of the others. It has been answered, whatever
-        becomes of the look at its drives."""
+        becomes of the reading of its drives."""
         after: frozenset[int] = frozenset()
         if before:
             with contextlib.suppress(LineFailure):

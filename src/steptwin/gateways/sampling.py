@@ -262,7 +262,7 @@ class Sampler:
             self._plan(name, self._now())
 
     def hasten(self, controller: str) -> None:
-        """It may have changed, or will: look at it when the interval is over."""
+        """It may have changed, or will: sample it when the interval is over."""
         if controller in self._last:
             self._plan(controller, max(self._last[controller] + self._slots, self._now()))
 

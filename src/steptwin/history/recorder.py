@@ -297,7 +297,7 @@ class Recorder:
         return self._batch
 
     def _due(self, events: Iterable[Event], now: Nanos) -> list[str]:
-        """Twins to look at: with an event, or not looked at for a while."""
+        """Twins to sample: those with an event, and those without a sample for a while."""
         if self._has_devices:
             return []
         busy = {event.controller for event in events}

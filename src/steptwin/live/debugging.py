@@ -1,7 +1,7 @@
 """The debugger of a world that runs in real time (`steptwin.subject.debugcommands`).
 
 It exists while somebody subscribes to its events. Before the world goes on, the debugger looks ahead (`Debugger.look_ahead`) and
-limits it; so time stops at a breakpoint, and `Pause` and `Resume` do what they always do. While time stands it can look at the
+limits it; so time stops at a breakpoint, and `Pause` and `Resume` do what they always do. While time stands it can show the
 past, as far as that is kept.
 """
 

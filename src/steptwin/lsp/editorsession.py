@@ -1,7 +1,7 @@
 """View of one client: the texts it has open, and their analyses. No input, no output but through `Files`.
 
 Texts go by normal addresses (`steptwin.lsp.files.normal`), whatever spelling the client uses. A change makes a new analysis of
-that text only; the others of its controller are made anew when they are next asked for and something they look at has changed.
+that text only; the others of its controller are made anew when they are next asked for and something they read has changed.
 What a language needs of the session is `steptwin.lsp.language.OtherTexts`.
 
 A question may be interrupted at any place by an exception. So what is made of a text is stored when it is complete.

@@ -64,7 +64,7 @@ async def _initialized(server: EditorServer, params: lsp.InitializedParams) -> N
     watchers = [lsp.FileSystemWatcher(f"**/*{one.suffix}") for one in LANGUAGES.values()]
     options = lsp.DidChangeWatchedFilesRegistrationOptions(watchers)
     registration = lsp.Registration("files", lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES, options)
-    # A client that refuses is asked nothing: files are looked at anyway when an answer depends on them.
+    # A client that refuses is asked nothing: files are read anyway when an answer depends on them.
     with suppress(JsonRpcException):
         await server.client_register_capability_async(lsp.RegistrationParams([registration]))
 

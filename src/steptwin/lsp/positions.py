@@ -33,7 +33,7 @@ class LineIndex:
         self._ascii = text.isascii()
 
     def changed(self, start: int, end: int, text: str) -> LineIndex:
-        """The text with ``text`` between two places. Only lines there, and one on each side, are looked at: a line end may have
+        """The text with ``text`` between two places. Only lines there, and one on each side, are made anew: a line end may have
         got its other half."""
         first, last = max(self.line_of(start) - 1, 0), min(self.line_of(end) + 2, len(self.starts))
         new = LineIndex.__new__(LineIndex)

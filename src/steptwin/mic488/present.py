@@ -60,8 +60,8 @@ def current_line(device: Mic488Device) -> SourceLine | None:
 
 def statement_of(device: Mic488Device) -> str | None:
     """The statement as text: its line and its source."""
-    place = current_line(device)
-    return None if place is None else f"line {place.line}: {place.text}"
+    line = current_line(device)
+    return None if line is None else f"line {line.line}: {line.text}"
 
 
 def empty_banks(name: str, device: Mic488Device) -> list[str]:
@@ -105,19 +105,19 @@ class Mic488State(StateReader[Mic488Device]):
         return controller_status(device.status())
 
     def program(self, device: Mic488Device, now: Nanos) -> StateProgram:
-        place, fault = current_line(device), device.program.fault
+        line, fault = current_line(device), device.program.fault
         activity = ACTIVITIES[device.program.state]
         text = activity.value
-        if place is not None:
-            text += f" at line {place.line}: {place.text}"
+        if line is not None:
+            text += f" at line {line.line}: {line.text}"
         elif fault is not None:
             text += f" by an error: {fault.text}"
         return StateProgram(
             state=activity,
             text=text,
-            file=None if place is None else place.file,
-            line=None if place is None else place.line,
-            statement=None if place is None else place.text,
+            file=None if line is None else line.file,
+            line=None if line is None else line.line,
+            statement=None if line is None else line.text,
             variables=device.program.variables(now),
         )
 

@@ -217,9 +217,9 @@ def _do_circle(plane: _Plane, row: RowValues) -> bool:
     arc = _circle(row, row[3] or 0.0)
     begin_p = plane.motor_p(arc.begin, "DOCIRC")
     if any(abs(begin - count) > 1 for begin, count in zip(begin_p, plane.counts, strict=True)):
-        place = "({}, {})".format(*map(real_text, plane.place_u()))
+        position = "({}, {})".format(*map(real_text, plane.place_u()))
         begin = "({}, {})".format(*map(real_text, arc.begin))
-        raise ProgramFault(CIRCLE_BEGINS_ELSEWHERE(begin=begin, place=place))
+        raise ProgramFault(CIRCLE_BEGINS_ELSEWHERE(begin=begin, place=position))
     return plane.arc(arc, plane.motor_p(arc.end, "DOCIRC"))
 
 

@@ -354,10 +354,10 @@ class RegisterMap:
 
     def find(self, space: Space, address: int) -> Register | None:
         """The register that covers ``address`` in ``space``, None in a hole."""
-        place = bisect_right(self._starts[space], address) - 1
-        if place < 0:
+        index = bisect_right(self._starts[space], address) - 1
+        if index < 0:
             return None
-        register = self._spaces[space][place]
+        register = self._spaces[space][index]
         return register if address <= register.last else None
 
     def at(self, space: Space, address: int) -> Register:
@@ -365,9 +365,9 @@ class RegisterMap:
         found = self.find(space, address)
         if found is not None:
             return found
-        place = bisect_right(self._starts[space], address)
+        index = bisect_right(self._starts[space], address)
         members = self._spaces[space]
-        near = [REGISTER_AT(name=r.name, place=_extent(r)) for r in members[max(place - 1, 0) : place + 1]]
+        near = [REGISTER_AT(name=r.name, place=_extent(r)) for r in members[max(index - 1, 0) : index + 1]]
         raise UnknownRegister(
             NO_REGISTER_HERE(firmware=self.firmware.name, space=space.value, address=show_address(address), near=near)
         )
@@ -380,9 +380,9 @@ class RegisterMap:
             if register is not None:
                 stop = min(end, register.last + 1)
             else:
-                place = bisect_right(self._starts[space], address)
+                index = bisect_right(self._starts[space], address)
                 starts = self._starts[space]
-                stop = min(end, starts[place]) if place < len(starts) else end
+                stop = min(end, starts[index]) if index < len(starts) else end
             yield RegisterSlice(register, address, stop - address)
             address = stop
 

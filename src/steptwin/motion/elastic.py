@@ -227,7 +227,7 @@ class Response:
 
 def _first(f: Callable[[Nanos], float], bend: Callable[[Nanos, Nanos], float], begin: Nanos, end: Nanos) -> Nanos | None:
     """First moment from ``begin`` to ``end`` at which f is not below 0. ``bend``: the most that its second derivative (per s²)
-    can be between two moments: where even that does not lead to 0, nothing is looked at."""
+    can be between two moments: where even that does not lead to 0, nothing is searched."""
     if begin > end:
         return None
     parts = [(begin, f(begin), end, f(end))]

@@ -370,7 +370,7 @@ class Hub:
         return self._moment[1]
 
     def tick(self, now: Nanos) -> None:
-        """Called about 30 times a second while there are viewers: reads what is watched, spreads events, looks at the clock."""
+        """Called about 30 times a second while there are viewers: reads what is watched, spreads events, sends the clock."""
         self._describe()
         points = self.watches.due(now)
         if points:

@@ -386,7 +386,7 @@ class RestoredPayload(JsonPayload):
     kind: ClassVar[str] = "restored"
     axis: ClassVar[None] = None
     snapshot: Annotated[str | None, "Its name; null without one."]
-    """None for a moment that was looked at."""
+    """None for a moment that was shown."""
 
     @property
     def text(self) -> str:

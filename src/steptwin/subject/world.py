@@ -46,7 +46,7 @@ STEPS = (
 
 
 LOOKS = frozenset({command.ReadPoints, command.ReadState, command.Encoders, command.Describe})
-"""Commands that change nothing, and bring to the present what they look at."""
+"""Commands that change nothing, and bring to the present what they read."""
 
 
 CANNOT_DO = Message("subject.cannot-do", "{name!r} is {kind}, which cannot do {command}; it can do {known}")

@@ -252,7 +252,7 @@ class Interpreter(Stateful):
             event = next((e for e in self._pending_events() if at_end or not code.entries[e].hard), None)
             if event is not None:
                 self._enter(code, event, now)
-        if now < self.not_before:  # the interrupt for which a DELAY was looked at again has been dropped meanwhile
+        if now < self.not_before:  # the interrupt that made a DELAY due earlier has been dropped meanwhile
             self.due = self.not_before
             return
         if self.statement_time == 0:

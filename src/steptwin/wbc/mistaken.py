@@ -16,7 +16,7 @@ from steptwin.wbc.scope import ProgramScope
 NOTHING_CHANGES = Message("wbc.nothing-changes", "nothing changes {name} while the program waits here")
 NOTHING_CHANGES_BOTH = Message("wbc.nothing-changes-both", "nothing changes {one} and {other} while the program waits here")
 REMOVE_OR_DID_YOU_MEAN = Message("wbc.remove-or-did-you-mean", "remove it, or did you mean {meant}?")
-WAIT_LOOKS_AT_REGISTERS = Message("wbc.wait-looks-at-registers", "a WAIT looks at registers, or at what an interrupt sets")
+WAIT_LOOKS_AT_REGISTERS = Message("wbc.wait-looks-at-registers", "a WAIT compares registers, or what an interrupt sets")
 IS_A_VARIABLE = Message("wbc.is-a-variable", "{name} is a variable: it has nothing to do with {meant}")
 IS_SET_BUT_NEVER_USED = Message("wbc.is-set-but-never-used", "{name} is set but never used")
 

@@ -86,7 +86,7 @@ class Hold(NamedTuple):
 
 
 TOO_MUCH_TO_SEARCH = Message(
-    "why.too-much-to-search", "more than {most} records and statements since {begin:g} s: too many to look at"
+    "why.too-much-to-search", "more than {most} records and statements since {begin:g} s: too many to search"
 )
 
 

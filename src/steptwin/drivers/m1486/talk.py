@@ -44,7 +44,7 @@ class ChipRequestKind(enum.Enum):
 
     LINE = "typed, verified, then CR"
     SELECT = "only the selection of the chip"
-    KILL = "at once, with its CR; the echo is looked at afterwards"
+    KILL = "at once, with its CR; the echo is checked afterwards"
     LISTEN = "nothing is sent: an answer is pending"
     LETTER = "nothing is sent: several chips are to send their type letters"
     UPLOAD = "nothing is sent: a program uploads"

@@ -29,7 +29,7 @@ from steptwin.simulation.toml.addresses import Address, is_loopback, parse_addre
 from steptwin.system import reason
 
 LOOK_S = 60.0
-"""Between looks at its certificate."""
+"""Time between two checks of its certificate."""
 PRODUCT_URI = "urn:steptwin"
 
 

@@ -1,4 +1,4 @@
-"""A recording to look at: its world at the end, and its whole past."""
+"""A recording to view: its world at the end, and its whole past."""
 
 from __future__ import annotations
 

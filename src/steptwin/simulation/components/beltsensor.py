@@ -66,10 +66,10 @@ class Sensor(Contact):
             return
         self._seen = version
         drive, load = self._belt.drive, self._belt.load
-        place = drive.grid_position(now)
-        is_seen = load.covering(self._at, place, of_marks=self._of_marks) is not None
+        position = drive.grid_position(now)
+        is_seen = load.covering(self._at, position, of_marks=self._of_marks) is not None
         self.change(is_seen is not self.normally_closed, now)
-        self._due = next_change(drive, *load.edges(self._at, place, of_marks=self._of_marks), now)
+        self._due = next_change(drive, *load.edges(self._at, position, of_marks=self._of_marks), now)
 
     def deadline(self) -> Nanos | None:
         moments = (moment for moment in (self.bounce_due(), self._due) if moment is not None)

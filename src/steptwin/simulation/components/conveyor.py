@@ -107,7 +107,7 @@ class Conveyor(TerminalComponent):
         self._moved_by = moved_by
         self._turning_points = turning_points
         self._then = drive.grid_position(block.scheduler.now)
-        """The place of the belt when it was looked at last: since then it has moved one way while anything stands."""
+        """The position of the belt at the last update: since then it has moved one way while anything stands."""
         self.following: Conveyor | None = None
         self.load = Load()
         self.fed = 0
@@ -247,7 +247,7 @@ class Conveyor(TerminalComponent):
 
     def _limit(self, front: int, stride: int, ahead: int | None, now: Nanos) -> int | None:
         """The place up to which a workpiece can go, with its front at ``front``. ``ahead``: behind one that stands before it."""
-        limits = [place for place in self._raised() if place >= front - stride]
+        limits = [position for position in self._raised() if position >= front - stride]
         if ahead is not None:
             limits.append(ahead)
         if self._is_blocked(now):

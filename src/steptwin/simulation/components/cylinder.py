@@ -99,9 +99,9 @@ class Cylinder(TerminalComponent):
         if force != self.travel.direction:
             self.travel.send(force, now)
             self.block.scheduler.notify(self.block.name)
-        place = self.travel.grid_position(now)
-        self.block.put(EXTENDED, float(place == self.travel.full))
-        self.block.put(RETRACTED, float(place == 0))
+        position = self.travel.grid_position(now)
+        self.block.put(EXTENDED, float(position == self.travel.full))
+        self.block.put(RETRACTED, float(position == 0))
 
     def _switch(self, now: Nanos) -> None:
         """Move the spool if that is due."""

@@ -140,8 +140,8 @@ class Follower(Stateful):
         here = self.shaft.grid_position(begin)
         for heading in (1, -1):
             now = begin
-            for place in self._cam.corners(here, heading):
-                due = self.shaft.reaches(place, now, heading)
+            for corner in self._cam.corners(here, heading):
+                due = self.shaft.reaches(corner, now, heading)
                 if due is None or (end is not None and due >= end):
                     break
                 if due > now + 1:

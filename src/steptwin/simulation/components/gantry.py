@@ -135,9 +135,9 @@ class Gantry(Touch):
     def moved(self) -> tuple[str, MovedChannel]:
         half, other_half = (end.mechanism.build.sign / (2.0 * float(end.scale.pulses_per_unit)) for end in self.ends)
         other = self.ends[1].mechanism
-        place = other.controller, str(other.number)
+        axis = other.controller, str(other.number)
         return self.ends[0].spec.name, MovedChannel(
-            self.block.name, "position", self.unit, half, other=place, other_per_pulse=other_half
+            self.block.name, "position", self.unit, half, other=axis, other_per_pulse=other_half
         )
 
     @property

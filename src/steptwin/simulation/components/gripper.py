@@ -87,9 +87,9 @@ class Gripper(Carrier):
         if direction != self.travel.direction:
             self.travel.send(direction, now)
             self.block.scheduler.notify(self.block.name)
-        place = self.travel.grid_position(now)
-        self.block.put(OPENED, float(place == 0))
-        self.block.put(CLOSED, float(place == self.travel.full))
+        position = self.travel.grid_position(now)
+        self.block.put(OPENED, float(position == 0))
+        self.block.put(CLOSED, float(position == self.travel.full))
         self.block.put(HELD, float(self.is_held))
 
     def deadline(self) -> Nanos | None:

@@ -101,9 +101,9 @@ def _turn(axis: tuple[str, int], counts: int) -> Turn:
 
 def _motion(command: Move | Home | Seek, within: Nanos | None) -> Repeat:
     """The motion that is commanded, to its end: a status from before does not count."""
-    place = command.controller, command.axis
-    reached = ExpectReached(*place, command if isinstance(command, Seek) else None)
-    return Repeat(1, (Order(command), UntilOver(*place, within), reached), is_one=True)
+    axis = command.controller, command.axis
+    reached = ExpectReached(*axis, command if isinstance(command, Seek) else None)
+    return Repeat(1, (Order(command), UntilOver(*axis, within), reached), is_one=True)
 
 
 def _move(axis: tuple[str, int], to: float | None, by: float | None, within: Nanos | None) -> Repeat:

@@ -112,11 +112,11 @@ BYTE_IS_WORN = Message("simulation.byte-is-worn", "after {saves} saves byte {byt
 def _wear(active: ActiveFault, controller: FaultyController, old: bytes, kept: bytearray, now: Nanos) -> None:
     good = active.fault.whole("writes") or 0
     if active.struck > good and len(active.worn) < len(kept):
-        sound = [place for place in range(len(kept)) if place not in active.worn]
+        sound = [index for index in range(len(kept)) if index not in active.worn]
         active.worn.append(sound[active.chance.below(len(sound))])
         controller.report(active, now, BYTE_IS_WORN(saves=active.struck, byte=active.worn[-1]))
-    for place in active.worn:
-        kept[place] = old[place]
+    for index in active.worn:
+        kept[index] = old[index]
 
 
 PHYSICS = (

@@ -211,9 +211,9 @@ class FaultyPort(Stateful):
     def _request_of(self, raw: bytes) -> bytes | None:
         """The oldest request that ``raw`` can be the answer to; on RTU older ones get none any more."""
         key = self._key(raw)
-        for place, asked in enumerate(self._asked):
+        for index, asked in enumerate(self._asked):
             if self._key(asked) == key:
-                for _ in range(place if self._line is LineProtocol.RTU else 0):
+                for _ in range(index if self._line is LineProtocol.RTU else 0):
                     self._asked.popleft()
                 self._asked.remove(asked)
                 return asked

@@ -23,13 +23,13 @@ def spoil(data: bytes, actives: Sequence[ActiveFault], now: Nanos, report: Fault
         elif isinstance(effect, InsertEffect) and active.strikes(now):
             effect.act(active, run, report)
     if bytewise:
-        for place, byte in enumerate(data):
+        for index, byte in enumerate(data):
             _pass(
                 run,
                 byte,
                 bytewise,
                 now,
-                lambda active, what, at=place: report(active, BYTE_OF(place=at + 1, count=len(data), what=text_of(what))),
+                lambda active, what, at=index: report(active, BYTE_OF(place=at + 1, count=len(data), what=text_of(what))),
             )
     else:
         run.put(data)

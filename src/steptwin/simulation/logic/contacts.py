@@ -279,10 +279,10 @@ class Switch(Contact):
         self._version = version
         if is_same and (self._due is None or self._due > now):
             return
-        place = self._carriage.grid_position(now)
-        self.on = self.zone.on(place, was_on=self.on)
+        position = self._carriage.grid_position(now)
+        self.on = self.zone.on(position, was_on=self.on)
         self.change(self.on is not self.normally_closed, now)
-        self._predict(place, now)
+        self._predict(position, now)
 
     def _predict(self, place: int, now: Nanos) -> None:
         below, above = self.zone.edges(place, is_on=self.on)

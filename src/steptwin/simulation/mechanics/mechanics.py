@@ -200,7 +200,7 @@ class Mechanism(Stateful):
     # ------------------------------------------------------------------ position
 
     def trajectory(self, now: Nanos) -> Trajectory:
-        """The trajectory at ``now``, which is the scheduler's moment or later. What is looked at in advance changes nothing: a
+        """The trajectory at ``now``, which is the scheduler's moment or later. A trajectory of later changes nothing: a
         trajectory is renewed at the scheduler's moment."""
         drive = self._drive
         if drive.revision != self._revision or (self._hold is not None and self._hold.is_switched(drive, self._scheduler.now)):

@@ -24,7 +24,7 @@ _SMALL = 0.5
 _STEPS = 64
 """Steps of the solution for each period of the swing."""
 _LOOKS = 8
-"""After so many steps the energy is looked at."""
+"""After so many steps the energy is checked."""
 _LONGEST = 20
 """Swings after which a rotor that has neither been held nor lost counts as lost."""
 

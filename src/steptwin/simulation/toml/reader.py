@@ -77,7 +77,7 @@ class TomlText:
         self._near = NearMiss()
         self._spans: Mapping[Path, Span] = {}
         self._wrong: set[Path] = set()
-        """Errors in the order of their reports; tables of these are not looked at further."""
+        """Errors in the order of their reports; tables of these are not checked further."""
         self._left_out: set[str] = set()
         self._left_out_uses: tuple[str, ...] = ()
         """Beginnings of names from uses with errors."""
@@ -285,14 +285,14 @@ class TomlText:
         span, meant = self._spans.get(path), self.meant(name, known)
         if span is None or meant is None:
             return None
-        place = self.source.text.find(name, span.start, span.end)
-        return None if place < 0 else Fix(Span(place, place + len(name)), meant)
+        begin = self.source.text.find(name, span.start, span.end)
+        return None if begin < 0 else Fix(Span(begin, begin + len(name)), meant)
 
     def replacement(self, path: Path, old: str, new: str | None) -> Fix | None:
         """The fix that puts a word in the place of the last such in what is at ``path``: its key or its text."""
         span = self._spans.get(path)
-        place = -1 if span is None else self.source.text.rfind(old, span.start, span.end)
-        return None if place < 0 or new is None else Fix(Span(place, place + len(old)), new)
+        begin = -1 if span is None else self.source.text.rfind(old, span.start, span.end)
+        return None if begin < 0 or new is None else Fix(Span(begin, begin + len(old)), new)
 
     def doubled(self, name: str) -> Fix | None:
         """The fix that writes ``[[name]]`` for ``[name]``."""

@@ -93,7 +93,7 @@ class Simulation(Model):
             self.start(spec.name, partial(do.run_through, steps, spec.repeat))
 
     def subscribe(self, subscriber: WorldSubscriber) -> None:
-        """Let it look at the world from now on, until `unsubscribe`."""
+        """Call it from now on, until `unsubscribe`."""
         self._scripts.subscribe(subscriber)
 
     def unsubscribe(self, subscriber: WorldSubscriber) -> None:

@@ -53,8 +53,8 @@ def _states(
     if resource.kind is ResourceKind.AXIS:
         for axis in simulation.kind(controller).state(simulation.controller(controller), simulation.now).axes:
             if axis.moving and resource.name in ("", str(axis.number)):
-                place = "" if axis.position is None else f" at {axis.position:g} {axis.unit}"
-                yield f"{controller}.{axis.name} moves{place}"
+                position = "" if axis.position is None else f" at {axis.position:g} {axis.unit}"
+                yield f"{controller}.{axis.name} moves{position}"
     elif resource.kind is ResourceKind.PIN and resource.name:
         yield from _level(simulation, controller, resource.name, drivers, held)
 

@@ -190,14 +190,14 @@ class ProgramWatch:
 def _describe(axis: Axis, before: AxisStatus, now: Nanos) -> str:
     """The present motion of an axis as text."""
     name, unit, gear = f"M{axis.number}", axis.config.unit_name, axis.gear
-    place = f"{real_text(axis.coordinate_p(now) / gear)} {unit}"
+    position = f"{real_text(axis.coordinate_p(now) / gear)} {unit}"
     match axis.status:
         case AxisStatus.OFF:
             return f"{name} off"
         case AxisStatus.ON if before is AxisStatus.OFF:
             return f"{name} on"
         case AxisStatus.ON:
-            return f"{name} at rest at {place}"
+            return f"{name} at rest at {position}"
         case AxisStatus.VELOCITY if axis.velocity_p == 0.0:
             return f"{name} slows down from {real_text(axis.profile.velocity(now) / gear)} {unit}/s"
         case AxisStatus.VELOCITY:
@@ -209,4 +209,4 @@ def _describe(axis: Axis, before: AxisStatus, now: Nanos) -> str:
         case AxisStatus.HOMING:
             return f"{name} homes"
         case status:
-            return f"{name} at {place}, {AXIS_STATUS_TEXTS[status]}"
+            return f"{name} at {position}, {AXIS_STATUS_TEXTS[status]}"
