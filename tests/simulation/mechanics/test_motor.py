@@ -15,7 +15,7 @@ from steptwin.controller import SECOND
 from steptwin.errors import Misuse
 from steptwin.motion import MotionState, Segment, plan_position, plan_velocity
 from steptwin.motion.ramps import SpeedCurve, plan_endless
-from steptwin.simulation.mechanics.motor import FASTEST, Burden, StepperMotor, _first_below_0, _first_not_below_0, _roots
+from steptwin.simulation.mechanics.motor import FASTEST, Burden, StepperMotor, _first_below_0, _first_not_below_0, roots
 from steptwin.simulation.mechanics.trajectory import Build, MechanicalState, Trajectory
 
 # ---------------------------------------------------------------------- thresholds
@@ -402,5 +402,5 @@ def test_how_deep_it_falls_is_looked_at_where_it_is_lowest() -> None:
 @given(st.floats(1e-12, 1e-6), st.floats(0.01, 10.0), st.sampled_from([1, -1]), st.floats(0.5, 2.0))
 def test_a_root_near_0_is_exact(root: float, other: float, sign: int, scale: float) -> None:
     """Of scale · (u + root) · (u + other), and of its mirror image."""
-    found = sorted(_roots((scale * root * other, sign * scale * (root + other), scale)), key=abs)
+    found = sorted(roots((scale * root * other, sign * scale * (root + other), scale)), key=abs)
     assert found == [pytest.approx(-sign * root, rel=1e-9), pytest.approx(-sign * other, rel=1e-9)]

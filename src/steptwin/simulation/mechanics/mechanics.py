@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from operator import attrgetter
 from typing import ClassVar, NamedTuple, Protocol
 
-from steptwin.controller import MILLISECOND, Nanos
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.motion import Profile
@@ -84,6 +84,7 @@ LEAVES_LOWER = Message(
 )
 HAS_NO_POWER = Message("simulation.axis-has-no-power", "{axis} has no power")
 HAS_POWER_AGAIN = Message("simulation.axis-has-power-again", "{axis} has power again")
+FOLLOWS = Message("simulation.follows-its-field", "{axis} follows its field, {pulses} pulses behind")
 STANDS = Message("simulation.stands-behind", "{axis} stands, {pulses} pulses behind")
 
 
@@ -238,6 +239,9 @@ class Mechanism(Stateful):
                 self._turn_encoders(now)
             if self._stall_due is not None and self._stall_due <= now:
                 self._watch_motor(now)
+                if self._lets_go(now):
+                    self._renew(drive, now)
+                    self._scheduler.notify(self.controller)
             if self._stop_due is not None and self._stop_due <= now:
                 self._watch_stops(now)
             if self._rest_due is not None and self._rest_due <= now:
@@ -303,10 +307,15 @@ class Mechanism(Stateful):
             self._stop = stop
         self._stop_due = self._trajectory.next_stop(now)
 
+    def _lets_go(self, now: Nanos) -> bool:
+        """Whether the field loses the rotor at this moment, and the rotor moves by itself from then on."""
+        is_free = self.build.coasts_unpowered and not self._blocked and self._trajectory.coasting is None
+        return is_free and self._trajectory.at(now).stalled
+
     def _renew(self, drive: Drive, now: Nanos, state: MechanicalState | None = None, *, rests: bool = False) -> None:
         """Compute a new trajectory after a change of the drive's plan or of the mechanics. ``rests``: a coasting rotor stands
         now."""
-        before, plan = self._trajectory, drive.plan
+        before, plan, was_stalled = self._trajectory, drive.plan, self._stalled
         if state is None:
             if self._simple:
                 here = self.build.sign * plan.count(now) + self.build.zero
@@ -325,6 +334,9 @@ class Mechanism(Stateful):
             coasting, state = self._hold.motion(
                 drive, before, state, now, is_new=is_new, burden=self._carried, stands=self._blocked or rests
             )
+        if coasting is not None and self.build.coasts_unpowered:
+            jump = 0.0
+        is_caught = before.coasting is not None and coasting is None and was_stalled and not state.stalled
         self._trajectory = Trajectory(
             self._loaded(),
             plan,
@@ -334,8 +346,14 @@ class Mechanism(Stateful):
             jump=jump,
             coasting=coasting,
             vibration=before.vibration(now),
-            needed=before.needs(now),
+            needed=self._needed(drive, now) if is_caught else before.needs(now),
         )
+        if self._hold is not None and self._lets_go(now):
+            self._watch_motor(now)
+            coasting, state = self._hold.motion(
+                drive, before, self._trajectory.at(now), now, is_new=is_new, burden=self._carried, stands=False
+            )
+            self._trajectory = Trajectory(self._loaded(), plan, now, state, coasting=coasting)
         self._changes += 1
         if self._encoders:
             self._turn_encoders(now)
@@ -344,7 +362,7 @@ class Mechanism(Stateful):
         if self.build.low is not None or self.build.high is not None:
             self._watch_stops(now)
         if self._hold is not None:
-            self._watch_fall(now, coasting)
+            self._watch_fall(now, coasting, is_caught=is_caught)
 
     # ------------------------------------------------------------------ load
 
@@ -361,13 +379,22 @@ class Mechanism(Stateful):
         own = Burden(motor.inertia, motor.friction, motor.load).plus(more)
         return replace(self.build, motor=replace(motor, inertia=own.inertia, friction=own.friction, load=own.load))
 
-    def _watch_fall(self, now: Nanos, coasting: Profile | None) -> None:
-        """Report that a rotor that its field does not hold begins to move, and that it rests again."""
+    def _needed(self, drive: Drive, now: Nanos) -> float | None:
+        """The torque that the motion needs of a motor whose field has just caught the rotor, N·m."""
+        motor, profile = self._loaded().motor, profile_of(drive.plan)
+        part = bisect_right(profile.ends, now - profile.start)
+        if motor is None or part >= len(profile.segments):
+            return None
+        return motor.need_at(profile.segments[part], (now - profile.start) / SECOND, self.build.sign)
+
+    def _watch_fall(self, now: Nanos, coasting: Profile | None, *, is_caught: bool = False) -> None:
+        """Report that a rotor that its field does not hold begins to move, and that it rests again or is caught."""
         falls = coasting is not None and coasting.moving(now)
         if falls is not self._falls and self._hold is not None:
             self._falls = falls
             lost = self.lost(now)
-            text = self._hold.why(axis=self._name) if falls else STANDS(axis=self._name, pulses=lost)
+            stands = FOLLOWS if is_caught and self._trajectory.moves(now) else STANDS
+            text = self._hold.why(axis=self._name) if falls else stands(axis=self._name, pulses=lost)
             facts = ("axis", self.number), ("element", self._name), ("falls", falls), ("lost", lost)
             self._scheduler.record(self.controller, "event", "fall", text, *facts)
         self._rest_due = coasting.end if coasting is not None and falls else None

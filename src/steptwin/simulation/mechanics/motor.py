@@ -5,7 +5,8 @@ Torques in N·m, speeds in pulses/s. While the torque that a motion needs,
     inertia · acceleration + friction · direction + load,
 
 does not exceed the curve at its speed, the rotor follows the field. Where it exceeds the curve, the rotor stops at once, and
-pulses are lost until the field is slow enough and the torque is sufficient; then the rotor synchronises. Velocity within a
+pulses are lost until the field is slow enough and the torque is sufficient; then the rotor synchronises. One that may move
+without current does so meanwhile (`steptwin.simulation.mechanics.catching`). Velocity within a
 segment is a polynomial, so both moments are computed in closed form. What it does in a band of resonance is in
 `steptwin.simulation.mechanics.resonance`, what it does when its field stops at once in `steptwin.simulation.mechanics.potential`.
 """
@@ -268,7 +269,7 @@ def _first_below_0(q: Quadratic, begin: float, end: float, slack: float) -> floa
         lowest = end if q[2] <= 0.0 else min(end, -q[1] / (2.0 * q[2]))
         if _at(q, lowest) < -slack:
             return begin
-    for u in sorted(u for u in _roots(q) if _slope(q, u) < 0.0):
+    for u in sorted(u for u in roots(q) if _slope(q, u) < 0.0):
         if begin < u <= end:
             return u if at_end < -slack or u < end else None
     if at_end >= -slack:
@@ -286,7 +287,7 @@ def _first_not_below_0(all_q: list[Quadratic], begin: float, end: float, slack: 
             return value > 0.0
         return _slope(q, u) >= 0.0 or (q[2] > 0.0 and _at(q, -q[1] / (2.0 * q[2])) >= -slack)
 
-    rising = sorted(u for q in all_q for u in _roots(q) if begin < u < end and _slope(q, u) > 0.0)
+    rising = sorted(u for q in all_q for u in roots(q) if begin < u < end and _slope(q, u) > 0.0)
     return next((u for u in (begin, *rising) if all(is_up(q, u) for q in all_q)), None)
 
 
@@ -298,7 +299,7 @@ def _slope(q: Quadratic, u: float) -> float:
     return q[1] + 2.0 * q[2] * u
 
 
-def _roots(q: Quadratic) -> list[float]:
+def roots(q: Quadratic) -> list[float]:
     """Where q passes through 0."""
     q0, q1, q2 = q
     if q2 == 0.0:

@@ -1,8 +1,9 @@
-"""The hold of a field on its rotor: when the rotor coasts, and how: without current, with too little of it, or after a stop
-without ramp."""
+"""The hold of a field on its rotor: when the rotor coasts, and how: without current, with too little of it, after a stop
+without ramp, or after it has lost its field."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import ClassVar
 
 from steptwin.controller import Nanos
@@ -10,6 +11,7 @@ from steptwin.messages import Message
 from steptwin.motion import Profile, at_rest
 from steptwin.motion.divisions import profile_of
 from steptwin.motioncontroller import Drive
+from steptwin.simulation.mechanics.catching import catch_of
 from steptwin.simulation.mechanics.coasting import CoastingRotor, slow_from
 from steptwin.simulation.mechanics.motor import Burden, StepperMotor
 from steptwin.simulation.mechanics.potential import PeriodicPotential
@@ -18,6 +20,7 @@ from steptwin.state import Stateful
 
 RUNS_ON = Message("simulation.runs-on", "{axis} runs on after a stop without ramp")
 MOVES_WITH_LITTLE_CURRENT = Message("simulation.moves-with-little-current", "{axis} moves with too little current")
+MOVES_WITHOUT_FIELD = Message("simulation.moves-without-field", "{axis} moves as its load has it: it has lost its field")
 MOVES_WITHOUT_CURRENT = Message("simulation.moves-without-current", "{axis} moves without current")
 
 
@@ -25,7 +28,17 @@ class RotorHold(Stateful):
     """Whether the field holds its rotor, from moment to moment."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("_build", "_motor")
-    __slots__ = (*FIXED, "_on_since", "_overruns", "due", "has_current", "is_coasting", "is_powered")
+    __slots__ = (
+        *FIXED,
+        "_is_lost",
+        "_may_be_caught",
+        "_on_since",
+        "_overruns",
+        "due",
+        "has_current",
+        "is_coasting",
+        "is_powered",
+    )
 
     def __init__(self, build: Build, motor: StepperMotor, now: Nanos) -> None:
         self._build = build
@@ -34,6 +47,10 @@ class RotorHold(Stateful):
         """Since when there has been current."""
         self._overruns = False
         """Whether the rotor runs on after a stop of its field."""
+        self._is_lost = False
+        """Whether the rotor has lost its field and moves by itself."""
+        self._may_be_caught: Nanos | None = None
+        """From when on the field may catch it then."""
         self.is_powered = True
         """Whether the motor has power, so that a drive that is energised gives it current."""
         self.has_current = True
@@ -52,6 +69,8 @@ class RotorHold(Stateful):
         """Message for events about what a coasting rotor does."""
         if self._overruns:
             return RUNS_ON
+        if self._is_lost:
+            return MOVES_WITHOUT_FIELD
         return MOVES_WITH_LITTLE_CURRENT if self.has_current else MOVES_WITHOUT_CURRENT
 
     def motion(
@@ -72,7 +91,9 @@ class RotorHold(Stateful):
         """
         plan, motor = profile_of(drive.plan), self._motor
         led = profile_of(before.plan) if before.coasting is None else before.coasting
-        moves = before.leads(now) and not stands
+        was_lost, self._is_lost = self._is_lost, False
+        loses = state.stalled and not was_lost and before.begin < now and before.leads(now - 1)
+        moves = (before.leads(now) or loses) and not stands
         speed = led.velocity(now) if moves else 0.0
         has_current = drive.is_energised and self.is_powered
         if has_current and not self.has_current:
@@ -85,7 +106,19 @@ class RotorHold(Stateful):
             return before.coasting, state
         motion = self._coasting_rotor(state, burden)
         is_weak = self._is_weak(plan, motion, now)
-        if not is_weak and (not self.is_coasting or self._motor.follows(speed)):
+        against = speed - plan.velocity(now) if self._build.coasts_unpowered else speed
+        if self._build.coasts_unpowered and not is_weak and not stands:
+            if self.is_coasting and plan.moving(now) and not motor.follows(against):
+                state = state._replace(stalled=True)
+            if state.stalled:
+                base = (state.rotor - self._build.zero) * self._build.sign
+                found = motion.profile(now, base, led.phase(now) if moves else 0.0, speed)
+                may_be = self._may_be_caught is not None and self._may_be_caught <= now if was_lost else not moves
+                if self._loses(plan, found, motion, now, may_be=may_be):
+                    self.is_coasting = self._is_lost = True
+                    return found, state
+                state, self.is_coasting = state._replace(stalled=False), False
+        if not is_weak and (not self.is_coasting or motor.follows(against)):
             self.is_coasting = False
             found = None
             if motor.overruns and before.leads(now - 1) and not stands and not state.stalled:
@@ -103,6 +136,18 @@ class RotorHold(Stateful):
         if not is_weak:
             self.due = slow_from(found, now, motor.catch_p)
         return found, state
+
+    def _loses(self, plan: Profile, rotor: Profile, motion: CoastingRotor, now: Nanos, *, may_be: bool) -> bool:
+        """Whether the field does not catch a rotor at once that moves by itself; when it does is due. ``may_be`` as in
+        `catch_of`."""
+        motor, sign = self._motor, self._build.sign
+        loaded = replace(motor, inertia=motion.inertia, friction=motion.friction, load=motion.load * sign)
+        limit = motor.start_p
+        if limit is None:
+            field = PeriodicPotential(motor.holding, float(self._build.period_p))
+            limit = field.catches_below(motion.inertia, abs(motion.load) + motion.friction)
+        self._may_be_caught, self.due = catch_of(loaded, plan, rotor, now, sign, limit, may_be=may_be)
+        return self.due is None or self.due > now
 
     def settles(self, trajectory: Trajectory, before: Burden, after: Burden, now: Nanos) -> bool:
         """Whether a coasting rotor, whose load changes from ``before`` to ``after``, swings by less than a full step about this

@@ -18,7 +18,7 @@ The torque of the field on a rotor that lags by x is T·sin(2π·x/λ), λ being
 So it settles at the nearest multiple of λ, which is at most λ/2 away: two full steps.
 
 Between two reversals of the field, rotor and load are constant or have a constant distance to the field: a trajectory is a list
-of such sections. While no current drives the rotor of a `Build.coasts_unpowered` axis, its motion
+of such sections. While the rotor of a `Build.coasts_unpowered` axis has no current, or has lost its field, its motion
 (`steptwin.simulation.mechanics.coasting`) is in the place of the field, and the load keeps its distance to the rotor.
 """
 
