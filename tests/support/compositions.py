@@ -127,6 +127,10 @@ PARTS = (
         "[[conveyor.stop]]\nat = 66\nhold = 'c.OUT1'\n"
         "[[fault]]\nkind = 'empty-feeder'\nelement = 'w'\nfrom_s = 0.5\nuntil_s = 1.3\n"
     ),
+    (
+        "[[conveyor]]\nname = 'k'\nlength = 120\nspeed = 180\nrun = 'c.OUT1'\nramp_up = '170 ms'\nramp_down = '90 ms'\n"
+        "feed_every = '350 ms'\n[[conveyor.sensor]]\nat = 40\nto = 'c.IN8'\n"
+    ),
     "[[cylinder]]\nname = 'z'\nextend = 'c.OUT1'\n[[cylinder.switch]]\nabove = 40\nto = 'c.IN5'\n",
     (
         "[[timer]]\nname = 'd'\ninput = 'c.OUT1'\nkind = 'on-delay'\ntime = '70 ms'\n"
@@ -212,6 +216,8 @@ JOINTS = {
     "cylinder": '[[cylinder]]\nname = "{}"\nextend = "{output}"\nextend_time = "{ms} ms"\n',
     "lamp": '[[lamp]]\nname = "{}"\nfrom = "{output}"\nwarms = "{ms} ms"\n',
     "conveyor": '[[conveyor]]\nname = "{}"\nlength = 200\nspeed = 150\nrun = "{output}"\nfeed_every = "{ms} ms"\n',
+    "ramped conveyor": '[[conveyor]]\nname = "{}"\nlength = 200\nspeed = 150\nrun = "{output}"\nfeed_every = "{ms} ms"\n'
+    'ramp_up = "{ms} ms"\nramp_down = "90 ms"\n[[conveyor.stop]]\nat = 80\nhold = "{another}"\n',
     "feeder": '[[conveyor]]\nname = "{}"\nlength = 200\nspeed = 150\nfeed_every = "{ms} ms"\n'
     '[[conveyor.sensor]]\nat = 90\nto = "c.{input}"\n',
     "button": '[[button]]\nname = "{}"\nto = "c.{input}"\nbounce = "{ms} ms"\n',

@@ -264,9 +264,64 @@ def test_snapshots_have_an_empty_feeder(moment_s: float) -> None:
     assert other.read("belt.missed") == world.read("belt.missed") == 2
 
 
+RAMPS = TEXT.replace("speed = 125.0", 'speed = 125.0\nramp_up = "800 ms"\nramp_down = "400 ms"')
+"""50 mm from rest to speed, 25 mm back."""
+
+
+def test_a_belt_has_ramps() -> None:
+    """With its front at 300 mm 250 mm at speed after the ramp; off at 340 mm it comes to 365 mm."""
+    world = World.from_toml(RAMPS)
+    world.mic488["a"].write("OUT1", 1)
+    world.press("feeder", "10 ms")
+    world.run(until=0.4)
+    assert world.read("belt.place1") == 12.5
+    world.run(until=3.12)
+    assert edges(world, "belt.sensor1") == [(0, 0), (2800, 1)]
+    assert world.read("belt.place1") == pytest.approx(340)
+    world.mic488["a"].write("OUT1", 0)
+    world.run(until=3.32)
+    assert world.read("belt.place1") == pytest.approx(340 + 18.75)
+    world.run(until=5.0)
+    assert world.read("belt.place1") == pytest.approx(365)
+    assert edges(world, "belt.sensor1")[-1] == (3120 + 1e-6, 0), "the rear: 40 mm behind"
+
+
+def test_a_stop_holds_while_the_belt_runs_up_and_down() -> None:
+    """At 20 mm it is on the ramp up, at 0.506 s; the next one comes there on the ramp down."""
+    stop = '[[conveyor.stop]]\nat = 20.0\nhold = "a.OUT2"\n'
+    world = World.from_toml(RAMPS.replace("workpiece = 40.0", "workpiece = 10.0") + stop)
+    world.mic488["a"].write("OUT2", 1)
+    world.mic488["a"].write("OUT1", 1)
+    world.press("feeder", "10 ms")
+    world.run(until=1.0)
+    assert [(round(time, 3), text) for time, text in happened(world)] == [
+        (0, "belt.1 is on belt"),
+        (505.964, "belt.1 stands at 20 mm of belt"),
+    ]
+    world.press("feeder", "10 ms")
+    world.mic488["a"].write("OUT1", 0)
+    world.run(until=2.0)
+    # It is behind the first one after 10 mm of 25: t = 0.4·(1 − √(1 − 10/25)) s.
+    assert happened(world)[-1][0] == pytest.approx(1000 + 90.161, abs=0.001)
+    assert happened(world)[-1][1].startswith("belt.2 stands at 10 mm")
+    world.mic488["a"].write("OUT2", 0)
+    world.run(until=3.0)
+    assert [round(world.read(f"belt.place{n}"), 3) for n in (1, 2)] == [20.0, 10.0], "the belt stands"
+
+
+def test_a_drive_with_ramps_that_fails_comes_to_rest_by_its_ramp() -> None:
+    world = World.from_toml(RAMPS)
+    world.mic488["a"].write("OUT1", 1)
+    world.press("feeder", "10 ms")
+    world.fault("belt-stop element=belt from_s=1 until_s=2")
+    world.run(until=2.0)
+    assert world.read("belt.place1") == pytest.approx(50 + 25 + 25)
+
+
+@pytest.mark.parametrize("keys", ["", 'ramp_up = "600 ms"\nramp_down = "250 ms"\n'])
 @pytest.mark.parametrize("moment_s", [0.0, 0.3, 1.0, 2.41, 2.9])
-def test_snapshots_have_it(moment_s: float) -> None:
-    text = TEXT.replace("workpiece", 'feed_every = "700 ms"\nworkpiece')
+def test_snapshots_have_it(moment_s: float, keys: str) -> None:
+    text = TEXT.replace("workpiece", f'{keys}feed_every = "700 ms"\nworkpiece')
     world = World.from_toml(text)
     world.mic488["a"].write("OUT1", 1)
     world.run(until=moment_s)
@@ -294,6 +349,7 @@ def test_a_belt_is_longer_than_a_step_of_its_drive() -> None:
         ("speed = 125.0", "", "a conveyor needs one of speed and axis"),
         ("speed = 125.0", 'speed = 125.0\naxis = "x"', "a conveyor needs one of speed and axis"),
         ("speed = 125.0", 'axis = "x"', "no axis is called 'x'"),
+        ("speed = 125.0", 'axis = "x"\nramp_up = "1 s"', "ramp_up means nothing without speed"),
         ("at = 300.0", "at = 400.5", "at = 400.5 is beyond length = 400"),
         ("at = 300.0", "", r"\[conveyor.sensor\]: at is missing"),
         ("workpiece = 40.0", 'next = "belt"', "belt is followed by itself"),

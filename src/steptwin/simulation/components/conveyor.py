@@ -26,6 +26,7 @@ from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.belt import BeltDrive, ConstantDrive, Load, Workpiece, next_change
 from steptwin.simulation.mechanics.drawing import BELT, Drawing, SensorZone
+from steptwin.simulation.mechanics.rampeddrive import RampedDrive
 from steptwin.simulation.mechanics.scale import exact_fraction
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.names import Unknown
@@ -91,7 +92,7 @@ class Conveyor(TerminalComponent):
         spec: ConveyorSpec,
         drive: BeltDrive,
         per_mm: Fraction,
-        own: ConstantDrive | None,
+        own: ConstantDrive | RampedDrive | None,
         moved_by: tuple[str, ...] = (),
         turning_points: Callable[[Nanos], Iterator[Nanos]] = lambda now: iter(()),
     ) -> None:
@@ -335,10 +336,16 @@ def _stop_feeder(active: ActiveFault, conveyor: Conveyor, begins: bool, now: Nan
     return (FEEDER_FAILS if begins else FEEDER_WORKS_AGAIN)(name=name)
 
 
+def _own_drive(spec: ConveyorSpec, speed: Fraction, now: Nanos) -> ConstantDrive | RampedDrive:
+    if spec.ramp_up or spec.ramp_down:
+        return RampedDrive(speed, spec.ramp_up, spec.ramp_down, now)
+    return ConstantDrive(speed, now)
+
+
 def _make(spec: ConveyorSpec, context: ElementContext) -> Conveyor:
     block = context.terminal_block(spec.name)
     if spec.axis is None:
-        own = ConstantDrive(exact_fraction(spec.speed), block.scheduler.now)
+        own = _own_drive(spec, exact_fraction(spec.speed), block.scheduler.now)
         conveyor = Conveyor(block, spec, own, Fraction(PICOMETRES), own)
     else:
         axis = find_axis(spec.axis, context)

@@ -14,7 +14,7 @@ from steptwin.simulation.components.mount import MoverSpec
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import TableSpec, key, table, tables_in
-from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, number, permitting, positive_time
+from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, number, permitting, positive_time, time_value
 
 RUN, FEED = "RUN", "FEED"
 
@@ -41,6 +41,8 @@ class ConveyorSpec(TerminalComponentSpec, MoverSpec):
     length: float = key(number(0.0, above=True), "mm")
     speed: float | None = key(number(0.0, above=True), "mm/s while RUN is on", default=None)
     run: Terminal | None = key(OUTPUT_PIN, "with speed: output connected to RUN; without it a wire may be", default=None)
+    ramp_up: Nanos = key(time_value, "from rest to speed when RUN is switched on; default at once", default=0, needs="speed")
+    ramp_down: Nanos = key(time_value, "from speed to rest when it is switched off; default at once", default=0, needs="speed")
     axis: str | None = key(NameOf("axis"), "the axis that moves the belt, instead of speed", default=None)
     mm_per_unit: float = key(number(0.0, above=True), "with axis: mm of the belt per unit of the axis", default=1.0)
     feed: Terminal | None = key(
