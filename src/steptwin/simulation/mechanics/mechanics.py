@@ -190,7 +190,7 @@ class Mechanism(Stateful):
                 f"{controller} axis {number} stands at {here} imp, outside its hard stops {build.low} to {build.high} imp"
             )
         self._revision = drive.revision
-        self._trajectory = Trajectory(build, drive.plan, scheduler.now, MechanicalState(here, here))
+        self._trajectory = Trajectory(build, drive.plan, scheduler.now, MechanicalState(here, build.load_at(here, here)))
         if self._hold is not None and not scheduler.is_blank:
             self._renew(drive, scheduler.now)
 
@@ -325,6 +325,9 @@ class Mechanism(Stateful):
                 # After power-off a controller counts from 0 again.
                 counted_anew = self.build.sign * (plan.count(now) - before.plan.count(now))
                 state = state._replace(behind=state.behind + counted_anew)
+        loaded = self._loaded()
+        if loaded.lies is not None:
+            state = state._replace(load=loaded.load_at(state.rotor, state.load))
         led = profile_of(before.plan) if before.coasting is None else before.coasting
         jump = profile_of(plan).velocity(now) - led.velocity(now)
         is_new = drive.revision != self._revision
@@ -338,7 +341,7 @@ class Mechanism(Stateful):
             jump = 0.0
         is_caught = before.coasting is not None and coasting is None and was_stalled and not state.stalled
         self._trajectory = Trajectory(
-            self._loaded(),
+            loaded,
             plan,
             now,
             state,
@@ -353,7 +356,7 @@ class Mechanism(Stateful):
             coasting, state = self._hold.motion(
                 drive, before, self._trajectory.at(now), now, is_new=is_new, burden=self._carried, stands=False
             )
-            self._trajectory = Trajectory(self._loaded(), plan, now, state, coasting=coasting)
+            self._trajectory = Trajectory(loaded, plan, now, state, coasting=coasting)
         self._changes += 1
         if self._encoders:
             self._turn_encoders(now)
@@ -511,7 +514,7 @@ class Mechanism(Stateful):
 
     def lose(self, pulses: int, now: Nanos) -> None:
         """Move the rotor ``pulses`` behind the field (negative: ahead), within the hard stops."""
-        build, (rotor, load, stalled, _) = self.build, self.at(now)
+        build, (rotor, load, stalled, _) = self._loaded(), self.at(now)
         rotor -= pulses
         if build.low is not None:
             rotor = max(rotor, build.low - build.play)
@@ -519,7 +522,7 @@ class Mechanism(Stateful):
             rotor = min(rotor, build.high)
         self._simple = False
         behind = self.trajectory(now).field(now) - rotor
-        self._renew(self._drive, now, MechanicalState(rotor, min(max(load, rotor), rotor + build.play), stalled, behind))
+        self._renew(self._drive, now, MechanicalState(rotor, build.load_at(rotor, load), stalled, behind))
         self._scheduler.notify(self.controller)
 
     def slip(self, counts: int, now: Nanos) -> None:

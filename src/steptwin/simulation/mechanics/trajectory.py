@@ -3,7 +3,8 @@
 All positions are whole pulses in the frame of the mechanics, whose zero is given by the description of the axis. The *field* is
 the commanded position. The *rotor* follows the field, less the lost pulses, and stops where a hard stop or insufficient torque
 holds it. The *load* follows the rotor through backlash of ``play`` pulses: it is at the rotor after upward motion, and ``play``
-above it after downward motion.
+above it after downward motion. One that a constant torque pulls, more than friction holds, lies on one side of the play all the
+time (`Build.lies`), but where a hard stop holds it.
 
 A rotor that was held synchronises at the nearest position with the electrical angle of the field as soon as the field stops or
 reverses: the loss is a whole number of electrical periods (four full steps). If that position is up to two full steps before a
@@ -61,6 +62,24 @@ class Build:
     """Whether the load moves the rotor while no current does."""
     may_lose_power: bool = False
     """Whether something besides the controller can take the current from the motor."""
+
+    @property
+    def lies(self) -> int | None:
+        """How far above the rotor a load lies that a constant torque pulls: 0, or the play; None: where motion has left it."""
+        motor = self.motor
+        if not self.play or motor is None or abs(motor.load) <= motor.friction:
+            return None
+        return 0 if motor.load > 0.0 else self.play
+
+    def load_at(self, rotor: int, load: int) -> int:
+        """Where the load is that was at ``load`` before its rotor came to ``rotor``."""
+        lies = self.lies
+        if lies is None:
+            return min(max(load, rotor), rotor + self.play)
+        place = rotor + lies
+        if self.low is not None:
+            place = max(place, self.low)
+        return place if self.high is None else min(place, self.high)
 
     @property
     def may_coast(self) -> bool:
@@ -514,7 +533,10 @@ class Trajectory:
         met = begin if touches else self._time(load - slack + direction - offset, begin)
         if met is not None and ((end is not None and met >= end) or (held is not None and met >= held)):
             met = None
-        if held != begin:
+        lies = build.lies
+        if lies is not None and lies != slack and held != begin:
+            self._follow_lying(begin, lies, end, direction)
+        elif held != begin:
             if met != begin:
                 self._laid.append(TrajectorySection(begin, direction, True, offset, False, load, False, behind))
             if met is not None:
@@ -526,7 +548,22 @@ class Trajectory:
             if stop is not None and (rotor - stop) * direction > 0:
                 rotor = stop
             carried = rotor + slack
-            self._now = MechanicalState(rotor, carried if (carried - load) * direction > 0 else load, False, behind)
+            carried = carried if (carried - load) * direction > 0 else load
+            self._now = MechanicalState(rotor, carried if lies is None else build.load_at(rotor, load), False, behind)
+
+    def _follow_lying(self, begin: Nanos, lies: int, end: Nanos | None, direction: int) -> None:
+        """The load goes before the rotor, which it pulls, until a stop holds it; the rotor goes on through the play."""
+        build, (rotor, load, _, behind) = self.build, self._now
+        stop, free = build.high if direction > 0 else build.low, True
+        stands: Nanos | None = None
+        if stop is not None:
+            free = (stop - rotor - lies) * direction >= 0
+            stands = self._time(stop + direction - lies + behind, begin) if free else begin
+        if free:
+            self._laid.append(TrajectorySection(begin, direction, True, -behind, True, lies - behind, False, behind))
+        if stands is not None and (end is None or stands < end):
+            place = load if stop is None else stop
+            self._laid.append(TrajectorySection(stands, direction, True, -behind, False, place, False, behind))
 
     def _is_pushed(self, now: Nanos, direction: int) -> bool:
         """Whether the field goes on against the stop at which the rotor stands."""
@@ -552,5 +589,5 @@ class Trajectory:
                 rotor = max(rotor, build.low - build.play)
             if build.high is not None:
                 rotor = min(rotor, build.high)
-            load = min(max(load, rotor), rotor + build.play)
+            load = build.load_at(rotor, load)
         self._now = MechanicalState(rotor, load, False, behind)
