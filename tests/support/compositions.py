@@ -128,8 +128,8 @@ PARTS = (
         "[[fault]]\nkind = 'empty-feeder'\nelement = 'w'\nfrom_s = 0.5\nuntil_s = 1.3\n"
     ),
     (
-        "[[conveyor]]\nname = 'k'\nlength = 120\nspeed = 180\nrun = 'c.OUT1'\nramp_up = '170 ms'\nramp_down = '90 ms'\n"
-        "feed_every = '350 ms'\n[[conveyor.sensor]]\nat = 40\nto = 'c.IN8'\n"
+        "[[conveyor]]\nname = 'kv'\nlength = 120\nspeed = 180\nrun = 'c.OUT1'\nramp_up = '170 ms'\nramp_down = '90 ms'\n"
+        "feed_every = '350 ms'\n[[conveyor.sensor]]\nat = 40\nto = 'c.IN13'\n"
     ),
     "[[cylinder]]\nname = 'z'\nextend = 'c.OUT1'\n[[cylinder.switch]]\nabove = 40\nto = 'c.IN5'\n",
     (
