@@ -38,6 +38,9 @@ def test_sensors_actuators_logic_and_power_of_the_press() -> None:
     texts = {one.text for one in found}
     assert {"jam element=ram", "no-air element=ram", "open-coil element=safety", "supply-drop machine=cell"} <= texts
     assert {"stuck machine=cell pin=IN4 value=0", "stuck machine=cell pin=IN4 value=1"} <= texts
+    assert {"stuck machine=cell pin=OUT1 value=0", "stuck machine=cell pin=OUT1 value=1"} <= texts
+    assert not {"stuck machine=cell pin=OUT2 value=1", "bounce machine=cell pin=OUT1"} & texts  # leads nowhere; has no switch
+    assert {one.part for one in found if one.place == "cell.OUT1"} == {FaultCategory.LOGIC}
     assert "stuck-output element=ram output=extended level=1" in texts
     assert {one.part for one in found if one.place == "ram"} == {FaultCategory.ACTUATOR}
     assert {one.part for one in found if one.place == "ram.extended"} == {FaultCategory.SENSOR}

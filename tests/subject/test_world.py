@@ -76,6 +76,15 @@ def test_a_command_moves_an_axis_and_its_answer_says_when() -> None:
     ]
 
 
+def test_pins_have_the_level_of_a_stuck_output_and_the_state_what_was_commanded() -> None:
+    world = small()
+    world.fault("stuck machine=a pin=OUT1 value=1")
+    subject = of(world)
+    subject.do(command.Advance(duration=SECOND))
+    assert subject.do(command.ReadPins("a")).value["a.OUT1"] == 1.0
+    assert subject.do(command.ReadState("a", ("pins",))).value["pins"]["OUT1"] == 0.0
+
+
 def test_what_each_command_of_a_controller_writes() -> None:
     subject = of(small())
     subscription = subject.subscribe(filter_of(["input"]), 99)
@@ -138,7 +147,7 @@ def test_every_kind_of_fault_says_what_it_takes() -> None:
     assert (stuck["layer"], stuck["occasion"], stuck["lines"]) == ("physics", "always", [])
     assert [one.pop("messages")["permitted"]["id"] for one in stuck["parameters"][:2]] == ["simulation.text", "simulation.to"]
     assert stuck["parameters"][:2] == [
-        {"name": "pin", "meaning": "Which input.", "permitted": "text", "default": "", "words": [], "required": True},
+        {"name": "pin", "meaning": "Which input or output.", "permitted": "text", "default": "", "words": [], "required": True},
         {
             "name": "value",
             "meaning": "The level; volts on analog inputs.",

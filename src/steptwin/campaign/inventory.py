@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from steptwin.errors import Misuse
 from steptwin.simulation.faults import Fault, parse
 from steptwin.simulation.faults.kinds import KINDS
-from steptwin.simulation.faults.table import FaultCategory, FaultKind, FaultValue, Layer
+from steptwin.simulation.faults.table import FaultCategory, FaultKind, FaultValue, Layer, Occasion
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.script.steps import Repeat, Set, Step
 from steptwin.simulation.world.simulation import Simulation
@@ -73,6 +73,8 @@ def _part(world: Simulation, kind: FaultKind, where: dict[str, FaultValue]) -> F
         name = where["element"]
         of = next((of for of, built in world.objects.elements.items() if name in built), "")
         return FaultCategory.LOGIC if of in _LOGIC else FaultCategory.SENSOR
+    if "pin" in where and where["pin"] in _outputs(world, str(where["machine"])):
+        return FaultCategory.LOGIC
     return kind.part
 
 
@@ -112,7 +114,8 @@ def _controllers(world: Simulation, kind: FaultKind) -> Iterator[tuple[dict[str,
     for name, controller in world.controllers.items():
         where: dict[str, FaultValue] = {"machine": name}
         if kind.parameter("pin") is not None:
-            for pin in _inputs(world, name):
+            outputs = _outputs(world, name) if kind.occasion is Occasion.ALWAYS else ()
+            for pin in (*_inputs(world, name), *outputs):
                 yield {**where, "pin": pin}, f"{name}.{pin}"
         elif kind.parameter("axis") is not None:
             for number in _axes(world, name, len(controller.axes)):
@@ -132,6 +135,13 @@ def _inputs(world: Simulation, controller: str) -> list[str]:
     led = {pin.pin for pin in (*world.objects.driven, *world.objects.circuits) if pin.controller == controller}
     led |= {pin.upper() for script in world.spec.scripts for name, pin in _set_by(script.steps) if name == controller}
     return [pin for pin in world.controllers[controller].pins() if pin in led]
+
+
+def _outputs(world: Simulation, controller: str) -> list[str]:
+    """The pins that a wire leads away from, but for lines that are inputs as well, in the order of the pins."""
+    led = {wire.source.pin for scheduler in world.schedulers for wire in scheduler.wires if wire.source.controller == controller}
+    inputs = _inputs(world, controller)
+    return [pin for pin in world.controllers[controller].pins() if pin in led and pin not in inputs]
 
 
 def _set_by(steps: Iterable[Step]) -> Iterator[tuple[str, str]]:

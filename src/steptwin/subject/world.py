@@ -242,7 +242,9 @@ class WorldSubject:
     def _levels(self, name: str) -> Mapping[str, float]:
         controller = self.world.controller(name)
         self.world.sync(name)
-        return self.world.kind(name).state.pins(controller, self.world.now)
+        levels = self.world.kind(name).state.pins(controller, self.world.now)
+        failing = self.world.objects.faults.controllers.get(name)
+        return levels if failing is None else {**levels, **{pin: held.level for pin, held in failing.held()}}
 
     def _state(self, wanted: command.ReadState) -> object:
         controller = self.world.controller(wanted.controller)

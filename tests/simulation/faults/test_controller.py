@@ -373,7 +373,9 @@ def test_worn_bytes_keep_what_they_have() -> None:
     [
         ("stall axis=5", "fault stall: axis = 5: permitted are 1 to 4"),
         ("stuck pin=IN21", "fault stuck: pin = 'IN21': '1' has IN1,"),
-        ("stuck pin=OUT1", "no input pin 'OUT1'"),
+        ("stuck pin=OUT1 value=0.5", "fault stuck: value = 0.5: an output is 0 or 1"),
+        ("stuck pin=M1_EN", "no input pin 'M1_EN'"),
+        ("bounce pin=OUT1", "no input pin 'OUT1'"),
         ("stuck pin=IN1 value=0.5", "IN1 = 0.5: a digital input is 0 or 1"),
         ("stuck pin=IN1 machine=7", "fault stuck: machine = '7': there are 1"),
     ],
@@ -528,3 +530,108 @@ def test_its_scheduler_is_told_when_the_supply_of_a_controller_fails() -> None:
     for on in (False, True):
         controller.supply(on, 0)
     assert told == [True, True]
+
+
+BLINKS = {
+    "mic488": ("OUT1", "MAIN:\nOUT1 = ON\nDELAY 0.2\nOUT1 = OFF\nDELAY 0.2\nJUMP MAIN\n", "start = true"),
+    "m1486": ("B2", "[\r@1\rc2\rw200\rt2\rw200\rj1\r]\r", ""),
+}
+BLINKING = """
+[[{kind}]]
+name = "a"
+program = "p"
+{more}
+[[wire]]
+from = "a.{pin}"
+to = "b.IN7"
+inverted = true
+[[relay]]
+name = "r"
+coil = "a.{pin}"
+pull_in = "1 ms"
+drop_out = "1 ms"
+[[mic488]]
+name = "b"
+"""
+
+
+def blinking(kind: str, *faults: str) -> World:
+    pin, program, more = BLINKS[kind]
+    world = World.from_toml(BLINKING.format(kind=kind, pin=pin, more=more), {"p": program.encode()})
+    for fault in faults:
+        world.fault(fault)
+    return world
+
+
+def levels(world: World, subject: str) -> list[tuple[int, object]]:
+    return [(record.time, record.value) for record in world.trace.edges() if record.subject == subject and record.time]
+
+
+@pytest.mark.parametrize("level", [0, 1])
+@pytest.mark.parametrize("kind", BLINKS)
+def test_an_output_that_is_stuck_is_seen_by_all_but_its_controller(kind: str, level: int) -> None:
+    pin = BLINKS[kind][0]
+    plain = blinking(kind)
+    plain.run(until=3.0)
+    free = levels(plain, pin)
+    assert len(free) > 8
+    begin, end = 1.05, 2.05
+    world = blinking(kind, f"stuck machine=a pin={pin} value={level} from_s={begin} until_s={end}")
+    world.run(until=3.0)
+
+    def at(moment: float) -> object:
+        return next((value for time, value in reversed(free) if time <= moment), None)
+
+    expected = [one for one in free if not begin * SECOND <= one[0] <= end * SECOND]
+    expected += [(round(moment * SECOND), value) for moment, value in ((begin, level), (end, at(end * SECOND)))]
+    first = at(begin * SECOND)
+    expected = sorted(one for one in expected if one != (round(begin * SECOND), first) and one != (round(end * SECOND), level))
+    assert levels(world, pin) == expected
+    assert [(time, value == 0) for time, value in levels(world, "IN7")] == [(time, value == 1) for time, value in expected]
+    contacts = [(time - MILLISECOND, value) for time, value in levels(world, "r.no")]
+    assert contacts == [one for one in expected if one[0] < 3 * SECOND - MILLISECOND]
+
+
+@pytest.mark.parametrize(("kind", "moment_s"), [("mic488", 1.1), ("m1486", 1.3)])
+def test_a_stuck_output_goes_on_alike_after_a_restore_and_ends_when_it_is_removed(kind: str, moment_s: float) -> None:
+    pin = BLINKS[kind][0]
+    fault = f"stuck machine=a pin={pin} value=1 from_s=0.5 until_s=1.7"
+    world = blinking(kind, fault)
+    world.run(until=moment_s)
+    snapshot = world.snapshot()
+    world.run(until=3.0)
+    other = blinking(kind)
+    other.restore(snapshot)
+    assert (other.read(f"a.{pin}"), other.read("r.coil")) == (1.0, 1.0)
+    other.run(until=3.0)
+    assert other.trace.digest() == world.trace.digest()
+    other.restore(snapshot)
+    other.clear_fault("stuck")
+    plain = blinking(kind)
+    plain.run(until=moment_s)
+    assert other.read(f"a.{pin}") == plain.read(f"a.{pin}") == 0.0
+    other.run(until=3.0)
+    plain.run(until=3.0)
+    assert levels(other, pin)[-8:] == levels(plain, pin)[-8:]
+
+
+def test_a_controller_believes_that_its_stuck_output_is_on_and_others_see_that_it_is_off() -> None:
+    world = blinking("mic488", "stuck machine=a pin=OUT1 value=0")
+    world.run(until=0.1)
+    assert world.mic488["a"].device.outputs[0]
+    assert (world.read("a.OUT1"), world.read("r.coil"), world.read("b.IN7")) == (0.0, 0.0, 1.0)
+
+
+def test_an_output_without_a_value_keeps_what_it_has_also_without_supply() -> None:
+    world = blinking("mic488", "stuck machine=a pin=OUT1 from_s=0.1", "supply-drop machine=a at_s=0.3 for_s=0.2")
+    world.run(until=2.0)
+    assert levels(world, "OUT1") == [(levels(world, "OUT1")[0][0], 1.0)]
+    assert world.read("r.no") == 1.0
+
+
+def test_two_faults_hold_an_output_one_after_the_other() -> None:
+    world = blinking(
+        "mic488", "stuck machine=a pin=OUT1 value=1 name=one", "stuck machine=a pin=OUT1 value=0 name=two from_s=0.5"
+    )
+    world.run(until=1.0)
+    assert levels(world, "OUT1") == [(SECOND // 2, 0.0)]

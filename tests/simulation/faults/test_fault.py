@@ -103,7 +103,7 @@ REFUSED = {
     "crc address=70000": "fault (crc): address = '70000': permitted are",
     "crc from_s=3 until_s=2": "fault (crc): until_s = 2 is before the fault begins at 3 s",
     "flip direction=up": "fault (flip): direction = 'up': permitted are in, out",
-    "stuck value=1": "fault (stuck): pin is missing: which input.",
+    "stuck value=1": "fault (stuck): pin is missing: which input or output.",
 }
 
 

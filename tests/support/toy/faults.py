@@ -10,6 +10,9 @@ from steptwin.simulation.faults import AxisLoad, FaultKind, FaultyController, Oc
 
 
 class ToyBody:
+    inputs = ("STOP",)
+    outputs = ("BUSY",)
+
     def __init__(self, shafts: Iterable[AxisLoad] = ()) -> None:
         self.shafts = list(shafts)
 
@@ -30,3 +33,6 @@ class ToyBody:
     def check_pin(self, pin: str, level: float) -> None:
         if pin != "STOP" or level not in (0.0, 1.0):
             raise Misuse(f"{pin} = {level:g}: the input is STOP, 0 or 1")
+
+    def applied(self, pin: str) -> None:
+        """No pin is both."""

@@ -12,6 +12,7 @@ from steptwin.messages import Message
 from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss, alike
 from steptwin.simulation.components.builtobjects import BuiltObjects
+from steptwin.simulation.faults.controller import FaultyController
 from steptwin.simulation.kinds.kind import AnyKind
 from steptwin.simulation.kinds.lines import Line
 from steptwin.simulation.logic.signal import SignalOf
@@ -112,7 +113,7 @@ def _of_controller(kind: AnyKind, controller: MotionController, source: Source, 
     pin = rest.upper()
     if pin in controller.pins():
         unit = kind.pins(controller)[pin].unit
-        read = partial(kind.state.pin, controller, pin)
+        read = partial(_level, kind, controller, source, pin)
         return SignalOf((source,), read, unit=unit, check=partial(kind.refuse_taken, controller, pin))
     point = kind.point(controller, rest) if rest else None
     if point is None:
@@ -120,6 +121,13 @@ def _of_controller(kind: AnyKind, controller: MotionController, source: Source, 
     return SignalOf(
         (source,), point.read, point.turning_points, point.version, point.point.unit, is_kept=point.is_kept, freeze=point.freeze
     )
+
+
+def _level(kind: AnyKind, controller: MotionController, source: Source, pin: str, now: Nanos) -> float:
+    """The level of a pin, for an output that a fault holds the one that all others see."""
+    failing = source.scheduler.controllers[source.name]
+    held = failing.held_outputs.get(pin) if isinstance(failing, FaultyController) else None
+    return kind.state.pin(controller, pin, now) if held is None else held
 
 
 def _quiet(line: Line, source: Source) -> SignalOf:

@@ -1,8 +1,8 @@
-"""Faults of physics: inputs, shafts, supply and memory of a controller; and requests that it refuses."""
+"""Faults of physics: pins, shafts, supply and memory of a controller; and requests that it refuses."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 from steptwin.controller import Nanos, PinEdge
@@ -41,6 +41,16 @@ class Body(Protocol):
     shafts: list[AxisLoad]
     """By axis. Mechanics replace the loads of their axes."""
 
+    @property
+    def inputs(self) -> Collection[str]:
+        """Pins that are set from outside."""
+        ...
+
+    @property
+    def outputs(self) -> Collection[str]:
+        """Pins with a level that may stick, as those of welded contacts; a line that is both is among the inputs, too."""
+        ...
+
     def lacks(self, kind: FaultKind) -> str | None:
         """The reason why faults of a kind are impossible, as the end of a message after its name; None if they are possible."""
         ...
@@ -61,6 +71,10 @@ class Body(Protocol):
         """`Misuse` unless ``pin`` is an input that can take ``level``."""
         ...
 
+    def applied(self, pin: str) -> float | None:
+        """The level that a line, input and output in one, has from outside; None for an input, which has just that."""
+        ...
+
 
 class FaultySnapshot(NamedTuple):
     """State of the faults of a controller, and of the controller."""
@@ -75,6 +89,7 @@ PIN_WITH_ITS_CONTROLLER = Message(
     "simulation.pin-with-its-controller", "fault {name}: pin = {pin!r}: name the controller as machine=NAME, and the pin alone"
 )
 UNKNOWN_PIN_OF_A_FAULT = Message("simulation.unknown-pin-of-a-fault", "fault {name}: pin = {pin!r}: {controller!r} has {names}")
+LEVEL_OF_AN_OUTPUT = Message("simulation.level-of-an-output", "fault {name}: value = {value:g}: an output is 0 or 1")
 PIN_IS_STUCK = Message("simulation.pin-is-stuck", "{pin} is stuck at {level:g}")
 PIN_IS_FREE = Message("simulation.pin-is-free", "{pin} is free")
 SLAVE_IS_MUTE = Message("simulation.slave-is-mute", "a slave of its Modbus master does not answer")
@@ -83,13 +98,26 @@ REFUSED_REQUEST = Message("simulation.refused-request", "{what}: {bytes}")
 
 
 class FaultyController(Stateful):
-    """Wraps a controller in its scheduler and applies faults to its inputs, shafts, supply and memory.
+    """Wraps a controller in its scheduler and applies faults to its pins, shafts, supply and memory.
 
-    Inputs are set through it, so that a stuck switch remains stuck.
+    Inputs are set through it, so that a stuck switch remains stuck; outputs are seen through it, so that the level of a stuck one
+    remains, whatever the controller does with it.
     """
 
     FIXED: ClassVar[tuple[str, ...]] = ("_faults", "_fresh", "_on_edge", "body", "changed", "inner", "name")
-    __slots__ = (*FIXED, "_bounces", "_cut", "_mute", "_off_until", "_outer", "_released", "_stuck", "_unsupplied")
+    __slots__ = (
+        *FIXED,
+        "_bounces",
+        "_cut",
+        "_edges",
+        "_mute",
+        "_off_until",
+        "_outer",
+        "_released",
+        "_stuck",
+        "_unsupplied",
+        "held_outputs",
+    )
 
     def __init__(
         self, inner: MotionController, name: str, faults: Faults, body: Body, on_edge: Callable[[str, Nanos, float], None]
@@ -107,7 +135,11 @@ class FaultyController(Stateful):
         self._bounces: list[tuple[Nanos, str, float]] = []
         """Scheduled levels."""
         self._stuck: dict[str, str] = {}
-        """The fault that holds each input."""
+        """The fault that holds each pin."""
+        self.held_outputs: dict[str, float] = {}
+        """The level of each output that a fault holds."""
+        self._edges: list[PinEdge] = []
+        """Edges of outputs that nobody has taken, where faults hold any."""
         self._mute: list[str] = []
         """Faults because of which a slave of the controller does not answer."""
         self._released: list[tuple[Nanos, str, int]] = []
@@ -130,14 +162,24 @@ class FaultyController(Stateful):
         self.changed()
 
     def take_edges(self) -> list[PinEdge]:
-        return self.inner.take_edges()
+        if not self.held_outputs and not self._edges:
+            return self.inner.take_edges()
+        self._collect_edges()
+        edges, self._edges = self._edges, []
+        return edges
+
+    def _collect_edges(self) -> None:
+        """Take the controller's edges, but for those of outputs that faults hold."""
+        self._edges += [edge for edge in self.inner.take_edges() if edge.pin not in self.held_outputs]
 
     def pins(self) -> Mapping[str, float]:
         """Levels at the controller, with the faults."""
-        return self.inner.pins()
+        levels = self.inner.pins()
+        return {**levels, **self.held_outputs} if self.held_outputs else levels
 
     def pin(self, name: str) -> float:
-        return self.inner.pin(name)
+        held = self.held_outputs.get(name)
+        return self.inner.pin(name) if held is None else held
 
     def power_off(self, now: Nanos) -> None:
         self.inner.power_off(now)
@@ -250,7 +292,7 @@ class FaultyController(Stateful):
     # ------------------------------------------------------------------ setting and removing
 
     def check(self, fault: Fault) -> None:
-        """`Misuse` unless the controller has the axis or input."""
+        """`Misuse` unless the controller has the axis or pin."""
         lacks = self.body.lacks(fault.kind)
         if lacks is not None:
             raise Misuse(CONTROLLER_LACKS_WHAT_FAILS(name=fault.kind.name, controller=self.name, problem=text_of(lacks)))
@@ -267,14 +309,20 @@ class FaultyController(Stateful):
             raise Misuse(PIN_WITH_ITS_CONTROLLER(name=fault.kind.name, pin=pin))
         if pin not in levels:
             raise Misuse(UNKNOWN_PIN_OF_A_FAULT(name=fault.kind.name, pin=pin, controller=self.name, names=list(levels)))
-        level = fault.get("value")
-        self.body.check_pin(pin, level if isinstance(level, float) else levels[pin])
+        value = fault.get("value")
+        level = value if isinstance(value, float) else levels[pin]
+        if fault.kind.occasion is not Occasion.ALWAYS or pin in self.body.inputs or pin not in self.body.outputs:
+            self.body.check_pin(pin, level)
+        elif level not in (0.0, 1.0):
+            raise Misuse(LEVEL_OF_AN_OUTPUT(name=fault.kind.name, value=level))
 
     def begin(self, active: ActiveFault) -> None:
         """A fault of this controller was set."""
         if active.fault.kind.parameter("pin") is not None:
             pin = self.pin_of(active.fault)
-            self._outer.setdefault(pin, self.inner.pin(pin))
+            if pin in self.body.inputs:
+                applied = self.body.applied(pin)
+                self._outer.setdefault(pin, self.inner.pin(pin) if applied is None else applied)
         if active.fault.kind.occasion is Occasion.ALWAYS:
             active.due = active.begin
         self.changed()
@@ -286,10 +334,9 @@ class FaultyController(Stateful):
             pin = self.pin_of(active.fault)
             self._bounces = [b for b in self._bounces if b[1] != pin]
             if self._stuck.get(pin, active.name) == active.name:
-                self._stuck.pop(pin, None)
-                self._put(pin, self._outer[pin], now)
+                self._free(pin, now)
             if not any(other.fault.get("pin") and self.pin_of(other.fault) == pin for other in self._mine()):
-                del self._outer[pin]
+                self._outer.pop(pin, None)
         for released in [r for r in self._released if r[1] == active.name]:
             self._let_go(released, now)
         if active.name in self._mute:
@@ -297,12 +344,12 @@ class FaultyController(Stateful):
             self.body.show_master_error(bool(self._mute), now)
         self.changed()
 
-    # ------------------------------------------------------------------ inputs
+    # ------------------------------------------------------------------ pins
 
     def held(self) -> Iterator[tuple[str, HeldLevel]]:
-        """The inputs that faults hold."""
+        """The pins that faults hold."""
         for pin, fault in self._stuck.items():
-            yield pin, HeldLevel(fault, self.inner.pin(pin))
+            yield pin, HeldLevel(fault, self.pin(pin))
 
     def pin_of(self, fault: Fault) -> str:
         """The pin that a fault names, under its one name."""
@@ -345,18 +392,41 @@ class FaultyController(Stateful):
         pin = self.pin_of(active.fault)
         if self._stuck.get(pin) != active.name:
             wanted = active.fault.get("value")
-            level = wanted if isinstance(wanted, float) else self.inner.pin(pin)
+            level = wanted if isinstance(wanted, float) else self.pin(pin)
             self._bounces = [b for b in self._bounces if b[1] != pin]
             self._stuck[pin] = active.name
-            self._put(pin, level, now)
+            self._hold(pin, level, now)
             active.struck += 1
             self.report(active, now, PIN_IS_STUCK(pin=pin, level=level))
             active.due = active.end
         else:
             active.due = None
-            del self._stuck[pin]
-            self._put(pin, self._outer[pin], now)
+            self._free(pin, now)
             self.report(active, now, PIN_IS_FREE(pin=pin))
+
+    def _hold(self, pin: str, level: float, now: Nanos) -> None:
+        """Give a pin a level that it keeps."""
+        if pin in self.body.outputs:
+            self._collect_edges()
+            before, self.held_outputs[pin] = self.pin(pin), level
+            self._edge(pin, before, now)
+        if pin in self._outer:
+            self._put(pin, level, now)
+
+    def _free(self, pin: str, now: Nanos) -> None:
+        """Let a pin have its own level again."""
+        self._stuck.pop(pin, None)
+        if pin in self._outer:
+            self._put(pin, self._outer[pin], now)
+        if pin in self.held_outputs:
+            self._collect_edges()
+            before = self.held_outputs.pop(pin)
+            self._edge(pin, before, now)
+
+    def _edge(self, pin: str, before: float, now: Nanos) -> None:
+        """Report the level of an output if it was another one ``before``."""
+        if self.pin(pin) != before:
+            self._edges.append(PinEdge(now, pin, self.pin(pin)))
 
     def fail_master(self, active: ActiveFault, now: Nanos) -> None:
         """The first moment sets the error, the second clears it."""

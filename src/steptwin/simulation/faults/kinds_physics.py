@@ -150,7 +150,7 @@ PHYSICS = (
         "stuck",
         Layer.PHYSICS,
         Occasion.ALWAYS,
-        "An input keeps a level, whatever its switch does.",
+        "An input keeps a level, whatever its switch does; or an output, whatever the controller does.",
         (PIN, number("value", "The level; volts on analog inputs.", 0, 10, otherwise="the one it has")),
         effect=WindowEffect(_stick),
         faulty=FaultCategory.SENSOR,

@@ -279,7 +279,7 @@ _LINK = Parameter("link", ParameterForm.TEXT, "On this link alone, such as tcp-1
 _LINE = Parameter("line", ParameterForm.TEXT, "On this line of a world alone.", otherwise="all")
 _CONTROLLER = Parameter("machine", ParameterForm.TEXT, "Which controller; for a served twin its unit.", otherwise="the only one")
 AXIS = whole("axis", "Which axis.", 1, 16, default=1)
-PIN = Parameter("pin", ParameterForm.TEXT, "Which input.", is_required=True)
+PIN = Parameter("pin", ParameterForm.TEXT, "Which input or output.", is_required=True)
 _ADDRESSED = (
     whole("unit", "Requests to this unit.", 0, 255, otherwise="all"),
     whole("function", "Requests with this function code.", 1, 127, otherwise="all"),

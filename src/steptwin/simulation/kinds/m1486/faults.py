@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486Chip
-from steptwin.m1486.pins import ALIASES, known_pin, refuse_taken
+from steptwin.m1486.pins import ALIASES, CONTROL_PINS, LINE_PINS, OUTPUT_PINS, known_pin, refuse_taken
 from steptwin.m1486.variants import Store
 from steptwin.messages import Message
 from steptwin.simulation.faults.controller import AxisLoad, FaultyController
@@ -18,6 +18,9 @@ WRONG_LEVEL = Message("simulation.m1486.wrong-level", "{pin} = {level:g}: a digi
 
 class M1486Body:
     """A file is of no use unless it is whole: one whose saving was cut off, or that meets a worn byte, is lost."""
+
+    inputs = (*LINE_PINS, *CONTROL_PINS)
+    outputs = (*LINE_PINS, *OUTPUT_PINS)
 
     def __init__(self, chip: M1486Chip, shafts: Iterable[AxisLoad] = ()) -> None:
         self._chip = chip
@@ -50,6 +53,10 @@ class M1486Body:
         refuse_taken(known_pin(pin), self._chip.interface)
         if level not in (0.0, 1.0):
             raise Misuse(WRONG_LEVEL(pin=pin, level=level))
+
+    def applied(self, pin: str) -> float | None:
+        line = LINE_PINS.get(pin)
+        return None if line is None else float(self._chip.io.external[line])
 
 
 def _keep(chip: M1486Chip, store: Callable[[bytes], bytes | None] | None, owner: FaultyController, image: bytes) -> bytes:

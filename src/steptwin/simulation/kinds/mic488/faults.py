@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from steptwin.controller import Nanos
-from steptwin.mic488.core import ControllerCore, check_pin
+from steptwin.mic488.core import ANALOG_PINS, INPUT_PINS, OUTPUT_PINS, ControllerCore, check_pin
 from steptwin.mic488.device import Mic488Device, Serving
 from steptwin.mic488.encoder import Coupling
 from steptwin.simulation.faults.answers import NEVER_SENT
@@ -36,6 +36,9 @@ class Mic488Body:
     """``unit`` and ``line`` are those under which the controller is served. Without mechanics its encoders are all that its axes
     move."""
 
+    inputs = (*INPUT_PINS, *ANALOG_PINS)
+    outputs = (*OUTPUT_PINS, "ERR")
+
     def __init__(self, device: Mic488Device, unit: int, line: str = "") -> None:
         self._device = device
         self._unit = unit
@@ -60,6 +63,9 @@ class Mic488Body:
 
     def check_pin(self, pin: str, level: float) -> None:
         check_pin(pin, level)
+
+    def applied(self, pin: str) -> None:
+        """No pin is both."""
 
 
 class _Watched:
