@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import ast
+import gc
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+
+import pytest
 
 SOURCE = Path(__file__).parents[1] / "src/steptwin"
 INTERNAL = (
@@ -37,10 +40,10 @@ def is_private(name: str) -> bool:
     return name.startswith("_") and not name.endswith("__") and name not in FIELDS
 
 
-def own_names(tree: ast.AST) -> set[str]:
+def own_names(nodes: Iterable[ast.AST]) -> set[str]:
     """Names that are defined in a module or class: functions, classes, variables, attributes of ``self``."""
     found: set[str] = set()
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
             found.add(node.name)
         elif isinstance(node, ast.Name) and not isinstance(node.ctx, ast.Load):
@@ -60,13 +63,13 @@ def is_oneself(node: ast.expr) -> bool:
 class Classes:
     """All classes of the package by their names, which are unique enough for this."""
 
-    def __init__(self, trees: Iterable[ast.AST]) -> None:
+    def __init__(self, nodes: Iterable[ast.AST]) -> None:
         self.own: dict[str, set[str]] = {}
         self.near: dict[str, set[str]] = {}
         """Bases and derived classes."""
         self.known: dict[str, set[str]] = {}
-        for one in (node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.ClassDef)):
-            self.own.setdefault(one.name, set()).update(own_names(one))
+        for one in (node for node in nodes if isinstance(node, ast.ClassDef)):
+            self.own.setdefault(one.name, set()).update(own_names(ast.walk(one)))
             for base in one.bases:
                 name = ast.unparse(base).partition("[")[0].rpartition(".")[2]
                 self.near.setdefault(one.name, set()).add(name)
@@ -87,11 +90,11 @@ class Classes:
         return theirs
 
 
-def foreign_names(tree: ast.AST, own: set[str], classes: Classes) -> Iterator[str]:
+def foreign_names(nodes: Sequence[ast.AST], own: set[str], classes: Classes) -> Iterator[str]:
     """Private names of other things than ``self`` that are not among ``own``, those of ``self`` that its class has not from this
     package, and what is kept by its library for itself. A module that imports a library has no private name of another thing."""
-    libraries = set(imported_from_libraries(tree))
-    for node in ast.walk(tree):
+    libraries = set(imported_from_libraries(nodes))
+    for node in nodes:
         if isinstance(node, ast.Attribute) and is_private(node.attr) and not is_oneself(node.value):
             if libraries or node.attr not in own:
                 yield f"{node.lineno}: {ast.unparse(node)}"
@@ -107,8 +110,8 @@ def foreign_names(tree: ast.AST, own: set[str], classes: Classes) -> Iterator[st
             yield f"{line}: {name}"
 
 
-def imported_from_libraries(tree: ast.AST) -> Iterator[tuple[int, str]]:
-    for node in ast.walk(tree):
+def imported_from_libraries(nodes: Iterable[ast.AST]) -> Iterator[tuple[int, str]]:
+    for node in nodes:
         if isinstance(node, ast.Import | ast.ImportFrom):
             module = (node.module or "") if isinstance(node, ast.ImportFrom) else ""
             for name in (f"{module}.{one.name}".lstrip(".") for one in node.names):
@@ -116,14 +119,27 @@ def imported_from_libraries(tree: ast.AST) -> Iterator[tuple[int, str]]:
                     yield node.lineno, name
 
 
+def nodes(text: str) -> list[ast.AST]:
+    return list(ast.walk(ast.parse(text)))
+
+
+@pytest.fixture
+def without_collector() -> Iterator[None]:
+    """To look for garbage in so many trees would take longer than to make them."""
+    gc.disable()
+    yield
+    gc.enable()
+
+
+@pytest.mark.usefixtures("without_collector")
 def test_private_parts_of_libraries_are_used_where_there_is_a_reason() -> None:
-    modules = {path.relative_to(SOURCE): ast.parse(path.read_text()) for path in sorted(SOURCE.rglob("*.py"))}
+    modules = {path.relative_to(SOURCE): nodes(path.read_text()) for path in sorted(SOURCE.rglob("*.py"))}
     own: dict[str, set[str]] = {}
     """By room, whose classes may know of each other."""
-    for path, tree in modules.items():
-        own.setdefault(path.parts[0], set()).update(own_names(tree))
-    classes = Classes(modules.values())
-    found = {path.as_posix(): list(foreign_names(tree, own[path.parts[0]], classes)) for path, tree in modules.items()}
+    for path, inside in modules.items():
+        own.setdefault(path.parts[0], set()).update(own_names(inside))
+    classes = Classes(node for inside in modules.values() for node in inside)
+    found = {path.as_posix(): list(foreign_names(inside, own[path.parts[0]], classes)) for path, inside in modules.items()}
     assert {name: uses for name, uses in found.items() if uses and name not in REASONS} == {}
     assert [name for name in REASONS if not found[name]] == []
 
@@ -132,11 +148,11 @@ def test_a_name_that_is_also_one_of_ours_hides_nothing() -> None:
     ours = "class Ours:\n    def __init__(self): self._queue = self._client = None\n"
     use = "def use(client, ours):\n    client._client._queue.clear()\n    client._loop.stop()\n    client._sock = ours._queue\n"
     derived = "class Theirs(Client):\n    def use(self): self._queue.clear()\n"
-    library = ast.parse(f"from aiomqtt import Client\n{ours}{use}{derived}")
-    plain = ast.parse(ours + use)
+    library = nodes(f"from aiomqtt import Client\n{ours}{use}{derived}")
+    plain = nodes(ours + use)
     names = {"_queue", "_client"}
     assert own_names(plain) & {"_queue", "_client", "_loop", "_sock"} == names
-    assert {text.partition(": ")[2] for text in foreign_names(library, names, Classes([library]))} == {
+    assert {text.partition(": ")[2] for text in foreign_names(library, names, Classes(library))} == {
         *("client._client._queue", "client._client", "client._loop", "client._sock", "ours._queue", "self._queue"),
     }
-    assert {text.partition(": ")[2] for text in foreign_names(plain, names, Classes([plain]))} == {"client._loop", "client._sock"}
+    assert {text.partition(": ")[2] for text in foreign_names(plain, names, Classes(plain))} == {"client._loop", "client._sock"}

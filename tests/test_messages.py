@@ -64,6 +64,7 @@ DONE = (
 ERRORS = ("LineFailure", "Misuse", "ProgramFault", "Refusal", "Runaway", "WrongData", "WrongMove")
 HAPPENS = ("devices/**/*.py", "drivers/**/*.py", "live/**/*.py", "m1486/**/*.py", "mic488/**/*.py", "simulation/**/*.py")
 REPORTS = ("axis_event", "event", "refusing", "report", "wrong_data", "wrong_data_received", "_started", "StatusPayload")
+CALLED = re.compile(r"\b(\w+)\(")
 DEFINITION = re.compile(r'^[A-Z_]+ = Message\(\s*"([^"]*)"', re.MULTILINE)
 FORMAT = re.compile(r"\+?(0\d+)?(\.\d+)?[gfdX]|\n|; ")
 """Formats of numbers and lists that the page knows."""
@@ -97,10 +98,10 @@ def test_a_message_has_a_readable_id_in_its_room() -> None:
 
 
 def calls() -> Iterator[tuple[str, ast.Call, Message]]:
-    names = re.compile(rf"\b({'|'.join({name for messages in defining().values() for name in messages})})\(")
+    names = {name for messages in defining().values() for name in messages}
     for path in SOURCES.rglob("*.py"):
         text = path.read_text("utf-8")
-        tree = ast.parse(text) if names.search(text) else None
+        tree = ast.parse(text) if names.intersection(CALLED.findall(text)) else None
         known = {} if tree is None else {**messages_in(module_of(path)), **messages_through(tree)}
         for node in ast.walk(tree) if tree is not None and known else ():
             if isinstance(node, ast.Call) and (name := ast.unparse(node.func)) in known:
