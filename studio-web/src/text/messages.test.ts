@@ -1,7 +1,8 @@
-import { expect, test, vi } from "vitest";
-import { inPolish } from "./messages";
+import { afterAll, expect, test, vi } from "vitest";
 
-vi.mock("./polish.json", () => ({
+// Other tests of this process have the real texts.
+vi.resetModules();
+vi.doMock("./polish.json", () => ({
   default: {
     numbers: "{a:g} {a:.3g} {b:+d} {b:04X} {c:.3f} {c} {{x}}",
     names: "{name!r} z {names!r}: {problem}",
@@ -10,6 +11,11 @@ vi.mock("./polish.json", () => ({
     lines: "{lines:\n}",
   },
 }));
+const { inPolish } = await import("./messages");
+afterAll(() => {
+  vi.doUnmock("./polish.json");
+  vi.resetModules();
+});
 
 test.each([
   [{ a: 1e7, b: 255, c: -0.5 }, "1e+07 1e+07 +255 00FF -0.500 -0.5 {x}"],

@@ -1,4 +1,4 @@
-import { beforeEach, expect, test, vi } from "vitest";
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { RequestError } from "../../lib/protocol/connection";
 import type { AxisModel } from "../../lib/state/model";
 import type { Studio } from "../../lib/state/studio.svelte";
@@ -23,6 +23,10 @@ beforeEach(() => {
   vi.stubGlobal("localStorage", { getItem: () => null, setItem: () => undefined });
   open = [];
   report.mockReset();
+});
+afterEach(() => {
+  vi.useRealTimers();
+  vi.unstubAllGlobals();
 });
 
 function jogging(): Jogging {
