@@ -8,7 +8,7 @@ import httpx
 import pytest
 from mosquitto import free_port
 from playwright.sync_api import Browser
-from studio_page import PICTURES, Studio, button, panels_of, show, wider_than_panes
+from studio_page import Studio, button, panels_of, show, wider_than_panes
 from tests.studio.conftest import Process, StudioWorld
 
 from steptwin.live.studio.demo import describe_demo
@@ -49,8 +49,8 @@ def test_no_panel_is_wider_than_its_pane(start_studio: Callable[..., Process], b
         for panel in panels_of(page):
             show(page, panel)
             page.wait_for_timeout(300)
-            page.screenshot(path=PICTURES / f"{size}-{panel.replace('/', '')}.png")
             found[f"{size}, {panel}"] = wider_than_panes(page)
+        page.context.close()
     studio.close()
     assert len(found) == 2 * 18
     assert {where: parts for where, parts in found.items() if parts} == {}
