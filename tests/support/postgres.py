@@ -50,6 +50,10 @@ class PostgresServer:
         until(self._answers, "PostgreSQL answers")
 
     def _answers(self) -> bool:
+        try:
+            socket.create_connection(("127.0.0.1", self.port)).close()
+        except OSError:
+            return False
         command = [str(self._where / "pg_isready"), "-q", "-h", "127.0.0.1", "-p", str(self.port)]
         return subprocess.run(command, check=False).returncode == 0
 
