@@ -117,6 +117,8 @@ PARTS = (
         "[[body]]\nname = 'hw'\non = 'y'\nat = [30, 3, -25]\nsize = [20, 10, 20]\n"
         "[[collision]]\nname = 'hc'\nbetween = ['hb', 'hw']\neffect = 'jam'\nreset = 'c.OUT2'\n"
     ),
+    "[[load]]\nname = 'jo'\naxis = 'x'\ninertia = 0.0004\nwhen = 'not c.OUT1'\n",  # a ramp needs 0.8 of the torque at once
+    "[[fault]]\nkind = 'stuck'\nmachine = 'c'\npin = 'OUT1'\nvalue = 1\nfrom_s = 0.6\nuntil_s = 1.1\n",
     "[[transducer]]\nname = 'v'\nof = 'x.position'\nto = 'c.AIN1'\npoints = [[0, 0], [80, 8]]\nresolution = 0.1\n",
     (
         "[[supply]]\nname = 'p'\nfeeds = 'c'\nrise = '20 ms'\n"
