@@ -164,7 +164,7 @@ def test_signals_are_completed_where_conditions_and_steps_name_them() -> None:
     script = WORLD + "\n[[script]]\nsteps = [\n{ "
     assert items(script + 'until = "')[:3] == ["table", "bus", "x"]
     assert "time" in items(script + 'until = "t')
-    assert items(script + 'until = "x.position > 1 and x.') == ["x.position", "x.lost", "x.stalled"]
+    assert items(script + 'until = "x.position > 1 and x.') == ["x.position", "x.lost", "x.stalled", "x.power", "x.speed"]
     assert items(script + "expect = 'not bus.") == ["bus.idle"]
     readable = items(script + 'until = "table.M1.st')
     assert {"table.M1.status", "table.IN1", "table.OUT1", "table.AIN1"} <= set(readable)
@@ -175,7 +175,7 @@ def test_signals_are_completed_where_conditions_and_steps_name_them() -> None:
     assert {"table.IN1", "table.AIN1"} <= set(settable)
     assert not {"table.M1_EN", "table.OUT1"} & set(settable)
     assert items(script + 'write = { "') == ["table"]
-    assert items(WORLD + '\n[[collision]]\nwhen = "x.') == ["x.position", "x.lost", "x.stalled"]
+    assert items(WORLD + '\n[[collision]]\nwhen = "x.') == ["x.position", "x.lost", "x.stalled", "x.power", "x.speed"]
     assert items(script + 'until = "nothing.') == []
     assert items(script + 'note = "table.') == []
     assert "within" not in items(script + 'until = "x.position > 1", ')  # a key follows, no signal

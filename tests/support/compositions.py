@@ -202,11 +202,12 @@ OUTPUTS = {
 }  # fmt: skip
 """Terminals of elements that give a level, by the names of `PARTS`."""
 SIGNALS = {
-    "x": ("position", "lost"), "y": ("position",), "h": ("position",), "z": ("position",), "w": ("count", "fed"),
+    "x": ("position", "lost", "reserve"), "y": ("position", "torque"), "h": ("position", "speed"),
+    "z": ("position",), "w": ("count", "fed"),
     "q": ("count", "fed"),
     "u": ("pressure",), "f": ("position",), "t": ("position", "settled"), "tl": ("x", "y"), "g": ("position",), "s": ("angle",),
     "ja": ("position",), "n": ("count",), "o": ("mass",), "m": ("share",),
-    "l": ("position", "lost"),
+    "l": ("position", "lost", "power", "speed", "torque", "reserve", "force"),
 }  # fmt: skip
 JOINTS = {
     "transducer": '[[transducer]]\nname = "{}"\nof = "{signal}"\nto = "c.{analog}"\npoints = [[0, 0], [90, 9]]\n',

@@ -205,7 +205,7 @@ def test_a_program_and_a_line_keep_a_world_busy() -> None:
         ("a.M5.position", rf"did you mean 'M1.position'\?\); there are status, program, {OF_M1} and more, \d+ in all, and pins$"),
         ("a.M1", rf"no signal 'a\.M1'; there are status, program, {OF_M1} and more, \d+ in all, and pins$"),
         ("d.status", r"no signal 'd\.status'; there are position, velocity, counter, moving, busy, valid, room, variable "),
-        ("x.speed", r"no signal 'x\.speed'; there are position, lost, stalled$"),
+        ("x.spin", r"no signal 'x\.spin'; there are position, lost, stalled, power, speed$"),
         ("go.pressd", r"no signal 'go\.pressd' \(did you mean 'pressed'\?\); there are pressed$"),
         ("tim", r"no signal 'tim': nothing is called 'tim' \(did you mean 'time'\?\); there are a, b, c, d, x, go, time, idle$"),
         ("qqqq.status", r"no signal 'qqqq\.status': nothing is called 'qqqq'; there are a, b, c, d, x, go, time, idle$"),

@@ -10,6 +10,8 @@ from typing import Any
 
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
+from steptwin.messages import Message, text_of
+from steptwin.motion.trig import PI
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
@@ -19,7 +21,8 @@ from steptwin.simulation.components.mount import UPRIGHT, Movement, MoverSpec
 from steptwin.simulation.components.switch import SwitchSpec, channel_of, put_switch, zone_of
 from steptwin.simulation.kinds.kind import EncoderInputs
 from steptwin.simulation.logic.contacts import Switch, Zone
-from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.logic.signal import SignalOf, SignalsOf
+from steptwin.simulation.mechanics.effort import Effort
 from steptwin.simulation.mechanics.mechanics import EncoderBuild, Mechanism, RotorMark
 from steptwin.simulation.mechanics.scale import LENGTHS, TURNS, GivenScale, Scale, exact_fraction, scale_of
 from steptwin.simulation.mechanics.trajectory import Build, Trajectory
@@ -44,8 +47,9 @@ from steptwin.simulation.toml.values import (
     word,
 )
 
+HAS_NO_MOTOR = Message("simulation.axis-has-no-motor", "axis {axis!r} has no [axis.motor]")
 MECHANICS = ("position", "lost", "stalled")
-"""Signals of the mechanics of an axis."""
+"""Signals of an axis that show where it is."""
 
 
 @table("[[axis]]")
@@ -260,7 +264,7 @@ def turning_points_of_axis(fitted: BuiltAxis, now: Nanos) -> Iterator[Nanos]:
 def _signals(fitted: BuiltAxis) -> Mapping[str, SignalOf]:
     mechanism, turning = fitted.mechanism, partial(turning_points_of_axis, fitted)
     up, down = fitted.scale.pulses_per_unit.as_integer_ratio()
-    source, version = (fitted.source,), mechanism.version
+    source, version, unit = (fitted.source,), mechanism.version, fitted.scale.unit
 
     def signal(of: Callable[[Trajectory, Nanos], float], unit: str = "") -> SignalOf:
         return SignalOf(
@@ -272,10 +276,45 @@ def _signals(fitted: BuiltAxis) -> Mapping[str, SignalOf]:
             freeze=lambda now: partial(of, mechanism.trajectory(now)),
         )
 
-    position = signal(lambda trajectory, now: trajectory.load_at(now) * down / up, fitted.scale.unit)
+    def effort(of: Callable[[Effort, Nanos], float], factor: float, unit: str) -> SignalOf:
+        return SignalOf(
+            source,
+            lambda now: of(mechanism.effort(now), now) * factor,
+            lambda now: mechanism.effort(now).turning_points(now),
+            lambda: (version(), mechanism.has_current),
+            unit,
+            freeze=lambda now: partial(_times, partial(of, mechanism.effort(now)), factor),
+        )
+
+    position = signal(lambda trajectory, now: trajectory.load_at(now) * down / up, unit)
     lost = signal(lambda trajectory, now: float(trajectory.field(now) - trajectory.at(now).rotor))
     stalled = signal(lambda trajectory, now: float(trajectory.at(now).stalled))
-    return dict(zip(MECHANICS, (position, lost, stalled), strict=True))
+    found = dict(zip(MECHANICS, (position, lost, stalled), strict=True))
+    found["power"] = SignalOf(source, lambda now: float(mechanism.has_current))
+    found["speed"] = effort(Effort.speed, down / up, f"{unit}/s")
+    if mechanism.build.motor is None:
+        return SignalsOf(found, dict.fromkeys(("torque", "reserve", "force"), HAS_NO_MOTOR(axis=fitted.spec.name)))
+    found["torque"] = effort(Effort.torque, 1.0, "N·m")
+    found["reserve"] = effort(Effort.reserve, 1.0, "N·m")
+    try:
+        found["force"] = effort(Effort.torque, *_per_torque(fitted))
+    except Misuse as error:
+        return SignalsOf(found, {"force": text_of(error)})
+    return found
+
+
+def _per_torque(axis: BuiltAxis) -> tuple[float, str]:
+    """The force or the torque at the load for a torque at the motor, without losses, and its unit. Raises `Misuse` for an axis in
+    a unit whose length is not known."""
+    scale, turns = axis.scale, TURNS.get(axis.scale.unit)
+    revs = scale.pulses_per_unit / scale.pulses_per_rev
+    if turns is not None:
+        return float(revs / turns), "N·m"
+    return 2.0 * PI * 1000.0 * float(revs / mm_per_unit(axis)), "N"
+
+
+def _times(of: Callable[[Nanos], float], factor: float, now: Nanos) -> float:
+    return of(now) * factor
 
 
 def mm_per_unit(axis: BuiltAxis) -> Fraction:

@@ -15,7 +15,7 @@ from steptwin.simulation.components.builtobjects import BuiltObjects
 from steptwin.simulation.faults.controller import FaultyController
 from steptwin.simulation.kinds.kind import AnyKind
 from steptwin.simulation.kinds.lines import Line
-from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.logic.signal import SignalOf, SignalsOf
 from steptwin.simulation.scheduler.scheduler import Source
 from steptwin.simulation.toml.names import Unknown, UnknownSignal
 
@@ -142,6 +142,8 @@ def _is_quiet(line: Line, now: Nanos) -> bool:
 
 def _chosen(known: Mapping[str, T], rest: str, name: str) -> T:
     found = known.get(rest.lower())
+    if found is None and isinstance(known, SignalsOf) and rest.lower() in known.absent:
+        raise Misuse(HAS_NO_SIGNAL(name=name, why=known.absent[rest.lower()]))
     if found is None:
         raise _unknown(list(known), rest, name)
     return found
@@ -149,6 +151,7 @@ def _chosen(known: Mapping[str, T], rest: str, name: str) -> T:
 
 AND_PINS = Message("simulation.and-pins", ", and pins")
 AND_MORE = Message("simulation.and-more", " and more, {count} in all")
+HAS_NO_SIGNAL = Message("simulation.has-no-signal", "no signal {name!r}: {why}")
 NO_SIGNAL = Message("simulation.no-signal", "no signal {name!r}{hint}; there are {names}{more}{others}")
 
 

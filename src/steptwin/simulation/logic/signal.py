@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from steptwin.controller import Nanos
@@ -12,6 +12,17 @@ from steptwin.simulation.scheduler.scheduler import Source
 
 IT_CAN_ONLY_BE_WRITTEN = Message("simulation.it-can-only-be-written", "it can only be written")
 CAN_ONLY_BE_WRITTEN = Message("simulation.can-only-be-written", "{name} can only be written")
+
+
+class SignalsOf(dict[str, "SignalOf"]):
+    """The signals of an element by name."""
+
+    __slots__ = ("absent",)
+
+    def __init__(self, there: Mapping[str, SignalOf], absent: Mapping[str, str]) -> None:
+        """``absent``: why it lacks signals that others of its kind have."""
+        super().__init__(there)
+        self.absent = absent
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ from steptwin.messages import Message
 from steptwin.motion import Profile
 from steptwin.motion.divisions import profile_of
 from steptwin.motioncontroller import Drive
+from steptwin.simulation.mechanics.effort import Effort
 from steptwin.simulation.mechanics.motor import NO_BURDEN, Burden
 from steptwin.simulation.mechanics.rotorhold import RotorHold
 from steptwin.simulation.mechanics.trajectory import Build, LoadSection, MechanicalState, Trajectory
@@ -406,6 +407,12 @@ class Mechanism(Stateful):
     def has_current(self) -> bool:
         """Whether the motor has current: its controller has switched it on, and nothing has taken its power."""
         return self._is_powered and self._drive.is_energised
+
+    def effort(self, now: Nanos) -> Effort:
+        """What the motor does at ``now`` and later, as `trajectory` has it."""
+        trajectory = self.trajectory(now)
+        reduced = None if self._hold is None else self._hold.reduced_from(profile_of(trajectory.plan))
+        return Effort(trajectory, self.has_current, reduced)
 
     def _switch(self, is_powered: bool, now: Nanos) -> None:
         """Give the motor power or take it away; its controller does not notice."""

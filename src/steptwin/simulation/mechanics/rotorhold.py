@@ -190,6 +190,11 @@ class RotorHold(Stateful):
             return rests
         return rests + motor.hold_ns if needed > motor.hold * motor.holding else None
 
+    def reduced_from(self, plan: Profile) -> Nanos | None:
+        """From when on the motor has the reduced current of rest; None: never, as things are."""
+        is_reduced = self._motor.hold < 1.0 and self.has_current and plan.end is not None
+        return max(plan.end or 0, self._on_since) + self._motor.hold_ns if is_reduced else None
+
     def _watch(self, plan: Profile, motion: CoastingRotor, now: Nanos) -> None:
         """Find when something happens to a rotor that is held."""
         deadlines = [self._weak_from(plan, motion)]

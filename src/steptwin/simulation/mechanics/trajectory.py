@@ -228,6 +228,18 @@ class Trajectory:
         """Whether the rotor goes with that."""
         return self._section(now).rotor_follows
 
+    def carries(self, now: Nanos) -> bool:
+        """Whether the load goes with that."""
+        return self._section(now).load_follows
+
+    def is_in_field(self, now: Nanos) -> bool:
+        """Whether the field leads the rotor, or holds it at rest at the place that it has in the field."""
+        section = self._section(now)
+        if self.coasting is not None or section.stalled or self.blocked:
+            return False
+        is_there = section.stop == 0 and self.field(now) - section.behind == section.rotor
+        return section.rotor_follows or (is_there and not self.moves(now))
+
     def _lead(self, now: Nanos) -> int:
         """Position that the rotor follows: that of the field, or of the coasting motion."""
         return self.field(now) if self.coasting is None else self.build.sign * self.coasting.count(now) + self.build.zero
