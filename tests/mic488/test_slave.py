@@ -10,6 +10,7 @@ from math import inf, nan
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from manual_registers import TABLES, WORDS_OF, controls, listed
 from mic488_rig import OFFSETS, OUT, Rig, coil_pdu, controller, dint_words, read_pdu, real_words, word_pdu, words_pdu
 
 from steptwin.mic488 import slave
@@ -18,7 +19,7 @@ from steptwin.wire import pdu as modbus
 from steptwin.wire.slave import TcpSlavePort
 
 FIRMWARES = tuple(OFFSETS)
-USER_REGISTERS = {"1.23": 500, "1.40": 2000, "1.70": 2000}
+USER_REGISTERS = {firmware: count for firmware, (_, _, count) in TABLES.items()}
 BANKS = {"1.23": 8, "1.40": 8, "1.70": 6}
 
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE = 1, 2, 3
@@ -78,22 +79,15 @@ def test_example_of_the_manual_velocity_of_12800_pulses_per_revolution(firmware:
 # ---------------------------------------------------------------------- which addresses exist
 
 
-def readable_words(firmware: str) -> set[int]:
-    base = OFFSETS[firmware]
-    return {*range(USER_REGISTERS[firmware]), *range(base, base + 14)}
-
-
-def readable_pairs(firmware: str) -> set[int]:
-    base = OFFSETS[firmware]
-    return {base + n for first, last in ((20, 58), (100, 114), (120, 134)) for n in range(first, last + 1, 2)}
+def readable(firmware: str) -> set[int]:
+    """Words of control registers."""
+    found = [one for is_word in (True, False) for one in controls(firmware, is_word=is_word) if one.reads]
+    return {one.address + n for one in found for n in range(WORDS_OF[one.kind])}
 
 
 @pytest.mark.parametrize("firmware", FIRMWARES)
 def test_mic_3_strict_single_registers_are_readable_where_the_manual_says_so_and_nowhere_else(firmware: str) -> None:
-    rig, words = (
-        Rig(firmware=firmware),
-        readable_words(firmware) | {address + n for address in readable_pairs(firmware) for n in (0, 1)},
-    )
+    rig, words = Rig(firmware=firmware), readable(firmware) | {*range(USER_REGISTERS[firmware])}
     for address in [*range(2200), *range(9900, 10300), 0x7FFF, 0xFFFE, 0xFFFF]:
         expected = 0 if address in words else ILLEGAL_ADDRESS
         assert rig.exception(read_pdu(3, address, 1)) == expected, address
@@ -101,9 +95,9 @@ def test_mic_3_strict_single_registers_are_readable_where_the_manual_says_so_and
 
 @pytest.mark.parametrize("firmware", FIRMWARES)
 def test_mic_5_two_words_are_readable_where_both_belong_to_something_readable(firmware: str) -> None:
-    rig, pairs = Rig(firmware=firmware), readable_pairs(firmware)
-    words, base = {address + n for address in pairs for n in (0, 1)}, OFFSETS[firmware]
-    for address in range(base + 14, base + 140):
+    rig, words, base = Rig(firmware=firmware), readable(firmware), OFFSETS[firmware]
+    assert {base, base + 13, base + 20, base + 135} <= words
+    for address in range(base, base + 150):
         expected = 0 if {address, address + 1} <= words else ILLEGAL_ADDRESS
         assert rig.exception(read_pdu(3, address, 2)) == expected, address
 
@@ -134,19 +128,18 @@ def test_bits_are_readable_where_the_manual_says_so(firmware: str) -> None:
 @pytest.mark.parametrize("firmware", FIRMWARES)
 def test_coils_are_writable_where_the_manual_says_so(firmware: str) -> None:
     rig = Rig(firmware=firmware)
-    writable = {*range(2000, 2016), *range(6000, 6008)}
-    if firmware == "1.70":
-        writable |= {2100, 2101, 2102}
+    writable = {one.address for one in listed(firmware) if one.kind == "BIT" and one.writes}
     for address in [*range(1990, 2110), *range(4990, 5030), *range(5990, 6020), 0, 0xFFFF]:
         assert rig.exception(coil_pdu(address, True)) == (0 if address in writable else ILLEGAL_ADDRESS), address
 
 
 @pytest.mark.parametrize("firmware", FIRMWARES)
 def test_mic_24_words_are_writable_where_the_manual_says_so(firmware: str) -> None:
-    rig, base = Rig(firmware=firmware), OFFSETS[firmware]
-    single = {*range(USER_REGISTERS[firmware]), *range(base, base + 9), *range(base + 14, base + 18)}
-    several = single - {base + 17}  # JOG_SPEED alone is a pair that takes function 06 (MIC-6)
-    for address in [*range(2100), *range(9990, 10140)]:
+    rig = Rig(firmware=firmware)
+    several = {*range(USER_REGISTERS[firmware]), *(one.address for one in controls(firmware, is_word=True) if one.writes)}
+    single = several | {one.address for one in controls(firmware, is_word=False) if one.writes == (6,)}
+    assert single - several == {OFFSETS[firmware] + 17}  # JOG_SPEED alone is a pair that takes function 06 (MIC-6)
+    for address in [*range(2100), *range(9990, 10150)]:
         assert rig.exception(word_pdu(address, 0)) == (0 if address in single else ILLEGAL_ADDRESS), address
         assert rig.exception(words_pdu(address, 0)) == (0 if address in several else ILLEGAL_ADDRESS), address
 
@@ -154,9 +147,8 @@ def test_mic_24_words_are_writable_where_the_manual_says_so(firmware: str) -> No
 @pytest.mark.parametrize("firmware", FIRMWARES)
 def test_mic_24_pairs_are_writable_where_the_manual_says_so(firmware: str) -> None:
     rig, base = Rig(firmware=firmware), OFFSETS[firmware]
-    ranges = ((17, 17), (20, 26), (36, 58), (60, 98), (100, 114), (120, 134))
-    writable = {base + n for first, last in ranges for n in range(first, last + 1, 2)}
-    for address in range(base + 17, base + 140):
+    writable = {one.address for one in controls(firmware, is_word=False) if one.writes}
+    for address in range(base + 17, base + 150):
         expected = 0 if address in writable else ILLEGAL_ADDRESS
         assert rig.exception(words_pdu(address, *real_words(1.0))) == expected, address
 

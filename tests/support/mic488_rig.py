@@ -5,11 +5,14 @@ Nothing here uses the product's register table or encoding, so that a mistake th
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+
+from manual_registers import BASES, controls
 
 from steptwin.controller import SECOND, PinEdge
 from steptwin.mic488.config import AxisConfig, ControllerConfig, read_config
@@ -25,17 +28,14 @@ from steptwin.wbc.check import check
 from steptwin.wbc.dialect import dialect_for
 from steptwin.wbc.positions import PositionTable, parse_positions
 
-OFFSETS = {"1.23": 1000, "1.40": 10000, "1.70": 10000}
-
-WORDS = {
-    "DATA_TYPE": 0, "PROG_BANK_SEL": 1, "POS_BANK_SEL": 2, "PROGRAM_CTRL": 3, "AXIS_CTR_MODE": 4, "AXIS_VEL_ABS_TRIG": 5,
-    "AXIS_VEL_REL_TRIG": 6, "AXIS_POS_ABS_TRIG": 7, "AXIS_POS_REL_TRIG": 8, "M_STATUS": 9, "M_ENABLE": 14, "M_DISABLE": 15,
-    "M_STOP": 16,
-}  # fmt: skip
+OFFSETS = BASES
+WORDS = {one.name: one.address - BASES["1.70"] for one in controls("1.70", is_word=True) if not one.name[1].isdigit()}
 VALUES = {
-    "POS_ACT": 20, "VEL_ACT": 28, "ACC": 36, "DEC": 44, "VMAX": 52, "HOME": 60, "VEL_ABS": 68, "VEL_REL": 76, "POS_ABS": 84,
-    "POS_REL": 92, "ENC_IMP": 100, "ENC_XPOS": 108, "POSLIM_L": 120, "POSLIM_R": 128,
-}  # fmt: skip
+    re.sub(r"^M1_|(?<=^ENC)1", "", one.name): one.address - BASES["1.70"]
+    for one in controls("1.70", is_word=False)
+    if one.name.startswith(("M1_", "ENC1_"))
+}
+"""Addresses from the base: of registers of the controller, and of axis 1."""
 EN, STOP, JOG, USER_REG_READ, USER_REG_SAVE, USER_REG_ZERO, IN, OUT = 2000, 2004, 2008, 2100, 2101, 2102, 5000, 6000
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "mic488"

@@ -87,8 +87,8 @@ def test_numbers_of_a_line_may_be_hexadecimal_where_they_are_whole() -> None:
 
 
 REFUSED = {
-    "": "a fault is KIND [NAME=VALUE ...], such as 'crc unit=1 nth=3'; kinds are flip, drop,",
-    "crcc": "fault: kind = 'crcc' (did you mean 'crc'?): permitted are flip, drop, insert,",
+    "": "a fault is KIND [NAME=VALUE ...], such as 'crc unit=1 nth=3'; kinds are flip, ",
+    "crcc": "fault: kind = 'crcc' (did you mean 'crc'?): permitted are flip, ",
     "crc nth": "fault 'crc nth': 'nth' is not NAME=VALUE",
     "crc nth=1 nth=2": "fault 'crc nth=1 nth=2': nth is given twice",
     "crc units=1": "fault (crc): there is no 'units': parameters are unit, function, address, link, line, nth,",
