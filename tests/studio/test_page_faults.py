@@ -62,3 +62,19 @@ def test_a_coupling_slips_and_holds_again(studio: Studio) -> None:
     assert angle(studio) > 0.0
     page.get_by_label("Kind of fault").select_option("stuck-output")
     expect(element.locator("option")).to_have_text([re.compile("."), "both"])
+
+
+def test_an_output_sticks_and_only_inputs_bounce(studio: Studio) -> None:
+    page = studio.page()
+    show(page, "Faults")
+    pin = page.get_by_label("pin", exact=True)
+    page.get_by_label("Kind of fault").select_option("bounce")
+    expect(pin.locator("option", has_text=re.compile("^OUT1$"))).to_have_count(0)
+    expect(pin.locator("option", has_text=re.compile("^IN1$"))).to_have_count(1)
+    page.get_by_label("Kind of fault").select_option("stuck")
+    pin.select_option("OUT1")
+    page.get_by_label("value", exact=True).fill("1")
+    button(page, "Set fault").click()
+    expect(page.get_by_role("row", name=re.compile("^stuck "))).to_contain_text("pin=OUT1")
+    answer = httpx.get(f"{studio.process.url}/api/points?names=both.in1").json()
+    assert answer["ok"][0]["value"] == 1.0
