@@ -12,9 +12,10 @@ import steptwin.testing  # noqa: F401  else every run imports it anew, for pytes
 
 
 @pytest.fixture(autouse=True)
-def without_asyncio_plugin(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
-    """pytest-lsp brings pytest-asyncio, which warns in runs whose configuration does not set its loop scope."""
-    monkeypatch.setenv("PYTEST_ADDOPTS", "-p no:asyncio")
+def with_this_plugin_alone(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As here; `test_wheel.py` has it as pytest finds it."""
+    monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
+    monkeypatch.setenv("PYTEST_ADDOPTS", "-p steptwin.pytest_plugin")
 
 
 @pytest.fixture
@@ -23,6 +24,6 @@ def run(pytester: pytest.Pytester) -> Callable[..., pytest.RunResult]:
 
     def run_(text: str, *options: str) -> pytest.RunResult:
         pytester.makepyfile(test_it=dedent(text))
-        return pytester.runpytest_inprocess("-W", "error", "-p", "no:cacheprovider", "-p", "no:rerunfailures", *options)
+        return pytester.runpytest_inprocess("-W", "error", "-p", "no:cacheprovider", *options)
 
     return run_

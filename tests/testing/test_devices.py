@@ -82,7 +82,7 @@ def test_a_device_that_is_not_there_is_told_in_a_line(run: Run) -> None:
         (["--device", "nonsense:"], "*'nonsense:' is not an address*"),
         (["--device", "/dev/a", "--device", "/dev/b"], "*there is an address already: /dev/a*"),
         (["--device", "m1486=/dev/a", "--device", "m1486=/dev/b"], "*m1486 has an address already: /dev/a*"),
-        (["--device", "/dev/a", "-n2"], "*several processes (-n) cannot share a device: run without -n*"),
+        (["--device", "/dev/a", "-p", "xdist", "-n2"], "*several processes (-n) cannot share a device: run without -n*"),
         (["--device", "/dev/a"], "*for a MIC488 and for an M1486: name the device, mic488=ADDRESS or m1486=ADDRESS*"),
     ],
 )

@@ -347,6 +347,8 @@ def test_it_works_in_processes_of_xdist(run: Run) -> None:
         def test_it(mic488):
             assert mic488.driver.axis(1).position() == 0.0
         """,
+        "-p",
+        "xdist",
         "-n1",
     ).assert_outcomes(passed=1)
 
@@ -383,7 +385,7 @@ def covered(run: Run, pytester: pytest.Pytester) -> Run:
     return run
 
 
-@pytest.mark.parametrize("processes", [(), ("-n2",)])
+@pytest.mark.parametrize("processes", [(), ("-p", "xdist", "-n2")])
 def test_coverage_adds_up_over_all_tests(covered: Run, pytester: pytest.Pytester, processes: tuple[str, ...]) -> None:
     """The input is seen after the first condition, so its other way is never gone."""
     done = covered(COVERED, "--steptwin-coverage=-", "--steptwin-coverage=c.json", *processes)
