@@ -215,14 +215,20 @@ TEXTS = {
 
 
 @pytest.mark.asyncio
-@pytest.mark.parametrize("name", TEXTS)
-async def test_every_question_about_any_text_has_an_answer(client: LanguageClient, tmp_path: Path, name: str) -> None:
-    suffix, text = TEXTS[name]
-    uri, text = (tmp_path / f"machine{suffix}").as_uri(), text.replace("\n", "\r\n" if "broken" in name else "\n")
-    open_text(client, uri, text)
-    found = await diagnostics(client, uri)
-    assert bool(found) == (not name.startswith("good") or suffix == ".prg")  # the program has no table here
-    await ask_everything(client, uri, text)
+async def test_every_question_about_any_text_has_an_answer(client: LanguageClient, tmp_path: Path) -> None:
+    for name, (suffix, plain) in TEXTS.items():
+        folder = tmp_path / name
+        folder.mkdir()
+        uri, text = (folder / f"machine{suffix}").as_uri(), plain.replace("\n", "\r\n" if "broken" in name else "\n")
+        open_text(client, uri, text)
+        found = await diagnostics(client, uri)
+        assert bool(found) == (not name.startswith("good") or suffix == ".prg"), name  # the program has no table here
+        try:
+            await ask_everything(client, uri, text)
+        except Exception as error:
+            error.add_note(f"asked about: {name}")
+            raise
+        client.text_document_did_close(lsp.DidCloseTextDocumentParams(lsp.TextDocumentIdentifier(uri)))
 
 
 async def ask_everything(client: LanguageClient, uri: str, broken: str) -> None:
