@@ -62,44 +62,52 @@ def test_a_stop_holds_a_queue_that_goes_on_together() -> None:
     world.at(5.0, lambda: world.mic488["a"].write("OUT3", 0))
     world.run(until=10.0)
     # 300 mm at 125 mm/s from 0.5 s on; the second one, 62.5 mm behind, comes to the rear of the first at 260 mm.
-    assert happened(world, "belt.1")[1:4] == [
+    # The next belt moves it from 420 mm on.
+    assert happened(world, "belt.1")[1:5] == [
         (2900, "stands at 300 mm of belt"),
         (5000, "goes on on belt"),
-        (5800, "leaves belt"),
+        (5960, "leaves belt"),
+        (5960, "is on out"),
     ]
     assert happened(world, "belt.2")[1:3] == [(3080, "stands at 260 mm of belt"), (5000, "goes on on belt")]
-    # The conveyor after it is half as fast: it has room for the next one 40 mm later.
-    assert happened(world, "belt.2")[3:5] == [
-        (pytest.approx(6120, abs=1e-5), "stands at 400 mm of belt"),
-        (pytest.approx(6440, abs=1e-4), "goes on on belt"),
+    # The next conveyor is half as fast: the second one touches the first at once, at 380 mm, and waits for 20 mm of room. Then it
+    # makes 40 mm while the first one makes 20.
+    assert happened(world, "belt.2")[3:6] == [
+        (pytest.approx(5960, abs=1e-5), "stands at 380 mm of belt"),
+        (pytest.approx(6280, abs=1e-4), "goes on on belt"),
+        (pytest.approx(6600, abs=1e-4), "leaves belt"),
     ]
 
 
 def integrated(changes: list[tuple[int, int]], end: int) -> tuple[list[tuple[int, bool]], list[float], int]:
-    """Edges of the sensor in ms, the fronts at the end, and how many have left, in steps of 1/8 mm."""
-    stops, fronts, edges, delivered, out = [False, False], [], [], 0, []  # type: ignore[var-annotated]
-    was_seen = False
+    """Edges of the sensor in ms, the fronts at the end in mm, and how many have left, in steps of 1/8 mm."""
+    stops, edges, delivered, was_seen, waits = [False, False], [], 0, False, False  # type: ignore[var-annotated]
+    fronts: list[float] = []
+    out: list[float] = []
     for step in range(end + 1):
         for at, stop in changes:
             if at == step:
                 stops[stop] = not stops[stop]
-        if step and step % 500 == 0 and not any(front <= 40 * 8 for front in fronts):
+        if step and step % 500 == 0 and not any(front <= 40 for front in fronts):
             fronts.append(0)
-        seen = any(280 * 8 <= front <= 320 * 8 for front in fronts)
+        seen = any(280 <= front <= 320 for front in fronts)
         if seen is not was_seen:
             edges.append((step, seen))
             was_seen = seen
-        moved: list[int] = []
+        rear = 400 + out[-1] - 40 if out else 1000.0
+        moved: list[float] = []
         for front in fronts:
-            blocked = any(on and front == place * 8 for on, place in zip(stops, (100, 300), strict=True))
-            blocked |= bool(moved) and moved[-1] - front <= 40 * 8
-            blocked |= front >= 400 * 8 and any(place <= 40 * 16 for place in out)
-            moved.append(front if blocked else front + 1)
-        out = [place + 1 for place in out]
+            blocked = any(on and front == place for on, place in zip(stops, (100, 300), strict=True))
+            blocked |= bool(moved) and moved[-1] - front <= 40
+            if not moved and not blocked:
+                waits = front >= rear if not waits else rear < min(front + 20, 420)
+                blocked = waits
+            moved.append(front if blocked else front + 1 / 8)
+        out = [front + 1 / 16 for front in out]
         fronts = moved
-        if fronts and fronts[0] >= 400 * 8 and not any(place <= 40 * 16 for place in out):
-            fronts, delivered, out = fronts[1:], delivered + 1, [*out, 0]
-    return edges, [front / 8 for front in fronts], delivered
+        if fronts and fronts[0] >= 420:
+            fronts, delivered, out = fronts[1:], delivered + 1, [*out, 20.0]
+    return edges, fronts, delivered
 
 
 @settings(max_examples=30, deadline=None)
@@ -169,9 +177,9 @@ def test_a_sensor_sees_the_marks_on_both_belts() -> None:
     # The mark from 10 to 15 mm behind the front is at 100 mm when the front is at 110 to 115 mm: 1.1 s after it came at 1 s.
     first = [time for time, _ in edges(world, "belt.sensor1")[1:5]]
     assert first == pytest.approx([2100, 2150, 2400, 2450], abs=2e-6)
-    # It comes to the second belt at 3 s; there the front is at 30 mm after 600 ms.
+    # Its centre comes to the second belt, with the front at 30 mm, at 3.3 s.
     second = [time for time, _ in edges(world, "second.sensor1")[1:5]]
-    assert second == pytest.approx([3600, 3700, 4200, 4300], abs=2e-5)
+    assert second == pytest.approx([3300, 3400, 3900, 4000], abs=2e-5)
 
 
 @pytest.mark.parametrize(

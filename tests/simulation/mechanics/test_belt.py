@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import pytest
 
-from steptwin.simulation.mechanics.belt import ConstantDrive, Load, Workpiece, next_change
+from steptwin.simulation.mechanics.belt import Belt, ConstantDrive, Near, Placed, Workpiece, nanometres, next_change
 
 
 def test_a_belt_with_its_own_drive() -> None:
@@ -43,52 +43,172 @@ def test_when_a_belt_comes_to_a_place() -> None:
     assert drive.reaches(1000, 60, 1) is None
 
 
-ONE, OTHER = Workpiece("a.1", 100, 30), Workpiece("a.2", 140, 30)
+class Walking:
+    """A drive that makes a step each ns."""
+
+    def version(self) -> object:
+        return None
+
+    def grid_position(self, now: int) -> int:
+        return now
+
+    def reaches(self, position: int, after: int, direction: int) -> int | None:
+        return position if direction > 0 and position > after else None
 
 
-def test_what_covers_a_place() -> None:
+def belt(name: str = "a", length: float = 200.0, per_mm: int = 1) -> Belt:
+    return Belt(name, length, Walking(), Fraction(per_mm))
+
+
+def placed(name: str, origin: int, length: int = 30, came_from: str = "") -> Placed:
+    return Placed(Workpiece(name, length * 10**6), origin, length, came_from=came_from)
+
+
+ONE, OTHER = placed("a.1", 100), placed("a.2", 140)
+
+
+def over(one: Belt, place: int, now: int) -> str:
+    """The name of the workpiece over a place."""
+    found = one.occupant(place, place, now)
+    return "" if found is None else found[1].workpiece.name
+
+
+def test_what_is_over_a_place() -> None:
     """A workpiece reaches from its front backwards, both ends included; of two the first one put there counts."""
-    load = Load()
-    load.put(ONE)
-    load.put(OTHER)
-    at_50 = {belt: load.covering(50, belt) for belt in range(140, 240)}
-    assert {belt for belt, piece in at_50.items() if piece == ONE} == set(range(150, 181))
-    assert {belt for belt, piece in at_50.items() if piece == OTHER} == set(range(190, 221))
-    load.put(Workpiece("b.1", 95, 30))
-    assert load.covering(50, 160) == ONE
-    assert load.covering(50, 145) == Workpiece("b.1", 95, 30)
+    there = belt()
+    there.put(ONE)
+    there.put(OTHER)
+    at_50 = {now: over(there, 50, now) for now in range(140, 240)}
+    assert {now for now, name in at_50.items() if name == "a.1"} == set(range(150, 181))
+    assert {now for now, name in at_50.items() if name == "a.2"} == set(range(190, 221))
+    there.put(placed("b.1", 95))
+    assert over(there, 50, 160) == "a.1"
+    assert over(there, 50, 145) == "b.1"
+
+
+def test_what_is_over_a_stretch() -> None:
+    """Any place of it, both ends included."""
+    there = belt()
+    there.put(ONE)
+    for low in range(120):
+        for high in range(low, 120):
+            found = there.occupant(low, high, 190)
+            assert (found is not None) is any(60 <= place <= 90 for place in range(low, high + 1))
+    assert there.occupant(-40, -1, 110) is None, "what is before a belt is on another one"
+    assert there.occupant(-40, 0, 100) == (there, ONE)
 
 
 def test_edges_are_all_places_where_that_changes() -> None:
-    load = Load()
-    load.put(ONE)
-    load.put(OTHER)
-    covered = {belt: load.covering(50, belt) for belt in range(100, 300)}
-    for belt in range(101, 299):
-        below, above = load.edges(50, belt)
-        assert below is None or below < belt
-        assert above is None or above > belt
-        for other in range(belt + 1, 299 if above is None else above):
-            assert covered[other] == covered[belt] or other == above
-        for other in range(101 if below is None else below + 1, belt):
-            assert covered[other] == covered[belt]
-    assert load.edges(50, 100) == (None, 149)
-    assert load.edges(50, 149) == (None, 150)
-    assert load.edges(50, 150) == (149, 180)
-    assert load.edges(50, 180) == (150, 181)
-    assert load.edges(50, 185) == (181, 189)
-    assert load.edges(50, 300) == (221, None)
-    assert Load().edges(50, 5) == (None, None)
+    there = belt()
+    there.put(ONE)
+    there.put(OTHER)
+    covered = {now: over(there, 50, now) for now in range(100, 300)}
+    for now in range(101, 299):
+        below, above = there.edges(50, now)
+        assert below is None or below < now
+        assert above is None or above > now
+        for other in range(now + 1, 299 if above is None else above):
+            assert covered[other] == covered[now] or other == above
+        for other in range(101 if below is None else below + 1, now):
+            assert covered[other] == covered[now]
+    assert there.edges(50, 100) == (None, 149)
+    assert there.edges(50, 149) == (None, 150)
+    assert there.edges(50, 150) == (149, 180)
+    assert there.edges(50, 180) == (150, 181)
+    assert there.edges(50, 185) == (181, 189)
+    assert there.edges(50, 300) == (221, None)
+    assert belt().edges(50, 5) == (None, None)
 
 
-def test_every_change_of_a_load_is_another_version() -> None:
-    load = Load()
-    versions = [load.version()]
-    for change in (lambda: load.put(ONE), lambda: load.put(OTHER), lambda: load.take(ONE)):
+def test_every_change_of_the_workpieces_is_another_version() -> None:
+    there = belt()
+    versions = [there.version()]
+    for change in (lambda: there.put(ONE), lambda: there.put(OTHER), lambda: there.take(ONE)):
         change()
-        versions.append(load.version())
+        versions.append(there.version())
     assert len(set(versions)) == 4
-    assert load.workpieces == (OTHER,)
+    assert there.workpieces == (OTHER,)
+
+
+def test_a_workpiece_keeps_its_size_on_any_grid() -> None:
+    """33.3 mm on grids of 1 pm, 0.3 mm and 1 mm, one after the other."""
+    workpiece = Workpiece("a.1", nanometres(33.3), marks=((nanometres(1.6), nanometres(3.1)),))
+    found = []
+    for per_mm in (Fraction(10**9), Fraction(10, 3), Fraction(1), Fraction(10**9)):
+        one = Belt("a", 100.0, Walking(), per_mm).place(workpiece, 5, 0)
+        assert (one.workpiece, one.front(0)) == (workpiece, 5)
+        found.append((one.length, one.marks))
+    assert found == [
+        (33_300_000_000, ((1_600_000_000, 3_100_000_000),)),
+        (111, ((5, 10),)),
+        (33, ((2, 3),)),
+        (33_300_000_000, ((1_600_000_000, 3_100_000_000),)),
+    ]
+
+
+@pytest.mark.parametrize("per_mm", [Fraction(10**9), Fraction(3200, 7), Fraction(1, 2)])
+def test_lengths_are_rounded_to_the_nearest(per_mm: Fraction) -> None:
+    there = Belt("a", 1000.0, Walking(), per_mm)
+    for nm in range(-3_000_000, 3_000_001, 123_457):
+        assert abs(there.from_nm(nm) - Fraction(nm, 10**6) * per_mm) <= Fraction(1, 2)
+    for steps in range(-40, 41, 3):
+        assert abs(there.to_nm(steps) - steps / per_mm * 10**6) <= Fraction(1, 2)
+
+
+def test_a_workpiece_is_over_every_belt_below_it() -> None:
+    """Three belts of 200, 100 and 200 mm on grids of 1, 0.5 and 0.25 mm; the middle one begins at 200 mm of the first."""
+    first, middle, last = belt("a"), belt("b", 100.0, 2), belt("c", 200.0, 4)
+    mm = 10**6
+    first.near = Near(middle, 200 * mm, 200 * mm, "a"), Near(last, 300 * mm, 300 * mm, "b")
+    middle.near = Near(first, -200 * mm), Near(last, 100 * mm, 100 * mm, "b")
+    last.near = Near(middle, -100 * mm), Near(first, -300 * mm)
+    # A front at 40 mm of the last one, 160 mm long: 180 to 340 mm from the beginning of the first one.
+    last.put(placed("a.1", -160, 640, came_from="b"))
+    for one, low, high in ((first, 180, 200), (middle, 0, 200), (last, 0, 160)):
+        places = [place for place in range(one.length + 1) if over(one, place, 0)]
+        assert places == list(range(low, high + 1))
+        assert one.occupant(low, low, 0) == (last, last.workpieces[0])
+    # Its rear is at 190 mm of the first one after 40 steps of a quarter of a millimetre, and never at 170 mm.
+    assert first.next_change(190, 0) == 40
+    assert first.next_change(190, 40) == 41
+    assert first.next_change(170, 0) is None
+    last.take(last.workpieces[0])
+    # What has its centre on the first one reaches to 240 mm.
+    first.put(placed("a.2", -240, 90))
+    assert [place for place in range(middle.length + 1) if over(middle, place, 0)] == list(range(81))
+
+
+def test_a_workpiece_is_on_the_way_that_it_came() -> None:
+    """Two belts join a third one: the rear of what one has brought is not over the other."""
+    one, other, third = belt("a"), belt("b"), belt("c")
+    mm = 10**6
+    one.near = Near(third, 200 * mm, 200 * mm, "a"), Near(other, 0, 200 * mm)
+    third.put(placed("a.1", -10, 30, came_from="a"))
+    assert [place for place in range(201) if over(one, place, 0)] == list(range(180, 201))
+    third.take(third.workpieces[0])
+    third.put(placed("b.1", -10, 30, came_from="b"))
+    assert [place for place in range(150, 220) if over(one, place, 0)] == list(range(200, 211))
+    third.take(third.workpieces[0])
+    other.put(placed("b.2", -210, 30))
+    assert [place for place in range(150, 220) if over(one, place, 0)] == list(range(200, 211))
+    other.take(other.workpieces[0])
+    third.put(placed("c.1", -10, 30))
+    assert [place for place in range(150, 220) if over(one, place, 0)] == list(range(180, 211)), (
+        "where it was put nothing is known"
+    )
+
+
+def test_a_belt_at_a_constant_speed_is_a_line() -> None:
+    drive = ConstantDrive(Fraction(5, 2), 0)
+    assert drive.line(5) == (0, 0)
+    drive.run(True, 8)
+    line = drive.line(8)
+    assert line is not None
+    assert line[1] == Fraction(5, 2)
+    assert [drive.grid_position(now) for now in range(8, 20)] == [int(line[0] + line[1] * now) for now in range(8, 20)]
+    drive.run(False, 11)
+    assert drive.line(11) == (7, 0)
+    assert drive.lead_over(drive) is None
 
 
 class Both:

@@ -108,3 +108,33 @@ def test_its_state_is_plain(runs: bool) -> None:
     other.set_state(drive.copy_state())
     assert [other.grid_position(n) for n in (110, 200, 999)] == [drive.grid_position(n) for n in (110, 200, 999)]
     assert other.version() == drive.version()
+
+
+@pytest.mark.parametrize(("up", "down"), [(70, 40), (0, 40), (70, 0), (13, 13)])
+@given(st.lists(st.integers(1, 150), min_size=1, max_size=6))
+def test_beyond_a_ramp_it_moves_straight_on(up: int, down: int, waits: list[int]) -> None:
+    drive, now = RampedDrive(Fraction(7, 3), up, down, 0), 0
+    for wait in waits:
+        drive.run(not drive.runs, now)
+        straight = drive.straight_from()
+        assert straight >= now
+        assert all(drive.line(moment) is None for moment in range(now, straight))
+        line = drive.line(straight)
+        assert line is not None
+        for moment in range(straight, straight + 30):
+            assert floor(line[0] + line[1] * moment) == drive.grid_position(moment)
+        now += wait
+
+
+def test_drives_that_are_switched_alike_keep_their_lead() -> None:
+    one, other = (RampedDrive(Fraction(7, 3), 70, 40, 0) for _ in range(2))
+    one.run(True, 10)
+    one.run(False, 40)
+    assert one.lead_over(other) is None
+    for drive, runs, now in ((one, True, 200), (other, True, 200), (one, False, 250), (other, False, 250)):
+        drive.run(runs, now)
+    lead = one.lead_over(other)
+    assert lead is not None
+    assert {one.grid_position(now) - other.grid_position(now) for now in range(250, 400)} == {lead}
+    assert one.lead_over(RampedDrive(Fraction(7, 3), 70, 41, 0)) is None
+    assert one.lead_over(ConstantDrive(Fraction(7, 3), 0)) is None

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Protocol, TypeVar
+from typing import ClassVar
 
 from steptwin.controller import Nanos
 from steptwin.simulation.components.contact import ContactSpec
 from steptwin.simulation.logic.contacts import Circuit, Contact
-from steptwin.simulation.mechanics.belt import BeltDrive, Load, next_change
+from steptwin.simulation.mechanics.belt import Belt
 from steptwin.simulation.scheduler.chance import Chance
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import INPUT_PIN, Terminal, number, word
 
 WORKPIECE, MARK = "workpiece", "mark"
-T = TypeVar("T")
 
 
 @table("[[conveyor.sensor]]")
@@ -25,26 +24,13 @@ class SensorSpec(ContactSpec):
     sees: str = key(word(WORKPIECE, MARK), "workpiece, or the marks on workpieces", default=WORKPIECE)
 
 
-class Carrying(Protocol):
-    """A belt with its workpieces."""
-
-    drive: BeltDrive
-    load: Load
-
-    def version(self) -> object:
-        """Another value whenever predictions no longer hold."""
-        ...
-
-    def to_grid(self, mm: float) -> int: ...
-
-
 class Sensor(Contact):
     """On while a workpiece, or a mark on one, covers its place."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("_at", "_belt", "_of_marks", "_seen")
     __slots__ = (*FIXED,)
 
-    def __init__(self, circuit: Circuit, belt: Carrying, spec: SensorSpec, chance: Chance, channel: str) -> None:
+    def __init__(self, circuit: Circuit, belt: Belt, spec: SensorSpec, chance: Chance, channel: str) -> None:
         super().__init__(
             circuit,
             normally_closed=spec.contact == "NC",
@@ -61,15 +47,14 @@ class Sensor(Contact):
 
     def update(self, now: Nanos) -> None:
         self.bounce(now)
-        version = self._belt.version()
+        belt = self._belt
+        version = belt.line_version()
         if version == self._seen and (self._due is None or self._due > now):
             return
         self._seen = version
-        drive, load = self._belt.drive, self._belt.load
-        position = drive.grid_position(now)
-        is_seen = load.covering(self._at, position, of_marks=self._of_marks) is not None
+        is_seen = belt.occupant(self._at, self._at, now, of_marks=self._of_marks) is not None
         self.change(is_seen is not self.normally_closed, now)
-        self._due = next_change(drive, *load.edges(self._at, position, of_marks=self._of_marks), now)
+        self._due = belt.next_change(self._at, now, of_marks=self._of_marks)
 
     def deadline(self) -> Nanos | None:
         moments = (moment for moment in (self.bounce_due(), self._due) if moment is not None)

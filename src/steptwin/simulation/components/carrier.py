@@ -8,12 +8,12 @@ from typing import ClassVar
 
 from steptwin.controller import Nanos
 from steptwin.messages import Message
-from steptwin.simulation.components.conveyor import find_conveyor
+from steptwin.simulation.components.conveyor import Conveyor, find_conveyor
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.components.logic import Joint, TerminalComponent, TerminalComponentSpec
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.mechanics.belt import Workpiece, next_change
+from steptwin.simulation.mechanics.belt import Belt, Placed, Workpiece
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, number
@@ -71,35 +71,36 @@ class Carrier(TerminalComponent):
         self.source, self.onto = (None if name is None else find_conveyor(name, context) for name in (spec.source, spec.onto))
         self._pick_at, self._place_at = spec.pick_at, spec.place_at
         self.carried: Workpiece | None = None
-        """As it was on the belt it was taken from."""
         self.dropped = 0
         """How many have fallen."""
 
     @property
     def depends_on(self) -> tuple[str, ...]:
-        return (self.block.name, *(() if self.source is None else (self.source.block.name,)))
+        return (self.block.name, *(() if self.source is None else self.source.line))
 
     def is_occupied(self, now: Nanos) -> bool:
         """Whether it carries a workpiece, or one is where it would pick it up."""
-        return self.carried is not None or self._below(now) is not None
+        if self.carried is not None or not self.block.is_on(PICK):
+            return self.carried is not None
+        return self.source is None or self._below(self.source, now) is not None
 
-    def _below(self, now: Nanos) -> Workpiece | None:
-        """The workpiece where it picks up. Without a conveyor there is one wherever PICK is on."""
-        if not self.block.is_on(PICK):
-            return None
-        source = self.source
-        if source is None:
-            return Workpiece("workpiece", 0, 0)
-        return source.load.covering(source.to_grid(self._pick_at), source.drive.grid_position(now))
+    def _below(self, source: Conveyor, now: Nanos) -> tuple[Belt, Placed] | None:
+        """The workpiece where it picks up, and the belt that moves it."""
+        place = source.belt.to_grid(self._pick_at)
+        return source.belt.occupant(place, place, now)
 
     def take(self, now: Nanos) -> None:
-        """It holds what is there from now on."""
-        workpiece = self._below(now)
-        if self.carried is None and workpiece is not None:
-            self.carried = workpiece
-            if self.source is not None:
-                self.source.take(workpiece)
-                self.source.report(HOLDS(cup=self.block.name, workpiece=workpiece.name), workpiece.name, "held")
+        """It holds what is there from now on. Without a conveyor there is a workpiece wherever PICK is on."""
+        if self.carried is not None or not self.block.is_on(PICK):
+            return
+        source = self.source
+        if source is None:
+            self.carried = Workpiece("workpiece", 0)
+        elif (found := self._below(source, now)) is not None:
+            belt, placed = found
+            self.carried = placed.workpiece
+            source.take(belt, placed)
+            source.report(HOLDS(cup=self.block.name, workpiece=self.carried.name), self.carried.name, "held")
 
     def let_go(self, now: Nanos) -> None:
         """It does not hold anything from now on."""
@@ -108,20 +109,21 @@ class Carrier(TerminalComponent):
         if workpiece is None or source is None:
             return
         if onto is not None and self.block.is_on(PLACE):
-            onto.take_over(workpiece, source, self._place_at, now)
+            lies = onto.put(workpiece, self._place_at, now)
         elif self.block.is_on(PICK):
-            source.put(workpiece, self._pick_at, now)
+            lies = source.put(workpiece, self._pick_at, now)
         else:
-            self.dropped += 1
+            lies = False
             source.report(FALLS_FROM(workpiece=workpiece.name, cup=self.block.name), workpiece.name, "falls")
+        if not lies:
+            self.dropped += 1
 
     def passing(self, now: Nanos) -> Nanos | None:
         """When a belt that moves brings a workpiece to where it picks up, or takes it away."""
         source = self.source
         if source is None or self.carried is not None or not self.block.is_on(PICK):
             return None
-        edges = source.load.edges(source.to_grid(self._pick_at), source.drive.grid_position(now))
-        return next_change(source.drive, *edges, now)
+        return source.belt.next_change(source.belt.to_grid(self._pick_at), now)
 
 
 def carrier_signals(carrier: Carrier) -> Mapping[str, SignalOf]:

@@ -1,7 +1,8 @@
 """``[[conveyor]]``: a belt that carries workpieces, with sensors that see them.
 
-A workpiece enters with its front at 0, when FEED is switched on or at a fixed period, unless another one is there; it leaves when
-its front comes to the end of the belt. Stops hold workpieces back while the belt slides below them.
+A workpiece enters with its front at 0, when FEED is switched on or at a fixed period, unless another one is there. The following
+conveyor moves it from when its centre is there; at the end of the last one it leaves with its front. Stops hold workpieces back
+while the belt slides below them.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from fractions import Fraction
 from functools import partial
-from math import ceil, floor, nan
+from math import ceil, nan
 from typing import ClassVar
 
 from steptwin.controller import Nanos
@@ -17,14 +18,15 @@ from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.simulation.components.axis import find_axis, turning_points_of_axis
 from steptwin.simulation.components.beltsensor import Sensor, SensorSpec
-from steptwin.simulation.components.conveyortable import FEED, RUN, ConveyorSpec, stop_terminal
+from steptwin.simulation.components.conveyortable import FEED, RUN, ConveyorSpec, NearSpec, near_ones, stop_terminal
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import Reference
 from steptwin.simulation.components.logic import STUCK_INPUT, TerminalComponent, with_terminals
 from steptwin.simulation.faults import ActiveFault, Fault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.mechanics.belt import BeltDrive, ConstantDrive, Load, Workpiece, next_change
+from steptwin.simulation.mechanics.belt import Belt, ConstantDrive, Near, Placed, Workpiece, nanometres, next_change
+from steptwin.simulation.mechanics.beltline import first_of, limit, next_look, pushed_against
 from steptwin.simulation.mechanics.drawing import BELT, Drawing, SensorZone
 from steptwin.simulation.mechanics.rampeddrive import RampedDrive
 from steptwin.simulation.mechanics.scale import exact_fraction
@@ -37,8 +39,6 @@ MOST_PLACES = 24
 """Limit of the workpieces of a conveyor whose places are signals."""
 PICOMETRES = 10**9
 """In a millimetre: steps of the grid of a belt that no axis moves."""
-_PULSE = 1
-"""The most that an axis moves a belt within a nanosecond, in its pulses."""
 
 
 # ---------------------------------------------------------------------- what is built
@@ -49,26 +49,26 @@ GOES_BACK = Message("simulation.goes-back-on-a-belt", "{workpiece} goes back on 
 GOES_ON = Message("simulation.goes-on-on-a-belt", "{workpiece} goes on on {belt}")
 LEAVES = Message("simulation.leaves-a-belt", "{workpiece} leaves {belt}")
 FALLS_OFF = Message("simulation.falls-off-a-belt", "{workpiece} falls off the beginning of {belt}")
+COLLIDES = Message("simulation.workpieces-collide", "{workpiece} collides with {other} on {belt}")
 STANDS_AT = Message("simulation.stands-on-a-belt", "{workpiece} stands at {place:g} mm of {belt}")
 
 
 class Conveyor(TerminalComponent):
-    """A belt with its workpieces. ``drive`` moves it, on a grid of which ``per_mm`` steps are a millimetre.
+    """A belt with its workpieces.
 
-    What leaves it is put at the beginning of the following one, or is gone. Workpieces stand before a stop that is on, behind
-    one that stands, and at the end while the beginning of the following conveyor is occupied. A belt that an axis moves
-    backwards takes back what stands, and loses workpieces at its beginning.
+    The following one takes over what leaves it; after the last one it is gone. Workpieces stand before a stop that is on, behind
+    one that stands, and before one that another belt moves and that they would touch. A belt that an axis moves backwards takes
+    back what stands, and loses workpieces at its beginning.
     """
 
     FIXED: ClassVar[tuple[str, ...]] = (
-        "_length",
         "_moved_by",
+        "_near",
         "_seen",
         "_stops",
         "_turning_points",
-        "drive",
         "following",
-        "per_mm",
+        "preceding",
         "spec",
     )
     __slots__ = (
@@ -78,11 +78,11 @@ class Conveyor(TerminalComponent):
         "_next_feed",
         "_own",
         "_then",
+        "belt",
         "delivered",
         "fed",
         "feeder_stands",
         "is_stopped",
-        "load",
         "missed",
     )
 
@@ -90,27 +90,26 @@ class Conveyor(TerminalComponent):
         self,
         block: TerminalBlock,
         spec: ConveyorSpec,
-        drive: BeltDrive,
-        per_mm: Fraction,
-        own: ConstantDrive | RampedDrive | None,
+        belt: Belt,
+        near: tuple[NearSpec, ...],
         moved_by: tuple[str, ...] = (),
         turning_points: Callable[[Nanos], Iterator[Nanos]] = lambda now: iter(()),
     ) -> None:
-        """``own``: the drive, where it is the conveyor's own; ``moved_by``: otherwise the controller that moves it, between
-        ``turning_points`` one way."""
+        """``moved_by``: the controller that moves the belt, between ``turning_points`` one way, unless it has a drive of its
+        own."""
         super().__init__(block)
         self.spec = spec
-        self.drive = drive
-        self.per_mm = per_mm
-        self._length = self.to_grid(spec.length)
-        self._stops = tuple((stop_terminal(n), self.to_grid(stop.at)) for n, stop in enumerate(spec.stops, start=1))
-        self._own = own
+        self.belt = belt
+        self._near = near
+        self._stops = tuple((stop_terminal(n), belt.to_grid(stop.at)) for n, stop in enumerate(spec.stops, start=1))
+        self._own = belt.own
         self._moved_by = moved_by
         self._turning_points = turning_points
-        self._then = drive.grid_position(block.scheduler.now)
+        self._then = belt.position(block.scheduler.now)
         """The position of the belt at the last update: since then it has moved one way while anything stands."""
         self.following: Conveyor | None = None
-        self.load = Load()
+        self.preceding: dict[str, Conveyor] = {}
+        """Those of which it is the following one, by name."""
         self.fed = 0
         """How many workpieces it was fed with."""
         self.delivered = 0
@@ -131,29 +130,38 @@ class Conveyor(TerminalComponent):
     def has_own_drive(self) -> bool:
         return self._own is not None
 
-    def to_grid(self, mm: float) -> int:
-        """The length on the grid of the belt."""
-        return floor(exact_fraction(mm) * self.per_mm + Fraction(1, 2))
+    @property
+    def line(self) -> tuple[str, ...]:
+        """Its name and those of the conveyors whose workpieces may lie over it."""
+        return (self.spec.name, *(near.name for near in self._near))
 
-    def version(self) -> object:
-        """Another value whenever predictions no longer hold."""
-        return self.drive.version(), self.load.version()
+    def connect(self, following: Conveyor | None, conveyors: Mapping[str, Conveyor]) -> None:
+        """Join it to the following one, and to the others of its line that are built."""
+        self.following = following
+        self.belt.following = None if following is None else following.belt
+        self.preceding = {name: one for name, one in conveyors.items() if one.spec.next == self.spec.name}
+        there = ((conveyors[near.name], near) for near in self._near if near.name in conveyors)
+        self.belt.near = tuple(Near(one.belt, near.begin, near.joins, near.after) for one, near in there)
 
     @property
     def depends_on(self) -> tuple[str, ...]:
-        return (self.block.name, *self._moved_by, *(() if self.spec.next is None else (self.spec.next,)))
+        return (self.block.name, *self._moved_by, *(near.name for near in self._near if near.joins is not None))
 
     def _state(self) -> object:
         """Another value whenever workpieces may move or stand otherwise."""
-        return self.version(), self._raised(), None if self.following is None else self.following.version()
+        return [(belt.version(), belt.raised) for belt in self._belts_ahead()]
 
-    def _raised(self) -> tuple[int, ...]:
-        """The places of the stops that are on."""
-        return tuple(place for terminal, place in self._stops if self.block.is_on(terminal))
+    def _belts_ahead(self) -> Iterator[Belt]:
+        """This one and those on which workpieces may be in the way."""
+        yield self.belt
+        for near in self.belt.near:
+            if near.joins is not None:
+                yield near.belt
 
     def update(self, now: Nanos) -> None:
         if self._own is not None:
             self._own.run(self.block.is_on(RUN) and not self.is_stopped, now)
+        self.belt.raised = tuple(place for terminal, place in self._stops if self.block.is_on(terminal))
         is_fed = self.block.is_on(FEED)
         if is_fed and not self._is_fed:
             self._feed(now)
@@ -163,53 +171,68 @@ class Conveyor(TerminalComponent):
             self._next_feed += self.spec.feed_every or 0
         if self._state() != self._seen or (self._due is not None and self._due <= now):
             self._hold(now)
-            self._deliver(now)
+            while self._deliver(now):
+                self._hold(now)
             self._seen = self._state()
             self.block.scheduler.notify(self.block.name)
             self._due = self._next(now)
 
     def _feed(self, now: Nanos) -> None:
         """Put a workpiece at the beginning, where there is room for it."""
-        if self.feeder_stands or self.load.covering(0, self.drive.grid_position(now)) is not None:
+        spec, length = self.spec, nanometres(self.spec.workpiece)
+        if self.feeder_stands or self.belt.occupant(-self.belt.from_nm(length), 0, now) is not None:
             self.missed += 1
             self.block.scheduler.notify(self.block.name)
             return
         self.fed += 1
-        spec = self.spec
-        marks = tuple((self.to_grid(mark), self.to_grid(mark + spec.mark_width)) for mark in spec.marks)
-        self.put(Workpiece(f"{spec.name}.{self.fed}", 0, self.to_grid(spec.workpiece), spec.mass, marks), 0.0, now)
+        marks = tuple((nanometres(mark), nanometres(mark + spec.mark_width)) for mark in spec.marks)
+        workpiece = Workpiece(f"{spec.name}.{self.fed}", length, spec.mass, marks)
+        self._lay(self.belt.place(workpiece, 0, now), now)
 
-    def put(self, workpiece: Workpiece, front: float, now: Nanos) -> None:
-        """Put a workpiece, whose lengths are on the grid of this belt, with its front ``front`` mm from the beginning."""
-        self._then = self.drive.grid_position(now)
-        self.load.put(workpiece._replace(origin=self.drive.grid_position(now) - self.to_grid(front), held=None))
-        self.report(IS_ON(workpiece=workpiece.name, belt=self.spec.name), workpiece.name, "on")
+    def put(self, workpiece: Workpiece, front: float, now: Nanos) -> bool:
+        """Put a workpiece with its front ``front`` mm from the beginning. Whether it lies there: it does not where it collides
+        with another one."""
+        place = self.belt.to_grid(front)
+        placed = self.belt.place(workpiece, place, now)
+        found = self.belt.occupant(place - placed.length + 1, place - 1, now)
+        if found is not None:
+            self._collides(placed, found[1])
+            return False
+        self._lay(placed, now)
+        return True
+
+    def _lay(self, placed: Placed, now: Nanos) -> None:
+        """A workpiece is on the belt from now on."""
+        self._then = self.belt.position(now)
+        self.belt.put(placed)
+        name = placed.workpiece.name
+        self.report(IS_ON(workpiece=name, belt=self.spec.name), name, "on")
         self.block.scheduler.notify(self.block.name)
 
-    def take_over(self, workpiece: Workpiece, other: Conveyor, front: float, now: Nanos) -> None:
-        """Put a workpiece that was on another belt on this one."""
-        ratio = self.per_mm / other.per_mm
+    def _collides(self, placed: Placed, other: Placed) -> None:
+        name, against = placed.workpiece.name, other.workpiece.name
+        self.report(COLLIDES(workpiece=name, other=against, belt=self.spec.name), name, "collides")
 
-        def to_grid(length: int) -> int:
-            return floor(length * ratio + Fraction(1, 2))
-
-        marks = tuple((to_grid(begin), to_grid(end)) for begin, end in workpiece.marks)
-        self.put(workpiece._replace(length=to_grid(workpiece.length), marks=marks), front, now)
-
-    def take(self, workpiece: Workpiece) -> None:
-        """Take a workpiece off the belt."""
-        self.load.take(workpiece)
-        self.block.scheduler.notify(self.block.name)
+    def take(self, belt: Belt, placed: Placed) -> None:
+        """Take a workpiece that lies over the belt off the one that moves it."""
+        belt.take(placed)
+        self.block.scheduler.notify(belt.name)
 
     def front(self, number: int, now: Nanos) -> float:
         """How far the front of a workpiece is from the beginning, mm. 0 is the workpiece that was put there first; NaN if
         there are fewer."""
-        workpieces = self.load.workpieces
-        return float(workpieces[number].front(self.drive.grid_position(now)) / self.per_mm) if number < len(workpieces) else nan
+        belt = self.belt
+        if number >= len(belt.workpieces):
+            return nan
+        return float(belt.workpieces[number].front(belt.position(now)) / belt.per_mm)
 
     def mass(self, now: Nanos) -> float:
         """kg of the workpieces on it."""
-        return sum(workpiece.mass for workpiece in self.load.workpieces)
+        return sum(placed.workpiece.mass for placed in self.belt.workpieces)
+
+    def _report(self, message: Message, placed: Placed, what: str) -> None:
+        name = placed.workpiece.name
+        self.report(message(workpiece=name, belt=self.spec.name), name, what)
 
     def report(self, text: str, name: str, what: str) -> None:
         """Something has happened to a workpiece."""
@@ -219,89 +242,108 @@ class Conveyor(TerminalComponent):
 
     def _hold(self, now: Nanos) -> None:
         """Let workpieces stand where they cannot go on, and let those go on that can."""
-        belt, stride = self.drive.grid_position(now), _PULSE if self._own is None else self._own.stride
-        back, self._then = self._then - belt, belt
+        belt, position, stride = self.belt, self.belt.position(now), self.belt.stride
+        back, self._then = self._then - position, position
         if back > 0:
-            for workpiece in self.load.workpieces:
-                if workpiece.held is not None:
-                    self.load.release(workpiece, belt + back)
-                    self.report(GOES_BACK(workpiece=workpiece.name, belt=self.spec.name), workpiece.name, "goes back")
+            for placed in belt.workpieces:
+                if placed.held is not None:
+                    belt.release(placed, position + back)
+                    self._report(GOES_BACK, placed, "goes back")
+        first = first_of(belt, now) if belt.near else None
+        while first is not None and (other := pushed_against(belt, first, now)) is not None:
+            self._collides(other.placed, first)
+            self.take(other.near.belt, other.placed)
         ahead: int | None = None
-        for workpiece in sorted(self.load.workpieces, key=lambda one: one.front(belt), reverse=True):
-            front = workpiece.front(belt)
-            limit = self._limit(front, stride, ahead, now)
-            if limit is not None and front >= limit:
-                at = limit if front - limit <= stride else front
-                if workpiece.held != at:
-                    self.load.hold(workpiece, at)
-                    self.report(
-                        STANDS_AT(workpiece=workpiece.name, place=float(at / self.per_mm), belt=self.spec.name),
-                        workpiece.name,
-                        "stands",
-                    )
-                ahead = at - workpiece.length - 1
+        for placed in sorted(belt.workpieces, key=lambda one: one.front(position), reverse=True):
+            front = placed.front(position)
+            most = self._limit(placed, front - stride, ahead, now, is_first=placed == first)
+            if most is not None and front >= most:
+                at = most if front - most <= stride else front
+                if placed.held != at:
+                    belt.hold(placed, at)
+                    place = float(at / belt.per_mm)
+                    name = placed.workpiece.name
+                    self.report(STANDS_AT(workpiece=name, place=place, belt=self.spec.name), name, "stands")
+                ahead = at - placed.length - 1
                 continue
             ahead = None
-            if workpiece.held is not None:
-                self.load.release(workpiece, belt)
-                self.report(GOES_ON(workpiece=workpiece.name, belt=self.spec.name), workpiece.name, "goes on")
+            if placed.held is not None:
+                belt.release(placed, position)
+                self._report(GOES_ON, placed, "goes on")
 
-    def _limit(self, front: int, stride: int, ahead: int | None, now: Nanos) -> int | None:
-        """The place up to which a workpiece can go, with its front at ``front``. ``ahead``: behind one that stands before it."""
-        limits = [position for position in self._raised() if position >= front - stride]
+    def _limit(self, placed: Placed, least: int, ahead: int | None, now: Nanos, *, is_first: bool) -> int | None:
+        """The place up to which a workpiece can go; stops before ``least`` do not concern it. ``ahead``: behind one that stands
+        before it. ``is_first``: nothing is before it on this belt."""
+        belt = self.belt
+        limits = [place for place in belt.raised if place >= least]
         if ahead is not None:
             limits.append(ahead)
-        if self._is_blocked(now):
-            limits.append(self._length)
+        if is_first:
+            for near in belt.near:
+                if near.after is not None:
+                    places = (belt.from_nm(near.belt.to_nm(place) + near.begin) for place in near.belt.raised)
+                    limits += [place for place in places if place >= least]
+            before = limit(belt, placed, now)
+            if before is not None:
+                limits.append(before)
         return min(limits, default=None)
 
-    def _is_blocked(self, now: Nanos) -> bool:
-        """Whether there is no room for a workpiece at the beginning of the following conveyor."""
-        following = self.following
-        return following is not None and following.covers_beginning(now)
-
-    def covers_beginning(self, now: Nanos) -> bool:
-        return self.load.covering(0, self.drive.grid_position(now)) is not None
-
-    def _deliver(self, now: Nanos) -> None:
-        """Let go what has come to an end of the belt."""
-        belt, length = self.drive.grid_position(now), self._length
-        for workpiece in self.load.workpieces:
-            front = workpiece.front(belt)
-            if front >= length and workpiece.held is None:
+    def _deliver(self, now: Nanos) -> bool:
+        """Let go what has come to an end of the belt. Whether another conveyor moves any of that."""
+        belt, position, goes_on = self.belt, self.belt.position(now), False
+        for placed in belt.workpieces:
+            front = placed.front(position)
+            if front >= belt.exit(placed) and placed.held is None:
                 self.delivered += 1
-                self.take(workpiece)
-                self.report(LEAVES(workpiece=workpiece.name, belt=self.spec.name), workpiece.name, "leaves")
+                self.take(belt, placed)
+                self._report(LEAVES, placed, "leaves")
                 if self.following is not None:
-                    self.following.take_over(workpiece, self, 0.0, now)
+                    goes_on = True
+                    self.following.take_over(placed, belt, front - belt.length, now)
             elif front < 0:
-                self.take(workpiece)
-                self.report(FALLS_OFF(workpiece=workpiece.name, belt=self.spec.name), workpiece.name, "falls")
+                self.take(belt, placed)
+                before = self.preceding.get(placed.came_from)
+                if before is None:
+                    self._report(FALLS_OFF, placed, "falls")
+                    continue
+                goes_on = True
+                self._report(LEAVES, placed, "leaves")
+                before.take_back(placed, belt, front, now)
+        return goes_on
+
+    def take_over(self, placed: Placed, other: Belt, beyond: int, now: Nanos) -> None:
+        """Move a workpiece that the belt before it has moved. ``beyond``: how far it is beyond its end, on its grid."""
+        found = self.belt.place(placed.workpiece, self.belt.from_nm(other.to_nm(beyond)), now, other.name)
+        short = found.length // 2 - found.front(self.belt.position(now))
+        self._lay(found._replace(origin=found.origin - max(short, 0)), now)
+
+    def take_back(self, placed: Placed, other: Belt, front: int, now: Nanos) -> None:
+        """Move a workpiece again that the following belt has moved back to its beginning. ``front`` is on its grid."""
+        self._lay(self.belt.place(placed.workpiece, self.belt.length + self.belt.from_nm(other.to_nm(front)), now), now)
 
     def _next(self, now: Nanos) -> Nanos | None:
-        """When the next workpiece is lost at the beginning, is delivered or cannot go on; or can again, at the end."""
-        belt = self.drive.grid_position(now)
-        moving = [workpiece for workpiece in self.load.workpieces if workpiece.held is None]
-        below = max((workpiece.origin for workpiece in moving), default=None)
-        above = min((workpiece.origin + self._way(workpiece, belt, now) for workpiece in moving), default=None)
-        due = next_change(self.drive, None if below is None else below - 1, above, now)
-        if len(moving) < len(self.load.workpieces):
-            due = min(
-                filter(None, (due, next(self._turning_points(now), None), self.drive.reaches(belt - 1, now, -1))), default=None
-            )
-        following = self.following
-        if following is None or not self.load.workpieces or not self._is_blocked(now):
-            return due
-        free = next_change(following.drive, *following.load.edges(0, following.drive.grid_position(now)), now)
-        return free if due is None else due if free is None else min(due, free)
+        """When the next workpiece is lost at the beginning, is delivered or cannot go on; or can again."""
+        belt, position = self.belt, self.belt.position(now)
+        moving = [placed for placed in belt.workpieces if placed.held is None]
+        first = first_of(belt, now) if belt.near else None
+        place, look = (None, None) if first is None else next_look(belt, first, now)
+        below = max((placed.origin - 1 for placed in moving), default=None)
+        ends = [placed.origin + self._way(placed, position, now, is_first=placed == first) for placed in moving]
+        if first is not None and first.held is None and place is not None:
+            ends.append(first.origin + place)
+        due = next_change(belt.drive, below, min(ends, default=None), now)
+        moments = [due, look]
+        if len(moving) < len(belt.workpieces):
+            moments += [next(self._turning_points(now), None), belt.drive.reaches(position - 1, now, -1)]
+        return min((moment for moment in moments if moment is not None), default=None)
 
-    def _way(self, workpiece: Workpiece, belt: int, now: Nanos) -> int:
+    def _way(self, placed: Placed, position: int, now: Nanos, *, is_first: bool) -> int:
         """Up to where a moving workpiece can go."""
-        front = workpiece.front(belt)
-        before = [one for one in self.load.workpieces if one.held is not None and one.held > front]
-        ahead = min((one.front(belt) - one.length - 1 for one in before), default=None)
-        found = self._limit(front, 0, ahead, now)
-        return self._length if found is None else min(found, self._length)
+        front, end = placed.front(position), self.belt.exit(placed)
+        before = [one for one in self.belt.workpieces if one.held is not None and one.held > front]
+        ahead = min((one.front(position) - one.length - 1 for one in before), default=None)
+        found = self._limit(placed, front, ahead, now, is_first=is_first)
+        return end if found is None else min(found, end)
 
     def deadline(self) -> Nanos | None:
         moments = (moment for moment in (self._due, self._next_feed) if moment is not None)
@@ -344,24 +386,28 @@ def _own_drive(spec: ConveyorSpec, speed: Fraction, now: Nanos) -> ConstantDrive
 
 def _make(spec: ConveyorSpec, context: ElementContext) -> Conveyor:
     block = context.terminal_block(spec.name)
+    conveyors = {one.name: one for one in context.objects.described.of(CONVEYOR)}
+    near = context.memo.once((*spec.path, "near"), lambda: near_ones(spec.name, conveyors))
     if spec.axis is None:
         own = _own_drive(spec, exact_fraction(spec.speed), block.scheduler.now)
-        conveyor = Conveyor(block, spec, own, Fraction(PICOMETRES), own)
+        belt = Belt(spec.name, spec.length, own, Fraction(PICOMETRES))
+        conveyor = Conveyor(block, spec, belt, near)
     else:
         axis = find_axis(spec.axis, context)
         per_mm = axis.scale.pulses_per_unit / exact_fraction(spec.mm_per_unit)
+        belt = Belt(spec.name, spec.length, axis.mechanism, per_mm)
         turning_points = partial(turning_points_of_axis, axis)
-        conveyor = Conveyor(block, spec, axis.mechanism, per_mm, None, (axis.mechanism.controller,), turning_points)
-    if conveyor.to_grid(spec.length) < 1:
+        conveyor = Conveyor(block, spec, belt, near, (axis.mechanism.controller,), turning_points)
+    if belt.length < 1:
         raise Misuse(
-            f"length = {spec.length:g} mm: the belt is shorter than one step of its drive, {float(1 / conveyor.per_mm):g} mm"
+            f"length = {spec.length:g} mm: the belt is shorter than one step of its drive, {float(1 / belt.per_mm):g} mm"
         )
     return conveyor
 
 
 def _connect(spec: ConveyorSpec, conveyor: Conveyor, context: ElementContext) -> None:
-    if spec.next is not None:
-        conveyor.following = find_conveyor(spec.next, context)
+    following = None if spec.next is None else find_conveyor(spec.next, context)
+    conveyor.connect(following, context.objects.built(CONVEYOR))
 
 
 def find_conveyor(name: str, context: ElementContext) -> Conveyor:
@@ -389,8 +435,8 @@ def _put_sensors(spec: ConveyorSpec, conveyor: Conveyor, context: ElementContext
 def _put_sensor(conveyor: Conveyor, spec: SensorSpec, channel: str, context: ElementContext) -> None:
     scheduler = conveyor.block.scheduler
     circuit = context.circuit(scheduler, spec.target, (*spec.path, "to"), spec.join)
-    sensor = Sensor(circuit, conveyor, spec, context.bounce_of(circuit), channel)
-    scheduler.add_part(sensor, (conveyor.block.name,), drives=circuit.target.controller)
+    sensor = Sensor(circuit, conveyor.belt, spec, context.bounce_of(circuit), channel)
+    scheduler.add_part(sensor, conveyor.line, drives=circuit.target.controller)
 
 
 def _place_names(spec: ConveyorSpec) -> tuple[str, ...]:
@@ -417,7 +463,7 @@ def _signals(conveyor: Conveyor) -> Mapping[str, SignalOf]:
     }
     return {
         **places,
-        "count": SignalOf(source, lambda now: float(len(conveyor.load.workpieces))),
+        "count": SignalOf(source, lambda now: float(len(conveyor.belt.workpieces))),
         "fed": SignalOf(source, lambda now: float(conveyor.fed)),
         "delivered": SignalOf(source, lambda now: float(conveyor.delivered)),
         "missed": SignalOf(source, lambda now: float(conveyor.missed)),

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
 
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
@@ -12,6 +12,7 @@ from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.components.logic import Joint, TerminalComponentSpec
 from steptwin.simulation.components.mount import MoverSpec
 from steptwin.simulation.kinds.kind import Terminals
+from steptwin.simulation.mechanics.belt import nanometres
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import TableSpec, key, table, tables_in
 from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, number, permitting, positive_time, time_value
@@ -97,3 +98,36 @@ class ConveyorSpec(TerminalComponentSpec, MoverSpec):
 
 def stop_terminal(n: int) -> str:
     return f"STOP{n}"
+
+
+class NearSpec(NamedTuple):
+    """A conveyor of the same line, as `Near` has its belt."""
+
+    name: str
+    begin: int
+    joins: int | None
+    after: str | None
+
+
+def near_ones(name: str, conveyors: Mapping[str, ConveyorSpec]) -> tuple[NearSpec, ...]:
+    """The conveyors before and behind one of which a workpiece may lie over it, or be in the way of one that leaves it."""
+    longest = max(nanometres(spec.workpiece) for spec in conveyors.values())
+
+    def before(of: str, end: int, joins: int | None, known: tuple[str, ...]) -> Iterator[NearSpec]:
+        for spec in conveyors.values():
+            if spec.next == of and spec.name not in known:
+                begin = end - nanometres(spec.length)
+                yield NearSpec(spec.name, begin, joins, None)
+                if begin > (joins or 0) - longest:
+                    yield from before(spec.name, begin, joins, (*known, spec.name))
+
+    def behind() -> Iterator[NearSpec]:
+        way, end = [name], nanometres(conveyors[name].length)
+        most = end + 2 * longest
+        while (following := conveyors[way[-1]].next) in conveyors and following not in way[1:] and end <= most:
+            yield NearSpec(following, end, end, way[-1])
+            yield from before(following, end, end, tuple(way))
+            way.append(following)
+            end += nanometres(conveyors[following].length)
+
+    return (*before(name, 0, None, ()), *behind())

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from fractions import Fraction
-from math import ceil
+from math import ceil, floor
 from typing import ClassVar, NamedTuple, Protocol
 
 from steptwin.controller import Nanos
+from steptwin.simulation.mechanics.rampeddrive import RampedDrive
+from steptwin.simulation.mechanics.scale import exact_fraction
 from steptwin.state import Stateful
+
+NANOMETRES = 10**6
+"""In a millimetre."""
+
+
+def nanometres(mm: float) -> int:
+    """The whole number of nm nearest to a length in mm."""
+    return floor(exact_fraction(mm) * NANOMETRES + Fraction(1, 2))
 
 
 class BeltDrive(Protocol):
@@ -44,6 +55,19 @@ class ConstantDrive(Stateful):
     def grid_position(self, now: Nanos) -> int:
         return self._base + (self._speed * (now - self._begin) // self._divisor if self.runs else 0)
 
+    def line(self, now: Nanos) -> tuple[Fraction, Fraction] | None:
+        """Its position at 0 ns and its speed in steps/ns, as long as it moves straight on."""
+        rate = Fraction(self._speed, self._divisor) if self.runs else Fraction(0)
+        return self._base - rate * self._begin, rate
+
+    def straight_from(self) -> Nanos:
+        """The moment, ns, from which it moves straight on."""
+        return self._begin
+
+    def lead_over(self, other: object) -> int | None:
+        """How far it is ahead of another drive that moves as it does at any time; None if they move differently."""
+        return None
+
     def reaches(self, position: int, after: Nanos, direction: int) -> Nanos | None:
         """As `MovingPart.reaches`."""
         if not self.runs or direction < 0 or position <= self.grid_position(after):
@@ -53,80 +77,188 @@ class ConstantDrive(Stateful):
 
 
 class Workpiece(NamedTuple):
-    """A workpiece on a belt. ``origin``: position of the belt at which the workpiece has its front at the beginning."""
+    """A workpiece, as it is wherever it lies. Lengths are in nm."""
 
     name: str
     """Name of the conveyor that was fed with it, and its number there, from 1."""
-    origin: int
     length: int
     mass: float = 0.0
     """kg."""
     marks: tuple[tuple[int, int], ...] = ()
     """Begin and end of each mark, from the front."""
+
+
+class Placed(NamedTuple):
+    """A workpiece on the belt that moves it. Lengths and places are on the grid of that belt."""
+
+    workpiece: Workpiece
+    origin: int
+    """Position of the belt at which it has its front at the beginning."""
+    length: int
+    marks: tuple[tuple[int, int], ...] = ()
     held: int | None = None
     """Where its front stands, while the belt does not move it."""
+    came_from: str = ""
+    """Name of the belt that moved it before, on which its rear may still be; empty where it was put on this one."""
 
-    def front(self, belt: int) -> int:
-        """The place of its front while the belt is at ``belt``."""
-        return belt - self.origin if self.held is None else self.held
+    def front(self, position: int) -> int:
+        """The place of its front while the belt is at ``position``."""
+        return position - self.origin if self.held is None else self.held
 
     def zones(self, *, of_marks: bool) -> tuple[tuple[int, int], ...]:
         """Begin and end, from the front, of what a sensor sees: of it, or of its marks."""
         return self.marks if of_marks else ((0, self.length),)
 
 
-class Load(Stateful):
-    """The workpieces on a belt."""
+class Near(NamedTuple):
+    """Another belt of the line, whose workpieces may lie over this one, too. Lengths are in nm."""
 
-    __slots__ = ("workpieces",)
+    belt: Belt
+    begin: int
+    """Its beginning, from that of this belt."""
+    joins: int | None = None
+    """The place of this belt where its way joins that over this belt; None: it leads over all of this belt."""
+    after: str | None = None
+    """The belt before it on the way over this one, if there is one."""
 
-    def __init__(self) -> None:
-        self.workpieces: tuple[Workpiece, ...] = ()
+    @property
+    def joining(self) -> int:
+        """The place on its own grid where its way joins that over this belt."""
+        return self.belt.from_nm((self.joins or 0) - self.begin)
+
+    def has_all_of(self, placed: Placed) -> bool:
+        """Whether one of its workpieces lies on the way over this belt, wherever it reaches."""
+        return self.joins is None or (self.after is not None and placed.came_from in ("", self.after))
+
+
+class Belt(Stateful):
+    """A belt with the workpieces that it moves: those whose centres are over it.
+
+    A workpiece reaches from its front backwards. It lies over every belt below it; `occupant` answers for all of them.
+    """
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_down", "_up", "drive", "following", "length", "name", "near", "own", "per_mm", "stride")
+    __slots__ = (*FIXED, "raised", "workpieces")
+
+    def __init__(self, name: str, length: float, drive: BeltDrive, per_mm: Fraction) -> None:
+        """``length`` in mm; ``per_mm``: steps of the grid of its drive."""
+        self.name = name
+        self.drive = drive
+        self.per_mm = per_mm
+        self._up, self._down = (per_mm / NANOMETRES).as_integer_ratio()
+        self.length = self.to_grid(length)
+        self.own = drive if isinstance(drive, ConstantDrive | RampedDrive) else None
+        """Its drive, if it never goes back."""
+        self.stride = 1 if self.own is None else self.own.stride
+        """The most that it moves within a nanosecond."""
+        self.following: Belt | None = None
+        """The belt on which workpieces go on at its end."""
+        self.near: tuple[Near, ...] = ()
+        self.workpieces: tuple[Placed, ...] = ()
+        self.raised: tuple[int, ...] = ()
+        """The places of the stops that are on."""
+
+    # ------------------------------------------------------------------ places
+
+    def to_grid(self, mm: float) -> int:
+        """The step nearest to a length in mm."""
+        return floor(exact_fraction(mm) * self.per_mm + Fraction(1, 2))
+
+    def from_nm(self, nm: int) -> int:
+        """The step nearest to a length in nm."""
+        return (2 * nm * self._up + self._down) // (2 * self._down)
+
+    def to_nm(self, steps: int) -> int:
+        """The whole number of nm nearest to a length in steps."""
+        return (2 * steps * self._down + self._up) // (2 * self._up)
+
+    def position(self, now: Nanos) -> int:
+        return self.drive.grid_position(now)
+
+    def exit(self, placed: Placed) -> int:
+        """The place of the front at which a workpiece leaves the belt: its centre is over the following one, or its front is at
+        the end of the last one."""
+        return self.length + (0 if self.following is None else placed.length // 2)
 
     def version(self) -> object:
-        """A value that changes with every change of the workpieces."""
-        return self.workpieces
+        """A value that changes whenever predictions for the workpieces that it moves become invalid."""
+        return self.drive.version(), self.workpieces
 
-    def put(self, workpiece: Workpiece) -> None:
-        self.workpieces = (*self.workpieces, workpiece)
+    def line_version(self) -> object:
+        """A value that changes whenever predictions for what lies over it become invalid."""
+        return (self.version(), *(near.belt.version() for near in self.near)) if self.near else self.version()
 
-    def take(self, workpiece: Workpiece) -> None:
-        self.workpieces = tuple(one for one in self.workpieces if one != workpiece)
+    # ------------------------------------------------------------------ workpieces
 
-    def hold(self, workpiece: Workpiece, front: int) -> None:
+    def place(self, workpiece: Workpiece, front: int, now: Nanos, came_from: str = "") -> Placed:
+        """How a workpiece lies with its front at ``front``."""
+        marks = tuple((self.from_nm(begin), self.from_nm(end)) for begin, end in workpiece.marks)
+        return Placed(workpiece, self.position(now) - front, self.from_nm(workpiece.length), marks, None, came_from)
+
+    def put(self, placed: Placed) -> None:
+        self.workpieces = (*self.workpieces, placed)
+
+    def take(self, placed: Placed) -> None:
+        self.workpieces = tuple(one for one in self.workpieces if one != placed)
+
+    def hold(self, placed: Placed, front: int) -> None:
         """Let a workpiece stand with its front at ``front``, whatever the belt does."""
-        self._replace(workpiece, workpiece._replace(held=front))
+        self._replace(placed, placed._replace(held=front))
 
-    def release(self, workpiece: Workpiece, belt: int) -> None:
-        """Let a workpiece that stood go on with the belt, which is at ``belt``."""
-        self._replace(workpiece, workpiece._replace(origin=belt - workpiece.front(belt), held=None))
+    def release(self, placed: Placed, position: int) -> None:
+        """Let a workpiece that stood go on with the belt, which is at ``position``."""
+        self._replace(placed, placed._replace(origin=position - placed.front(position), held=None))
 
-    def _replace(self, workpiece: Workpiece, other: Workpiece) -> None:
-        self.workpieces = tuple(other if one == workpiece else one for one in self.workpieces)
+    def _replace(self, placed: Placed, other: Placed) -> None:
+        self.workpieces = tuple(other if one == placed else one for one in self.workpieces)
 
-    def covering(self, position: int, belt: int, *, of_marks: bool = False) -> Workpiece | None:
-        """The workpiece over ``position``, or with a mark there, while the belt is at ``belt``; of several the one put there
-        first."""
-        for one in self.workpieces:
-            behind = one.front(belt) - position
-            if any(begin <= behind <= end for begin, end in one.zones(of_marks=of_marks)):
-                return one
+    # ------------------------------------------------------------------ occupancy
+
+    def occupant(self, low: int, high: int, now: Nanos, *, of_marks: bool = False) -> tuple[Belt, Placed] | None:
+        """The workpiece, or one with a mark, over the stretch from ``low`` to ``high``, ends included, and the belt of it.
+
+        Those that this belt moves come first; of several of one belt it is the one that was put there first. What is before
+        the beginning of this belt, or beyond its end, is on those before and behind it.
+        """
+        for near, first, last in self._views(low, high):
+            position = near.belt.position(now)
+            for one in near.belt.workpieces:
+                begins, front = first if near.has_all_of(one) else max(first, near.joining), one.front(position)
+                zones = one.zones(of_marks=of_marks) if begins <= last else ()
+                if any(front - end <= last and front - begin >= begins for begin, end in zones):
+                    return near.belt, one
         return None
 
-    def edges(self, position: int, belt: int, *, of_marks: bool = False) -> tuple[int | None, int | None]:
-        """The next positions of the belt below and above ``belt`` at which `covering` may change."""
+    def next_change(self, place: int, now: Nanos, *, of_marks: bool = False) -> Nanos | None:
+        """The moment, ns, at which the occupant of a place may become another one while nothing else happens."""
+        moments = (
+            next_change(near.belt.drive, *near.belt.edges(there, near.belt.position(now), of_marks=of_marks), now)
+            for near, there, _ in self._views(place, place)
+        )
+        return min((moment for moment in moments if moment is not None), default=None)
+
+    def _views(self, low: int, high: int) -> Iterator[tuple[Near, int, int]]:
+        """A stretch as each belt has it whose workpieces may lie over it; the one that is on this belt comes first."""
+        yield Near(self, 0), max(low, 0), high
+        for near in self.near:
+            first, last = (near.belt.from_nm(self.to_nm(place) - near.begin) for place in (low, high))
+            yield near, first, last
+
+    def edges(self, place: int, position: int, *, of_marks: bool = False) -> tuple[int | None, int | None]:
+        """The next positions of the belt below and above ``position`` at which one of its workpieces may come to ``place``, or
+        leave it."""
         below: int | None = None
         above: int | None = None
         for one in self.workpieces:
             if one.held is not None:
                 continue
-            front = one.origin + position
+            front = one.origin + place
             for begin, end in one.zones(of_marks=of_marks):
-                for place in (front + begin - 1, front + begin, front + end, front + end + 1):
-                    if place < belt and (below is None or place > below):
-                        below = place
-                    elif place > belt and (above is None or place < above):
-                        above = place
+                for edge in (front + begin - 1, front + begin, front + end, front + end + 1):
+                    if edge < position and (below is None or edge > below):
+                        below = edge
+                    elif edge > position and (above is None or edge < above):
+                        above = edge
         return below, above
 
 

@@ -76,3 +76,26 @@ class RampedDrive(Stateful):
             level = isqrt(needed + before * before - 1) + 1
             return self._begin - (before - level) // rate
         return self._begin - -(needed + (whole - before) ** 2) // (2 * rate * whole)
+
+    def line(self, now: Nanos) -> tuple[Fraction, Fraction] | None:
+        """Its position at 0 ns and its speed in steps/ns; None on a ramp."""
+        if now < self.straight_from():
+            return None
+        if not self.runs:
+            return Fraction(self.grid_position(now)), Fraction(0)
+        rate = Fraction(self._speed, self._divisor)
+        lost = Fraction((self._whole - self._level) ** 2, 2 * self._rate * self._whole)
+        return self._base - rate * (self._begin + lost), rate
+
+    def straight_from(self) -> Nanos:
+        """The moment, ns, at which the present ramp ends."""
+        left = self._whole - self._level if self.runs else self._level
+        return self._begin - -left // self._rate
+
+    def lead_over(self, other: object) -> int | None:
+        """How far it is ahead of another drive that moves as it does at any time; None if they move differently."""
+        return self._base - other._base if isinstance(other, RampedDrive) and self._motion == other._motion else None
+
+    @property
+    def _motion(self) -> tuple[int, ...]:
+        return self._speed, self._divisor, self._up, self._down, self._begin, self._level, self.runs
