@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from pages import PYTEST_OF_USERS
 
 from steptwin.campaign.cases import Cases
 from steptwin.campaign.findings import FoundFailure, find, is_within
@@ -113,7 +114,7 @@ def test_the_session_is_the_run_of_the_case(found: list[FoundFailure], campaign:
 
 def test_the_test_fails_until_the_program_is_mended(found: list[FoundFailure], campaign: Path) -> None:
     tests = [str(one.files.test) for one in found if one.files is not None]
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:randomly", *tests]
+    command = [sys.executable, "-m", "pytest", "-q", *PYTEST_OF_USERS, *tests]
     failing = subprocess.run(command, cwd=campaign.parent, capture_output=True, text=True, check=False)
     assert f"{len(tests)} failed" in failing.stdout
     assert "x.lost == 0" in failing.stdout

@@ -34,6 +34,8 @@ _BLOCK = re.compile(
 _PROMISE = re.compile(r"^ *print\(.*\)  # ((?:M|chip )\d.*)$", re.MULTILINE)
 """What a Python block says that it prints."""
 LIMIT_S = 100.0
+PYTEST_OF_USERS = tuple(f"-pno:{name}" for name in ("cacheprovider", "asyncio", "hypothesispytest", "pytest-lsp", "schemathesis"))
+"""Options without what only these tests have, and what takes a second to import."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,7 @@ class Reader:
             "XDG_RUNTIME_DIR": str(runtime),
             "COLUMNS": "200",
             "TERM": "dumb",
-            "PYTEST_ADDOPTS": "-p no:cacheprovider",
+            "PYTEST_ADDOPTS": shlex.join(PYTEST_OF_USERS),
         }
         self._environment.pop("STEPTWIN_DEVICE", None)
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
+from pages import PYTEST_OF_USERS
 
 from steptwin.campaign.campaign import Campaign
 from steptwin.campaign.case import Case, CaseResult, FaultAt, Verdict
@@ -165,7 +166,7 @@ def test_a_campaign_inside_of_a_test(chance: str, shown: str, tmp_path: Path) ->
     shutil.copytree(EXAMPLES / "press", tmp_path, dirs_exist_ok=True)
     (tmp_path / "campaign.toml").write_text(CAMPAIGN.replace("chance = 0.5", f"chance = {chance}"), encoding="utf-8")
     (tmp_path / "test_press.py").write_text(TEST, encoding="utf-8")
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_press.py"]
+    command = [sys.executable, "-m", "pytest", "-q", *PYTEST_OF_USERS, "test_press.py"]
     ran = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert shown in ran.stdout
     assert ("jam element=ram" in ran.stdout) is (chance == "1.0")
