@@ -32,6 +32,7 @@ HAS_ACTED_SINCE = Message("why.has-acted-since", ", on which {name} has acted si
 IS_WIRED_TO = Message("why.is-wired-to", ", which is wired to {pin}")
 CONTACT_OF = Message("why.contact-of", ", a contact of {pin}")
 CONTACT_BOUNCED = Message("why.contact-bounced", ", and the contact bounced")
+GIVES_POWER = Message("why.gives-power", ", which gives {axis} its power")
 DRIVES = Message("why.drives", "[[{kind}]] in {where} drives {pin}")
 CLIENT = Message("why.client", "client {client}: {meaning}")
 REQUEST = Message("why.request", "request: {meaning}")
@@ -106,6 +107,22 @@ class Causes:
         change, signal = max(found, key=lambda one: (one[0].time, one[0].position))
         return self.change(signal, change, how)
 
+    def power(self, axis: str, until: Nanos) -> FoundCause:
+        """The last change by a moment of the output that gives the motor of an axis power; None for one that always has some."""
+        power = self._world.axes[axis].spec.power
+        return None if power is None else self.last((self._name(PinName(*power)),), until, GIVES_POWER(axis=axis))
+
+    def moved(self, axis: str, until: Nanos) -> FoundCause:
+        """What moved the load of an axis last, or left it where it is: a motion, or the power of its motor meanwhile."""
+        built = self._world.axes[axis]
+        controller, number = built.spec.drive[0], built.spec.drive[1].removeprefix("M")
+        motion, power = self.motion(controller, number, until, axis), self.power(axis, until)
+        if power is None or (motion is not None and motion.link.time >= power.link.time):
+            return motion
+        plans = self._log.plans_in_force(controller, number, power.link.time)
+        matters = built.mechanism.build.coasts_unpowered or any(self._end(plan)[0] > power.link.time for plan in plans)
+        return power if matters else motion
+
     def _of_change(self, signal: str, change: Change) -> FoundCause:
         owner, _, terminal = signal.partition(".")
         fault = self._fault(owner, change.time, None if owner in self._parts else terminal)
@@ -116,8 +133,7 @@ class Causes:
         if owner in self._world.controllers:
             return self._of_pin(PinName(owner, terminal), change)
         if owner in self._world.axes:
-            drive = self._world.axes[owner].spec.drive
-            return self.motion(drive[0], drive[1].removeprefix("M"), change.time, owner)
+            return self.moved(owner, change.time)
         return self._operated(owner, change)
 
     def _fault(self, owner: str, time: Nanos, named: str | None = None) -> FoundCause:

@@ -363,8 +363,12 @@ class Why:
         owner, _, rest = signal.partition(".")
         world, causes = self.log.world, self._causes
         if owner in world.axes:
-            drive = world.axes[owner].spec.drive
-            return causes.motion(drive[0], drive[1].removeprefix("M"), time, owner)
+            if rest != "power":
+                return causes.moved(owner, time)
+            drive, switched = world.axes[owner].spec.drive, causes.power(owner, time)
+            if switched is not None and switched.link.time == time:
+                return switched
+            return causes.at_moment(drive[0], time, Resource(ResourceKind.AXIS, drive[1].removeprefix("M")))
         if owner not in world.controllers:
             channels = [name for name in self.log.changes if name == owner or name.startswith(f"{owner}.")]
             return causes.last(channels, time)
