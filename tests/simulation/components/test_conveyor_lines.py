@@ -348,6 +348,26 @@ def test_what_a_belt_pushes_back_against_another_one_collides_with_it() -> None:
     assert [world.read(f"{name}.count") for name in ("first", "second")] == [1, 0]
 
 
+def test_a_belt_knows_those_from_which_a_workpiece_may_reach_to_it() -> None:
+    """Six belts of 100 mm in a ring; workpieces are 120 mm long."""
+    text = '[[mic488]]\nname = "a"\n'
+    for n in range(6):
+        text += f'[[conveyor]]\nname = "b{n}"\nnext = "b{(n + 1) % 6}"\nlength = 100.0\nspeed = 50.0\nrun = "a.OUT1"\n'
+        text += "workpiece = 120.0\n"
+    belts = World.from_toml(text).objects.built(CONVEYOR)
+    mm = 10**6
+    assert [(near.belt.name, near.begin, near.joins, near.after) for near in belts["b3"].belt.near] == [
+        ("b2", -100 * mm, None, None),
+        ("b1", -200 * mm, None, None),
+        ("b4", 100 * mm, 100 * mm, "b3"),
+        ("b5", 200 * mm, 200 * mm, "b4"),
+        ("b0", 300 * mm, 300 * mm, "b5"),
+    ]
+    # Short ones concern their neighbours only.
+    belts = World.from_toml(text.replace("workpiece = 120.0", "workpiece = 30.0")).objects.built(CONVEYOR)
+    assert [near.belt.name for near in belts["b3"].belt.near] == ["b2", "b4"]
+
+
 # ---------------------------------------------------------------------- any line, sampled
 
 NAMES = ("p", "q", "r")
@@ -388,6 +408,8 @@ class Plant:
         self.ways = chance.choice(WAYS)
         self.lengths = {name: chance.choice((chance.randrange(15, 60), chance.randrange(60, 200))) for name in NAMES}
         self.sizes = {name: chance.choice((chance.randrange(5, 30), chance.randrange(20, 90))) for name in NAMES}
+        self.sensors: dict[str, int] = {}
+        """Where each belt has one, mm."""
         tables, speed = [DRIVES], chance.choice((40, 100, 250))
         for n, name in enumerate(NAMES):
             tables.append(f"[[conveyor]]\nname = '{name}'\nlength = {self.lengths[name]}\nworkpiece = {self.sizes[name]}\n")
@@ -402,6 +424,8 @@ class Plant:
             tables += [f"feed_every = '{chance.choice((97, 211, 350))} ms'\n"] if n == 0 or chance.random() < 0.4 else []
             if chance.random() < 0.6:
                 tables.append(f"[[conveyor.stop]]\nat = {chance.randrange(self.lengths[name] + 1)}\nhold = 'a.OUT{n + 4}'\n")
+            self.sensors[name] = chance.randrange(1, self.lengths[name])
+            tables.append(f"[[conveyor.sensor]]\nat = {self.sensors[name]}\nto = 'a.IN{n + 2}'\n")
         source, onto = chance.choice(NAMES), chance.choice(NAMES)
         pick_at, place_at = (chance.randrange(self.lengths[name] + 1) for name in (source, onto))
         tables.append(
@@ -448,21 +472,18 @@ class Plant:
         return found
 
     def _behind(self, belt: str, rear: float, size: float, name: str, came_from: str) -> list[tuple[str, float, float, str]]:
-        """On those before a belt, as long as it is known which."""
-        found, known = [], {belt}
-        while rear < 0:
-            before = [came_from] if came_from else [one for one, other in self.ways.items() if other == belt]
-            if len(before) != 1 or before[0] in known:
-                break
-            (belt,), came_from = before, ""
-            known.add(belt)
-            rear += self.lengths[belt]
-            found.append((belt, max(rear, 0.0), min(rear + size, self.lengths[belt]), name))
+        """On those before a belt: on the one that it came from, or on all of them."""
+        found = []
+        for before in [came_from] if came_from else [one for one, other in self.ways.items() if other == belt]:
+            its = rear + self.lengths[before]
+            if rear < 0:
+                found.append((before, max(its, 0.0), min(its + size, self.lengths[before]), name))
+                found += self._behind(before, its, size, name, "")
         return found
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_no_two_workpieces_share_a_place(seed: int) -> None:
+def test_no_two_workpieces_share_a_place_and_sensors_see_each(seed: int) -> None:
     plant = Plant(seed)
     world = World.from_toml(plant.text)
     for moment in range(0, END_MS, 7):
@@ -471,6 +492,10 @@ def test_no_two_workpieces_share_a_place(seed: int) -> None:
         for (belt, _, end, name), (its, begin, its_end, other) in pairwise(covered):
             if belt == its and name != other:
                 assert min(end, its_end) - begin <= plant.tolerance, (world.now, belt, name, other)
+        for n, (belt, at) in enumerate(plant.sensors.items()):
+            near = [min(at - begin, end - at) for its, begin, end, _ in covered if its == belt]
+            if all(abs(one) > plant.tolerance for one in near):
+                assert bool(world.read(f"a.IN{n + 2}")) is any(one > 0 for one in near), (world.now, belt, at)
     assert sum(world.read(f"{name}.fed") for name in NAMES) > 0
 
 
