@@ -21,8 +21,8 @@ def test_names_that_are_not_there_are_misuse_with_those_that_are() -> None:
         world.mic488["d"]
     with pytest.raises(Misuse, match=r"nothing is called 'z'.* there are a, b, c, x, go, time, idle"):
         world.run(until="z.position > 1")
-    with pytest.raises(Misuse, match=r"no signal 'x\.speed'; there are position, lost, stalled$"):
-        world.read("x.speed")
+    with pytest.raises(Misuse, match=r"no signal 'x\.spin'; there are position, lost, stalled, power, speed$"):
+        world.read("x.spin")
     with pytest.raises(Misuse, match="no button is called 'stop'; there are go"):
         world.press("stop")
     with pytest.raises(Misuse, match="M1_POS_AB"):
