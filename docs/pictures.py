@@ -314,6 +314,37 @@ points = [[200, 1.0], [240, 9.0], [260, 9.0], [300, 2.0]]
 resolution = 0.25
 """
 
+SPACE = """
+[[axis]]
+name = "x"
+drive = "table.M1"
+pitch = 5.0
+at = [0, 0, 200]
+[[cylinder]]
+name = "lift"
+extend = "table.OUT1"
+stroke = 60.0
+extend_time = "250 ms"
+retract_time = "200 ms"
+on = "x"
+along = "-z"
+[[vacuum]]
+name = "cup"
+ejector = "table.OUT2"
+on = "lift"
+at = [0, 0, -19]
+[[nest]]
+name = "tray"
+at = [0, 0, 100]
+workpiece = [40, 30, 20]
+filled = 1
+[[beam]]
+name = "passes"
+at = [60, -50, 165]
+along = "+y"
+length = 100
+"""
+
 
 def main() -> None:
     mpl.rcParams["svg.hashsalt"] = "steptwin"
@@ -329,6 +360,17 @@ def main() -> None:
     lifted = ((0.0, "M1_EN=1"), (0.3, "OUT5=1"), (0.315, "OUT5=0"), (0.8, "M1_POS_REL=100"))
     draw("load", AXIS + LOADS, lifted, 2.4, ("z.position", "guide.share"), ("box.acts", "z.stalled"))
     way = ((0.0, "M1_EN=1"), (0.2, "M1_POS_REL=100"))
+    cup = (
+        (0.0, "M1_EN=1"),
+        (0.1, "OUT1=1"),
+        (0.4, "OUT2=1"),
+        (0.6, "OUT1=0"),
+        (0.9, "M1_POS_REL=100"),
+        (2.4, "OUT1=1"),
+        (2.7, "OUT2=0"),
+        (2.8, "OUT1=0"),
+    )
+    draw("beam", SPACE, cup, 3.2, ("x.position", "lift.position"), ("table.OUT2", "cup.held", "passes.seen"))
     draw("transducer", AXIS + GAP, way, 1.8, ("z.position", "gap.volts"), ())
     draw("shaft", AXIS + SHAFT, way, 1.8, ("z.position", "cams.angle"), ("table.IN11", "table.IN12"))
     apart = ((0.0, "M1_EN=1"), (0.0, "M2_EN=1"), (0.2, "M1_POS_REL=80"), (0.2, "M2_POS_REL=80"), (0.7, "M2_EN=0"))

@@ -119,6 +119,14 @@ PARTS = (
     ),
     "[[load]]\nname = 'jo'\naxis = 'x'\ninertia = 0.0004\nwhen = 'not c.OUT1'\n",  # a ramp needs 0.8 of the torque at once
     "[[fault]]\nkind = 'stuck'\nmachine = 'c'\npin = 'OUT1'\nvalue = 1\nfrom_s = 0.6\nuntil_s = 1.1\n",
+    (
+        "[[cylinder]]\nname = 'dip'\nextend = 'c.OUT1'\nstroke = 20\nextend_time = '60 ms'\non = 'x'\nalong = '-z'\n"
+        "[[vacuum]]\nname = 'cu'\nejector = 'c.OUT1'\non = 'dip'\nat = [0, 0, 40]\ndiameter = 2\nreach = 8\nbuild_up = '9 ms'\n"
+        "[[nest]]\nname = 'ne'\non = 'y'\ncells = [3, 1]\npitch = [30, 30]\nworkpiece = [24, 24, 18]\nfilled = 3\n"
+        "[[conveyor]]\nname = 'sp'\nlength = 120\nspeed = 90\nfeed_every = '400 ms'\nworkpiece = [20, 12]\nat = [-40, 0, 6]\n"
+        "[[beam]]\nname = 'bm'\nat = [10, -40, 10]\nalong = '+y'\nlength = 80\n"
+        "[[event]]\nwhen = 'bm.seen'\nsteps = [{ note = 'seen' }]\n"
+    ),
     "[[transducer]]\nname = 'v'\nof = 'x.position'\nto = 'c.AIN1'\npoints = [[0, 0], [80, 8]]\nresolution = 0.1\n",
     (
         "[[supply]]\nname = 'p'\nfeeds = 'c'\nrise = '20 ms'\n"

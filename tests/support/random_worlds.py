@@ -17,6 +17,7 @@ from chance import Chance
 from machine_scenes import MACHINE_SCENES
 from plant_scenes import PLANT_SCENES
 from scenes import Scene
+from workpiece_scenes import WORKPIECE_SCENES
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.diagnostics import Severity
@@ -43,7 +44,7 @@ MOMENTS = 7
 TURNS = 3
 WRONG = 16
 END_S = 1.5
-SCENES = BELT_SCENES | AXIS_SCENES | MACHINE_SCENES | PLANT_SCENES
+SCENES = BELT_SCENES | AXIS_SCENES | MACHINE_SCENES | PLANT_SCENES | WORKPIECE_SCENES
 
 
 def described(chance: Chance, scene: Scene) -> tuple[str, list[str]]:

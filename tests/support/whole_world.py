@@ -87,6 +87,17 @@ name = "wall"
 when = "table.OUT1"
 at = [40, 0, -20]
 size = [10, 10, 30]
+[[nest]]
+name = "tray"
+on = "x"
+cells = [2, 1]
+workpiece = [20, 10, 5]
+filled = 3
+[[beam]]
+name = "glance"
+at = [30, 0, 2]
+along = "-x"
+length = 60
 [[collision]]
 name = "nudge"
 between = ["nose", "wall"]

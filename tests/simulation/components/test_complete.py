@@ -28,8 +28,14 @@ NO_OWN_FAULTS = {
     "button": "its input can be stuck or bounce",
     "wire": "its input can be stuck; the output before it, too",
     "body": "it only is where others have it",
+    "nest": "workpieces in it are others' faults",
 }
-DRAWN_ELSEWHERE = {"axis": "Axis.svelte", "button": "Machine.svelte", "wire": "../io/Wiring.svelte", "body": "Machine.svelte"}
+DRAWN_ELSEWHERE = {
+    "axis": "Axis.svelte",
+    "button": "Machine.svelte",
+    "wire": "../io/Wiring.svelte",
+    **dict.fromkeys(("beam", "body", "nest"), "Machine.svelte"),
+}
 """In the page, those that are no symbol and no track."""
 TESTS = {
     "axis": "../mechanics/test_mechanics.py",
@@ -71,7 +77,7 @@ def test_the_page_draws_it(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_its_section_has_a_picture(name: str) -> None:
-    pages = [(ROOT / "docs" / page).read_text("utf-8") for page in ("elements.md", "motors.md", "worlds.md")]
+    pages = [(ROOT / "docs" / page).read_text("utf-8") for page in ("elements.md", "motors.md", "space.md", "worlds.md")]
     sections = [section for page in pages for section in re.split(r"^## ", page, flags=re.MULTILINE) if f"[[{name}]]" in section]
     assert any("](images/" in section for section in sections)
 

@@ -12,7 +12,7 @@ from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, 
 from steptwin.simulation.components.frames import Frames
 from steptwin.simulation.components.mount import MountSpec, to_nm
 from steptwin.simulation.components.quantity import TIME, check_condition, owners_of
-from steptwin.simulation.space.bodies import Body, Box, Cylinder, Shape
+from steptwin.simulation.space.bodies import Body, Box, Cylinder, Shape, half_height
 from steptwin.simulation.space.frames import AXES
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
@@ -59,6 +59,11 @@ class BodySpec(NamedSpec, MountSpec):
         return True
 
     @property
+    def holds_workpieces(self) -> bool:
+        """Not where it comes and goes."""
+        return self.when is None
+
+    @property
     def shape(self) -> Shape:
         return shape_of(self.size, self.diameter, self.height)
 
@@ -80,10 +85,6 @@ def shape_of(size: tuple[float, float, float] | None, diameter: float | None, he
         x, y, z = (to_nm(one) // 2 for one in size)
         return Box((x, y, z))
     return Cylinder(to_nm(diameter or 0.0) // 2, to_nm(height or 0.0) // 2)
-
-
-def half_height(shape: Shape) -> int:
-    return shape.half[2] if isinstance(shape, Box) else shape.half
 
 
 def body_of(spec: BodySpec, frames: Frames) -> Body:

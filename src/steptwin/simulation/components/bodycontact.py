@@ -17,7 +17,7 @@ class BodyContact:
 
     __slots__ = ("_found", "_overlap", "_version", "_whens", "pair")
 
-    def __init__(self, pair: Pair, whens: Sequence[SignalCondition]) -> None:
+    def __init__(self, pair: Pair, whens: Sequence[SignalCondition] = ()) -> None:
         """``whens``: conditions under which they are there."""
         self.pair = pair
         self._whens = tuple(whens)

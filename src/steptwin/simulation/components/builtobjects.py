@@ -9,6 +9,7 @@ from typing import Any, cast
 from steptwin.motioncontroller import MotionController
 from steptwin.simulation.components.elementspec import B, ElementSpecs, ElementTable, NamedSpec, S
 from steptwin.simulation.components.frames import Frames
+from steptwin.simulation.components.workpieces import Workpieces
 from steptwin.simulation.faults import Faults
 from steptwin.simulation.kinds.kind import AnyKind, Terminals
 from steptwin.simulation.kinds.lines import Line
@@ -47,6 +48,7 @@ class BuiltObjects:
     """The contacts of the inputs that have some."""
     frames: Frames = field(init=False)
     """Places in space."""
+    workpieces: Workpieces = field(default_factory=Workpieces)
     elements: dict[str, dict[str, Any]] = field(default_factory=dict)
     """Built elements with names: by the name of the kind, then by their own."""
     signals_of: dict[str, Callable[[], Mapping[str, SignalOf]]] = field(default_factory=dict)

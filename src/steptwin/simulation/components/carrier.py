@@ -1,20 +1,19 @@
-"""Common part of suction cups and grippers: where they pick workpieces up, and where they put them down."""
+"""Common part of suction cups and grippers: they take workpieces in space, or from a belt where a terminal says that they are."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping
-from typing import ClassVar
+from typing import Protocol
 
 from steptwin.controller import Nanos
-from steptwin.messages import Message
-from steptwin.simulation.components.conveyor import Conveyor, find_conveyor
-from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.components.logic import Joint, TerminalComponent, TerminalComponentSpec
+from steptwin.simulation.components.mount import MountSpec
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.mechanics.belt import Belt, Placed, Workpiece
+from steptwin.simulation.mechanics.workpiece import Workpiece
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
+from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, number
 
@@ -22,7 +21,9 @@ PICK, PLACE, HELD = "PICK", "PLACE", "HELD"
 
 
 @table()
-class CarrierSpec(TerminalComponentSpec):
+class CarrierSpec(TerminalComponentSpec, MountSpec):
+    """With a place in space it takes what it meets there; otherwise PICK and PLACE say where it is."""
+
     pick: Terminal | None = key(OUTPUT_PIN, "output connected to PICK: it is where it picks up", default=None)
     place: Terminal | None = key(OUTPUT_PIN, "output connected to PLACE: it is where it puts down", default=None)
     source: str | None = key(
@@ -45,90 +46,104 @@ class CarrierSpec(TerminalComponentSpec):
         own = self.own_joint
         if own is not None:
             yield own
+        if self.is_mounted:
+            return
         for name, terminal, source in (("pick", PICK, self.pick), ("place", PLACE, self.place)):
             if source is not None:
                 yield Joint(name, terminal, source)
 
+    @property
+    def places(self) -> tuple[str, ...]:
+        """Terminals that say where it is."""
+        return () if self.is_mounted else (PICK, PLACE)
+
+    @property
+    def holds_workpieces(self) -> bool:
+        return True
+
+    def check(self, text: TomlText) -> None:
+        given = [name for name in ("pick", "place", "from", "onto") if text.is_given((*self.path, name))]
+        there = [name for name in ("on", "at", "along") if text.is_given((*self.path, name))]
+        if given and there:
+            message = f"{given[0]} and {there[0]} exclude each other: in space it takes what is there"
+            text.wrong((*self.path, given[0]), "D007", message)
+
     def others(self, described: ElementSpecs) -> Iterable[tuple[str, str]]:
+        if self.is_mounted:
+            yield from (("at", name) for name in described.holders if name != self.name)
         if self.source is not None:
             yield "from", self.source
         if self.onto is not None:
             yield "onto", self.onto
 
 
-HOLDS = Message("simulation.holds-a-workpiece", "{cup} holds {workpiece}")
-FALLS_FROM = Message("simulation.falls-from", "{workpiece} falls from {cup}")
+class Grip(Protocol):
+    """How something takes workpieces, and puts them down."""
+
+    dropped: int
+    """How many have fallen."""
+
+    @property
+    def workpiece(self) -> Workpiece | None:
+        """The one that it holds."""
+        ...
+
+    @property
+    def depends_on(self) -> tuple[str, ...] | None:
+        """As `TerminalComponent.depends_on`."""
+        ...
+
+    def is_met(self, now: Nanos) -> bool:
+        """Whether there is one to take."""
+        ...
+
+    def hold(self, now: Nanos) -> None:
+        """Take the one that is there."""
+        ...
+
+    def release(self, now: Nanos) -> None:
+        """Let go of the one that it holds."""
+        ...
+
+    def change(self, now: Nanos) -> Nanos | None:
+        """When there may be another one to take without an event."""
+        ...
 
 
 class Carrier(TerminalComponent):
-    """It carries a workpiece while it holds it. Then it lies on the belt below, or has fallen."""
+    """It carries a workpiece while it holds it."""
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_pick_at", "_place_at", "onto", "source")
-    __slots__ = (*FIXED, "carried", "dropped")
+    __slots__ = ("grip",)
 
-    def __init__(self, block: TerminalBlock, spec: CarrierSpec, context: ElementContext) -> None:
+    def __init__(self, block: TerminalBlock, grip: Grip) -> None:
         super().__init__(block)
-        self.source, self.onto = (None if name is None else find_conveyor(name, context) for name in (spec.source, spec.onto))
-        self._pick_at, self._place_at = spec.pick_at, spec.place_at
-        self.carried: Workpiece | None = None
-        self.dropped = 0
-        """How many have fallen."""
+        self.grip = grip
 
     @property
-    def depends_on(self) -> tuple[str, ...]:
-        return (self.block.name, *(() if self.source is None else self.source.line))
+    def depends_on(self) -> tuple[str, ...] | None:
+        return self.grip.depends_on
 
     def is_occupied(self, now: Nanos) -> bool:
         """Whether it carries a workpiece, or one is where it would pick it up."""
-        if self.carried is not None or not self.block.is_on(PICK):
-            return self.carried is not None
-        return self.source is None or self._below(self.source, now) is not None
-
-    def _below(self, source: Conveyor, now: Nanos) -> tuple[Belt, Placed] | None:
-        """The workpiece where it picks up, and the belt that moves it."""
-        place = source.belt.to_grid(self._pick_at)
-        return source.belt.occupant(place, place, now)
+        return self.grip.workpiece is not None or self.grip.is_met(now)
 
     def take(self, now: Nanos) -> None:
-        """It holds what is there from now on. Without a conveyor there is a workpiece wherever PICK is on."""
-        if self.carried is not None or not self.block.is_on(PICK):
-            return
-        source = self.source
-        if source is None:
-            self.carried = Workpiece("workpiece", 0)
-        elif (found := self._below(source, now)) is not None:
-            belt, placed = found
-            self.carried = placed.workpiece
-            source.take(belt, placed)
-            source.report(HOLDS(cup=self.block.name, workpiece=self.carried.name), self.carried.name, "held")
+        """It holds what is there from now on."""
+        if self.grip.workpiece is None:
+            self.grip.hold(now)
 
     def let_go(self, now: Nanos) -> None:
         """It does not hold anything from now on."""
-        workpiece, self.carried = self.carried, None
-        source, onto = self.source, self.onto
-        if workpiece is None or source is None:
-            return
-        if onto is not None and self.block.is_on(PLACE):
-            lies = onto.put(workpiece, self._place_at, now)
-        elif self.block.is_on(PICK):
-            lies = source.put(workpiece, self._pick_at, now)
-        else:
-            lies = False
-            source.report(FALLS_FROM(workpiece=workpiece.name, cup=self.block.name), workpiece.name, "falls")
-        if not lies:
-            self.dropped += 1
+        self.grip.release(now)
 
     def passing(self, now: Nanos) -> Nanos | None:
-        """When a belt that moves brings a workpiece to where it picks up, or takes it away."""
-        source = self.source
-        if source is None or self.carried is not None or not self.block.is_on(PICK):
-            return None
-        return source.belt.next_change(source.belt.to_grid(self._pick_at), now)
+        """When a workpiece comes to where it picks up, or leaves that place."""
+        return None if self.grip.workpiece is not None else self.grip.change(now)
 
 
 def carrier_signals(carrier: Carrier) -> Mapping[str, SignalOf]:
-    source = (carrier.block.source,)
+    source, grip = (carrier.block.source,), carrier.grip
     return {
-        "dropped": SignalOf(source, lambda now: float(carrier.dropped)),
-        "mass": SignalOf(source, lambda now: 0.0 if carrier.carried is None else carrier.carried.mass, unit="kg"),
+        "dropped": SignalOf(source, lambda now: float(grip.dropped)),
+        "mass": SignalOf(source, lambda now: 0.0 if grip.workpiece is None else grip.workpiece.mass, unit="kg"),
     }

@@ -16,17 +16,21 @@ from steptwin.simulation.components.carriage import CARRIAGE
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.components.follower import FOLLOWER
-from steptwin.simulation.components.frames import sources_of
+from steptwin.simulation.components.frames import bodies_on, sources_of
 from steptwin.simulation.components.gantry import GANTRY
 from steptwin.simulation.components.logic import STUCK, Joint, TerminalComponentSpec, with_terminals
 from steptwin.simulation.components.mount import Movement
+from steptwin.simulation.components.probe import Probe
 from steptwin.simulation.components.quantity import TIME, check_condition, condition_of, owners_of
+from steptwin.simulation.components.resting import resting_of
 from steptwin.simulation.components.shaft import SHAFT
 from steptwin.simulation.components.tool import TOOL
 from steptwin.simulation.components.touch import HIT, JAM, REPORT, RESET, Contact, Touch
+from steptwin.simulation.components.workpieces import WORKPIECES
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.mechanics import Mechanism
+from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.space.contacts import Pair
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
@@ -54,7 +58,7 @@ class CollisionSpec(TerminalComponentSpec):
     )
     between: tuple[str, ...] = key(
         _names,
-        "bodies, or elements with the bodies on them: those of one touch those of another",
+        f"bodies, elements with the bodies on them, or '{WORKPIECES}': those of one touch those of another",
         default=(),
         excludes=("when",),
     )
@@ -81,7 +85,8 @@ class CollisionSpec(TerminalComponentSpec):
 
     def others(self, described: ElementSpecs) -> Iterator[tuple[str, str]]:
         yield from (("when", owner) for owner in self.owners if owner != TIME)
-        yield from (("between", name) for name in self.between)
+        for wanted in self.between:
+            yield from (("between", name) for name in (described.holders if wanted == WORKPIECES else (wanted,)))
         if self.all:
             yield from (("all", body.name) for body in described.of(BODY))
         yield from (("except", name) for pair in self.apart_from for name in pair)
@@ -118,7 +123,7 @@ class _Bodies:
         self._described = {one.name: one for one in context.objects.described.of(BODY)}
         self._bodies = {name: body_of(one, context.frames) for name, one in self._described.items()}
         self._moved: list[Movement] = []
-        self.contacts = tuple(self._contact(*pair) for pair in self._pairs())
+        self.contacts = (*(self._contact(*pair) for pair in self._pairs()), *self._with_workpieces())
         if not self.contacts:
             raise Misuse("nothing moves these bodies against each other")
 
@@ -126,24 +131,36 @@ class _Bodies:
     def depends_on(self) -> tuple[str, ...]:
         """Names of what changes whether they touch."""
         owners = (owner for one in self._described.values() for owner in one.owners)
-        return tuple(dict.fromkeys((self._spec.name, *sources_of(self._moved), *owners)))
+        pieces = self._context.objects.workpieces.sources if WORKPIECES in self._spec.between else ()
+        return tuple(dict.fromkeys((self._spec.name, *sources_of(self._moved), *owners, *pieces)))
 
     def _on(self, name: str) -> list[str]:
-        """The bodies that something carries, and itself if it is one."""
-        frame = self._context.frames[name].frame
-        found = [other for other, body in self._bodies.items() if any(one is frame for one in body.frame.line())]
-        if not found:
-            raise Misuse(f"{name!r} is no [[body]], and carries none")
-        return found
+        return bodies_on(self._context.frames[name], self._bodies, name)
 
     def _pairs(self) -> Iterator[tuple[str, str]]:
         spec = self._spec
-        groups: Sequence[Sequence[str]] = [[name] for name in self._bodies] if spec.all else [*map(self._on, spec.between)]
+        named = [self._on(name) for name in spec.between if name != WORKPIECES]
+        groups: Sequence[Sequence[str]] = [[name] for name in self._bodies] if spec.all else named
         those = {frozenset(pair) for one, other in combinations(groups, 2) for pair in product(one, other)}
         those -= {frozenset(pair) for one, other in spec.apart_from for pair in product(self._on(one), self._on(other))}
         for one, other in combinations(self._bodies, 2):
             if frozenset((one, other)) in those and not Pair(self._bodies[one], self._bodies[other]).is_constant:
                 yield one, other
+
+    def _with_workpieces(self) -> Iterator[Contact]:
+        """Of each body with any workpiece."""
+        spec, context = self._spec, self._context
+        if WORKPIECES not in spec.between:
+            return
+        block = context.terminal_block(spec.name)
+        resting_of(context, block.scheduler)
+        for name in dict.fromkeys(one for wanted in spec.between if wanted != WORKPIECES for one in self._on(wanted)):
+            body = self._bodies[name]
+            moved = context.frames.carrying(body.frame)
+            self._moved += moved
+            probe = Probe(body, {}, context.objects.workpieces)
+            blocks = tuple(dict.fromkeys(drive for movement in moved for drive in movement.blocks))
+            yield Contact(probe, blocks, partial(_touching, spec.name, name, probe, block))
 
     def _contact(self, one: str, other: str) -> Contact:
         bodies, context = (self._bodies[one], self._bodies[other]), self._context
@@ -156,6 +173,10 @@ class _Bodies:
         blocks = tuple(dict.fromkeys(drive for movement in moved for drive in movement.blocks))
         text = partial(BODIES_TOUCH, zone=self._spec.name, one=one, other=other)
         return Contact(BodyContact(pair, [condition_of(when, block, context) for when in whens]), blocks, text)
+
+
+def _touching(zone: str, body: str, probe: Probe, block: TerminalBlock) -> str:
+    return BODIES_TOUCH(zone=zone, one=body, other=", ".join(probe.met(block.scheduler.now)))
 
 
 def _axes_of(spec: CollisionSpec, context: ElementContext) -> Iterator[tuple[str, Mechanism]]:

@@ -22,14 +22,16 @@ from steptwin.simulation.components.conveyortable import FEED, RUN, ConveyorSpec
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import Reference
 from steptwin.simulation.components.logic import STUCK_INPUT, TerminalComponent, with_terminals
+from steptwin.simulation.components.workpieces import workpiece_of
 from steptwin.simulation.faults import ActiveFault, Fault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.logic.signal import SignalOf
-from steptwin.simulation.mechanics.belt import Belt, ConstantDrive, Near, Placed, Workpiece, nanometres, next_change
+from steptwin.simulation.mechanics.belt import Belt, ConstantDrive, Near, Placed, nanometres, next_change
 from steptwin.simulation.mechanics.beltline import first_of, limit, next_look, pushed_against
 from steptwin.simulation.mechanics.drawing import BELT, Drawing, SensorZone
 from steptwin.simulation.mechanics.rampeddrive import RampedDrive
 from steptwin.simulation.mechanics.scale import exact_fraction
+from steptwin.simulation.mechanics.workpiece import Workpiece
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.names import Unknown
 
@@ -179,21 +181,21 @@ class Conveyor(TerminalComponent):
 
     def _feed(self, now: Nanos) -> None:
         """Put a workpiece at the beginning, where there is room for it."""
-        spec, length = self.spec, nanometres(self.spec.workpiece)
+        spec, length = self.spec, nanometres(self.spec.workpiece[0])
         if self.feeder_stands or self.belt.occupant(-self.belt.from_nm(length), 0, now) is not None:
             self.missed += 1
             self.block.scheduler.notify(self.block.name)
             return
         self.fed += 1
         marks = tuple((nanometres(mark), nanometres(mark + spec.mark_width)) for mark in spec.marks)
-        workpiece = Workpiece(f"{spec.name}.{self.fed}", length, spec.mass, marks)
+        workpiece = workpiece_of(f"{spec.name}.{self.fed}", spec.workpiece, spec.mass, marks)
         self._lay(self.belt.place(workpiece, 0, now), now)
 
-    def put(self, workpiece: Workpiece, front: float, now: Nanos) -> bool:
-        """Put a workpiece with its front ``front`` mm from the beginning. Whether it lies there: it does not where it collides
-        with another one."""
-        place = self.belt.to_grid(front)
-        placed = self.belt.place(workpiece, place, now)
+    def lay(self, workpiece: Workpiece, front: int, now: Nanos, across: int = 0, yaw_q: float = 0.0) -> bool:
+        """Put a workpiece with its front ``front`` steps from the beginning, ``across`` and ``yaw_q`` as in `Placed`. Whether it
+        lies there: it does not where it collides with another one."""
+        place = front
+        placed = self.belt.place(workpiece, place, now, "", across, yaw_q)
         found = self.belt.occupant(place - placed.length + 1, place - 1, now)
         if found is not None:
             self._collides(placed, found[1])
@@ -213,7 +215,7 @@ class Conveyor(TerminalComponent):
         name, against = placed.workpiece.name, other.workpiece.name
         self.report(COLLIDES(workpiece=name, other=against, belt=self.spec.name), name, "collides")
 
-    def take(self, belt: Belt, placed: Placed) -> None:
+    def remove(self, belt: Belt, placed: Placed) -> None:
         """Take a workpiece that lies over the belt off the one that moves it."""
         belt.take(placed)
         self.block.scheduler.notify(belt.name)
@@ -252,7 +254,7 @@ class Conveyor(TerminalComponent):
         first = first_of(belt, now) if belt.near else None
         while first is not None and (other := pushed_against(belt, first, now)) is not None:
             self._collides(other.placed, first)
-            self.take(other.near.belt, other.placed)
+            self.remove(other.near.belt, other.placed)
         ahead: int | None = None
         for placed in sorted(belt.workpieces, key=lambda one: one.front(position), reverse=True):
             front = placed.front(position)
@@ -295,13 +297,13 @@ class Conveyor(TerminalComponent):
             front = placed.front(position)
             if front >= belt.exit(placed) and placed.held is None:
                 self.delivered += 1
-                self.take(belt, placed)
+                self.remove(belt, placed)
                 self._report(LEAVES, placed, "leaves")
                 if self.following is not None:
                     goes_on = True
                     self.following.take_over(placed, belt, front - belt.length, now)
             elif front < 0:
-                self.take(belt, placed)
+                self.remove(belt, placed)
                 before = self.preceding.get(placed.came_from)
                 if before is None:
                     self._report(FALLS_OFF, placed, "falls")
@@ -313,13 +315,16 @@ class Conveyor(TerminalComponent):
 
     def take_over(self, placed: Placed, other: Belt, beyond: int, now: Nanos) -> None:
         """Move a workpiece that the belt before it has moved. ``beyond``: how far it is beyond its end, on its grid."""
-        found = self.belt.place(placed.workpiece, self.belt.from_nm(other.to_nm(beyond)), now, other.name)
+        found = self.belt.place(
+            placed.workpiece, self.belt.from_nm(other.to_nm(beyond)), now, other.name, placed.across, placed.yaw_q
+        )
         short = found.length // 2 - found.front(self.belt.position(now))
         self._lay(found._replace(origin=found.origin - max(short, 0)), now)
 
     def take_back(self, placed: Placed, other: Belt, front: int, now: Nanos) -> None:
         """Move a workpiece again that the following belt has moved back to its beginning. ``front`` is on its grid."""
-        self._lay(self.belt.place(placed.workpiece, self.belt.length + self.belt.from_nm(other.to_nm(front)), now), now)
+        place = self.belt.length + self.belt.from_nm(other.to_nm(front))
+        self._lay(self.belt.place(placed.workpiece, place, now, "", placed.across, placed.yaw_q), now)
 
     def _next(self, now: Nanos) -> Nanos | None:
         """When the next workpiece is lost at the beginning, is delivered or cannot go on; or can again."""
@@ -441,14 +446,14 @@ def _put_sensor(conveyor: Conveyor, spec: SensorSpec, channel: str, context: Ele
 
 def _place_names(spec: ConveyorSpec) -> tuple[str, ...]:
     """Signals with the places of as many workpieces as there is room for."""
-    return tuple(f"place{n + 1}" for n in range(ceil(min(MOST_PLACES - 1, spec.length / spec.workpiece)) + 1))
+    return tuple(f"place{n + 1}" for n in range(ceil(min(MOST_PLACES - 1, spec.length / spec.workpiece[0])) + 1))
 
 
 def _drawing(conveyor: Conveyor) -> Drawing:
     spec = conveyor.spec
     sensors = tuple(SensorZone(sensor.target, sensor.at, sensor.at) for sensor in spec.sensors)
     stops = tuple(SensorZone((spec.name, stop_terminal(n)), stop.at, stop.at) for n, stop in enumerate(spec.stops, start=1))
-    return Drawing(BELT, spec.length, _place_names(spec), spec.workpiece, sensors + stops)
+    return Drawing(BELT, spec.length, _place_names(spec), spec.workpiece[0], sensors + stops)
 
 
 def _refuse_place() -> None:

@@ -11,6 +11,7 @@ from steptwin.simulation.components.beltsensor import SensorSpec
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.components.logic import Joint, TerminalComponentSpec
 from steptwin.simulation.components.mount import MoverSpec
+from steptwin.simulation.components.workpieces import size_of_workpiece
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.mechanics.belt import nanometres
 from steptwin.simulation.toml.reader import TomlText
@@ -50,7 +51,11 @@ class ConveyorSpec(TerminalComponentSpec, MoverSpec):
         OUTPUT_PIN, "output connected to FEED, which puts a workpiece on when it is switched on", default=None
     )
     feed_every: Nanos | None = key(positive_time, "a workpiece comes after each such time", default=None)
-    workpiece: float = key(number(0.0, above=True), "length of a workpiece, mm", default=50.0)
+    workpiece: tuple[float, ...] = key(
+        size_of_workpiece,
+        "mm: its length; in space [length, width, height] or [diameter, height]",
+        default=(50.0, 50.0, 50.0),
+    )
     mass: float = key(number(0.0), "kg of a workpiece", default=0.0)
     marks: tuple[float, ...] = key(
         _mark_places, "mm from the front of a workpiece to each of its marks, such as [10, 35]", default=()
@@ -60,6 +65,10 @@ class ConveyorSpec(TerminalComponentSpec, MoverSpec):
     width: float = key(number(0.0, above=True), "mm across, in space; its top face is at its origin", default=100.0, order=2)
     sensors: tuple[SensorSpec, ...] = tables_in("sensor", SensorSpec)
     stops: tuple[StopSpec, ...] = tables_in("stop", StopSpec)
+
+    @property
+    def holds_workpieces(self) -> bool:
+        return True
 
     @property
     def terminals(self) -> Terminals:
@@ -91,8 +100,8 @@ class ConveyorSpec(TerminalComponentSpec, MoverSpec):
             if one.at > self.length:
                 text.wrong((*one.path, "at"), "D007", f"at = {one.at:g} is beyond length = {self.length:g}")
         for mark in self.marks:
-            if mark + self.mark_width > self.workpiece:
-                message = f"a mark from {mark:g} to {mark + self.mark_width:g} mm is beyond workpiece = {self.workpiece:g}"
+            if mark + self.mark_width > self.workpiece[0]:
+                message = f"a mark from {mark:g} to {mark + self.mark_width:g} mm is beyond workpiece = {self.workpiece[0]:g}"
                 text.wrong((*self.path, "marks"), "D007", message)
 
 
@@ -111,7 +120,7 @@ class NearSpec(NamedTuple):
 
 def near_ones(name: str, conveyors: Mapping[str, ConveyorSpec]) -> tuple[NearSpec, ...]:
     """The conveyors before and behind one of which a workpiece may lie over it, or be in the way of one that leaves it."""
-    longest = max(nanometres(spec.workpiece) for spec in conveyors.values())
+    longest = max(nanometres(spec.workpiece[0]) for spec in conveyors.values())
 
     def before(of: str, end: int, joins: int | None, known: tuple[str, ...]) -> Iterator[NearSpec]:
         for spec in conveyors.values():

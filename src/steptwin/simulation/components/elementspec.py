@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Generic, NamedTuple, TypeVar, cast
 
-from steptwin.simulation.components.mount import MountSpec
+from steptwin.simulation.components.mount import MountSpec, places
 from steptwin.simulation.toml.keypaths import Path
 from steptwin.simulation.toml.table import TableSpec, table
 
@@ -39,6 +39,12 @@ class ElementSpecs(dict[str, tuple[TableSpec, ...]]):
     def of(self, element: ElementTable[S, Any]) -> tuple[S, ...]:
         """Those of one kind."""
         return cast("tuple[S, ...]", self[element.name])
+
+    @property
+    def holders(self) -> list[str]:
+        """Those in space that workpieces may be on, or in."""
+        placed = places(self.mounts)
+        return [name for name, its in self.mounts.items() if name in placed and its.holds_workpieces]
 
     @property
     def mounts(self) -> dict[str, MountSpec]:

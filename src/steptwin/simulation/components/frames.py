@@ -8,7 +8,8 @@ from typing import NamedTuple
 from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.simulation.components.elementspec import ElementSpecs
-from steptwin.simulation.components.mount import MountSpec, Movement
+from steptwin.simulation.components.mount import MountSpec, Movement, places
+from steptwin.simulation.space.bodies import Body
 from steptwin.simulation.space.frames import Frame, Joint, path
 
 HAS_NO_PLACE = Message("simulation.has-no-place", "{name!r} has no place in space: give it on, at or along")
@@ -36,6 +37,7 @@ class Frames(Mapping[str, Mounted]):
         self.described = described.mounts
         self._places = places(self.described)
         self._moves: dict[str, Callable[[], Sequence[Movement]]] = {}
+        self._bases: dict[str, Frame] = {}
         self._made: dict[str, Mounted] = {}
         self._movements: dict[Frame, Movement] = {}
         """Of the frames with a joint."""
@@ -46,10 +48,20 @@ class Frames(Mapping[str, Mounted]):
 
     def __getitem__(self, name: str) -> Mounted:
         if name not in self._made:
-            if name not in self._places or name not in self._moves:
-                raise Misuse(HAS_NO_PLACE(name=name))
-            self._made[name] = self._make(name, self._places[name])
+            self._made[name] = self._make(name)
         return self._made[name]
+
+    def base(self, name: str) -> Frame:
+        """Where an element stands, which may not be built yet."""
+        if name not in self._bases:
+            place = self._places.get(name)
+            if place is None:
+                raise Misuse(HAS_NO_PLACE(name=name))
+            self._bases[name] = Frame(name, None if place.on is None else self[place.on].frame, place.origin)
+        return self._bases[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._places
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._places)
@@ -57,15 +69,16 @@ class Frames(Mapping[str, Mounted]):
     def __len__(self) -> int:
         return len(self._places)
 
-    def _make(self, name: str, place: MountSpec) -> Mounted:
-        on = None if place.on is None else self[place.on].frame
-        frame = base = Frame(name, on, place.origin)
-        movements = tuple(self._moves[name]())
+    def _make(self, name: str) -> Mounted:
+        frame = base = self.base(name)
+        if name not in self._moves:
+            raise Misuse(HAS_NO_PLACE(name=name))
+        place, movements = self._places[name], tuple(self._moves[name]())
         for n, one in enumerate(movements):
             # The first joint is at the origin of its element, each further one is on the one before.
             its = "" if n + 1 == len(movements) else f".{one.signal}"
             joint = Joint(one.motion, one.along, one.turns)
-            frame = Frame(name + its, frame if n else on, (0, 0, 0) if n else place.origin, joint)
+            frame = Frame(name + its, frame if n else base.on, (0, 0, 0) if n else place.origin, joint)
             self._movements[frame] = one
         return Mounted(self.described[name], place, base, frame, movements)
 
@@ -73,16 +86,19 @@ class Frames(Mapping[str, Mounted]):
         """What moves two frames against each other."""
         return [self._movements[step.frame] for step in path(one, other) if step.frame in self._movements]
 
+    def carrying(self, frame: Frame) -> list[Movement]:
+        """What moves a frame, up to the floor."""
+        return [self._movements[one] for one in frame.line() if one in self._movements]
 
-def places(mounts: Mapping[str, MountSpec]) -> dict[str, MountSpec]:
-    """The tables that say where elements are, by the names of those that have a place."""
-    carrying = {its.on for its in mounts.values()}
-    found: dict[str, MountSpec] = {}
-    for name, its in mounts.items():
-        other = None if its.is_mounted or its.mounted_as is None else mounts.get(its.mounted_as)
-        place = other or its
-        if place.is_mounted or name in carrying:
-            found[name] = place
+
+NO_BODIES = Message("simulation.carries-no-bodies", "{name!r} is no [[body]], and carries none")
+
+
+def bodies_on(mounted: Mounted, bodies: Mapping[str, Body], name: str) -> list[str]:
+    """The names of the bodies that the element ``name`` carries, and its own if it is one. Raises `Misuse` if there is none."""
+    found = [other for other, body in bodies.items() if any(one is mounted.frame for one in body.frame.line())]
+    if not found:
+        raise Misuse(NO_BODIES(name=name))
     return found
 
 

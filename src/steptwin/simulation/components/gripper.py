@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from fractions import Fraction
 from math import floor
 from typing import ClassVar
 
 from steptwin.controller import MILLISECOND, Nanos
 from steptwin.messages import Message
-from steptwin.simulation.components.carrier import HELD, PICK, PLACE, Carrier, CarrierSpec, carrier_signals
+from steptwin.simulation.components.beltgrip import BeltGrip
+from steptwin.simulation.components.carrier import HELD, Carrier, CarrierSpec, carrier_signals
 from steptwin.simulation.components.elementcontext import ElementContext
+from steptwin.simulation.components.grasp import Grasp
 from steptwin.simulation.components.logic import STUCK, Joint, with_terminals
+from steptwin.simulation.components.mount import MoverSpec, to_nm
+from steptwin.simulation.components.workpieces import Lie
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.kinds.kind import Terminals
@@ -19,6 +24,7 @@ from steptwin.simulation.mechanics.drawing import ROD, Drawing
 from steptwin.simulation.mechanics.scale import exact_fraction
 from steptwin.simulation.mechanics.travel import Travel
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
+from steptwin.simulation.space.bodies import Body, Box
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, number, positive_time
@@ -27,7 +33,7 @@ CLOSE, OPENED, CLOSED = "CLOSE", "OPENED", "CLOSED"
 
 
 @table("[[gripper]]")
-class GripperSpec(CarrierSpec):
+class GripperSpec(CarrierSpec, MoverSpec):
     close: Terminal | None = key(
         OUTPUT_PIN,
         "output connected to CLOSE, which closes the jaws while it is on; without it a wire may be",
@@ -38,44 +44,74 @@ class GripperSpec(CarrierSpec):
     width: float = key(number(0.0), "mm of a workpiece between the jaws", default=10.0)
     close_time: Nanos = key(positive_time, "from open to closed, without a workpiece", default=100 * MILLISECOND)
     open_time: Nanos = key(positive_time, "from closed to open", default=100 * MILLISECOND)
+    overlap: float = key(
+        number(0.0, 1000.0),
+        "in space: mm of a workpiece that are between the jaws, from their tips up",
+        default=5.0,
+        order=2,
+    )
 
     @property
     def terminals(self) -> Terminals:
-        return Terminals(digital_inputs=(CLOSE, PICK, PLACE), outputs=(OPENED, CLOSED, HELD))
+        return Terminals(digital_inputs=(CLOSE, *self.places), outputs=(OPENED, CLOSED, HELD))
 
     @property
     def own_joint(self) -> Joint | None:
         return None if self.close is None else Joint("close", CLOSE, self.close)
 
     def check(self, text: TomlText) -> None:
+        super().check(text)
         if self.width >= self.stroke:
             message = f"width = {self.width:g} mm is not below stroke = {self.stroke:g} mm: open jaws must go over a workpiece"
             text.wrong((*self.path, "width"), "D007", message)
+
+
+def _grasp(block: TerminalBlock, spec: GripperSpec, context: ElementContext) -> Grasp:
+    probe = Body(spec.name, context.frames.base(spec.name), Box((0, 0, 0)), (0, 0, to_nm(spec.overlap)))
+    across = spec.towards().axis
+
+    def centred(lie: Lie, body: Body) -> Lie:
+        x, y, z = (0 if axis == across else at for axis, at in enumerate(lie.at))
+        return Lie((x, y, z), lie.yaw_q)
+
+    return Grasp(block, context, probe, centred)
 
 
 class Gripper(Carrier):
     """The jaws move at constant speeds. They hold a workpiece that is between them when they come to its width, until they open.
     Without one they close."""
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_at", "_spec")
+    FIXED: ClassVar[tuple[str, ...]] = ("_at", "_grasp", "_spec")
     __slots__ = (*FIXED, "_is_narrow", "is_held", "slips", "travel")
 
     def __init__(self, block: TerminalBlock, spec: GripperSpec, context: ElementContext) -> None:
-        super().__init__(block, spec, context)
+        self._grasp = _grasp(block, spec, context) if spec.is_mounted else None
+        super().__init__(block, self._grasp or BeltGrip(block, spec, context))
         self._spec = spec
         self.travel = Travel(spec.close_time, spec.open_time, is_forth=False, now=block.scheduler.now)
-        share = 1 - exact_fraction(spec.width) / exact_fraction(spec.stroke)
-        self._at = floor(share * self.travel.full)
-        """The place of the jaws at a workpiece."""
+        self._at = self._closed_at(exact_fraction(spec.width))
+        """The place of the jaws at a workpiece, without a place in space."""
         self._is_narrow = False
         """Whether the jaws are closer than a workpiece is wide, or hold one."""
         self.is_held = False
         self.slips = False
         """Fault: the jaws hold nothing."""
 
+    def _closed_at(self, width: Fraction) -> int:
+        """The place of the jaws, this far apart in mm."""
+        return floor((1 - width / exact_fraction(self._spec.stroke)) * self.travel.full)
+
+    def _meets_at(self, now: Nanos) -> int | None:
+        """The place of the jaws at what is between them; None where nothing is."""
+        if self._grasp is None:
+            return self._at
+        body = self._grasp.met(now)
+        return None if body is None else self._closed_at(self._grasp.width_of(body, self._spec.towards(), now))
+
     def update(self, now: Nanos) -> None:
         closes = self.block.is_on(CLOSE)
-        is_narrow = self.travel.grid_position(now) >= self._at
+        at = None if self.is_held else self._meets_at(now)
+        is_narrow = self.is_held or (at is not None and self.travel.grid_position(now) >= at)
         if self.is_held and (not closes or self.slips):
             self.is_held = False
             self.let_go(now)
@@ -94,9 +130,13 @@ class Gripper(Carrier):
 
     def deadline(self) -> Nanos | None:
         now = self.block.scheduler.now
-        touches = self.travel.reaches(self._at, now, 1)
-        moments = (*self.travel.turning_points(now), *(() if touches is None else (touches,)))
-        return min(moments, default=None)
+        at = None if self.is_held else self._meets_at(now)
+        moments = (
+            *self.travel.turning_points(now),
+            None if at is None else self.travel.reaches(at, now, 1),
+            None if self._grasp is None or not self.block.is_on(CLOSE) else self.passing(now),
+        )
+        return min((moment for moment in moments if moment is not None), default=None)
 
     @property
     def stroke(self) -> float:
@@ -127,6 +167,7 @@ def _signals(gripper: Gripper) -> Mapping[str, SignalOf]:
 
 GRIPPER = with_terminals(
     GripperSpec,
+    moves=lambda spec, gripper: (),
     make=lambda spec, context: Gripper(context.terminal_block(spec.name), spec, context),
     signals=_signals,
     drawing=lambda gripper: Drawing(ROD, gripper.stroke, ("position",)),

@@ -5,7 +5,7 @@ An element that is mounted has a frame (`steptwin.simulation.space`), which is a
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from math import floor
 from typing import Any, NamedTuple, TypeAlias
@@ -54,6 +54,11 @@ class MountSpec(TableSpec):
 
     on: str | None = key(FrameName(), "the element that carries it; without it the floor does", default=None, order=2)
     at: Vector | None = key(point, "[x, y, z] of its origin on that element, mm; default [0, 0, 0]", default=None, order=2)
+
+    @property
+    def holds_workpieces(self) -> bool:
+        """Whether workpieces may be on it, or in it."""
+        return False
 
     @property
     def is_mounted(self) -> bool:
@@ -107,3 +112,15 @@ class Movement(NamedTuple):
     sources: tuple[str, ...]
     """Controllers and elements whose changes change the motion."""
     turns: bool = False
+
+
+def places(mounts: Mapping[str, MountSpec]) -> dict[str, MountSpec]:
+    """The tables that say where elements are, by the names of those that have a place."""
+    carrying = {its.on for its in mounts.values()}
+    found: dict[str, MountSpec] = {}
+    for name, its in mounts.items():
+        other = None if its.is_mounted or its.mounted_as is None else mounts.get(its.mounted_as)
+        place = other or its
+        if place.is_mounted or name in carrying:
+            found[name] = place
+    return found

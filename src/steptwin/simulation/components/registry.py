@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 from steptwin.errors import Misuse
 from steptwin.simulation.components.axis import AXIS
+from steptwin.simulation.components.beam import BEAM
 from steptwin.simulation.components.body import BODY
 from steptwin.simulation.components.brake import BRAKE
 from steptwin.simulation.components.button import BUTTON
@@ -22,6 +23,7 @@ from steptwin.simulation.components.gate import GATE
 from steptwin.simulation.components.gripper import GRIPPER
 from steptwin.simulation.components.latch import LATCH
 from steptwin.simulation.components.load import LOAD
+from steptwin.simulation.components.nest import NEST
 from steptwin.simulation.components.relay import RELAY
 from steptwin.simulation.components.shaft import SHAFT
 from steptwin.simulation.components.source import SOURCE
@@ -76,8 +78,6 @@ for _one in (
     RELAY,
     CYLINDER,
     CONVEYOR,
-    VACUUM,
-    GRIPPER,
     BRAKE,
     SHAFT,
     FOLLOWER,
@@ -86,6 +86,10 @@ for _one in (
     GANTRY,
     TRANSDUCER,
     BODY,
+    NEST,
+    VACUUM,
+    GRIPPER,
+    BEAM,
     COLLISION,
     SUPPLY,
     LOAD,

@@ -9,14 +9,19 @@ from typing import ClassVar
 from steptwin.controller import MILLISECOND, Nanos
 from steptwin.messages import Message
 from steptwin.motion.exponential import decay, logarithm
-from steptwin.simulation.components.carrier import HELD, PICK, PLACE, Carrier, CarrierSpec, carrier_signals
+from steptwin.simulation.components.beltgrip import BeltGrip
+from steptwin.simulation.components.carrier import HELD, Carrier, CarrierSpec, Grip, carrier_signals
 from steptwin.simulation.components.elementcontext import ElementContext
+from steptwin.simulation.components.grasp import Grasp
 from steptwin.simulation.components.logic import STUCK, Joint, with_terminals
+from steptwin.simulation.components.mount import to_nm
+from steptwin.simulation.components.workpieces import Lie
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
+from steptwin.simulation.space.bodies import Body, Box, half_height
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, number, positive_time
@@ -31,22 +36,39 @@ class VacuumSpec(CarrierSpec):
     threshold: float = key(number(0.0, 101.0, above=True), "kPa, from which HELD is on", default=50.0)
     build_up: Nanos = key(positive_time, "from 0 to the threshold", default=100 * MILLISECOND)
     release: Nanos = key(positive_time, "from vacuum to the threshold", default=40 * MILLISECOND)
+    diameter: float = key(number(0.0, 10_000.0), "in space: mm of the cup, which points down", default=20.0, order=2)
+    reach: float = key(number(0.0, 1000.0, above=True), "in space: mm from which it draws a workpiece", default=2.0, order=2)
 
     @property
     def terminals(self) -> Terminals:
-        return Terminals(digital_inputs=(EJECTOR, PICK, PLACE), outputs=(HELD,))
+        return Terminals(digital_inputs=(EJECTOR, *self.places), outputs=(HELD,))
 
     @property
     def own_joint(self) -> Joint | None:
         return None if self.ejector is None else Joint("ejector", EJECTOR, self.ejector)
 
     def check(self, text: TomlText) -> None:
+        super().check(text)
         if self.threshold >= self.vacuum:
             text.wrong(
                 (*self.path, "threshold"),
                 "D007",
                 f"threshold = {self.threshold:g} kPa is not below vacuum = {self.vacuum:g} kPa: nothing would ever be held",
             )
+
+
+def _grip(block: TerminalBlock, spec: VacuumSpec, context: ElementContext) -> Grip:
+    if not spec.is_mounted:
+        return BeltGrip(block, spec, context)
+    half = to_nm(spec.reach) // 2
+    probe = Body(spec.name, context.frames.base(spec.name), Box((0, 0, half)), (0, 0, -half))
+    return Grasp(block, context, probe, _drawn, to_nm(spec.diameter) // 2)
+
+
+def _drawn(lie: Lie, body: Body) -> Lie:
+    """Its top is at the cup."""
+    x, y, _ = lie.at
+    return Lie((x, y, -2 * half_height(body.shape)), lie.yaw_q)
 
 
 class Vacuum(Carrier):
@@ -59,7 +81,7 @@ class Vacuum(Carrier):
     __slots__ = (*FIXED, "_begin", "_due", "_first", "_goal", "_is_held", "leaks")
 
     def __init__(self, block: TerminalBlock, spec: VacuumSpec, context: ElementContext) -> None:
-        super().__init__(block, spec, context)
+        super().__init__(block, _grip(block, spec, context))
         self.spec = spec
         self.leaks = False
         self._is_held = False
@@ -146,6 +168,7 @@ def _signals(vacuum: Vacuum) -> Mapping[str, SignalOf]:
 
 VACUUM = with_terminals(
     VacuumSpec,
+    moves=lambda spec, vacuum: (),
     make=lambda spec, context: Vacuum(context.terminal_block(spec.name), spec, context),
     signals=_signals,
     faults=(

@@ -10,6 +10,7 @@ from typing import ClassVar, NamedTuple, Protocol
 from steptwin.controller import Nanos
 from steptwin.simulation.mechanics.rampeddrive import RampedDrive
 from steptwin.simulation.mechanics.scale import exact_fraction
+from steptwin.simulation.mechanics.workpiece import Workpiece
 from steptwin.state import Stateful
 
 NANOMETRES = 10**6
@@ -55,9 +56,14 @@ class ConstantDrive(Stateful):
     def grid_position(self, now: Nanos) -> int:
         return self._base + (self._speed * (now - self._begin) // self._divisor if self.runs else 0)
 
+    @property
+    def whole_speed(self) -> Fraction:
+        """Its speed while it runs, steps/ns."""
+        return Fraction(self._speed, self._divisor)
+
     def line(self, now: Nanos) -> tuple[Fraction, Fraction] | None:
         """Its position at 0 ns and its speed in steps/ns, as long as it moves straight on."""
-        rate = Fraction(self._speed, self._divisor) if self.runs else Fraction(0)
+        rate = self.whole_speed if self.runs else Fraction(0)
         return self._base - rate * self._begin, rate
 
     def straight_from(self) -> Nanos:
@@ -76,18 +82,6 @@ class ConstantDrive(Stateful):
         return self._begin - (-distance // self._speed)
 
 
-class Workpiece(NamedTuple):
-    """A workpiece, as it is wherever it lies. Lengths are in nm."""
-
-    name: str
-    """Name of the conveyor that was fed with it, and its number there, from 1."""
-    length: int
-    mass: float = 0.0
-    """kg."""
-    marks: tuple[tuple[int, int], ...] = ()
-    """Begin and end of each mark, from the front."""
-
-
 class Placed(NamedTuple):
     """A workpiece on the belt that moves it. Lengths and places are on the grid of that belt."""
 
@@ -100,6 +94,10 @@ class Placed(NamedTuple):
     """Where its front stands, while the belt does not move it."""
     came_from: str = ""
     """Name of the belt that moved it before, on which its rear may still be; empty where it was put on this one."""
+    across: int = 0
+    """How far its middle is left of the middle of the belt, nm."""
+    yaw_q: float = 0.0
+    """Quarter turns by which it is turned on the belt."""
 
     def front(self, position: int) -> int:
         """The place of its front while the belt is at ``position``."""
@@ -190,10 +188,13 @@ class Belt(Stateful):
 
     # ------------------------------------------------------------------ workpieces
 
-    def place(self, workpiece: Workpiece, front: int, now: Nanos, came_from: str = "") -> Placed:
+    def place(
+        self, workpiece: Workpiece, front: int, now: Nanos, came_from: str = "", across: int = 0, yaw_q: float = 0.0
+    ) -> Placed:
         """How a workpiece lies with its front at ``front``."""
         marks = tuple((self.from_nm(begin), self.from_nm(end)) for begin, end in workpiece.marks)
-        return Placed(workpiece, self.position(now) - front, self.from_nm(workpiece.length), marks, None, came_from)
+        length = self.from_nm(workpiece.extent(yaw_q))
+        return Placed(workpiece, self.position(now) - front, length, marks, None, came_from, across, yaw_q)
 
     def put(self, placed: Placed) -> None:
         self.workpieces = (*self.workpieces, placed)

@@ -92,6 +92,16 @@ class RampedDrive(Stateful):
         left = self._whole - self._level if self.runs else self._level
         return self._begin - -left // self._rate
 
+    @property
+    def whole_speed(self) -> Fraction:
+        """Its greatest speed, steps/ns."""
+        return Fraction(self._speed, self._divisor)
+
+    @property
+    def acceleration(self) -> Fraction:
+        """That of its present ramp, steps/ns²."""
+        return self.whole_speed * (self._rate if self.runs else -self._rate) / self._whole
+
     def lead_over(self, other: object) -> int | None:
         """How far it is ahead of another drive that moves as it does at any time; None if they move differently."""
         return self._base - other._base if isinstance(other, RampedDrive) and self._motion == other._motion else None

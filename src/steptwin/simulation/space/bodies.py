@@ -31,6 +31,10 @@ class Cylinder(NamedTuple):
 Shape: TypeAlias = Box | Cylinder
 
 
+def half_height(shape: Shape) -> int:
+    return shape.half[2] if isinstance(shape, Box) else shape.half
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Body:
     name: str

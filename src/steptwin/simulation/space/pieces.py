@@ -66,10 +66,12 @@ class StillPiece(Piece):
 
 @dataclass(frozen=True, slots=True)
 class SteadyPiece(Piece):
-    """A motion with the constant speed ``rate`` per second, whose whole ``place`` a part of a controller gives."""
+    """A motion with the constant speed ``rate`` per second, whose whole ``place`` a part of a controller gives. With an
+    ``acceleration`` per second² that is its greatest speed."""
 
     place: Callable[[Nanos], int]
     rate: float
+    acceleration: float = 0.0
 
     def at(self, now: Nanos) -> float:
         return float(self.place(now))
@@ -78,7 +80,7 @@ class SteadyPiece(Piece):
         return abs(self.rate)
 
     def bend(self, begin: Nanos, end: Nanos) -> Range:
-        return 0.0, 0.0
+        return self.acceleration, self.acceleration
 
 
 @dataclass(frozen=True, slots=True)

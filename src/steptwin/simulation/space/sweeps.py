@@ -97,7 +97,7 @@ class Sweeps:
         its = self._by_name[name]
         fewest = min((self._along(its, axis) for axis in range(len(AXES))), key=lambda found: sum(len(one) for one in found))
         others = (other for ordered in fewest for other in ordered)
-        return sorted(other for other in others if other != name and _meet(its, self._by_name[other]))
+        return sorted(other for other in others if other != name and meet(its, self._by_name[other]))
 
     def _along(self, its: Sweep, axis: int) -> list[list[str]]:
         """Those that may meet it as far as one axis tells."""
@@ -114,6 +114,7 @@ def _width(its: Sweep, axis: int) -> float:
     return width if width == inf else ldexp(1.0, frexp(width)[1])
 
 
-def _meet(one: Sweep, other: Sweep) -> bool:
+def meet(one: Sweep, other: Sweep) -> bool:
+    """Whether they have a part in common."""
     ends = zip(one.low, one.high, other.low, other.high, strict=True)
     return all(low < its_high and its_low < high for low, high, its_low, its_high in ends)

@@ -1,0 +1,101 @@
+"""What a body of a sensor or a tool meets: bodies of the machine, and workpieces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from steptwin.controller import Nanos
+from steptwin.simulation.components.bodycontact import BodyContact
+from steptwin.simulation.components.workpieces import Workpieces, versions_of
+from steptwin.simulation.space.bodies import Body
+from steptwin.simulation.space.contacts import Pair
+from steptwin.simulation.space.sweeps import meet, sweep
+
+
+def whole(body: Body) -> Body | None:
+    """All of a workpiece."""
+    return body
+
+
+class Probe:
+    """A `steptwin.simulation.components.touch.Meeting` of one body with parts of the machine, or with workpieces.
+
+    What it has found holds while no workpiece comes or goes and no plan changes, up to the moment that it has found. A workpiece
+    that does not come near before its plan changes is not searched for.
+    """
+
+    __slots__ = ("_bodies", "_contacts", "_due", "_inner", "_lasting", "_met", "_state", "_versions", "_workpieces", "body")
+
+    def __init__(
+        self,
+        body: Body,
+        lasting: Mapping[str, BodyContact],
+        workpieces: Workpieces | None = None,
+        inner: Callable[[Body], Body | None] = whole,
+    ) -> None:
+        """``lasting``: with parts of the machine. ``inner``: what it has to meet of a workpiece."""
+        self.body = body
+        self._lasting = lasting
+        self._workpieces = workpieces
+        self._inner = inner
+        self.forget()
+
+    def forget(self) -> None:
+        self._bodies: Mapping[str, Body] = {}
+        self._contacts: dict[str, tuple[Body, BodyContact | None]] = {}
+        """With workpieces: the body it is with, None where there is nothing to meet."""
+        self._versions: tuple[Callable[[], object], ...] = ()
+        self._state: object = None
+        self._met: tuple[str, ...] = ()
+        self._due: Nanos | None = None
+        for contact in self._lasting.values():
+            contact.forget()
+
+    def _search(self, workpieces: Workpieces, now: Nanos) -> None:
+        """Find which workpieces it meets, and when that changes, unless it is known."""
+        bodies = workpieces.bodies()
+        if bodies is not self._bodies:
+            self._bodies, self._state = bodies, None
+            own = versions_of(self.body)
+            self._versions = tuple(dict.fromkeys((*own, *(one for body in bodies.values() for one in versions_of(body)))))
+        state = [version() for version in self._versions]
+        if state == self._state and (self._due is None or self._due > now):
+            return
+        self._state = state
+        around, known, self._contacts = sweep(self.body, now), self._contacts, {}
+        met: list[str] = []
+        self._due = None
+        for name, body in bodies.items():
+            if not meet(around, workpieces.sweep_of(name, now)):
+                continue
+            its, contact = known.get(name, (None, None))
+            if its is not body:
+                inner = self._inner(body)
+                contact = None if inner is None else BodyContact(Pair(self.body, inner))
+            self._contacts[name] = body, contact
+            if contact is None:
+                continue
+            if contact.holds(now):
+                met.append(name)
+            due = contact.change(now)
+            if due is not None and (self._due is None or due < self._due):
+                self._due = due
+        self._met = tuple(met)
+
+    def met(self, now: Nanos) -> tuple[str, ...]:
+        """The names of what it overlaps: parts of the machine, then workpieces, each in their order."""
+        there = tuple(name for name, contact in self._lasting.items() if contact.holds(now))
+        if self._workpieces is None:
+            return there
+        self._search(self._workpieces, now)
+        return there + self._met
+
+    def holds(self, now: Nanos) -> bool:
+        return bool(self.met(now))
+
+    def change(self, now: Nanos) -> Nanos | None:
+        changes = [contact.change(now) for contact in self._lasting.values()]
+        if self._workpieces is not None:
+            self._search(self._workpieces, now)
+            changes.append(self._due)
+        return min((due for due in changes if due is not None), default=None)

@@ -1,0 +1,209 @@
+"""Workpieces that lie on parts of the machine, in nests, on each other and on the floor, and those that fall."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from math import sqrt
+from typing import ClassVar, NamedTuple
+
+from steptwin.controller import SECOND, Nanos
+from steptwin.messages import Message
+from steptwin.simulation.components.beltspace import BeltSpace
+from steptwin.simulation.components.body import BODY, body_of
+from steptwin.simulation.components.conveyor import CONVEYOR
+from steptwin.simulation.components.elementcontext import ElementContext
+from steptwin.simulation.components.frames import Frames, sources_of
+from steptwin.simulation.components.nesttable import NestSpec
+from steptwin.simulation.components.workpieces import REACH_NM, WORKPIECES, Lie, Rest, Workpieces, body_in, lie_in
+from steptwin.simulation.mechanics.workpiece import Workpiece
+from steptwin.simulation.scheduler.scheduler import Scheduler
+from steptwin.simulation.space.bodies import Body, half_height
+from steptwin.simulation.space.frames import FLOOR, NM_PER_MM, Frame
+from steptwin.state import Plain, Stateful
+
+GRAVITY_NM_S2 = 9.80665e9
+
+FALLS = Message("simulation.workpiece-falls", "{workpiece} falls {height:g} mm")
+LIES_ON = Message("simulation.workpiece-lies-on", "{workpiece} lies on {on}")
+LIES_ON_FLOOR = Message("simulation.workpiece-lies-on-floor", "{workpiece} lies on the floor")
+
+
+LIES_CROOKED = Message("simulation.workpiece-lies-crooked", "{workpiece} lies crooked on {on}")
+
+
+class Fall(NamedTuple):
+    """A workpiece in the air, which falls straight down. ``lie``: on the floor of the world, where it began to fall."""
+
+    workpiece: Workpiece
+    lie: Lie
+    ends: Nanos
+
+
+class Resting(Stateful):
+    """A `steptwin.simulation.components.workpieces.Holder`, and a part of a scheduler.
+
+    What lies on a workpiece goes wherever that goes. What loses what it lies on, and what is let go of higher than
+    `REACH_NM` above what is below it, falls straight down for √(2 h / g), and lies on what is below it then.
+    """
+
+    FIXED: ClassVar[tuple[str, ...]] = ("_bodies", "_frames", "_nests", "_scheduler", "_supports", "_workpieces")
+    __slots__ = (*FIXED, "_falls", "_rests")
+
+    def __init__(
+        self,
+        scheduler: Scheduler,
+        frames: Frames,
+        workpieces: Workpieces,
+        supports: Mapping[str, Body],
+        nests: Mapping[str, NestSpec],
+    ) -> None:
+        self._scheduler = scheduler
+        self._frames = frames
+        self._workpieces = workpieces
+        self._supports = supports
+        self._nests = nests
+        self._rests = tuple(rest for nest in nests.values() for rest in nest.workpieces())
+        self._falls: tuple[Fall, ...] = ()
+        self._bodies: dict[str, tuple[Rest, Frame | None, Body]] = {}
+        """As they were made: a body stays the same while nothing below it changes."""
+
+    # ------------------------------------------------------------------ a holder
+
+    @property
+    def sources(self) -> Iterable[str]:
+        return (WORKPIECES, *sources_of(one for body in self._supports.values() for one in self._frames.carrying(body.frame)))
+
+    def version(self) -> object:
+        return self._rests, self._falls
+
+    def supports(self) -> Iterable[Body]:
+        return self._supports.values()
+
+    def bodies(self) -> Mapping[str, Body]:
+        others = {name: body for one in self._workpieces.holders if one is not self for name, body in one.bodies().items()}
+        rests = {rest.workpiece.name: rest for rest in self._rests}
+        made: dict[str, Body] = {}
+        for name in rests:
+            self._make(name, rests, others, made)
+        self._bodies = {name: one for name, one in self._bodies.items() if name in made}
+        return made
+
+    def _make(self, name: str, rests: Mapping[str, Rest], others: Mapping[str, Body], made: dict[str, Body]) -> Body | None:
+        """The body of one that rests, as are those below it; None where what it lies on is gone."""
+        if name in others or name in made:
+            return others.get(name) or made[name]
+        rest = rests.get(name)
+        if rest is None:
+            return None
+        frame: Frame | None = None
+        if rest.on in self._supports:
+            frame = self._supports[rest.on].frame
+        elif rest.on:
+            below = self._make(rest.on, rests, others, made)
+            known = self._bodies.get(name)
+            frame = below.frame if below is not None else known[1] if known is not None else None
+        known = self._bodies.get(name)
+        if known is None or known[0] != rest or known[1] is not frame:
+            self._bodies[name] = known = rest, frame, body_in(rest.workpiece, frame, rest.lie)
+        made[name] = known[2]
+        return known[2]
+
+    def take(self, name: str, now: Nanos) -> Workpiece:
+        (found,) = (rest.workpiece for rest in self._rests if rest.workpiece.name == name)
+        self._rests = tuple(rest for rest in self._rests if rest.workpiece.name != name)
+        self._scheduler.notify(WORKPIECES)
+        return found
+
+    def put(self, workpiece: Workpiece, on: Body, lie: Lie, now: Nanos) -> bool:
+        """It lies on a support, or on another workpiece; aligned, where that is a nest, or in one."""
+        nest = self._nests.get(self._lowest(on.name))
+        found = None if nest is None else nest.aligned(lie) if on.name in self._nests else nest.snapped(lie, (0, 0))
+        self._rests = (*self._rests, Rest(workpiece, on.name, found or lie))
+        is_crooked = nest is not None and found is None
+        text = (LIES_CROOKED if is_crooked else LIES_ON)(workpiece=workpiece.name, on=on.name)
+        self._report(text, workpiece, "crooked" if is_crooked else "on")
+        return True
+
+    def _lowest(self, name: str) -> str:
+        """The element that a workpiece lies on, through others; itself for an element."""
+        on = {rest.workpiece.name: rest.on for rest in self._rests}
+        while name in on:
+            name = on[name]
+        return name
+
+    def count(self, name: str) -> int:
+        """The workpieces on an element, those on others too."""
+        return sum(self._lowest(rest.workpiece.name) == name for rest in self._rests)
+
+    # ------------------------------------------------------------------ letting go
+
+    def release(self, workpiece: Workpiece, frame: Frame, now: Nanos) -> bool:
+        """Something lets go of a workpiece, the middle of whose lower face is at the origin of a frame. Whether it lies there;
+        otherwise it falls."""
+        found = self._workpieces.below(workpiece.name, frame, now)
+        lie = lie_in(frame, FLOOR, now)
+        height = lie.at[2] if found is None else found[2]
+        if height <= REACH_NM:
+            self._lay(workpiece, frame, now)
+            return True
+        self._falls = (*self._falls, Fall(workpiece, lie, now + round(sqrt(2.0 * height / GRAVITY_NM_S2) * SECOND)))
+        self._report(FALLS(workpiece=workpiece.name, height=height / NM_PER_MM), workpiece, "falls")
+        return False
+
+    def _lay(self, workpiece: Workpiece, frame: Frame, now: Nanos) -> None:
+        """It lies on what is below it."""
+        found = self._workpieces.below(workpiece.name, frame, now)
+        if found is not None:
+            holder, below, _ = found
+            (x, y, _), yaw_q = lie_in(frame, below.frame, now)
+            lie = Lie((x, y, below.centre[2] + half_height(below.shape)), yaw_q)
+            if (holder or self).put(workpiece, below, lie, now):
+                return
+        (x, y, _), yaw_q = lie_in(frame, FLOOR, now)
+        self._rests = (*self._rests, Rest(workpiece, "", Lie((x, y, 0), yaw_q)))
+        self._report(LIES_ON_FLOOR(workpiece=workpiece.name), workpiece, "on the floor")
+
+    # ------------------------------------------------------------------ part of a scheduler
+
+    def update(self, now: Nanos) -> None:
+        for rest in self._rests:
+            if rest.on and rest.on not in self._supports and rest.on not in self._workpieces.bodies():
+                body = self._bodies[rest.workpiece.name][2]
+                self.take(rest.workpiece.name, now)
+                self.release(rest.workpiece, body.frame, now)
+        for fall in self._falls:
+            if fall.ends <= now:
+                self._falls = tuple(one for one in self._falls if one is not fall)
+                self._lay(fall.workpiece, body_in(fall.workpiece, None, fall.lie).frame, now)
+
+    def deadline(self) -> Nanos | None:
+        return min((fall.ends for fall in self._falls), default=None)
+
+    def set_state(self, plain: Plain) -> None:
+        super().set_state(plain)
+        self._bodies.clear()
+
+    def _report(self, text: str, workpiece: Workpiece, what: str) -> None:
+        scheduler = self._scheduler
+        facts = ("workpiece", workpiece.name), ("element", WORKPIECES), ("what", what)
+        scheduler.record(next(iter(scheduler.controllers)), "event", "workpiece", text, *facts)
+        scheduler.notify(WORKPIECES)
+
+
+def resting_of(context: ElementContext, scheduler: Scheduler) -> Resting:
+    """That of a world. With it all that has workpieces in space is made, when something first needs it; what has a place is built
+    before."""
+    workpieces, frames = context.objects.workpieces, context.frames
+    there = next((holder for holder in workpieces.holders if isinstance(holder, Resting)), None)
+    if there is not None:
+        return there
+    described = context.objects.described
+    nests = {spec.name: spec for spec in described.mounts.values() if isinstance(spec, NestSpec)}
+    supports = {one.name: body_of(one, frames) for one in described.of(BODY) if one.holds_workpieces}
+    supports |= {name: nest.bottom(frames.base(name)) for name, nest in nests.items()}
+    made = Resting(scheduler, frames, workpieces, supports, nests)
+    conveyors = context.objects.built(CONVEYOR)
+    workpieces.holders += (BeltSpace(one, frames) for name, one in conveyors.items() if name in frames)
+    workpieces.holders.append(made)
+    scheduler.add_part(made, None, WORKPIECES)
+    return made

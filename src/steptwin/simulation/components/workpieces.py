@@ -1,0 +1,180 @@
+"""All workpieces in space, wherever they are: on belts, in cups and jaws, in nests, on bodies, on each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple, Protocol
+
+from steptwin.controller import Nanos
+from steptwin.errors import Misuse
+from steptwin.simulation.components.mount import UPRIGHT, to_nm
+from steptwin.simulation.mechanics.workpiece import Workpiece
+from steptwin.simulation.space.bodies import Body, Box, Cylinder, Shape, half_height
+from steptwin.simulation.space.frames import Frame, Joint, Vector, Z, pose
+from steptwin.simulation.space.pieces import standing
+from steptwin.simulation.space.sweeps import Sweep, sweep
+from steptwin.simulation.space.tops import top_below
+from steptwin.simulation.toml.values import number, permitting
+
+WORKPIECES = "workpieces"
+"""What sensors call all of them; the name of the part that has those which rest."""
+REACH_NM = 2_000_000
+"""Height from which a workpiece is put down. From higher up it falls."""
+
+
+class Lie(NamedTuple):
+    """Where a workpiece is in a frame: the middle of its lower face, in nm, and its turn about z."""
+
+    at: Vector
+    yaw_q: float = 0.0
+
+
+class Rest(NamedTuple):
+    """A workpiece on an element, on another workpiece, or on the floor (empty)."""
+
+    workpiece: Workpiece
+    on: str
+    lie: Lie
+
+
+class Holder(Protocol):
+    """Something that workpieces are on, or in."""
+
+    @property
+    def sources(self) -> Iterable[str]:
+        """Controllers and elements whose changes change where its workpieces are."""
+        ...
+
+    def version(self) -> object:
+        """A value that changes whenever it has other workpieces, or has them elsewhere."""
+        ...
+
+    def bodies(self) -> Mapping[str, Body]:
+        """Its workpieces by name: the same body while it stays where it is on its holder."""
+        ...
+
+    def supports(self) -> Iterable[Body]:
+        """What workpieces can be put on, besides workpieces."""
+        ...
+
+    def take(self, name: str, now: Nanos) -> Workpiece:
+        """A workpiece leaves it."""
+        ...
+
+    def put(self, workpiece: Workpiece, on: Body, lie: Lie, now: Nanos) -> bool:
+        """Put a workpiece on one of its supports, in the frame of that. Whether it lies there: not where another one is in its
+        way."""
+        ...
+
+
+_LENGTH = number(0.0, 100_000.0, above=True)
+
+
+@permitting("[length, width, height] or [diameter, height], mm; or a number, for a cube")
+def size_of_workpiece(value: Any) -> tuple[float, ...]:
+    if isinstance(value, list) and len(value) in (2, 3):
+        return tuple(map(_LENGTH, value))
+    if isinstance(value, list):
+        raise Misuse(f"{value!r}: expected [length, width, height] or [diameter, height], in mm")
+    return (_LENGTH(value),) * 3
+
+
+def workpiece_of(name: str, size: Sequence[float], mass: float, marks: tuple[tuple[int, int], ...] = ()) -> Workpiece:
+    """``size`` in mm: of a box, or diameter and height of a cylinder."""
+    lengths = [to_nm(one) for one in size]
+    is_round = len(lengths) == 2
+    length, width, height = (lengths[0], lengths[0], lengths[1]) if is_round else lengths
+    return Workpiece(name, length, mass, marks, width, height, is_round)
+
+
+def shape_of(workpiece: Workpiece) -> Shape:
+    half = workpiece.height // 2
+    return (
+        Cylinder(workpiece.length // 2, half) if workpiece.is_round else Box((workpiece.length // 2, workpiece.width // 2, half))
+    )
+
+
+def body_in(workpiece: Workpiece, frame: Frame | None, lie: Lie) -> Body:
+    """The body of a workpiece on a frame, which is a frame of its own: others may lie on it."""
+    shape = shape_of(workpiece)
+    turned = None if lie.yaw_q == 0.0 else Joint(standing(lie.yaw_q), UPRIGHT, turns=True)
+    return Body(workpiece.name, Frame(workpiece.name, frame, lie.at, turned), shape, (0, 0, half_height(shape)))
+
+
+def lie_in(frame: Frame, seen_from: Frame, now: Nanos) -> Lie:
+    """Where a frame is in another one, if it is upright there."""
+    at = pose(frame, seen_from, now)
+    return Lie(at.at, at.angle_q if at.about == Z else 0.0)
+
+
+class _Swept(NamedTuple):
+    body: Body
+    versions: tuple[Callable[[], object], ...]
+    state: list[object]
+    sweep: Sweep
+
+
+def versions_of(body: Body) -> tuple[Callable[[], object], ...]:
+    """The versions of all that moves a body."""
+    joints = (frame.joint for frame in body.frame.line())
+    return tuple(joint.motion.version for joint in joints if joint is not None and not joint.motion.is_still)
+
+
+class Workpieces:
+    """The workpieces of all holders, in the order in which these were built."""
+
+    __slots__ = ("_bodies", "_holder_of", "_sweeps", "_version", "holders")
+
+    def __init__(self) -> None:
+        self.holders: list[Holder] = []
+        self._version: object = None
+        self._bodies: Mapping[str, Body] = {}
+        self._holder_of: Mapping[str, Holder] = {}
+        self._sweeps: dict[str, _Swept] = {}
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(source for holder in self.holders for source in holder.sources))
+
+    def bodies(self) -> Mapping[str, Body]:
+        """All of them by name: the same mapping while none is taken or put."""
+        version = [holder.version() for holder in self.holders]
+        if version != self._version:
+            found = [(holder, holder.bodies()) for holder in self.holders]
+            self._bodies = {name: body for _, bodies in found for name, body in bodies.items()}
+            self._holder_of = {name: holder for holder, bodies in found for name in bodies}
+            self._sweeps = {name: one for name, one in self._sweeps.items() if self._bodies.get(name) is one.body}
+            self._version = version
+        return self._bodies
+
+    def sweep_of(self, name: str, now: Nanos) -> Sweep:
+        """Where a workpiece may come before its plan changes."""
+        known = self._sweeps.get(name)
+        if known is None:
+            body = self._bodies[name]
+            versions = versions_of(body)
+        else:
+            body, versions, state, found = known
+            if state == [version() for version in versions]:
+                return found
+        found = sweep(body, now)
+        self._sweeps[name] = _Swept(body, versions, [version() for version in versions], found)
+        return found
+
+    def take(self, name: str, now: Nanos) -> Workpiece:
+        """Take one from where it is."""
+        self.bodies()
+        return self._holder_of[name].take(name, now)
+
+    def below(self, workpiece: str, frame: Frame, now: Nanos) -> tuple[Holder | None, Body, int] | None:
+        """What carries a workpiece whose lower face has its middle at the origin of a frame: its holder, None for another
+        workpiece, and how far it is below, in nm. None where nothing is."""
+        supports = {body.name: (holder, body) for holder in self.holders for body in holder.supports()}
+        others = {name: (None, body) for name, body in self.bodies().items() if name != workpiece and not _is_on(body, frame)}
+        every = {**supports, **others}
+        found = top_below((body for _, body in every.values()), frame, (0, 0, 0), now)
+        return None if found is None else (every[found.body.name][0], found.body, found.gap)
+
+
+def _is_on(body: Body, frame: Frame) -> bool:
+    return any(one is frame for one in body.frame.line())

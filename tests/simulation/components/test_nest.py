@@ -1,0 +1,280 @@
+"""Workpieces in space: cups and jaws take them from nests, bodies and each other, and put them down; what falls, lies crooked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from world_rig import check_it_can_be_restored
+
+from steptwin.controller import SECOND
+from steptwin.files.world import World
+from steptwin.simulation.space.frames import FLOOR, pose
+from steptwin.simulation.toml.reader import WorldError
+
+MACHINE = """
+[[mic488]]
+name = "c"
+[mic488.M1]
+unit = "mm"
+gear = 160.0
+acc = 4000.0
+dec = 4000.0
+vel = 400.0
+mot_resol = 3200
+[mic488.M2]
+unit = "degree"
+gear = 100.0
+[[axis]]
+name = "x"
+drive = "c.M1"
+pitch = 20.0
+at = [0, 0, 200]
+[[cylinder]]
+name = "lift"
+extend = "c.OUT1"
+stroke = 60.0
+extend_time = "100 ms"
+retract_time = "100 ms"
+on = "x"
+along = "-z"
+[[nest]]
+name = "tray"
+at = [0, 0, 100]
+cells = [3, 2]
+pitch = [60, 50]
+workpiece = [40, 30, 20]
+mass = 0.25
+filled = 7
+[[body]]
+name = "table"
+at = [400, 0, 80]
+size = [120, 120, 20]
+[[axis]]
+name = "plate"
+drive = "c.M2"
+kind = "rotary"
+pulses_per_unit = 100.0
+at = [600, 0, 90]
+[[body]]
+name = "disc"
+on = "plate"
+diameter = 300.0
+height = 10.0
+"""
+CUP = """
+[[vacuum]]
+name = "cup"
+ejector = "c.OUT2"
+on = "lift"
+at = [0, 0, -19]
+diameter = 18.0
+build_up = "50 ms"
+release = "20 ms"
+"""
+JAWS = """
+[[gripper]]
+name = "jaws"
+close = "c.OUT2"
+on = "lift"
+at = [0, 0, -30]
+along = "+y"
+stroke = 50.0
+close_time = "100 ms"
+open_time = "100 ms"
+overlap = 8.0
+"""
+
+
+class Rig:
+    def __init__(self, text: str) -> None:
+        self.world = World.from_toml(text)
+        self._cell = self.world.mic488["c"]
+        self._cell.write("M1_EN", 1)
+
+    def go(self, x: float) -> None:
+        self._cell.write("M1_POS_ABS", x)
+        self.world.run(for_=3.0)
+
+    def lower(self, *, hold: bool) -> None:
+        """Lower it, take or let go, and lift it again."""
+        self._cell.write("OUT1", 1)
+        self.world.run(for_=0.3)
+        self._cell.write("OUT2", int(hold))
+        self.world.run(for_=0.3)
+        self._cell.write("OUT1", 0)
+        self.world.run(for_=0.3)
+
+    def take(self, x: float) -> None:
+        self.go(x)
+        self.lower(hold=True)
+
+    def put(self, x: float) -> None:
+        self.go(x)
+        self.lower(hold=False)
+
+    def told(self) -> list[str]:
+        return [str(record.value) for record in self.world.trace.of("event") if record.subject == "workpiece"]
+
+    def place(self, name: str) -> tuple[float, ...]:
+        """The middle of the lower face of a workpiece, mm from the floor."""
+        body = self.world.objects.workpieces.bodies()[name]
+        return tuple(one / 1e6 for one in pose(body.frame, FLOOR, self.world.now).at)
+
+
+def test_a_nest_is_filled_cell_by_cell_and_layer_by_layer() -> None:
+    rig = Rig(MACHINE + CUP)
+    assert rig.world.read("tray.count") == 7
+    assert [rig.place(f"tray.{n}") for n in (1, 3, 4, 6, 7)] == [
+        (0, 0, 100),
+        (120, 0, 100),
+        (0, 50, 100),
+        (120, 50, 100),
+        (0, 0, 120),
+    ]
+
+
+def test_a_cup_takes_the_highest_one_below_it_and_puts_it_down_as_it_took_it() -> None:
+    """The upper one of two is 19 mm higher than the cup reaches down to: 1 mm below its tip is the top of the lower one."""
+    rig = Rig(MACHINE.replace("filled = 7", "filled = 6") + CUP)
+    rig.take(63.0)
+    assert rig.told() == ["cup holds tray.2"]
+    assert (rig.world.read("cup.held"), rig.world.read("cup.mass"), rig.world.read("tray.count")) == (1, 0.25, 5)
+    assert rig.place("tray.2") == (60, 0, 200 - 19 - 20)
+    rig.put(403.0)
+    assert rig.told()[1:] == ["cup lets go of tray.2", "tray.2 lies on table"]
+    assert rig.place("tray.2") == (400, 0, 100)
+
+
+def test_a_cup_that_is_not_closed_all_around_holds_nothing() -> None:
+    """A cup of 18 mm on a workpiece of 40 mm: 11 mm beside its middle."""
+    rig = Rig(MACHINE.replace("filled = 7", "filled = 6") + CUP)
+    rig.take(60.0 + 10.99)
+    assert rig.told() == ["cup holds tray.2"]
+    rig.put(60.0 + 10.99)
+    rig.take(60.0 + 11.01)
+    assert len(rig.told()) == 3
+    assert rig.world.read("cup.held") == 0
+
+
+def test_a_workpiece_that_is_put_near_a_cell_is_aligned() -> None:
+    rig = Rig(MACHINE.replace("filled = 7", "filled = 1").replace("snap", "#") + CUP)
+    rig.take(3.0)
+    rig.put(67.5)
+    assert rig.told()[2:] == ["tray.1 lies on tray"]
+    assert rig.place("tray.1") == (60, 0, 100)
+    rig.take(60.0)
+    rig.put(67.0)
+    assert rig.told()[-1] == "tray.1 lies crooked on tray"
+    assert rig.place("tray.1") == (67, 0, 100)
+
+
+def test_what_is_put_on_another_one_goes_with_it() -> None:
+    rig = Rig(MACHINE.replace("filled = 7", "filled = 2").replace("at = [400, 0, 80]", "at = [400, 0, 60]") + CUP)
+    rig.take(0.0)
+    rig.put(400.0)  # 20 mm lower: it falls
+    assert rig.told()[1:] == ["cup lets go of tray.1", "tray.1 falls 21 mm", "tray.1 lies on table"]
+    rig.take(60.0)
+    rig.put(402.0)
+    assert rig.told()[-1] == "tray.2 lies on tray.1"
+    assert rig.place("tray.2") == (402, 0, 100)
+    body = rig.world.objects.workpieces
+    assert body.bodies()["tray.2"].frame.on is body.bodies()["tray.1"].frame
+
+
+def test_what_is_let_go_in_the_air_falls_for_as_long_as_it_does() -> None:
+    rig = Rig(MACHINE.replace("filled = 7", "filled = 1") + CUP)
+    rig.take(0.0)
+    rig.go(200.0)
+    rig.world.mic488["c"].write("OUT2", 0)
+    rig.world.run(for_=2.0)
+    falls, lies = [record for record in rig.world.trace.of("event") if record.subject == "workpiece"][-2:]
+    assert (falls.value, lies.value) == ("tray.1 falls 161 mm", "tray.1 lies on the floor")
+    assert (lies.time - falls.time) / SECOND == pytest.approx((2 * 0.161 / 9.80665) ** 0.5, abs=1e-9)
+    assert rig.place("tray.1") == (200, 0, 0)
+    assert rig.world.read("cup.dropped") == 1
+
+
+def test_a_workpiece_on_a_turntable_turns_with_it() -> None:
+    rig = Rig(MACHINE.replace("filled = 7", "filled = 1") + CUP)
+    rig.take(0.0)
+    rig.put(700.0)
+    assert rig.place("tray.1") == (700, 0, 100)
+    rig.world.mic488["c"].write("M2_EN", 1)
+    rig.world.mic488["c"].write("M2_POS_ABS", 90.0)
+    rig.world.run(for_=20.0)
+    assert rig.world.axis["plate"].position == 90.0
+    assert rig.place("tray.1") == (600, 100, 100)
+
+
+def test_jaws_take_what_is_between_them_and_centre_it() -> None:
+    """Workpieces are 30 mm wide along y, 40 mm along x; the jaws are open by 50 mm, and 20 mm of 50 in 40 ms of 100."""
+    text = MACHINE.replace("filled = 7", "filled = 1").replace("at = [0, 0, 100]", "at = [0, 2, 100]") + JAWS
+    rig = Rig(text)
+    rig.go(5.0)
+    rig.lower(hold=True)
+    assert rig.told() == ["jaws holds tray.1"]
+    assert rig.world.read("jaws.position") == pytest.approx(20.0)
+    assert rig.place("tray.1") == (0, 0, 160)
+    rig.put(400.0)
+    assert rig.place("tray.1") == (395, 0, 100)
+
+
+def test_a_workpiece_that_is_carried_against_something_is_a_collision() -> None:
+    """The cup is at 400 mm; what it holds is 40 mm long and comes to a wall, 10 mm long, at 300 mm."""
+    wall = """
+    [[body]]
+    name = "wall"
+    at = [300, 0, 0]
+    size = [10, 100, 170]
+    [[collision]]
+    name = "bump"
+    between = ["workpieces", "wall"]
+    """
+    rig = Rig(MACHINE.replace("filled = 7", "filled = 1") + CUP + wall)
+    rig.take(0.0)
+    rig.go(400.0)
+    (first, *_) = (record for record in rig.world.trace.of("event") if record.subject == "collision")
+    assert first.value == "bump: wall and tray.1 touch"
+    assert rig.world.read("bump.count") == 1
+    assert rig.world.read("bump.hit") == 0
+
+
+def test_jaws_without_anything_between_them_close() -> None:
+    rig = Rig(MACHINE + JAWS)
+    rig.take(250.0)
+    assert rig.told() == []
+    assert (rig.world.read("jaws.closed"), rig.world.read("jaws.held")) == (1, 0)
+
+
+@pytest.mark.parametrize(
+    ("more", "problem"),
+    [
+        (CUP + 'pick = "c.OUT3"\n', "pick and on exclude each other"),
+        (CUP.replace("diameter", "diametre"), "diametre"),
+        ('[[nest]]\nname = "n"\nfilled = 2', "filled means nothing without workpiece"),
+        ('[[nest]]\nname = "n"\ncells = [0, 1]', "permitted are whole numbers from 1 to 1000"),
+        ('[[nest]]\nname = "n"\nworkpiece = [1, 2, 3, 4]', "expected [length, width, height] or [diameter, height]"),
+    ],
+)
+def test_what_does_not_fit_is_refused(more: str, problem: str) -> None:
+    with pytest.raises(WorldError) as error:
+        World.from_toml(MACHINE + more)
+    assert problem in str(error.value)
+
+
+@pytest.mark.parametrize("tool", [CUP, JAWS])
+def test_it_can_be_restored_while_it_carries_a_workpiece(tool: str, tmp_path: Path) -> None:
+    text = MACHINE + tool + '[[beam]]\nname = "b"\nat = [300, -50, 165]\nalong = "+y"\nlength = 100\n'
+    script = """
+    [[script]]
+    name = "s"
+    steps = [
+      { write = { "c.M1_EN" = 1, "c.OUT1" = 1 } }, { wait = "200 ms" }, { write = { "c.OUT2" = 1 } }, { wait = "300 ms" },
+      { write = { "c.OUT1" = 0 } }, { wait = "200 ms" }, { write = { "c.M1_POS_ABS" = 400.0 } }, { wait = "3 s" },
+      { write = { "c.OUT2" = 0 } },
+    ]
+    """
+    world = World.from_toml(text + script)
+    check_it_can_be_restored(world, World.from_toml(text + script), 1.0, 6.0, tmp_path)
+    assert [record.subject for record in world.trace.edges() if record.subject == "b.seen"] == ["b.seen"] * 3
