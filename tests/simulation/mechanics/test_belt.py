@@ -43,6 +43,9 @@ def test_when_a_belt_comes_to_a_place() -> None:
     assert drive.reaches(1000, 60, 1) is None
 
 
+FAR = 10**15
+
+
 class Walking:
     """A drive that makes a step each ns."""
 
@@ -159,9 +162,9 @@ def test_a_workpiece_is_over_every_belt_below_it() -> None:
     """Three belts of 200, 100 and 200 mm on grids of 1, 0.5 and 0.25 mm; the middle one begins at 200 mm of the first."""
     first, middle, last = belt("a"), belt("b", 100.0, 2), belt("c", 200.0, 4)
     mm = 10**6
-    first.near = Near(middle, 200 * mm, 200 * mm, "a"), Near(last, 300 * mm, 300 * mm, "b")
-    middle.near = Near(first, -200 * mm), Near(last, 100 * mm, 100 * mm, "b")
-    last.near = Near(middle, -100 * mm), Near(first, -300 * mm)
+    first.near = Near(middle, 200 * mm, -FAR, FAR, 200 * mm, "a"), Near(last, 300 * mm, -FAR, FAR, 300 * mm, "b")
+    middle.near = Near(first, -200 * mm, -FAR, FAR), Near(last, 100 * mm, -FAR, FAR, 100 * mm, "b")
+    last.near = Near(middle, -100 * mm, -FAR, FAR), Near(first, -300 * mm, -FAR, FAR)
     # A front at 40 mm of the last one, 160 mm long: 180 to 340 mm from the beginning of the first one.
     last.put(placed("a.1", -160, 640, came_from="b"))
     for one, low, high in ((first, 180, 200), (middle, 0, 200), (last, 0, 160)):
@@ -178,11 +181,20 @@ def test_a_workpiece_is_over_every_belt_below_it() -> None:
     assert [place for place in range(middle.length + 1) if over(middle, place, 0)] == list(range(81))
 
 
+def test_belts_concern_only_the_places_that_their_workpieces_reach() -> None:
+    one, other = belt("a"), belt("b")
+    one.near = (Near(other, 200 * 10**6, 150 * 10**6, FAR, 200 * 10**6, "a"),)
+    versions = {place: one.version_at(place) for place in (149, 150)}
+    other.put(placed("a.1", -10, 100, came_from="a"))
+    assert [one.version_at(place) != versions[place] for place in (149, 150)] == [False, True]
+    assert [over(one, place, 0) for place in (149, 150)] == ["", "a.1"]
+
+
 def test_a_workpiece_is_on_the_way_that_it_came() -> None:
     """Two belts join a third one: the rear of what one has brought is not over the other."""
     one, other, third = belt("a"), belt("b"), belt("c")
     mm = 10**6
-    one.near = Near(third, 200 * mm, 200 * mm, "a"), Near(other, 0, 200 * mm)
+    one.near = Near(third, 200 * mm, -FAR, FAR, 200 * mm, "a"), Near(other, 0, -FAR, FAR, 200 * mm)
     third.put(placed("a.1", -10, 30, came_from="a"))
     assert [place for place in range(201) if over(one, place, 0)] == list(range(180, 201))
     third.take(third.workpieces[0])

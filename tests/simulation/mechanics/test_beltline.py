@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from steptwin.simulation.mechanics.belt import Belt, ConstantDrive, Near, Placed, Workpiece
 from steptwin.simulation.mechanics.beltline import ahead_of, first_of, limit, next_look, pushed_against
 
+FAR = 10**15
 NM = 1000
 """Steps of a belt with a drive of its own."""
 
@@ -44,8 +45,8 @@ def line(length_nm: int, drive: object, per_mm: Fraction, other: object, its_per
     """A belt and the following one."""
     one, two = Belt("a", length_nm / 10**6, drive, per_mm), Belt("b", 0.001, other, its_per_mm)  # type: ignore[arg-type]
     one.following = two
-    one.near = (Near(two, length_nm, length_nm, "a"),)
-    two.near = (Near(one, -length_nm),)
+    one.near = (Near(two, length_nm, -FAR, FAR, length_nm, "a"),)
+    two.near = (Near(one, -length_nm, -FAR, FAR),)
     return one, two
 
 
@@ -61,7 +62,7 @@ SPEEDS = st.fractions(Fraction(1, 2), Fraction(9000), max_denominator=7)
 def test_two_constant_speeds_touch_where_a_walk_has_it(fast: Fraction, slow: Fraction, gap: int, long: int, short: int) -> None:
     """Places in nm, for 300 ns."""
     one, two = own("a", fast, 100), own("b", slow, 100)
-    one.following, one.near = two, (Near(two, 100, 100, "a"),)
+    one.following, one.near = two, (Near(two, 100, -FAR, FAR, 100, "a"),)
     two.put(lying("a.1", long * NM // 2, long * NM, "a"))
     one.put(lying("a.2", (100 - long) * NM + long * NM // 2 - gap * NM, short * NM))
     first = first_of(one, 0)
@@ -132,7 +133,7 @@ def test_whoever_looks_when_it_is_due_sees_what_one_sees_who_always_looks(ways: 
 
 def test_one_that_stands_goes_on_with_room_for_half_of_it() -> None:
     one, two = own("a", Fraction(4), 100), own("b", Fraction(1), 100)
-    one.following, one.near = two, (Near(two, 100, 100, "a"),)
+    one.following, one.near = two, (Near(two, 100, -FAR, FAR, 100, "a"),)
     two.put(lying("a.1", 10 * NM, 40 * NM, "a"))
     one.put(lying("a.2", 0, 30 * NM, held=69 * NM))
     first = one.workpieces[0]
@@ -146,7 +147,7 @@ def test_one_that_stands_goes_on_with_room_for_half_of_it() -> None:
     # As quick: at once.
     quick = own("b", Fraction(4), 100)
     quick.put(two.workpieces[0])
-    one.near = (Near(quick, 100, 100, "a"),)
+    one.near = (Near(quick, 100, -FAR, FAR, 100, "a"),)
     assert limit(one, first, 0) is None
 
 
@@ -164,7 +165,7 @@ def test_of_two_ways_the_one_goes_on_that_is_further(its: int, mine: int, waits:
     one, third = own("a", Fraction(1), 100), own("c", Fraction(1), 100)
     other = own("b", Fraction(1), 100)
     one.following = other.following = third
-    one.near = Near(third, 100, 100, "a"), Near(other, 0, 100)
+    one.near = Near(third, 100, -FAR, FAR, 100, "a"), Near(other, 0, -FAR, FAR, 100)
     other.put(lying("b.1", (100 + its) * NM, 20 * NM))
     one.put(lying("a.1", (100 + mine) * NM, 20 * NM))
     first = one.workpieces[0]

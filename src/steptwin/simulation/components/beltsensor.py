@@ -48,7 +48,7 @@ class Sensor(Contact):
     def update(self, now: Nanos) -> None:
         self.bounce(now)
         belt = self._belt
-        version = belt.line_version()
+        version = belt.version_at(self._at)
         if version == self._seen and (self._due is None or self._due > now):
             return
         self._seen = version

@@ -143,7 +143,7 @@ class Conveyor(TerminalComponent):
         self.belt.following = None if following is None else following.belt
         self.preceding = {name: one for name, one in conveyors.items() if one.spec.next == self.spec.name}
         there = ((conveyors[near.name], near) for near in self._near if near.name in conveyors)
-        self.belt.near = tuple(Near(one.belt, near.begin, near.joins, near.after) for one, near in there)
+        self.belt.near = tuple(Near(one.belt, *near[1:]) for one, near in there)
 
     @property
     def depends_on(self) -> tuple[str, ...]:

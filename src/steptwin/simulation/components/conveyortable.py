@@ -114,6 +114,8 @@ class NearSpec(NamedTuple):
 
     name: str
     begin: int
+    low: int
+    high: int
     joins: int | None
     after: str | None
 
@@ -122,11 +124,16 @@ def near_ones(name: str, conveyors: Mapping[str, ConveyorSpec]) -> tuple[NearSpe
     """The conveyors before and behind one of which a workpiece may lie over it, or be in the way of one that leaves it."""
     longest = max(nanometres(spec.workpiece[0]) for spec in conveyors.values())
 
+    def near(other: str, begin: int, joins: int | None, after: str | None) -> NearSpec:
+        # On a coarse grid it is up to twice as long.
+        end = begin + nanometres(conveyors[other].length)
+        return NearSpec(other, begin, begin - 2 * longest, end + 2 * longest, joins, after)
+
     def before(of: str, end: int, joins: int | None, known: tuple[str, ...]) -> Iterator[NearSpec]:
         for spec in conveyors.values():
             if spec.next == of and spec.name not in known:
                 begin = end - nanometres(spec.length)
-                yield NearSpec(spec.name, begin, joins, None)
+                yield near(spec.name, begin, joins, None)
                 if begin > (joins or 0) - longest:
                     yield from before(spec.name, begin, joins, (*known, spec.name))
 
@@ -134,7 +141,7 @@ def near_ones(name: str, conveyors: Mapping[str, ConveyorSpec]) -> tuple[NearSpe
         way, end = [name], nanometres(conveyors[name].length)
         most = end + 2 * longest
         while (following := conveyors[way[-1]].next) in conveyors and following not in way[1:] and end <= most:
-            yield NearSpec(following, end, end, way[-1])
+            yield near(following, end, end, way[-1])
             yield from before(following, end, end, tuple(way))
             way.append(following)
             end += nanometres(conveyors[following].length)

@@ -114,6 +114,9 @@ class Near(NamedTuple):
     belt: Belt
     begin: int
     """Its beginning, from that of this belt."""
+    low: int
+    high: int
+    """Its workpieces lie over this belt only between these places."""
     joins: int | None = None
     """The place of this belt where its way joins that over this belt; None: it leads over all of this belt."""
     after: str | None = None
@@ -135,7 +138,19 @@ class Belt(Stateful):
     A workpiece reaches from its front backwards. It lies over every belt below it; `occupant` answers for all of them.
     """
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_down", "_up", "drive", "following", "length", "name", "near", "own", "per_mm", "stride")
+    FIXED: ClassVar[tuple[str, ...]] = (
+        "_down",
+        "_itself",
+        "_up",
+        "drive",
+        "following",
+        "length",
+        "name",
+        "near",
+        "own",
+        "per_mm",
+        "stride",
+    )
     __slots__ = (*FIXED, "raised", "workpieces")
 
     def __init__(self, name: str, length: float, drive: BeltDrive, per_mm: Fraction) -> None:
@@ -152,6 +167,7 @@ class Belt(Stateful):
         self.following: Belt | None = None
         """The belt on which workpieces go on at its end."""
         self.near: tuple[Near, ...] = ()
+        self._itself = Near(self, 0, 0, 0)
         self.workpieces: tuple[Placed, ...] = ()
         self.raised: tuple[int, ...] = ()
         """The places of the stops that are on."""
@@ -182,9 +198,9 @@ class Belt(Stateful):
         """A value that changes whenever predictions for the workpieces that it moves become invalid."""
         return self.drive.version(), self.workpieces
 
-    def line_version(self) -> object:
-        """A value that changes whenever predictions for what lies over it become invalid."""
-        return (self.version(), *(near.belt.version() for near in self.near)) if self.near else self.version()
+    def version_at(self, place: int) -> object:
+        """A value that changes whenever predictions for what lies over a place become invalid."""
+        return tuple(near.belt.version() for near, _, _ in self._views(place, place)) if self.near else self.version()
 
     # ------------------------------------------------------------------ workpieces
 
@@ -240,10 +256,11 @@ class Belt(Stateful):
 
     def _views(self, low: int, high: int) -> Iterator[tuple[Near, int, int]]:
         """A stretch as each belt has it whose workpieces may lie over it; the one that is on this belt comes first."""
-        yield Near(self, 0), max(low, 0), high
+        yield self._itself, max(low, 0), high
         for near in self.near:
-            first, last = (near.belt.from_nm(self.to_nm(place) - near.begin) for place in (low, high))
-            yield near, first, last
+            begin, end = self.to_nm(low), self.to_nm(high)
+            if begin <= near.high and end >= near.low:
+                yield near, near.belt.from_nm(begin - near.begin), near.belt.from_nm(end - near.begin)
 
     def edges(self, place: int, position: int, *, of_marks: bool = False) -> tuple[int | None, int | None]:
         """The next positions of the belt below and above ``position`` at which one of its workpieces may come to ``place``, or

@@ -166,7 +166,8 @@ def next_look(belt: Belt, first: Placed, now: Nanos) -> tuple[int | None, Nanos 
         if ahead.placed.held is not None or ahead.near.after is None:
             continue
         if ahead.rear > clear:
-            moments.append(drive.reaches(_back_at(belt, ahead, clear), now, -1))
+            if other.own is None:
+                moments.append(drive.reaches(_back_at(belt, ahead, clear), now, -1))
             continue
         if first.held is not None:
             moments.append(drive.reaches(_forth_at(belt, ahead, _goes_on_at(first, front, clear) + _LEAST_GAP), now, 1))
