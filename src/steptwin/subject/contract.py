@@ -130,7 +130,7 @@ class DrawingDescription:
     low: float = 0.0
     across: float = 0.0
     across_low: float = 0.0
-    """As ``length`` and ``low``, of the other direction of a plane."""
+    """As ``length`` and ``low``, of the other direction of a plane; the width of a belt."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from world_rig import check_it_can_be_restored
 
+from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.simulation.space.frames import pose
 from steptwin.simulation.toml.reader import WorldError
@@ -174,6 +175,31 @@ def test_a_viewer_gets_the_frames_with_their_signals() -> None:
     assert (by_name["belt"].along, by_name["belt"].joints) == ("+x", ())
     assert (by_name["tip"].on, by_name["tip"].at) == ("z", (0.0, 0.0, -12.5))
     assert [(one.name, one.diameter, one.height, one.size) for one in scene.bodies] == [("tip", 8.0, 12.5, None)]
+
+
+HAND = """[[body]]
+name = "hand"
+size = [100, 100, 100]
+when = "x.position > 0.03 and c.OUT1"
+"""
+
+
+def test_a_viewer_sees_whether_a_body_is_there() -> None:
+    world = World.from_toml(MACHINE + HAND)
+    c = world.mic488["c"]
+    assert world.read("hand.present") == 0.0
+    c.write("OUT1", 1)
+    c.write("M1_EN", 1)
+    c.write("M1_POS_ABS", 30.0)
+    world.run(until="x.position > 0.02")
+    assert world.read("hand.present") == 0.0
+    world.run(until="x.position > 0.03")
+    assert world.read("hand.present") == 1.0
+    c.write("OUT1", 0)
+    assert world.read("hand.present") == 0.0
+    with pytest.raises(Misuse, match="conditions say themselves when it is"):
+        world.run(until="hand.present == 1")
+    assert "present" not in [signal.name for one in describe(world).elements if one.name == "tip" for signal in one.signals]
 
 
 STEPS = """[[axis]]

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
 
 from steptwin.errors import Misuse
+from steptwin.messages import Message
+from steptwin.simulation.components.builtobjects import BuiltObjects
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.components.frames import Frames
 from steptwin.simulation.components.mount import MountSpec, to_nm
 from steptwin.simulation.components.quantity import TIME, check_condition, owners_of
+from steptwin.simulation.components.signals import Idle, find_signal
+from steptwin.simulation.logic.condition import SignalCondition
+from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.space.bodies import Body, Box, Cylinder, Shape, half_height
 from steptwin.simulation.space.frames import AXES
 from steptwin.simulation.toml.reader import TomlText
@@ -93,6 +98,34 @@ def body_of(spec: BodySpec, frames: Frames) -> Body:
     return Body(spec.name, frames[spec.name].frame, shape, (0, 0, half_height(shape)))
 
 
+PRESENCE_CAN_ONLY_BE_WATCHED = Message(
+    "simulation.presence-can-only-be-watched", "whether a body is there can be watched; conditions say themselves when it is"
+)
+
+
+class BuiltBody(NamedTuple):
+    spec: BodySpec
+    objects: BuiltObjects
+
+    def signals(self) -> Mapping[str, SignalOf]:
+        """Whether it is there, where that depends on anything."""
+        if self.spec.when is None:
+            return {}
+        found: list[SignalOf | Idle] = []
+
+        def signal(name: str) -> SignalOf | Idle:
+            found.append(find_signal(self.objects, name))
+            return found[-1]
+
+        condition = SignalCondition(self.spec.when, signal)
+        sources = tuple(dict.fromkeys(source for one in found if isinstance(one, SignalOf) for source in one.sources))
+        return {"present": SignalOf(sources, lambda now: float(condition.holds(now)), check=_refuse_presence)}
+
+
+def _refuse_presence() -> None:
+    raise Misuse(PRESENCE_CAN_ONLY_BE_WATCHED())
+
+
 def _refers(spec: BodySpec, described: ElementSpecs) -> Iterator[Reference]:
     """Nothing for one that stands on the floor, and is always there."""
     if spec.on is not None:
@@ -101,10 +134,10 @@ def _refers(spec: BodySpec, described: ElementSpecs) -> Iterator[Reference]:
         yield Reference(spec.on or spec.owners[0], owner, (*spec.path, "when"))
 
 
-BODY: Element[BodySpec, BodySpec] = Element(
+BODY: Element[BodySpec, BuiltBody] = Element(
     spec=BodySpec,
     refers=_refers,
-    build=lambda spec, context: spec,
-    signals=lambda spec: {},
+    build=lambda spec, context: BuiltBody(spec, context.objects),
+    signals=BuiltBody.signals,
     moves=lambda spec, body: (),
 )

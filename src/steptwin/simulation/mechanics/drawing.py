@@ -44,7 +44,7 @@ class Drawing:
     """Where the track begins."""
     across: float = 0.0
     across_low: float = 0.0
-    """As ``length`` and ``low``, of the other direction of a plane."""
+    """As ``length`` and ``low``, of the other direction of a plane; the width of a belt."""
 
 
 def rail(travel: tuple[float, float] | None, sensors: tuple[SensorZone, ...] = (), beyond: float = 0.0) -> Drawing:
