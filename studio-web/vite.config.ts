@@ -30,6 +30,7 @@ export default defineConfig({
     target: "es2022",
     // Nothing inline: the page is served with a content security policy that permits neither code nor data in the text.
     assetsInlineLimit: 0,
+    chunkSizeWarningLimit: 600,
     modulePreload: { polyfill: false },
     rolldownOptions: { checks: { pluginTimings: false } },
   },

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import shutil
@@ -57,6 +58,26 @@ WORLD = (
 )
 
 ROOT = Path(__file__).parent.parent.parent
+
+
+def web_builder() -> Any:
+    """studio-web/build.py as a module."""
+    spec = importlib.util.spec_from_file_location("studio_web_build", ROOT / "studio-web/build.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def require_node() -> None:
+    try:
+        web_builder().node_folder()
+    except Exception as error:  # noqa: BLE001  of the module that was loaded
+        if os.environ.get("STEPTWIN_REQUIRE_PEERS") == "1":
+            pytest.fail(str(error), pytrace=False)
+        pytest.skip(str(error))
 
 
 class StudioWorld(NamedTuple):

@@ -106,17 +106,22 @@ COLOURS = 256
 BEGUN_MS = 25_000
 """Until the machine works in its cycle, and the curves fill the scope."""
 ALONE = [["machine"]]
-BESIDE = [["axes"], ["machine", "scope"]]
 """Panels by columns."""
+GRAPHICS = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
-def opened(page: Page, url: str, columns: list[list[str]]) -> None:
-    """The page with these panels, after its first minute."""
+def opened(page: Page, url: str, columns: list[list[str]] | None = None) -> None:
+    """The page with these panels, otherwise with those that it begins with, after its first minute."""
+    if columns is not None:
+        choose(page, columns)
+    page.goto(url)
+    page.get_by_role("button", name="Skip").click()
+
+
+def choose(page: Page, columns: list[list[str]]) -> None:
     panes = [{"share": 1, "panes": [{"panel": panel, "share": 1} for panel in column]} for column in columns]
     kept = json.dumps(json.dumps({"version": 1, "value": panes}))
     page.add_init_script(f"localStorage.setItem('steptwin.layout', {kept})")
-    page.goto(url)
-    page.get_by_role("button", name="Skip").click()
 
 
 def picture(of: Page | Locator, name: str) -> None:
@@ -131,15 +136,19 @@ def keep(png: bytes, name: str) -> None:
 def main() -> None:
     chromium = shutil.which("chromium")
     with studio(describe_demo(free_ports=True)) as url, sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox", *GRAPHICS])
         page = browser.new_page(viewport={"width": 1600, "height": 900})
-        opened(page, url, BESIDE)
+        opened(page, url)
         page.wait_for_timeout(BEGUN_MS)
         picture(page, "studio-axes")
         page = browser.new_page(viewport={"width": 1280, "height": 720})
         opened(page, url, ALONE)
         page.wait_for_timeout(BEGUN_MS)
         picture(page, "studio-machine")
+        page.get_by_role("button", name="3D", exact=True).click()
+        page.get_by_role("button", name="Follow", exact=True).wait_for()
+        page.wait_for_timeout(5000)
+        picture(page.locator("main section canvas"), "studio-space")
         show(page, "Scope")
         page.wait_for_timeout(2000)
         picture(page, "studio-scope")

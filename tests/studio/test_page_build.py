@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import shutil
@@ -15,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.studio.conftest import newer_source
+from tests.studio.conftest import newer_source, web_builder
 
 from steptwin.errors import Refusal
 from steptwin.studio import page
@@ -23,25 +22,6 @@ from steptwin.studio import page
 ROOT = Path(__file__).parent.parent.parent
 WEB = ROOT / "studio-web"
 BUILDER = WEB / "build.py"
-
-
-def _builder() -> Any:
-    spec = importlib.util.spec_from_file_location("studio_web_build", BUILDER)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-@pytest.fixture
-def require_node() -> None:
-    try:
-        _builder().node_folder()
-    except Exception as error:  # noqa: BLE001  of the module that was loaded
-        if os.environ.get("STEPTWIN_REQUIRE_PEERS") == "1":
-            pytest.fail(str(error), pytrace=False)
-        pytest.skip(str(error))
 
 
 @pytest.fixture
@@ -104,7 +84,7 @@ def test_versions_are_exact() -> None:
     [("v20.18.9", False), ("v20.19.0", True), ("v21.9.0", False), ("v22.11.0", False), ("v22.12.0", True), ("v24.0.1", True)],
 )
 def test_which_node_is_new_enough(version: str, is_enough: bool) -> None:
-    assert _builder().is_new_enough(version, "^20.19 || >=22.12") is is_enough
+    assert web_builder().is_new_enough(version, "^20.19 || >=22.12") is is_enough
 
 
 def test_without_node_the_message_says_what_to_do(tmp_path: Path) -> None:

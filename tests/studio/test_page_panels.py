@@ -308,11 +308,12 @@ def test_the_wiring_is_shown_with_its_levels(start_studio: Callable[..., Process
 def test_the_machine_is_drawn_and_its_button_pressed(start_studio: Callable[..., Process], browser: Browser) -> None:
     studio = Studio(start_studio("--demo"), browser)
     page = studio.page(panel="Machine")
+    page.get_by_label("Selected").select_option("x")
     place = page.get_by_label("x place")
     expect(place).not_to_have_text("–")
     shown = place.inner_text()
     expect(place).not_to_have_text(shown)  # the program moves it
-    expect(page.get_by_label("infeed, conveyor").locator(".belt").first).to_be_visible()  # a workpiece
+    expect(page.locator("svg .piece[data-element=infeed]").first).to_be_visible()  # a workpiece
     press = button(page, "Press part")
     press.hover()
     page.mouse.down()

@@ -162,7 +162,8 @@ def test_nor_with_the_panels_of_a_machine_open(start_studio: Callable[..., Proce
     expect(page.get_by_text("JUMP MAIN").first).to_be_visible()
     found += [f"Program: {what}" for what in serious(page)]
     show(page, "Machine")
-    button(page, "Arrange").click()
+    button(page, "Labels").click()
+    page.get_by_label("Selected").select_option("infeed")
     found += [f"Machine: {what}" for what in serious(page)]
     show(page, "I/O")
     button(page, "Wiring").click()

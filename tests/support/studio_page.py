@@ -22,6 +22,11 @@ WAIT_MS = 60_000
 expect.set_options(timeout=WAIT_MS)
 
 
+ONE_PANE = """localStorage.getItem("steptwin.layout") ?? localStorage.setItem("steptwin.layout",
+  JSON.stringify({version: 1, value: [{share: 1, panes: [{panel: "axes", share: 1}]}]}))"""
+"""A layout that somebody has chosen; a machine in space begins with several panes."""
+
+
 class Studio:
     """A studio, a master at its Modbus port, and pages that must not complain."""
 
@@ -39,7 +44,7 @@ class Studio:
         settings: dict[str, Any] = {"viewport": {"width": 1280, "height": 720}, "locale": language, **options}
         context = self._browser.new_context(**settings)
         self._opened.callback(context.close)
-        context.add_init_script(init_script)
+        context.add_init_script(f"{'' if panel is None else ONE_PANE};{init_script}")
         page = context.new_page()
         page.set_default_timeout(WAIT_MS)
         page.on("pageerror", lambda error: self.complaints.append(str(error)))

@@ -36,8 +36,18 @@ export class Layout {
   /** The pane that the next chosen panel goes to: column and place in it. */
   active = $state<[number, number]>([0, 0]);
 
+  /** Whether anybody has chosen it, now or at an earlier time. */
+  private isChosen: boolean;
+
   constructor(first: Column[]) {
-    this.columns = restore("layout", VERSION, isColumns) ?? first;
+    const kept = restore("layout", VERSION, isColumns);
+    this.isChosen = kept !== null;
+    this.columns = kept ?? first;
+  }
+
+  /** What is shown first, where nobody has chosen anything. */
+  begin(columns: Column[]): void {
+    if (!this.isChosen) this.columns = columns;
   }
 
   get count(): number {
@@ -107,6 +117,7 @@ export class Layout {
   }
 
   private keep(): void {
+    this.isChosen = true;
     keep("layout", VERSION, this.columns);
   }
 }

@@ -70,6 +70,7 @@ export interface Model {
   buttons: readonly string[];
   elements: readonly Element[];
   connections: readonly Connection[];
+  scene: Description["scene"];
   commands: ReadonlySet<string>;
 }
 
@@ -150,6 +151,7 @@ export function modelOf(description: Description): Model {
     buttons: description.buttons,
     elements: description.elements,
     connections: description.connections,
+    scene: description.scene,
     commands: new Set(description.commands),
   };
 }

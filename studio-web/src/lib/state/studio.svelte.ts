@@ -32,6 +32,7 @@ const EMPTY: Model = {
   buttons: [],
   elements: [],
   connections: [],
+  scene: { frames: [], bodies: [] },
   commands: new Set(),
 };
 /** Frames and statements are as frequent as requests: a panel that shows them follows them itself. */

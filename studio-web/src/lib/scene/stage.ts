@@ -1,0 +1,115 @@
+import type { Model } from "../state/model";
+import { copyPose, POSE, Poses, shift, type Scene } from "./poses";
+import { solidsOf, travelOf, type Solid, type Vector } from "./solids";
+
+/** The least box about everything. [mm] */
+export interface Extent {
+  low: Vector;
+  high: Vector;
+}
+
+/** Where all solids of a scene are at one moment. Nothing is allocated for a picture. */
+export class Stage {
+  readonly solids: readonly Solid[];
+  readonly poses: Poses;
+  /** Poses of the middles of the solids. */
+  readonly places: Float64Array;
+  /** 0: a solid is not there. */
+  readonly isThere: Uint8Array;
+  /** Ends of the least upright box about each solid: x, y, z. */
+  readonly lows: Float64Array;
+  readonly highs: Float64Array;
+  /** Of all, wherever they may be. */
+  readonly extent: Extent;
+  private readonly slides: Int32Array;
+  private readonly shown: Int32Array;
+
+  constructor(scene: Scene, model: Model) {
+    this.solids = solidsOf(scene, model);
+    const more = this.solids.flatMap(({ slide, shown }) => [slide?.signal ?? [], shown ?? []].flat());
+    this.poses = new Poses(scene, more);
+    const place = (signal: string | undefined | null) => (signal ? this.poses.signals.indexOf(signal) : -1);
+    const count = this.solids.length;
+    this.places = new Float64Array(count * POSE);
+    this.isThere = new Uint8Array(count);
+    this.lows = new Float64Array(3 * count);
+    this.highs = new Float64Array(3 * count);
+    this.slides = Int32Array.from(this.solids, ({ slide }) => place(slide?.signal));
+    this.shown = Int32Array.from(this.solids, ({ shown }) => place(shown));
+    this.extent = this.widest(rangesOf(scene, model));
+    this.poses.values.fill(NaN);
+    this.update();
+  }
+
+  /** Everything from the values of `poses`. */
+  update(): void {
+    const { poses, places } = this;
+    poses.update();
+    for (let n = 0; n < this.solids.length; n++) {
+      const { isCarried, frame, at, slide } = this.solids[n] as Solid;
+      const from = n * POSE;
+      copyPose(places, from, isCarried ? poses.carried : poses.bases, frame * POSE);
+      shift(places, from, at[0], at[1], at[2]);
+      if (slide !== null) {
+        const value = poses.values[this.slides[n] as number] || 0;
+        shift(places, from, slide.by[0] * value, slide.by[1] * value, slide.by[2] * value);
+      }
+      const shown = this.shown[n] as number;
+      const value = shown < 0 ? 1 : (poses.values[shown] as number);
+      this.isThere[n] = (slide === null ? value > 0 : !Number.isNaN(value)) ? 1 : 0;
+      this.bound(n);
+    }
+  }
+
+  private bound(n: number): void {
+    const { size } = this.solids[n] as Solid;
+    for (let k = 0; k < 3; k++) {
+      const row = n * POSE + 3 * k;
+      let half = 0;
+      for (let j = 0; j < 3; j++) half += (Math.abs(this.places[row + j] as number) * (size[j] as number)) / 2;
+      const middle = this.places[n * POSE + 9 + k] as number;
+      this.lows[3 * n + k] = middle - half;
+      this.highs[3 * n + k] = middle + half;
+    }
+  }
+
+  private widest(ranges: ReadonlyMap<string, readonly [number, number]>): Extent {
+    const STEPS = 4;
+    const low = [Infinity, Infinity, Infinity];
+    const high = [-Infinity, -Infinity, -Infinity];
+    for (let step = 0; step <= STEPS; step++) {
+      this.poses.signals.forEach((signal, k) => {
+        const [from, to] = ranges.get(signal) ?? [0, 1];
+        this.poses.values[k] = from + ((to - from) * step) / STEPS;
+      });
+      this.update();
+      for (let k = 0; k < this.lows.length; k++) {
+        low[k % 3] = Math.min(low[k % 3] as number, this.lows[k] as number);
+        high[k % 3] = Math.max(high[k % 3] as number, this.highs[k] as number);
+      }
+    }
+    return { low: low as unknown as Vector, high: high as unknown as Vector };
+  }
+}
+
+/** Where signals of motion may be, in their units. */
+function rangesOf({ frames }: Scene, model: Model): Map<string, readonly [number, number]> {
+  const found = new Map<string, readonly [number, number]>();
+  for (const { joints } of frames)
+    for (const { signal, turns, per_unit } of joints) if (turns) found.set(signal, [0, 360 / per_unit]);
+  for (const axis of model.mechanics) {
+    const joint = frames.find(({ name }) => name === axis.name)?.joints[0];
+    if (joint !== undefined && !joint.turns) found.set(joint.signal, travelOf(axis, joint.per_unit));
+  }
+  for (const { name, drawing } of model.elements) {
+    if (drawing === null || drawing.shape === "dial") continue;
+    const { low, length, across_low, across } = drawing;
+    drawing.places.forEach((place, k) =>
+      found.set(
+        `${name}.${place}`,
+        drawing.shape === "plane" && k === 1 ? [across_low, across_low + across] : [low, low + length],
+      ),
+    );
+  }
+  return found;
+}

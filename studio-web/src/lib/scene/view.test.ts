@@ -1,0 +1,61 @@
+import { expect, test } from "vitest";
+import type { Model } from "../state/model";
+import type { Scene } from "./poses";
+import { Stage } from "./stage";
+import { facesOf, frameOf, Order, spotX, spotY, VIEWS, type ViewName } from "./view";
+
+type Box = readonly [name: string, at: readonly number[], size: readonly number[], on?: string];
+
+function stageOf(boxes: readonly Box[], more: Scene["frames"] = []): Stage {
+  const frames = boxes.map(([name, at, , on = null]) => ({ name, kind: "body", on, at: [...at], along: null, joints: [] })); // prettier-ignore
+  const bodies = boxes.map(([name, , size]) => ({ name, size: [...size], diameter: null, height: null, color: null, when: null })); // prettier-ignore
+  const model = { mechanics: [], elements: [] } as unknown as Model;
+  return new Stage({ frames: [...frames, ...more], bodies } as unknown as Scene, model);
+}
+
+function orderOf(stage: Stage, view: ViewName): string[] {
+  const order = new Order(stage, VIEWS[view]);
+  order.update();
+  return [...order.drawn].map((n) => stage.solids[n]?.element ?? "");
+}
+
+test("what is in front is drawn last, from every side", () => {
+  const stage = stageOf([
+    ["shelf", [0, 100, 50], [400, 50, 10]],
+    ["bed", [0, 0, 0], [1000, 400, 20]],
+    ["post", [300, 100, 20], [30, 30, 300]],
+    ["crate", [0, -100, 20], [100, 100, 100]],
+  ]);
+  for (const view of ["oblique", "top"] as const) {
+    const found = orderOf(stage, view);
+    expect(found[0]).toBe("bed");
+  }
+  const front = orderOf(stage, "front");
+  expect(front.indexOf("crate")).toBeGreaterThan(front.indexOf("shelf"));
+  const side = orderOf(stage, "side");
+  expect(side.indexOf("post")).toBeGreaterThan(side.indexOf("shelf"));
+});
+
+test("things that reach into each other are drawn as they stand for the most part", () => {
+  const stage = stageOf([
+    ["slide", [0, -100, 18], [600, 40, 40]],
+    ["bed", [0, 0, 0], [1000, 400, 20]],
+  ]);
+  expect(orderOf(stage, "oblique")).toEqual(["bed", "slide"]);
+});
+
+test("what turns is drawn turned, and stands where its carrier has it", () => {
+  const turns = [{ signal: "table.position", along: "+z", turns: true, per_unit: 1 }];
+  const stage = stageOf(
+    [["box", [100, 0, 0], [20, 10, 30], "table"]],
+    [{ name: "table", kind: "axis", on: null, at: [10, 0, 5], along: null, joints: turns }],
+  );
+  stage.poses.values[0] = 90;
+  stage.update();
+  const { places } = stage;
+  expect([spotX(VIEWS.top, places, 0), spotY(VIEWS.top, places, 0)]).toEqual([10, -100]);
+  const [solid] = stage.solids;
+  if (solid === undefined) throw new Error("no solid");
+  expect(facesOf(solid, places, 0, VIEWS.top)).toEqual({ front: "", side: "", top: "M-5.00 -10.00L-5.00 10.00L5.00 10.00L5.00 -10.00Z" }); // prettier-ignore
+  expect(frameOf(VIEWS.top, stage.extent)[2]).toBeGreaterThan(200);
+});

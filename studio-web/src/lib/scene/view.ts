@@ -1,0 +1,216 @@
+import { POSE } from "./poses";
+import type { Solid, Vector } from "./solids";
+import type { Extent, Stage } from "./stage";
+
+/** A parallel view: where right, up, and towards who looks are in space. */
+export interface View {
+  right: Vector;
+  up: Vector;
+  near: Vector;
+}
+
+const dot = (one: Vector, other: Vector) => one[0] * other[0] + one[1] * other[1] + one[2] * other[2];
+
+/** Seen from an angle about the upright [degrees], 0 is from the front, and from so far above. */
+function viewFrom(around: number, above: number): View {
+  const [a, b] = [(around * Math.PI) / 180, (above * Math.PI) / 180];
+  const [ca, sa, cb, sb] = [Math.cos(a), Math.sin(a), Math.cos(b), Math.sin(b)];
+  return { right: [ca, sa, 0], up: [-sa * sb, ca * sb, cb], near: [sa * cb, -ca * cb, sb] };
+}
+
+export const VIEWS = {
+  oblique: viewFrom(-24, 24),
+  front: { right: [1, 0, 0], up: [0, 0, 1], near: [0, -1, 0] },
+  side: { right: [0, 1, 0], up: [0, 0, 1], near: [1, 0, 0] },
+  top: { right: [1, 0, 0], up: [0, 1, 0], near: [0, 0, 1] },
+} as const satisfies Record<string, View>;
+export type ViewName = keyof typeof VIEWS;
+
+/** Left, upper edge, width and height of a picture of it, y downwards. */
+export function frameOf({ right, up }: View, { low, high }: Extent): [number, number, number, number] {
+  const middle: Vector = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2];
+  const half: Vector = [(high[0] - low[0]) / 2, (high[1] - low[1]) / 2, (high[2] - low[2]) / 2];
+  const reach = (direction: Vector) => dot(direction.map(Math.abs) as unknown as Vector, half);
+  const [wide, tall] = [reach(right), reach(up)];
+  return [dot(right, middle) - wide, -dot(up, middle) - tall, 2 * wide, 2 * tall];
+}
+
+/** What is drawn of a solid, about its middle, as the data of paths: its outline and faces by how much light they have. */
+export interface Faces {
+  front: string;
+  side: string;
+  top: string;
+}
+
+type Flat = readonly [number, number];
+
+const pathOf = (points: readonly Flat[]) =>
+  points.length ? `M${points.map(([x, y]) => `${x.toFixed(2)} ${y.toFixed(2)}`).join("L")}Z` : "";
+
+/** Counterclockwise, by the monotone chain of Andrew. */
+function hullOf(points: readonly Flat[]): Flat[] {
+  const sorted = [...points].sort((one, other) => one[0] - other[0] || one[1] - other[1]);
+  const turns = (o: Flat, a: Flat, b: Flat) => (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]);
+  const half = (list: readonly Flat[]) => {
+    const chain: Flat[] = [];
+    for (const point of list) {
+      while (chain.length > 1 && turns(chain.at(-2) as Flat, chain.at(-1) as Flat, point) <= 1e-9) chain.pop();
+      chain.push(point);
+    }
+    return chain.slice(0, -1);
+  };
+  return [...half(sorted), ...half(sorted.reverse())];
+}
+
+/** The corners of the ends of a prism, or of a box as one that is upright: first those of the lower one, then of the upper. */
+export function cornersOf({ size, prism }: Pick<Solid, "size" | "prism">): [Vector[], Vector[]] {
+  const axis = prism?.axis ?? 2;
+  const [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
+  const count = prism?.corners ?? 4;
+  const first = prism === null ? Math.PI / 4 : Math.atan2(prism.towards[b] as number, prism.towards[a] as number);
+  // The corners of a box are on a circle about it only where it is a square.
+  const reach = prism === null ? Math.SQRT1_2 : 0.5;
+  const end = (side: number) =>
+    Array.from({ length: count }, (_, k): Vector => {
+      const angle = first + (2 * Math.PI * k) / count;
+      const corner = [0, 0, 0];
+      corner[axis] = (side * (size[axis] as number)) / 2;
+      corner[a] = Math.cos(angle) * reach * (size[a] as number);
+      corner[b] = Math.sin(angle) * reach * (size[b] as number);
+      return corner as unknown as Vector;
+    });
+  return [end(-1), end(1)];
+}
+
+const SEEN = 1e-6;
+
+/** A solid in a view, turned by the pose at `from`. */
+export function facesOf(solid: Solid, poses: Float64Array, from: number, { right, up, near }: View): Faces {
+  const turned = (vector: Vector): Vector => {
+    const row = (k: number) => poses.subarray(from + 3 * k, from + 3 * k + 3) as unknown as Vector;
+    return [dot(row(0), vector), dot(row(1), vector), dot(row(2), vector)];
+  };
+  const flat = (corner: Vector): Flat => [dot(right, corner), -dot(up, corner)];
+  const [lower, upper] = cornersOf(solid).map((end) => end.map(turned)) as [Vector[], Vector[]];
+  const faces: Faces = { front: "", side: "", top: "" };
+  const add = (corners: readonly Vector[], normal: Vector) => {
+    if (dot(normal, near) < SEEN) return;
+    const light = Math.abs(normal[2]) > 0.7 ? "top" : Math.abs(dot(normal, right)) > 0.5 ? "side" : "front";
+    faces[light] += pathOf(corners.map(flat));
+  };
+  const axis = solid.prism?.axis ?? 2;
+  const upright = turned([+(axis === 0), +(axis === 1), +(axis === 2)]);
+  if (solid.prism === null) {
+    for (let k = 0; k < 4; k++) {
+      const next = (k + 1) % 4;
+      const corners = [lower[k], lower[next], upper[next], upper[k]] as Vector[];
+      add(corners, turned(k === 0 ? [0, 1, 0] : k === 1 ? [-1, 0, 0] : k === 2 ? [0, -1, 0] : [1, 0, 0]));
+    }
+  } else faces.front = pathOf(hullOf([...lower, ...upper].map(flat)));
+  add(upper, upright);
+  add(lower, upright.map((one) => -one) as unknown as Vector);
+  return faces;
+}
+
+/** Of a direction that is nearly in the picture. */
+const FLAT = 0.01;
+const TOUCHING_MM = 0.01;
+
+interface Ends {
+  low: number;
+  high: number;
+  from: number;
+  to: number;
+}
+
+/** In what order solids are drawn, those behind first. */
+export class Order {
+  readonly drawn: Int32Array;
+  private readonly state: Uint8Array;
+  private readonly both: Ends = { low: 0, high: 0, from: 0, to: 0 };
+  private count = 0;
+
+  constructor(
+    private readonly stage: Stage,
+    private readonly view: View,
+  ) {
+    this.drawn = new Int32Array(stage.solids.length);
+    this.state = new Uint8Array(stage.solids.length);
+  }
+
+  update(): void {
+    this.state.fill(0);
+    this.count = 0;
+    for (let n = 0; n < this.drawn.length; n++) this.visit(n);
+  }
+
+  /** After all that is behind it. */
+  private visit(n: number): void {
+    if (this.state[n]) return;
+    this.state[n] = 1;
+    for (let other = 0; other < this.drawn.length; other++)
+      if (!this.state[other] && this.meets(n, other) && this.isBehind(other, n)) this.visit(other);
+    this.drawn[this.count++] = n;
+  }
+
+  /** Whether two cover each other in the picture, or might. */
+  private meets(one: number, other: number): boolean {
+    return this.meetsAlong(one, other, this.view.right) && this.meetsAlong(one, other, this.view.up);
+  }
+
+  private meetsAlong(one: number, other: number, direction: Vector): boolean {
+    let apart = 0;
+    let reach = 0;
+    for (let k = 0; k < 3; k++) {
+      const its = this.ends(one, other, k);
+      apart += ((its.low + its.high - its.from - its.to) / 2) * (direction[k] as number);
+      reach += ((its.high - its.low + its.to - its.from) / 2) * Math.abs(direction[k] as number);
+    }
+    return Math.abs(apart) < reach;
+  }
+
+  /** Of both along an axis. */
+  private ends(one: number, other: number, axis: number): Ends {
+    const { lows, highs } = this.stage;
+    this.both.low = lows[3 * one + axis] as number;
+    this.both.high = highs[3 * one + axis] as number;
+    this.both.from = lows[3 * other + axis] as number;
+    this.both.to = highs[3 * other + axis] as number;
+    return this.both;
+  }
+
+  /** Where a plane between two has one of them on the side of who looks, that one is covered by nothing of the other. Where they
+   * overlap, the plane is across the axis along which they do least. */
+  private isBehind(one: number, other: number): boolean {
+    let isFree = false;
+    let isOtherFree = false;
+    let least = Infinity;
+    let isLower = one < other;
+    for (let k = 0; k < 3; k++) {
+      const towards = this.view.near[k] as number;
+      if (Math.abs(towards) < FLAT) continue;
+      const { low, high, from, to } = this.ends(one, other, k);
+      isFree ||= towards > 0 ? low >= to - TOUCHING_MM : high <= from + TOUCHING_MM;
+      isOtherFree ||= towards > 0 ? high <= from + TOUCHING_MM : low >= to - TOUCHING_MM;
+      const apart = (low + high - from - to) * towards;
+      const overlap = (Math.min(high, to) - Math.max(low, from)) / Math.min(high - low, to - from);
+      if (overlap >= least || apart === 0) continue;
+      least = overlap;
+      isLower = apart < 0;
+    }
+    return isFree === isOtherFree ? isLower : isOtherFree;
+  }
+}
+
+/** Where a middle is in a picture. */
+export function spotX(view: View, poses: Float64Array, n: number): number {
+  return dotAt(view.right, poses, n * POSE + 9);
+}
+
+export function spotY(view: View, poses: Float64Array, n: number): number {
+  return -dotAt(view.up, poses, n * POSE + 9);
+}
+
+function dotAt(direction: Vector, numbers: Float64Array, at: number): number {
+  return direction[0] * (numbers[at] as number) + direction[1] * (numbers[at + 1] as number) + direction[2] * (numbers[at + 2] as number); // prettier-ignore
+}

@@ -1,0 +1,163 @@
+import { POSE } from "../../lib/scene/poses";
+import type { Stage } from "../../lib/scene/stage";
+import { facesOf, frameOf, Order, spotX, spotY, type View } from "../../lib/scene/view";
+
+const SVG = "http://www.w3.org/2000/svg";
+const LIGHTS = ["front", "side", "top"] as const;
+/** Of the picture, around what is in it. */
+const ROOM = 0.06;
+const ORDER_MS = 120;
+/** A turn that is seen. */
+const TURN = 1e-6;
+
+/** What is shown of elements besides where they are. */
+export interface Marks {
+  levelOf: (pin: string) => number | null;
+  isStalled: (element: string) => boolean;
+  selected: string;
+  labels: boolean;
+}
+
+const create = <K extends keyof SVGElementTagNameMap>(name: K, parent: Element, className = "") => {
+  const made = document.createElementNS(SVG, name);
+  if (className) made.setAttribute("class", className);
+  parent.append(made);
+  return made;
+};
+
+/** A scene in one parallel view, as lines and areas of an SVG that are moved, and drawn anew only where they have turned. */
+export class Drawing {
+  private readonly parts: SVGGElement[];
+  private readonly turns: Float64Array;
+  private readonly spots: Float64Array;
+  private readonly order: Order;
+  private readonly all: SVGGElement;
+  private readonly labels = new Map<string, SVGTextElement>();
+  /** The solids of each element with a label. */
+  private readonly named = new Map<string, number[]>();
+  private readonly frame: readonly number[];
+  private ordered_ms = 0;
+
+  constructor(
+    private readonly svg: SVGSVGElement,
+    private readonly stage: Stage,
+    private readonly view: View,
+  ) {
+    svg.replaceChildren();
+    const [left, top, width, height] = frameOf(view, stage.extent);
+    const room = ROOM * Math.max(width, height);
+    this.frame = [left - room, top - room, width + 2 * room, height + 2 * room];
+    svg.setAttribute("viewBox", this.frame.join(" "));
+    this.all = create("g", svg);
+    this.parts = stage.solids.map(({ element, material, color }) => {
+      const part = create("g", this.all, `solid ${material}`);
+      part.dataset["element"] = element;
+      for (const light of LIGHTS) create("path", part, light);
+      if (color !== null) part.style.setProperty("--fill", color);
+      return part;
+    });
+    const count = stage.solids.length;
+    this.turns = new Float64Array(count * 9).fill(NaN);
+    this.spots = new Float64Array(count * 2).fill(NaN);
+    this.order = new Order(stage, view);
+    stage.solids.forEach(({ element, material }, n) => {
+      if (material !== "frame" || stage.solids.some((one) => one.element === element && one.material !== "frame"))
+        this.named.set(element, [...(this.named.get(element) ?? []), n]);
+    });
+    const words = create("g", svg, "labels");
+    for (const name of this.named.keys()) {
+      const label = create("text", words);
+      label.textContent = name;
+      label.dataset["element"] = name;
+      this.labels.set(name, label);
+    }
+  }
+
+  get aspect(): number {
+    return (this.frame[2] ?? 1) / (this.frame[3] ?? 1);
+  }
+
+  /** Gives the pixels for 1 mm, in a picture of this size on the screen. */
+  fit(width: number, height: number): number {
+    const [, , wide = 1, tall = 1] = this.frame;
+    const scale = Math.min(width / wide, height / tall) || 1;
+    this.svg.style.setProperty("--pixel", `${1 / scale}px`);
+    return scale;
+  }
+
+  draw(now_ms: number): void {
+    const { stage } = this;
+    for (let n = 0; n < this.parts.length; n++) {
+      const part = this.parts[n] as SVGGElement;
+      const display = stage.isThere[n] ? "" : "none";
+      if (part.style.display !== display) part.style.display = display;
+      if (!stage.isThere[n]) continue;
+      if (this.hasTurned(n)) this.outline(n, part);
+      const x = spotX(this.view, stage.places, n);
+      const y = spotY(this.view, stage.places, n);
+      if (this.spots[2 * n] === x && this.spots[2 * n + 1] === y) continue;
+      this.spots[2 * n] = x;
+      this.spots[2 * n + 1] = y;
+      part.setAttribute("transform", `translate(${x.toFixed(2)} ${y.toFixed(2)})`);
+    }
+    if (now_ms - this.ordered_ms < ORDER_MS) return;
+    this.ordered_ms = now_ms;
+    this.sort();
+  }
+
+  mark({ levelOf, isStalled, selected, labels }: Marks): void {
+    this.stage.solids.forEach(({ element, pin, material }, n) => {
+      const { classList } = this.parts[n] as SVGGElement;
+      classList.toggle("on", pin !== null && levelOf(pin) === 1);
+      classList.toggle("stalled", material === "moving" && isStalled(element));
+      classList.toggle("selected", element === selected);
+    });
+    for (const [name, label] of this.labels) {
+      label.classList.toggle("selected", name === selected);
+      label.style.display = labels || name === selected ? "" : "none";
+    }
+  }
+
+  private hasTurned(n: number): boolean {
+    let has = false;
+    for (let k = 0; k < 9; k++) {
+      const now = this.stage.places[n * POSE + k] as number;
+      if (Math.abs(now - (this.turns[n * 9 + k] as number)) < TURN) continue;
+      has = true;
+      this.turns[n * 9 + k] = now;
+    }
+    return has;
+  }
+
+  private outline(n: number, part: SVGGElement): void {
+    const solid = this.stage.solids[n];
+    if (solid === undefined) return;
+    const faces = facesOf(solid, this.stage.places, n * POSE, this.view);
+    LIGHTS.forEach((light, k) => part.children[k]?.setAttribute("d", faces[light]));
+  }
+
+  private sort(): void {
+    this.order.update();
+    let next = this.all.firstChild;
+    for (let k = 0; k < this.parts.length; k++) {
+      const part = this.parts[this.order.drawn[k] as number] as SVGGElement;
+      if (part === next) next = next.nextSibling;
+      else this.all.insertBefore(part, next);
+    }
+    for (const [name, solids] of this.named) this.label(name, solids);
+  }
+
+  /** Above what is drawn of it. */
+  private label(name: string, solids: readonly number[]): void {
+    let [left, right, top] = [Infinity, -Infinity, Infinity];
+    for (const n of solids) {
+      const x = this.spots[2 * n] as number;
+      if (!this.stage.isThere[n] || !this.stage.solids[n]?.isCarried !== !this.stage.solids[solids[0] ?? 0]?.isCarried)
+        continue;
+      left = Math.min(left, x);
+      right = Math.max(right, x);
+      top = Math.min(top, this.spots[2 * n + 1] as number);
+    }
+    this.labels.get(name)?.setAttribute("transform", `translate(${((left + right) / 2).toFixed(1)} ${top.toFixed(1)})`);
+  }
+}

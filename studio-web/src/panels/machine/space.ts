@@ -1,0 +1,258 @@
+import {
+  AmbientLight,
+  BoxGeometry,
+  CylinderGeometry,
+  DirectionalLight,
+  EdgesGeometry,
+  HemisphereLight,
+  LineBasicMaterial,
+  LineSegments,
+  Mesh,
+  MeshStandardMaterial,
+  PerspectiveCamera,
+  Raycaster,
+  Scene,
+  Vector2,
+  Vector3,
+  WebGLRenderer,
+  type BufferGeometry,
+  type Matrix4,
+} from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { POSE } from "../../lib/scene/poses";
+import type { Material, Solid } from "../../lib/scene/solids";
+import type { Stage } from "../../lib/scene/stage";
+import { frameOf, VIEWS, type ViewName } from "../../lib/scene/view";
+import type { Marks } from "./drawing";
+
+/** Of the camera, upright. [degrees] */
+const ANGLE = 20;
+
+/** A scene in three dimensions, of the same solids as the drawing. */
+export class Space {
+  private readonly renderer: WebGLRenderer;
+  private readonly scene = new Scene();
+  private readonly camera = new PerspectiveCamera(ANGLE);
+  private readonly controls: OrbitControls;
+  private readonly meshes: readonly Mesh<BufferGeometry, MeshStandardMaterial>[];
+  private readonly lines = new LineBasicMaterial();
+  private readonly looks = new Map<string, MeshStandardMaterial>();
+  private readonly middle = new Vector3();
+  private readonly size: number;
+  private readonly place = new Vector3();
+  private isFollowing = false;
+  /** The solid of what is selected that moves with it; below 0: none. */
+  private goes = -1;
+  private view: ViewName = "oblique";
+  /** Something has changed since the last picture. */
+  private isStale = true;
+
+  /** Raises an error where the browser has no WebGL 2. */
+  constructor(
+    private readonly canvas: HTMLCanvasElement,
+    private readonly stage: Stage,
+  ) {
+    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
+    const { low, high } = stage.extent;
+    this.middle.set((low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2);
+    this.size = Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
+    this.camera.up.set(0, 0, 1);
+    this.camera.near = this.size / 100;
+    this.camera.far = this.size * 20;
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.addEventListener("change", this.change);
+    this.meshes = stage.solids.map((solid) => this.mesh(solid));
+    this.light();
+    canvas.addEventListener("webglcontextrestored", this.change);
+  }
+
+  /** From a side. */
+  look(view: ViewName): void {
+    this.view = view;
+    const { right, up, near } = VIEWS[view];
+    const [, , wide, tall] = frameOf({ right, up, near }, this.stage.extent);
+    const half = Math.tan((ANGLE * Math.PI) / 360);
+    const [, , , deep] = frameOf({ right, up: near, near: up }, this.stage.extent);
+    const far = (0.5 * Math.max(tall, wide / this.camera.aspect)) / half + deep / 2;
+    this.controls.target.copy(this.middle);
+    // Who looks straight down would have no direction that is up.
+    this.camera.position
+      .set(near[0], near[1] - (view === "top" ? 1e-4 : 0), near[2])
+      .multiplyScalar(far)
+      .add(this.middle);
+    this.controls.update();
+    this.isStale = true;
+  }
+
+  /** The picture goes with what is selected. */
+  follow(isFollowing: boolean): void {
+    this.isFollowing = isFollowing;
+  }
+
+  fit(width: number, height: number): void {
+    if (width === 0 || height === 0) return;
+    this.renderer.setPixelRatio(window.devicePixelRatio);
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.look(this.view);
+  }
+
+  draw(): void {
+    const { places, isThere } = this.stage;
+    for (let n = 0; n < this.meshes.length; n++) {
+      const mesh = this.meshes[n] as Mesh;
+      const isVisible = isThere[n] === 1;
+      if (setMatrix(mesh.matrixWorld, places, n * POSE) || mesh.visible !== isVisible) this.isStale = true;
+      mesh.visible = isVisible;
+    }
+    if (this.isFollowing) this.goAlong();
+    if (!this.isStale) return;
+    this.isStale = false;
+    this.renderer.render(this.scene, this.camera);
+  }
+
+  mark({ levelOf, isStalled, selected }: Marks): void {
+    this.goes = this.stage.solids.map((one) => one.element === selected && one.isCarried).lastIndexOf(true);
+    this.isStale = true;
+    this.stage.solids.forEach((solid, n) => {
+      const mesh = this.meshes[n] as Mesh<BufferGeometry, MeshStandardMaterial>;
+      const isOn = solid.pin !== null && levelOf(solid.pin) === 1;
+      const look = solid.material === "moving" && isStalled(solid.element) ? "stalled" : isOn ? "on" : solid.material;
+      mesh.material = this.materialOf(look, solid.color, solid.element === selected);
+    });
+  }
+
+  /** The colours of the page, as they are now. */
+  paint(): void {
+    const style = getComputedStyle(this.canvas);
+    for (const [name, material] of this.looks) {
+      const [look, own, selected] = name.split(" ");
+      material.color.set(own || style.getPropertyValue(`--${COLOURS[look as Material]}`));
+      material.emissive.set(selected ? style.getPropertyValue("--trace-6") : "#000000");
+      material.emissiveIntensity = 0.45;
+    }
+    this.lines.color.set(style.getPropertyValue("--dim"));
+    this.isStale = true;
+  }
+
+  /** The element that is drawn at a place on the screen; empty where there is none. */
+  at(x: number, y: number): string {
+    const { left, top, width, height } = this.canvas.getBoundingClientRect();
+    const ray = new Raycaster();
+    ray.setFromCamera(new Vector2((2 * (x - left)) / width - 1, 1 - (2 * (y - top)) / height), this.camera);
+    const seen = this.meshes.filter((mesh) => mesh.visible);
+    const [hit] = ray.intersectObjects(seen, false);
+    return hit === undefined ? "" : (this.stage.solids[this.meshes.indexOf(hit.object as never)]?.element ?? "");
+  }
+
+  end(): void {
+    this.canvas.removeEventListener("webglcontextrestored", this.change);
+    this.controls.dispose();
+    for (const mesh of this.meshes) mesh.geometry.dispose();
+    for (const material of this.looks.values()) material.dispose();
+    this.renderer.dispose();
+  }
+
+  /** After it was lost, the renderer gives everything to the graphics processor again. */
+  private readonly change = (): void => {
+    this.isStale = true;
+  };
+
+  private goAlong(): void {
+    const n = this.goes;
+    if (n < 0) return;
+    const { places } = this.stage;
+    const from = n * POSE + 9;
+    this.place.set(places[from] as number, places[from + 1] as number, places[from + 2] as number);
+    this.camera.position.add(this.place).sub(this.controls.target);
+    this.controls.target.copy(this.place);
+  }
+
+  private light(): void {
+    const sun = new DirectionalLight(0xffffff, 2.2);
+    sun.position.set(-0.4, -0.7, 1);
+    this.scene.add(new HemisphereLight(0xffffff, 0x777777, 1.2), new AmbientLight(0xffffff, 0.5), sun);
+  }
+
+  private mesh(solid: Solid): Mesh<BufferGeometry, MeshStandardMaterial> {
+    const geometry = geometryOf(solid);
+    const mesh = new Mesh(geometry, this.materialOf(solid.material, solid.color, false));
+    const edges = new LineSegments(new EdgesGeometry(geometry, 40), this.lines);
+    // Poses are set as they are, not computed from others.
+    mesh.matrixAutoUpdate = mesh.matrixWorldAutoUpdate = false;
+    edges.matrixAutoUpdate = edges.matrixWorldAutoUpdate = false;
+    edges.matrixWorld = mesh.matrixWorld;
+    mesh.frustumCulled = edges.frustumCulled = false;
+    mesh.add(edges);
+    this.scene.add(mesh);
+    return mesh;
+  }
+
+  private materialOf(look: string, own: string | null, isSelected: boolean): MeshStandardMaterial {
+    const name = `${look} ${own ?? ""} ${isSelected ? "!" : ""}`;
+    let found = this.looks.get(name);
+    if (found === undefined) {
+      const isMetal = look === "rod" || look === "rail";
+      found = new MeshStandardMaterial({ roughness: isMetal ? 0.35 : 0.7, metalness: isMetal ? 0.25 : 0 });
+      this.looks.set(name, found);
+      this.paint();
+    }
+    return found;
+  }
+}
+
+/** Properties of app.css. */
+const COLOURS: Readonly<Record<Material | "on" | "stalled", string>> = {
+  frame: "metal-strong",
+  rail: "metal",
+  drive: "motor",
+  moving: "accent",
+  rod: "metal",
+  belt: "rubber",
+  piece: "trace-2",
+  mark: "dim",
+  lamp: "rubber",
+  on: "good",
+  stalled: "danger-fill",
+};
+
+function geometryOf({ size: [x, y, z], prism }: Solid): BufferGeometry {
+  if (prism === null) return new BoxGeometry(x, y, z);
+  const { axis, corners, towards } = prism;
+  const [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
+  const first = Math.atan2(towards[b] as number, towards[a] as number);
+  // That of three stands along y; its first corner is along z, from where the others follow towards x.
+  const geometry = new CylinderGeometry(0.5, 0.5, 1, corners, 1, false, first);
+  const place = geometry.getAttribute("position");
+  const normal = geometry.getAttribute("normal");
+  const size = [x, y, z];
+  for (const [attribute, isPlace] of [
+    [place, true],
+    [normal, false],
+  ] as const)
+    // prettier-ignore
+    for (let n = 0; n < attribute.count; n++) {
+      const own = [0, 0, 0];
+      own[axis] = attribute.getY(n);
+      own[a] = attribute.getZ(n);
+      own[b] = attribute.getX(n);
+      const [u = 0, v = 0, w = 0] = own.map((one, k) => (isPlace ? one * (size[k] as number) : one));
+      attribute.setXYZ(n, u, v, w);
+    }
+  return geometry;
+}
+
+/** Gives whether it is another one. */
+function setMatrix(matrix: Matrix4, poses: Float64Array, from: number): boolean {
+  const { elements } = matrix;
+  let has = false;
+  for (let row = 0; row < 3; row++)
+    for (let column = 0; column < 4; column++) {
+      const number = poses[column < 3 ? from + 3 * row + column : from + 9 + row] as number;
+      if (elements[4 * column + row] === number) continue;
+      elements[4 * column + row] = number;
+      has = true;
+    }
+  return has;
+}

@@ -1,0 +1,199 @@
+"""The machine in space: the drawing, what is selected in it, three dimensions."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Callable, Iterator
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+from studio_page import PICTURES, Studio, button, serious
+from tests.conftest import until
+from tests.studio.conftest import Process, StudioWorld
+
+WORLD = """
+[world]
+name = "hall"
+[[line]]
+name = "bus"
+kind = "modbus"
+tcp = "127.0.0.1:0"
+[[mic488]]
+name = "table"
+line = "bus"
+[mic488.M1]
+unit = "mm"
+gear = 100.0
+acc = 400.0
+dec = 400.0
+vel = 100.0
+[[axis]]
+name = "x"
+drive = "table.M1"
+unit = "mm"
+pulses_per_unit = 100
+travel = [-10.0, 200.0]
+at = [0, 0, 300]
+[[axis.switch]]
+above = 100.0
+to = "table.IN5"
+[[cylinder]]
+name = "lift"
+extend = "table.OUT1"
+stroke = 60.0
+on = "x"
+at = [0, -60, 0]
+along = "-z"
+[[conveyor]]
+name = "belt"
+length = 400.0
+speed = 200.0
+run = "table.OUT2"
+feed_every = "500 ms"
+at = [-100, -60, 100]
+[[button]]
+name = "door"
+to = "table.IN7"
+[[body]]
+name = "hand"
+at = [0, -200, 0]
+size = [80, 80, 200]
+when = "door.pressed == 1"
+[[collision]]
+name = "crash"
+when = "x.position > 150"
+[[gate]]
+name = "both"
+kind = "and"
+inputs = ["table.OUT1", "table.OUT2"]
+"""
+
+
+@pytest.fixture
+def studio_world() -> StudioWorld:
+    return StudioWorld(WORLD)
+
+
+def part(element: str, material: str) -> str:
+    return f'svg .solid.{material}[data-element="{element}"]'
+
+
+def left(page: Page, element: str, material: str) -> float:
+    box = page.locator(part(element, material)).first.bounding_box()
+    assert box is not None
+    return box["x"] + box["width"] / 2
+
+
+def test_the_machine_in_space_is_what_one_sees_first(studio: Studio) -> None:
+    """With its axes beside it and curves below; what is drawn is no strip too, and what has no place is one."""
+    page = studio.page(panel=None)
+    for panel in ("Machine", "Axes", "Scope"):
+        expect(page.get_by_role("region", name=panel, exact=True).last).to_be_visible()
+    expect(page.get_by_role("img", name="Picture of the machine")).to_be_visible()
+    elements = page.get_by_role("group", name="Elements")
+    expect(elements.get_by_role("region", name="both, gate")).to_be_visible()
+    expect(elements.get_by_role("region", name="belt, conveyor")).to_have_count(0)
+    expect(page.get_by_role("region", name="x, moved by table M1")).to_have_count(0)
+    phone = studio.page(panel=None, viewport={"width": 390, "height": 844})
+    expect(phone.get_by_role("img", name="Picture of the machine")).to_be_visible()
+    assert phone.evaluate("document.documentElement.scrollWidth") <= 390
+
+
+def test_what_moves_is_drawn_where_it_is(studio: Studio) -> None:
+    page = studio.page(panel="Machine")
+    button(page, "Front").click()
+    before, hanging = left(page, "x", "moving"), left(page, "lift", "moving")
+    studio.master.enable(1)
+    studio.master.move(1, 120.0)
+    until(lambda: studio.at(1) == 120.0, "the axis has moved")
+    lamp = page.locator(part("x", "lamp"))
+    expect(lamp).to_have_class(re.compile(r"\bon\b"))
+    pixels = page.locator(".ruler").bounding_box()
+    assert pixels is not None
+    scale = pixels["width"] / float(page.locator(".ruler").inner_text().split()[0])
+    assert left(page, "x", "moving") - before == pytest.approx(120.0 * scale, abs=2.0)
+    assert left(page, "lift", "moving") - hanging == pytest.approx(120.0 * scale, abs=2.0)
+    hand, pieces = page.locator(part("hand", "frame")), page.locator(part("belt", "piece"))
+    expect(hand).to_be_hidden()
+    expect(pieces.first).to_be_visible()
+    expect(pieces.last).to_be_hidden()  # there is room for it
+    button(page, "Press door").hover()
+    page.mouse.down()
+    expect(hand).to_be_visible()
+    page.mouse.up()
+    expect(hand).to_be_hidden()
+
+
+def test_a_collision_is_said(studio: Studio) -> None:
+    page = studio.page(panel="Machine")
+    studio.master.enable(1)
+    studio.master.move(1, 160.0)
+    expect(page.get_by_text("crash: collision")).to_be_visible()
+    studio.master.move(1, 100.0)
+    expect(page.get_by_text("crash: collision")).to_have_count(0)
+
+
+def test_a_thing_is_selected_in_the_picture_or_in_the_list(studio: Studio) -> None:
+    page = studio.page(panel="Machine", bypass_csp=True)
+    button(page, "Labels").click()
+    page.locator(part("lift", "rail")).click()
+    card = page.get_by_role("region", name="lift, cylinder")
+    expect(card).to_be_visible()
+    expect(page.get_by_role("list", name="Wiring of lift")).to_contain_text("table.OUT1 → lift.extend")
+    page.get_by_label("Selected").select_option("x")
+    expect(page.get_by_label("x place")).to_have_text("0.00")
+    expect(card).to_have_count(0)
+    assert serious(page) == []
+    page.get_by_label("Selected").select_option("")
+    expect(page.get_by_label("x place")).to_have_count(0)
+
+
+@pytest.fixture
+def graphics(browser: Browser) -> Iterator[Browser]:
+    """A browser that draws WebGL without a graphics processor."""
+    arguments = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+    started = browser.browser_type.launch(executable_path=shutil.which("chromium"), args=arguments)
+    yield started
+    started.close()
+
+
+HAS_CONTEXT = """() => {
+  const canvas = document.querySelector("section canvas");
+  const gl = canvas.getContext("webgl2");
+  return gl !== null && !gl.isContextLost();
+}"""
+
+
+def test_three_dimensions_come_back_after_the_context_was_lost(start_studio: Callable[..., Process], graphics: Browser) -> None:
+    studio = Studio(start_studio(), graphics)
+    page = studio.page(panel="Machine")
+    button(page, "3D").click()
+    expect(button(page, "Follow")).to_be_visible()
+    canvas = page.locator("section canvas")
+    expect(canvas).to_be_visible()
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    whole = canvas.screenshot(path=PICTURES / "space.png")
+    page.evaluate("""() => {
+      const gl = document.querySelector("section canvas").getContext("webgl2");
+      window.lose = gl.getExtension("WEBGL_lose_context");
+      window.lose.loseContext();
+    }""")
+    until(lambda: not page.evaluate(HAS_CONTEXT), "the context is lost")
+    page.wait_for_timeout(200)
+    page.evaluate("window.lose.restoreContext()")
+    until(lambda: page.evaluate(HAS_CONTEXT), "the context is back")
+    until(lambda: len(canvas.screenshot()) > 0.8 * len(whole), "it is drawn again")
+    button(page, "3D").click()
+    expect(canvas).to_have_count(0)
+    expect(page.locator(part("x", "moving"))).to_be_visible()
+    studio.close()
+
+
+def test_without_webgl_the_drawing_stays(studio: Studio) -> None:
+    page = studio.page(panel="Machine", init_script="HTMLCanvasElement.prototype.getContext = () => null")
+    button(page, "3D").click()
+    expect(page.get_by_role("alert").last).to_contain_text("no WebGL 2: the drawing stays")
+    expect(page.locator(part("x", "moving"))).to_be_visible()
+    expect(button(page, "3D")).to_have_attribute("aria-pressed", "false")
+    studio.complaints.clear()  # three.js has said it on the console, too
