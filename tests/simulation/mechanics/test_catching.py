@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from math import inf
+from math import inf, pi
 
 import pytest
+from free_rotors import in_field
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from motor_rig import INERTIA, LINEAR, at_speed
+from motor_rig import INERTIA, LINEAR, PER_REV, at_speed
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.motion import MotionState, Profile, at_rest, plan_position, plan_velocity
 from steptwin.simulation.mechanics.catching import Catch, catch_of
 from steptwin.simulation.mechanics.coasting import CoastingRotor
 from steptwin.simulation.mechanics.motor import StepperMotor
+from steptwin.simulation.mechanics.potential import PeriodicPotential
 
 STEP: Nanos = 500_000
 
@@ -74,6 +76,22 @@ def test_it_is_caught_where_samples_have_it(
         assert found.may_be is not None
         assert found.may_be <= found.caught
         assert expected is None or found.caught <= expected  # a sample may miss a short moment
+
+
+@pytest.mark.parametrize("friction", [0.05, 0.2, 0.4])
+@pytest.mark.parametrize(("speed", "phase"), [(45.0, 0.25), (60.0, -0.25)])
+def test_the_limit_is_that_of_the_equation(friction: float, speed: float, phase: float) -> None:
+    """A rotor that passes a field at rest, from where it has its mean energy, rests in the period of the equation; in rad/s."""
+    inertia, radian = 5e-5, PER_REV / (2 * pi)
+    (_, place, _) = in_field(
+        phase * 2 * pi / 50, speed, 0.25, inertia=inertia, load=0.0, friction=friction, field=lambda t: 0.0, torque=lambda t: 1.0
+    )[-1]
+    rotor = CoastingRotor(inertia / radian, 0.0, friction, None, None).profile(0, 0, 0.0, speed * radian)
+    limit = PeriodicPotential(1.0, 64.0).catches_below(inertia / radian, friction)
+    driven = StepperMotor(((0.0, 1.0),), inertia / radian, friction, 0.0, None)
+    caught = catch_of(driven, at_rest(0, 0), rotor, 0, 1, limit, may_be=True).caught
+    assert caught is not None
+    assert rotor.position(caught) / 64 + phase == pytest.approx(place * 50 / (2 * pi), abs=0.55)
 
 
 def test_it_is_caught_at_the_limit_to_the_nanosecond() -> None:
