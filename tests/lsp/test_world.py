@@ -269,6 +269,95 @@ def test_a_rename_reaches_what_elements_and_steps_name() -> None:
     assert len(navigation.references(made, URI, text.index('"table.IN1"') + 2)) == 9
 
 
+SPACE = """
+[[cylinder]]
+name = "lift"
+extend = "table.OUT1"
+stroke = 50
+on = "x"
+along = "-z"
+
+[[body]]
+name = "head"
+on = "lift"
+at = [0, 0, -20]
+size = [10, 10, 10]
+
+[[body]]
+name = "post"
+at = [0, 0, -500]
+size = [10, 10, 10]
+
+[[body]]
+name = "workpiece"
+at = [500, 0, 0]
+size = [10, 10, 10]
+
+[[nest]]
+name = "tray"
+at = [900, 0, 0]
+
+[[conveyor]]
+name = "belt"
+length = 100
+speed = 10
+run = "table.OUT3"
+[[conveyor.sensor]]
+at = 5
+sees = "workpiece"
+to = "table.IN7"
+
+[[collision]]
+name = "crash"
+between = ["head", "post", "workpieces"]
+except = [["lift", "post"]]
+
+[[beam]]
+name = "gate"
+at = [0, 0, 10]
+length = 100
+sees = ["workpieces", "head", "workpiece"]
+to = "table.IN8"
+"""
+
+
+def test_elements_in_space_are_found_and_renamed_where_others_name_them() -> None:
+    text = WORLD + SPACE
+    made = session(text)
+    assert of(made).diagnostics() == []
+    for name, count in (("x", 3), ("lift", 3), ("head", 3), ("post", 3), ("workpiece", 2), ("tray", 1)):
+        place = text.index(f'name = "{name}"') + 8
+        assert len(navigation.references(made, URI, place)) == count, name
+    renamed = navigation.rename(made, URI, text.index('name = "lift"') + 8, "ram")[URI]
+    assert sorted(edit.span.start for edit in renamed) == [found.start() for found in re.finditer("lift", text)]
+    used = text.index('on = "lift"') + 7
+    (defined,) = navigation.definition(made, URI, used)
+    assert text[defined.span.start : defined.span.end] == "lift"
+
+
+def test_keys_of_places_are_completed() -> None:
+    text = WORLD + SPACE
+    placed = ["x", "lift", "belt", "head", "post", "workpiece", "tray", "gate"]
+    assert items(text + '\n[[body]]\non = "') == placed
+    assert items(text + '\n[[collision]]\nbetween = ["') == ["workpieces", *placed]
+    assert items(text + '\n[[collision]]\nbetween = ["head", "p') == ["workpieces", *placed]
+    assert items(text + '\n[[collision]]\nexcept = [["head", "post"], ["') == placed
+    assert items(text + "\n[[beam]]\nsees = [") == ["workpieces", *placed]
+    assert items(text + '\n[[cylinder]]\nalong = "') == ["+x", "-x", "+y", "-y", "+z", "-z"]
+    assert items(text + '\n[[tool]]\nalong = ["+x", "') == ["+x", "-x", "+y", "-y", "+z", "-z"]
+    assert items(text + '\n[[supply]]\nfeeds = ["') == ["table"]
+    assert items(text + "\n[[body]]\nsize = [") == []
+    found = {item.label: item.insert for item in of(session(text + "\n[[collision]]\n")).items(len(text) + 16).items}
+    assert found["between"] == 'between = ["$1", "$2"]'
+    assert found["except"] == 'except = [["$1", "$2"]]'
+    found = {item.label: item.insert for item in of(session(text + "\n[[body]]\n")).items(len(text) + 10).items}
+    assert found["at"] == "at = [${1:0}, ${2:0}, ${3:0}]"
+    assert found["on"] == 'on = "$1"'
+    hover = of(session(text)).hover(text.index("sees = [") + 1)
+    assert hover is not None
+    assert "`sees` of `beam`" in hover.text
+
+
 def test_files_are_links_and_programs_look_at_the_files_of_their_world() -> None:
     made = session()
     links = of(made).links()

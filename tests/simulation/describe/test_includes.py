@@ -315,6 +315,25 @@ name = "to"
 name = "g"
 kind = "or"
 inputs = ["b.OUT1", "unit.OUT1", "{on}", "other.OUT1"]
+[[body]]
+name = "mark"
+on = "other"
+[[nest]]
+name = "tray"
+on = "mark"
+[[collision]]
+between = ["mark", "tray", "workpieces"]
+except = [["mark", "tray"], ["tray", "other"]]
+[[beam]]
+name = "eye"
+along = "+x"
+sees = ["workpieces", "mark"]
+[[conveyor]]
+name = "belt"
+[[conveyor.sensor]]
+sees = "mark"
+[[supply]]
+feeds = ["unit", "b", "other"]
 [[use]]
 name = "in"
 file = "inner/i.toml"
@@ -353,6 +372,25 @@ name = "u_to"
 name = "u_g"
 kind = "or"
 inputs = ["u_b.OUT1", "u_unit.OUT1", "m.OUT1", "other.OUT1"]
+[[body]]
+name = "u_mark"
+on = "other"
+[[nest]]
+name = "u_tray"
+on = "u_mark"
+[[collision]]
+between = ["u_mark", "u_tray", "workpieces"]
+except = [["u_mark", "u_tray"], ["u_tray", "other"]]
+[[beam]]
+name = "u_eye"
+along = "+x"
+sees = ["workpieces", "u_mark"]
+[[conveyor]]
+name = "u_belt"
+[[conveyor.sensor]]
+sees = "mark"
+[[supply]]
+feeds = ["u_unit", "u_b", "other"]
 [[fault]]
 name = "u_late"
 kind = "delay"

@@ -10,17 +10,29 @@ from steptwin.lsp.answers import Completion, CompletionKind, Completions
 from steptwin.lsp.world.outline import TableOutline, WorldOutline
 from steptwin.lsp.world.signals import WorldSignals
 from steptwin.lsp.world.snippets import table_snippet, value_snippet
+from steptwin.simulation.components.mount import MountSpec
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.describe.servicetables import SERVICE_TABLES, inner_tables
 from steptwin.simulation.describe.steptable import ACTIONS
 from steptwin.simulation.describe.tables import all_keys, written
 from steptwin.simulation.kinds.registry import KINDS
 from steptwin.simulation.toml.reader import Key
-from steptwin.simulation.toml.values import ANALOG_INPUT, DIGITAL_INPUT, OUTPUT, NameOf, PinOf, Word, flag
+from steptwin.simulation.toml.values import (
+    ANALOG_INPUT,
+    DIGITAL_INPUT,
+    OUTPUT,
+    NameOf,
+    NamesInSpace,
+    PinOf,
+    ValueReader,
+    Word,
+    flag,
+)
 from steptwin.symbols import SymbolKind
 
 _KEY = re.compile(r"[ \t]*([A-Za-z0-9_-]*)\Z")
-_VALUE = re.compile(r"[ \t]*([A-Za-z0-9_-]+)[ \t]*=[ \t]*([\"']?)([^\"'=,#]*)\Z")
+_VALUE = re.compile(r"[ \t]*([A-Za-z0-9_-]+)[ \t]*=[ \t]*(?:\[(?:[^#]*,)?[ \t\[]*)?([\"']?)([^\"'=,#\[\]]*)\Z")
+"""Of a key, or an item of its list in the same line."""
 _STEP = re.compile(r"[{,][ \t]*([A-Za-z_]*)\Z")
 _STEP_VALUE = re.compile(r"([A-Za-z_]+)[ \t]*=[ \t]*([\"'])([^\"']*)\Z")
 _STEP_NAMES = {
@@ -96,12 +108,18 @@ class ItemBuilder:
         key = next((key for key in keys_of(table) if key.name == name), None)
         if key is None:
             return
-        if isinstance(key.read, Word):
+        if isinstance(key.read, NamesInSpace):
+            kinds = (kind for kind, element in ELEMENTS.items() if issubclass(element.spec, MountSpec))
+            yield from (_text(word, span, mark, key.meaning) for word in key.read.words)
+            yield from (_text(named, span, mark, kind) for kind in kinds for named in self._outline.named(kind))
+        elif isinstance(key.read, Word | ValueReader) and key.read.words:
             yield from (_text(word, span, mark, key.meaning) for word in key.read.words)
         elif key.read is flag:
             yield from (Completion(word, CompletionKind.VALUE, span, key.meaning) for word in ("true", "false"))
         elif name == "line":
             yield from self._names(SymbolKind.LINE, span, mark)
+        elif name == "feeds":
+            yield from self._names(SymbolKind.CONTROLLER, span, mark)
         elif name == "follows":
             yield from self._names(SymbolKind.AXIS, span, mark)
         elif name == "drive":

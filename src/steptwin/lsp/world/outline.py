@@ -141,7 +141,7 @@ class WorldOutline:
             value = self.value_span(path, span)
             if value.start + 1 in defined:
                 yield defined[value.start + 1]
-            elif NAMING & set(path):
+            elif any(NAMING.refers(path[:n], step) for n, step in enumerate(path)):
                 # Of { "table.M1_EN" = 1 } the key names something.
                 yield from self._named(span if _is_key(path) else value)
 

@@ -26,13 +26,13 @@ from steptwin.simulation.space.contacts import Pair
 from steptwin.simulation.space.frames import Direction, Frame
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
-from steptwin.simulation.toml.values import INPUT_PIN, Terminal, name_value, number, permitting, whole, word
+from steptwin.simulation.toml.values import INPUT_PIN, Terminal, name_value, naming_in_space, number, whole, word
 from steptwin.state import Plain
 
 SEEN = "SEEN"
 
 
-@permitting(f"list of {WORKPIECES} and names of bodies, or of elements that carry some")
+@naming_in_space(f"list of {WORKPIECES} and names of bodies, or of elements that carry some", (WORKPIECES,))
 def _names(value: Any) -> tuple[str, ...]:
     if not isinstance(value, list) or not value:
         raise Misuse(f"{value!r}: expected a list of names, or ['{WORKPIECES}']")

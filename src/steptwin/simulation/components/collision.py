@@ -34,17 +34,17 @@ from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.space.contacts import Pair
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
-from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, flag, name_value, permitting, text_value, word
+from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, flag, name_value, naming_in_space, text_value, word
 
 
-@permitting("list of at least two names")
+@naming_in_space("list of at least two names", (WORKPIECES,))
 def _names(value: Any) -> tuple[str, ...]:
     if not isinstance(value, list) or len(value) < 2:
         raise Misuse(f"{value!r}: expected a list of at least two names")
     return tuple(map(name_value, value))
 
 
-@permitting("list of pairs of names, such as [['cup', 'table']]")
+@naming_in_space("list of pairs of names, such as [['cup', 'table']]")
 def _pairs(value: Any) -> tuple[tuple[str, str], ...]:
     if not isinstance(value, list) or not all(isinstance(one, list) and len(one) == 2 for one in value):
         raise Misuse(f"{value!r}: expected a list of pairs of names")

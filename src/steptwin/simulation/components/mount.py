@@ -16,7 +16,7 @@ from steptwin.simulation.mechanics.scale import exact_fraction
 from steptwin.simulation.space.frames import AXES, NM_PER_MM, Direction, Vector, X, Z
 from steptwin.simulation.space.pieces import Motion
 from steptwin.simulation.toml.table import TableSpec, key, table
-from steptwin.simulation.toml.values import FrameName, number, permitting
+from steptwin.simulation.toml.values import frame_name, number, permitting
 
 FARTHEST_MM = 100_000.0
 _COORDINATE = number(-FARTHEST_MM, FARTHEST_MM)
@@ -40,7 +40,7 @@ FORWARD, UPRIGHT = Direction(X, 1), Direction(Z, 1)
 DIRECTIONS = {str(one): one for axis in range(len(AXES)) for one in (Direction(axis, 1), Direction(axis, -1))}
 
 
-@permitting(", ".join(DIRECTIONS))
+@permitting(", ".join(DIRECTIONS), tuple(DIRECTIONS))
 def direction(value: Any) -> Direction:
     found = DIRECTIONS.get(value) if isinstance(value, str) else None
     if found is None:
@@ -52,7 +52,7 @@ def direction(value: Any) -> Direction:
 class MountSpec(TableSpec):
     """Where an element is in space. It is only there if one of these keys is given, or another element is on it."""
 
-    on: str | None = key(FrameName(), "the element that carries it; without it the floor does", default=None, order=2)
+    on: str | None = key(frame_name, "the element that carries it; without it the floor does", default=None, order=2)
     at: Vector | None = key(point, "[x, y, z] of its origin on that element, mm; default [0, 0, 0]", default=None, order=2)
 
     @property

@@ -43,7 +43,7 @@ def _shares(value: Any) -> tuple[float, float]:
     return one, other
 
 
-@permitting("two directions, such as ['+x', '+y']")
+@permitting("two directions, such as ['+x', '+y']", direction.words)
 def _directions(value: Any) -> tuple[Direction, Direction]:
     if not isinstance(value, list) or len(value) != 2:
         raise Misuse(f"{value!r}: expected two directions, such as ['+x', '+y']")

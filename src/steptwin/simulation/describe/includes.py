@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from steptwin.errors import Misuse
 from steptwin.simulation.kinds.registry import KINDS
 from steptwin.simulation.toml.keypaths import Path
 from steptwin.simulation.toml.reader import TomlText, WorldError, read_table
 from steptwin.simulation.toml.table import TableRows, TableSpec, key, table
-from steptwin.simulation.toml.values import NameOf, PinOf, name_value, text_value
+from steptwin.simulation.toml.values import NameOf, NamesInSpace, PinOf, Word, name_value, text_value
 
 ReadFile: TypeAlias = Callable[[str], bytes]
 """Gives the content of a file that a description names. Raises `Misuse`."""
@@ -37,16 +37,30 @@ class UseSpec(TableSpec):
 
 
 _REFERRING = frozenset(
-    {"line", "drive", "to", "from", "follows", "when", "until", "expect", "set", "press", "release", "write", "send"}
+    {"line", "drive", "feeds", "to", "from", "follows", "when", "until", "expect", "set", "press", "release", "write", "send"}
     | {"power_cycle", "turn", "couple", "machine", "element", "of", "move", "home", "wait_for"}
 )
 _IDENTIFIER = re.compile(r"(?<![\w.&-])[A-Za-z_][\w-]*")
 _PLACEHOLDER = re.compile(r"\{\{|\}\}|\{([^{}]*)\}")
 
 
-def referring_keys(rows: Mapping[str, TableRows]) -> frozenset[str]:
-    """Keys whose values name controllers, lines and elements."""
-    return _REFERRING | {key.name for of in rows.values() for key in of.keys if isinstance(key.read, PinOf | NameOf)}
+class ReferringKeys(NamedTuple):
+    """Keys whose values name controllers, lines and elements, but for those of tables in which a key of that name is a word."""
+
+    names: frozenset[str]
+    words: frozenset[tuple[str, str]]
+    """Tables, and keys in them."""
+
+    def refers(self, table: Path, key: object) -> bool:
+        """``table``: the path of the table that the key is in."""
+        kind = next((step for step in reversed(table) if isinstance(step, str)), "")
+        return key in self.names and (kind, key) not in self.words
+
+
+def referring_keys(rows: Mapping[str, TableRows]) -> ReferringKeys:
+    keys = [(table, key) for table, of in rows.items() for key in of.keys]
+    naming = frozenset(key.name for _, key in keys if isinstance(key.read, PinOf | NameOf | NamesInSpace))
+    return ReferringKeys(_REFERRING | naming, frozenset((table, key.name) for table, key in keys if isinstance(key.read, Word)))
 
 
 def given_files(files: Mapping[str, bytes]) -> ReadFile:
@@ -169,7 +183,7 @@ class _Instance:
     """The data of an include, for one use of it: with its names, files and parameters."""
 
     def __init__(
-        self, include: TomlText, prefix: str, where: str, parameters: Mapping[str, Any], referring: frozenset[str]
+        self, include: TomlText, prefix: str, where: str, parameters: Mapping[str, Any], referring: ReferringKeys
     ) -> None:
         self._include = include
         self._prefix = prefix
@@ -201,7 +215,7 @@ class _Instance:
 
     def _refers(self, path: Path, key: str) -> bool:
         """Whether the value of a key names something in the include."""
-        return key in self._referring or path[-1] == WITH or key == "clear_fault"
+        return self._referring.refers(path, key) or path[-1] == WITH or key == "clear_fault"
 
     @staticmethod
     def _gives_name(path: Path) -> bool:

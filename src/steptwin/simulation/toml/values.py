@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from math import isnan
-from typing import Any, ClassVar, Generic, TypeAlias, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar
 
 from steptwin.controller import SECOND
 from steptwin.durations import duration
@@ -30,14 +30,26 @@ class ValueReader(Generic[T]):
 
     read: Callable[[Any], T]
     permitted: str
+    words: tuple[str, ...] = ()
+    """Those that it may consist of, if they are few."""
 
     def __call__(self, value: Any) -> T:
         return self.read(value)
 
 
-def permitting(what: str) -> Callable[[Callable[[Any], T]], ValueReader[T]]:
+def permitting(what: str, words: tuple[str, ...] = ()) -> Callable[[Callable[[Any], T]], ValueReader[T]]:
     """Says what the decorated function takes."""
-    return lambda read: ValueReader(read, what)
+    return lambda read: ValueReader(read, what, words)
+
+
+@dataclass(frozen=True, slots=True)
+class NamesInSpace(ValueReader[T]):
+    """Names of elements with a place in space. One of ``words`` may stand for a name."""
+
+
+def naming_in_space(what: str, words: tuple[str, ...] = ()) -> Callable[[Callable[[Any], T]], NamesInSpace[T]]:
+    """Says what the decorated function takes, which reads names of elements with a place in space."""
+    return lambda read: NamesInSpace(read, what, words)
 
 
 @permitting("text")
@@ -261,14 +273,10 @@ class NameOf:
         return name_value(value)
 
 
-@dataclass(frozen=True, slots=True)
-class FrameName:
-    """The name of an element that has a frame, which carries others."""
-
-    permitted: ClassVar[str] = "name of an element with a place in space"
-
-    def __call__(self, value: Any) -> str:
-        return name_value(value)
+@naming_in_space("name of an element with a place in space")
+def frame_name(value: Any) -> str:
+    """The name of an element that carries others."""
+    return name_value(value)
 
 
 INPUT_PIN = PinOf(DIGITAL_INPUT)
