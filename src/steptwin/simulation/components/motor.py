@@ -18,6 +18,7 @@ NO_START_SPEED = Message(
     "simulation.no-start-speed",
     "a motor without start_speed follows every jump of the speed, and is caught only at rest once it has lost its field",
 )
+FOLLOWS_EVERY_JUMP = Message("simulation.follows-every-jump", "a motor without start_speed follows every jump of the speed")
 START_SPEED_HINT = Message("simulation.start-speed-hint", "the data sheet has it: pull-in speed, or maximum starting frequency")
 
 _not_negative = number(0.0)
@@ -48,7 +49,9 @@ class MotorSpec(TableSpec):
         number(), "constant N on a linear axis; positive pulls towards lower positions", default=0.0, kinds=("linear",)
     )
     start_speed: float | None = key(
-        _not_negative, "rev/min it starts with at once and is caught at; default any, caught at rest", default=None
+        _not_negative,
+        "rev/min it starts with at once and is caught at; default any, caught at rest (free: by its energy)",
+        default=None,
     )
     when_off: str = key(
         word("holds", "free"), "without current: holds (self-locking), or free: its load moves it", default="holds"
@@ -71,7 +74,8 @@ class MotorSpec(TableSpec):
 
     def check(self, text: TomlText) -> None:
         if self.start_speed is None:
-            text.warn(self.path, "D011", NO_START_SPEED(), START_SPEED_HINT())
+            without = FOLLOWS_EVERY_JUMP if self.when_off == "free" else NO_START_SPEED
+            text.warn(self.path, "D011", without(), START_SPEED_HINT())
         if self.torque[0][0] != 0.0 or any(torque < 0.0 for _, torque in self.torque):
             text.wrong((*self.path, "torque"), "D003", "a torque curve begins at 0 rev/min and is never negative")
         moves = self.inertia or self.mass
