@@ -195,3 +195,36 @@ def test_snapshots_and_recordings_have_it(text: str, moment_s: float, tmp_path: 
 def test_mistakes_have_their_places(power: str, text: str) -> None:
     with pytest.raises(WorldError, match=f"(?s)w.toml:16.*{text}"):
         World.from_toml(TEXT.replace("k.no", power), name="w.toml")
+
+
+def test_a_normally_closed_contact_gives_power_from_the_beginning() -> None:
+    world = World.from_toml(TEXT.replace("k.no", "k.nc"))
+    world.run(until=0.1)
+    assert [one for one in world.trace.of("event") if one.subject == "power"] == []
+    assert world.read("x.power") == 0.0  # its controller has not switched it on
+    world.mic488["c"].write("M1_EN", 1)
+    assert world.read("x.power") == 1.0
+
+
+def test_the_other_motor_of_a_gantry_moves_all_of_it() -> None:
+    """Half of the beam is not too much for a motor, all of it is."""
+    text = STIFF.replace('name = "x"', 'name = "y1"') + (
+        '[mic488.M2]\nunit = "mm"\ngear = 640.0\nacc = 900.0\ndec = 900.0\nvel = 90.0\nmot_resol = 3200\n'
+        '[[axis]]\nname = "y2"\ndrive = "c.M2"\npitch = 5.0\n[axis.motor]\ntorque = [[0, 0.8], [1500, 0.8]]\n'
+        '[[gantry]]\nname = "g"\naxis = "y1"\nother = "y2"\nlimit = 30\nfriction_force = 1500\n'
+    )
+    head, controller, rest = text.partition("[mic488.M2]")
+    second = controller + rest.partition("[[axis]]")[0]
+    text = head.replace("[[axis]]", second + "[[axis]]", 1) + "[[axis]]" + rest.partition("[[axis]]")[2]
+    world = World.from_toml(text)
+    device = world.mic488["c"]
+    device.write("OUT1", 1)
+    for number in (1, 2):
+        device.write(f"M{number}_EN", 1)
+        device.write(f"M{number}_POS_ABS", 80.0)
+    world.run(until=0.4)
+    assert (world.read("y1.stalled"), world.read("y2.stalled")) == (0.0, 0.0)
+    device.write("OUT1", 0)
+    world.run(until=0.5)
+    assert world.read("y1.power") == 0.0
+    assert world.read("y2.stalled") == 1.0
