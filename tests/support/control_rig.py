@@ -60,6 +60,9 @@ class Desk:
     def plans(self, what: Filter) -> list[Event]:
         return [Event(0, 5, "a", PlanPayload("1", at_rest(0, 7), 0))]
 
+    def workpieces(self) -> tuple[()]:
+        return ()
+
     def happen(self, count: int = 1) -> None:
         for number in range(count):
             self.subscribers.publish(Event(number, number, "a", EdgePayload("IN1", 1.0)))

@@ -19,6 +19,7 @@ from steptwin.subject.commands import COMMANDS, Command, type_of
 from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
 from steptwin.subject.events import Event, Numbering
 from steptwin.subject.jogs import ExtendableJog
+from steptwin.subject.scene import WorkpieceState
 from steptwin.subject.subscriptions import Filter, Subscription, Subscriptions
 
 TIME = "time"
@@ -250,7 +251,7 @@ class CompositeSubject:
         return Result(value, now, number)
 
     def present(self) -> dict[str, Any]:
-        return {"state": {}, "faults": []} if self._world is None else dict(self._world.present())
+        return {"state": {}, "faults": [], "workpieces": []} if self._world is None else dict(self._world.present())
 
     def subscribe(self, what: Filter, bound: int) -> Subscription:
         subscription = Subscription(what, bound, self._unsubscribe)
@@ -263,6 +264,10 @@ class CompositeSubject:
         self._subscriptions.remove(subscription)
         for member in self._members:
             member.subscribers.remove(subscription)
+
+    def workpieces(self) -> Sequence[WorkpieceState]:
+        """As `PlannedSubject.workpieces`."""
+        return () if self._world is None else self._world.workpieces()
 
     def plans(self, what: Filter) -> list[Event]:
         return [event for member in self._members for event in member.plans(what)]

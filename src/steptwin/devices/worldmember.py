@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from steptwin.jsonvalues import to_json
 from steptwin.subject import commands as command
 from steptwin.subject.contract import Description, PlannedSubject, Reading, Result
 from steptwin.subject.jogs import Jogs
@@ -11,9 +12,10 @@ from steptwin.subject.subscriptions import Subscriptions
 
 
 def present_of(world: PlannedSubject) -> dict[str, Any]:
-    """``state`` by controller and ``faults``."""
+    """``state`` by controller, ``faults`` and ``workpieces``."""
     states = {controller.name: world.do(command.ReadState(controller.name)).value for controller in world.description.controllers}
-    return {"state": states, "faults": world.do(command.ListFaults()).value}
+    pieces = [to_json(one) for one in world.workpieces()]
+    return {"state": states, "faults": world.do(command.ListFaults()).value, "workpieces": pieces}
 
 
 class WorldMember:
@@ -24,7 +26,8 @@ class WorldMember:
     def __init__(self, world: PlannedSubject, subscribers: Subscriptions, jogs: Jogs) -> None:
         self._world = world
         self.subscribers = subscribers
-        self.do, self.plans, self.begin_jog = world.answer, world.plans, jogs.begin_jog
+        self.do, self.plans, self.workpieces = world.answer, world.plans, world.workpieces
+        self.begin_jog = jogs.begin_jog
 
     @property
     def description(self) -> Description:

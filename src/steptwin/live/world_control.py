@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 from steptwin.live.debugging import Debugging
@@ -14,6 +14,7 @@ from steptwin.subject import commands as command
 from steptwin.subject import debugcommands
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event
+from steptwin.subject.scene import WorkpieceState
 from steptwin.subject.subscriptions import Filter, Subscription
 
 T = TypeVar("T")
@@ -61,6 +62,9 @@ class WorldControl:
 
     def plans(self, what: Filter) -> list[Event]:
         return self.at_present(lambda: self.subject.plans(what))
+
+    def workpieces(self) -> Sequence[WorkpieceState]:
+        return self.at_present(self.subject.workpieces)
 
     def at_present(self, action: Callable[[], T]) -> T:
         """Do something at the present moment, and set the timer for its consequences."""

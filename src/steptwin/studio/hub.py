@@ -15,6 +15,7 @@ from steptwin.access.roles import Role
 from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse, Refusal, SteptwinError
+from steptwin.jsonvalues import to_json
 from steptwin.messages import Message
 from steptwin.studio.branchrequests import Branches
 from steptwin.studio.calculations import Calculations
@@ -43,6 +44,7 @@ from steptwin.subject import commands as command
 from steptwin.subject.commands import COMMANDS
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.jogs import ExtendableJog, Jogs
+from steptwin.subject.scene import WorkpieceState
 from steptwin.subject.subscriptions import filter_of
 
 MOST_VIEWERS = 64
@@ -141,6 +143,8 @@ class Hub:
         self._clock_due: Nanos = 0
         self._running: tuple[bool, float] | None = None
         self._moment: tuple[Nanos, str] = (-1, "")
+        self._workpieces: Sequence[WorkpieceState] = ()
+        """As they were sent."""
         self.shared = SharedState(lost=None, control=None, viewers=0, leases=[], clock=None)
 
     def _describe(self) -> None:
@@ -376,6 +380,10 @@ class Hub:
         if points:
             self.watches.put(self.subject.read(*points))
         self.shared.put("lost", self.subject.lost)
+        pieces = self.subject.workpieces()
+        if pieces is not self._workpieces:
+            self._workpieces = pieces
+            self.shared.put("workpieces", [to_json(one) for one in pieces])
         self.streams.flush()
         over = [lease for lease in self._leases.values() if lease.held.over is not None]
         for lease in over:

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 from steptwin.access.roles import ROLES
 from steptwin.fields import Schema
-from steptwin.jsonvalues import FLAG, MOMENT, NUMBER, TEXT, WHOLE, list_of, members, or_null
+from steptwin.jsonvalues import FLAG, MOMENT, NUMBER, TEXT, WHOLE, list_of, members, or_null, shape
 from steptwin.subject.commands import VERSION
+from steptwin.subject.scene import WorkpieceState
 
 _COUNT: Schema = {"type": "integer", "minimum": 0}
 SPEED: Schema = {
@@ -40,6 +41,7 @@ _PRESENT: Mapping[str, Schema] = {
     },
     "faults": {"type": "array", "items": {"type": "object"}, "description": "As the answer to faults."},
     "plans": {"type": "array", "items": {"$ref": "#/$defs/(event)"}, "description": "Present plans of all axes."},
+    "workpieces": list_of(shape(WorkpieceState)),
 }
 CLOCK = members({"time_ns": MOMENT, "running": FLAG, "speed": SPEED})
 
@@ -140,6 +142,11 @@ _ROWS = (
     MessageRow("control", "Who holds control from now on.", CONTROL),
     MessageRow("viewers", "How many viewers there are now.", _COUNT),
     MessageRow("leases", "The jogs that are held now.", LEASES),
+    MessageRow(
+        "workpieces",
+        "The workpieces in space, after any came, went or was carried by something else.",
+        list_of(shape(WorkpieceState)),
+    ),
     MessageRow("lost", "The connection to the device is lost, and why; null when it is there again.", or_null(TEXT)),
 )
 

@@ -18,7 +18,7 @@ from steptwin.datatypes import format_short
 from steptwin.errors import Misuse
 from steptwin.explain.model import MemoryUse
 from steptwin.fields import PROGRAM, TIME, Meaning, RequestType, choices, number, whole
-from steptwin.jsonvalues import TEXT, JsonForm, Moment, list_of, members
+from steptwin.jsonvalues import TEXT, JsonForm, Moment, list_of, members, shape
 from steptwin.messages import Message
 from steptwin.nearmiss import NearMiss
 from steptwin.simulation.world.worldprograms import ShownProgram, ShownProgramText
@@ -33,6 +33,7 @@ from steptwin.studio.toolrequests import ToolRequest
 from steptwin.studio.workrequests import WorkRequest
 from steptwin.subject.commands import COMMANDS
 from steptwin.subject.payloads import KINDS
+from steptwin.subject.scene import WorkpieceState
 
 FASTEST_RATE = 30.0
 """Updates in a second of the wall clock."""
@@ -94,6 +95,7 @@ class PastEvents:
         "As in hello.",
     ]
     faults: Annotated[Sequence[Mapping[str, object]], JsonForm(list_of({"type": "object"}))]
+    workpieces: Annotated[Sequence[Mapping[str, object]], JsonForm(list_of(shape(WorkpieceState)))]
     plans: _EVENTS
     events: _EVENTS
 

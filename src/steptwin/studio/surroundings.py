@@ -22,6 +22,7 @@ from steptwin.studio.servicerequests import WorldServices
 from steptwin.studio.timetravel import TimeTravel
 from steptwin.studio.workrequests import Work
 from steptwin.subject.contract import AsyncSubject, Result
+from steptwin.subject.scene import WorkpieceState
 
 
 class PresentMoment(NamedTuple):
@@ -48,7 +49,11 @@ class Served(AsyncSubject, Protocol):
         ...
 
     def present(self) -> dict[str, Any]:
-        """``state`` by controller and ``faults``, if known."""
+        """``state`` by controller, ``faults`` and ``workpieces``, if known."""
+        ...
+
+    def workpieces(self) -> Sequence[WorkpieceState]:
+        """As `steptwin.subject.contract.PlannedSubject.workpieces`; none of a device."""
         ...
 
 

@@ -7,7 +7,7 @@ device behind a driver (`steptwin.drivers.subject`). Unknown values have the qua
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol
 
@@ -18,7 +18,7 @@ from steptwin.messages import read_message_text, with_messages
 from steptwin.subject.commands import VERSION, Command
 from steptwin.subject.controls import ControlDescription
 from steptwin.subject.events import Event
-from steptwin.subject.scene import NO_SCENE, SceneDescription
+from steptwin.subject.scene import NO_SCENE, SceneDescription, WorkpieceState
 from steptwin.subject.subscriptions import Filter, Subscription
 
 GOOD, UNKNOWN = "good", "unknown"
@@ -260,6 +260,10 @@ class PlannedSubject(Subject, Protocol):
 
     def plans(self, what: Filter) -> list[Event]:
         """The present plan of every axis that ``what`` selects, as events of now."""
+        ...
+
+    def workpieces(self) -> Sequence[WorkpieceState]:
+        """Those in space: the same object while none comes or goes, and none is carried by something else."""
         ...
 
 

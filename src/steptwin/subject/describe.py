@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import cast
 
 from steptwin.simulation.components.axis import AXIS, MECHANICS
 from steptwin.simulation.components.body import BODY
@@ -12,7 +13,8 @@ from steptwin.simulation.components.mount import MoverSpec
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.mechanics.drawing import Drawing, SensorZone
-from steptwin.simulation.space.frames import NM_PER_MM
+from steptwin.simulation.space.bodies import Box, half_height
+from steptwin.simulation.space.frames import FLOOR, NM_PER_MM, path, pose
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.wiring import connections, terminal_name
 from steptwin.subject.commands import COMMANDS
@@ -28,7 +30,7 @@ from steptwin.subject.contract import (
     SwitchDescription,
 )
 from steptwin.subject.controls import controls_of
-from steptwin.subject.scene import BodyDescription, FrameDescription, JointDescription, SceneDescription
+from steptwin.subject.scene import BodyDescription, FrameDescription, JointDescription, Point, SceneDescription, WorkpieceState
 
 
 def describe(world: Simulation) -> Description:
@@ -102,6 +104,32 @@ def _frame(name: str, mounted: Mounted) -> FrameDescription:
     x, y, z = (one / NM_PER_MM for one in place.origin)
     along = str(spec.towards()) if isinstance(spec, MoverSpec) and not joints else None
     return FrameDescription(name, str(spec.path[0]), place.on, (x, y, z), along, joints)
+
+
+def workpiece_states(world: Simulation) -> Iterator[WorkpieceState]:
+    """All workpieces in space, at the present moment."""
+    frames = world.objects.frames
+    owners = {mounted.frame: name for name, mounted in frames.items()}
+    for name, body in world.objects.workpieces.bodies().items():
+        carrier = next((one for one in body.frame.line() if one in owners), None)
+        there = pose(body.frame, FLOOR if carrier is None else carrier, world.now)
+        x, y, z = (one / NM_PER_MM for one in there.at)
+        shape, height = body.shape, 2 * half_height(body.shape) / NM_PER_MM
+        size = tuple(2 * one / NM_PER_MM for one in shape.half) if isinstance(shape, Box) else None
+        moves = any(one.motion is not None and not one.motion.is_still for one in path(carrier or FLOOR, body.frame))
+        on = None if carrier is None else owners[carrier]
+        travel = f"{on}.travel" if moves else None
+        yield WorkpieceState(
+            name,
+            cast("Point | None", size),
+            None if isinstance(shape, Box) else 2 * shape.radius / NM_PER_MM,
+            height,
+            on,
+            (x, y, z),
+            there.angle_q * 90.0,
+            travel,
+            0.0 if travel is None else world.read(travel),
+        )
 
 
 def _connections(world: Simulation) -> Iterator[ConnectionDescription]:

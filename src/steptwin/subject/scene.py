@@ -43,6 +43,21 @@ class BodyDescription:
 
 
 @dataclass(frozen=True, slots=True)
+class WorkpieceState:
+    """A workpiece, and where the middle of its lower face is in the frame of an element."""
+
+    name: str
+    size: Annotated[Point | None, "Of a box: length, width and height [mm]"]
+    diameter: Annotated[float | None, "Of an upright cylinder [mm]"]
+    height: float
+    on: Annotated[str | None, "The element that carries it, perhaps through other workpieces; none: the floor"]
+    at: Annotated[Point, "In the frame of that element, once all its joints have moved [mm]"]
+    yaw: Annotated[float, "Turn about z [degrees]"]
+    travel: Annotated[str | None, "A signal, in mm, by whose changes it moves along its conveyor; none: it stands there"]
+    travel_at: Annotated[float, "The value of that signal while it is at ``at``"]
+
+
+@dataclass(frozen=True, slots=True)
 class SceneDescription:
     """All elements that have a place in space."""
 

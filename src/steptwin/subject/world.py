@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import isfinite
 from typing import Any, get_args
@@ -28,10 +28,11 @@ from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import SimulationSnapshot
 from steptwin.subject import commands as command
 from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
-from steptwin.subject.describe import describe
+from steptwin.subject.describe import describe, workpiece_states
 from steptwin.subject.dispatch import Action, Dispatcher
 from steptwin.subject.events import Event, Numbering, payload_of
 from steptwin.subject.payloads import FramePayload, InputPayload, PacePayload, Payload, PlanPayload, RestoredPayload, WritePayload
+from steptwin.subject.scene import WorkpieceState
 from steptwin.subject.snapshots import Snapshots
 from steptwin.subject.subscriptions import Filter, Subscription, Subscriptions, filter_of
 from steptwin.subject.time import advance
@@ -65,6 +66,9 @@ class WorldSubject:
         self.on_subscribed: Callable[[], None] = lambda: None
         """Called when other kinds of events are subscribed to than before."""
         self.snapshots = Snapshots()
+        self._bodies: object = None
+        self._workpieces: Sequence[WorkpieceState] = ()
+        """Those of these bodies."""
         self.dispatcher = Dispatcher(self._actions(), self._begin, self._end)
         self.sources: dict[tuple[str, str], str] = {}
         """Who a client of a line is, for writes; a client that is not named here stands for itself."""
@@ -306,6 +310,13 @@ class WorldSubject:
                 if what.wants(event):
                     found.append(event)
         return found
+
+    def workpieces(self) -> Sequence[WorkpieceState]:
+        """Those in space: the same object while none comes or goes, and none is carried by something else."""
+        bodies = self.world.objects.workpieces.bodies()
+        if bodies is not self._bodies:
+            self._bodies, self._workpieces = bodies, tuple(workpiece_states(self.world))
+        return self._workpieces
 
     def paced(self, pace: PacePayload) -> None:
         """Report that time was paused or resumed."""

@@ -10,6 +10,7 @@ from world_rig import check_it_can_be_restored
 from steptwin.controller import SECOND
 from steptwin.files.world import World
 from steptwin.simulation.space.frames import FLOOR, pose
+from steptwin.subject.world import WorldSubject
 
 CELL = """
 [[mic488]]
@@ -189,3 +190,23 @@ def test_it_can_be_restored(tmp_path: Path) -> None:
     world = World.from_toml(CELL + steps)
     check_it_can_be_restored(world, World.from_toml(CELL + steps), 8.6, 25.0, tmp_path)
     assert world.read("outfeed.delivered") >= 2
+
+
+def test_a_viewer_gets_workpieces_when_they_go_elsewhere() -> None:
+    """While a belt moves one, the way of the belt says where it is."""
+    world = picked(CELL)
+    subject = WorldSubject(world)
+    states = {one.name: one for one in subject.workpieces()}
+    assert subject.workpieces() is subject.workpieces()
+    on_belt = states["infeed.1"]
+    assert (on_belt.on, on_belt.size, on_belt.travel) == ("outfeed", (40, 30, 20), "outfeed.travel")
+    assert on_belt.at == pytest.approx((0, -52, 0), abs=1e-4)
+    assert on_belt.yaw == 90.0
+    world.mic488["c"].write("OUT4", 1)
+    world.run(for_=0.5)
+    assert subject.workpieces() is not None
+    way = world.read("outfeed.travel") - on_belt.travel_at
+    body = world.objects.workpieces.bodies()["infeed.1"]
+    assert [one / 1e6 for one in pose(body.frame, FLOOR, world.now).at] == pytest.approx([350, -2 - way, 100], abs=1e-4)
+    world.run(for_=9.0)
+    assert "infeed.1" not in {one.name for one in subject.workpieces()}

@@ -228,6 +228,10 @@ class Conveyor(TerminalComponent):
             return nan
         return float(belt.workpieces[number].front(belt.position(now)) / belt.per_mm)
 
+    def travel(self, now: Nanos) -> float:
+        """mm that its belt has moved."""
+        return float(self.belt.position(now) / self.belt.per_mm)
+
     def mass(self, now: Nanos) -> float:
         """kg of the workpieces on it."""
         return sum(placed.workpiece.mass for placed in self.belt.workpieces)
@@ -468,6 +472,7 @@ def _signals(conveyor: Conveyor) -> Mapping[str, SignalOf]:
     }
     return {
         **places,
+        "travel": SignalOf(source, conveyor.travel, unit="mm", check=_refuse_place),
         "count": SignalOf(source, lambda now: float(len(conveyor.belt.workpieces))),
         "fed": SignalOf(source, lambda now: float(conveyor.fed)),
         "delivered": SignalOf(source, lambda now: float(conveyor.delivered)),
