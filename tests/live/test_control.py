@@ -160,7 +160,7 @@ def test_events_come_after_the_answer_with_its_id_until_they_are_not_wanted_any_
         assert "missed" not in found[0]
         writer.write(b'{"do": "unsubscribe", "subscription": "e", "id": 2}\n')
         assert (await next_of(reader))["id"] == 2
-        assert not desk.subscribers
+        assert not desk.subscribers.all
         writer.write(b'{"do": "unsubscribe", "subscription": "e"}\n')
         assert await next_of(reader) == misuse("no subscription has the id 'e'")
         writer.close()
@@ -171,9 +171,9 @@ def test_events_come_after_the_answer_with_its_id_until_they_are_not_wanted_any_
 def test_what_one_follows_ends_with_the_connection() -> None:
     async def play(endpoint: ControlEndpoint, desk: Desk) -> None:
         _, writer, _ = await subscription(endpoint)
-        assert desk.subscribers
+        assert desk.subscribers.all
         writer.close()
-        await until(lambda: not desk.subscribers)
+        await until(lambda: not desk.subscribers.all)
 
     served(play)
 
