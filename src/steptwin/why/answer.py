@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -12,6 +13,14 @@ SINCE_BEFORE = Message("why.since-before", "since before {time:.6f} s")
 FROM_THE_BEGINNING = Message("why.from-the-beginning", "from the beginning")
 
 MOST_LINKS = 8
+
+
+class ChainRule(enum.Enum):
+    """A rule that a chain can break."""
+
+    ORDER = "a cause comes before its effect"
+    """So a chain never returns to what it has named."""
+    ROOT = "what changed has a cause, unless it comes from outside or holds from the beginning"
 
 
 class ChainLink(NamedTuple):
@@ -39,6 +48,8 @@ class Answer(NamedTuple):
     """The moment from which on the past was searched."""
     is_cut: bool = False
     """Whether the chain ends there, because of something before that moment."""
+    broken: ChainRule | None = None
+    """The rule that what was found next would have broken: the chain was ended there, and its last link says so."""
 
     def text(self) -> str:
         """The answer in lines."""

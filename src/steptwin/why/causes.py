@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
-from typing import NamedTuple, TypeAlias
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message, MessageText, text_of
@@ -20,7 +19,8 @@ from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.control import Halt
 from steptwin.simulation.world.inputs import Download, See, SetVariable
 from steptwin.why.answer import ChainLink, since_before
-from steptwin.why.log import Act, CauseLog, Change
+from steptwin.why.chain import Cause, FoundCause, Place, nothing, unknown
+from steptwin.why.log import LAST, MOST_LOOKED_BACK, Act, CauseLog, Change, sets
 from steptwin.why.sentences import Frames, describe_input, statement
 
 BECAME = Message("why.became", "{signal} became {value:g}{how}")
@@ -46,30 +46,8 @@ WAS_IN_EXECUTION = Message("why.was-in-execution", "{statement} was in execution
 ENDED = Message("why.ended", "{statement} ended")
 DECIDED = Message("why.decided", "{statement} decided")
 PROGRAM_STARTED = Message("why.program-started", "the program started")
-MOST_LOOKED_BACK = 20_000
-"""Limit of the records and statements that are searched for one cause."""
 MOST_UNDECIDED = 5000
 """Limit of the statements among which the one that decided is looked for."""
-
-
-class Cause(NamedTuple):
-    """A link, and what finds the cause of it."""
-
-    link: ChainLink
-    before: Callable[[], Cause | None]
-
-
-FoundCause: TypeAlias = "Cause | None"
-
-
-def nothing() -> FoundCause:
-    """The end of a chain: what comes from outside or holds from the beginning."""
-    return None
-
-
-def unknown() -> FoundCause:
-    """The end of a chain whose cause was before the log."""
-    return None
 
 
 class Causes:
@@ -92,19 +70,19 @@ class Causes:
 
     def change(self, signal: str, change: Change, how: MessageText | None = None) -> Cause:
         """A signal took its value."""
-        owner = signal.partition(".")[0]
+        owner, place = signal.partition(".")[0], Place(change.time, change.order)
         if self._log.is_first(signal, change):
             text = IS_SINCE(signal=signal, value=change.value, since=since_before(self._log.begin), how=how or "")
-            return Cause(ChainLink(change.time, owner, text), self._at_begin)
+            return Cause(ChainLink(change.time, owner, text), place, self._at_begin)
         text = BECAME(signal=signal, value=change.value, how=how or "")
-        return Cause(ChainLink(change.time, owner, text), partial(self._of_change, signal, change))
+        return Cause(ChainLink(change.time, owner, text), place, partial(self._of_change, signal, change))
 
-    def last(self, signals: Sequence[str], until: Nanos, how: MessageText | None = None) -> FoundCause:
-        """The last change among signals by a moment."""
-        found = [(change, signal) for signal in signals if (change := self._log.last_change(signal, until))]
+    def last(self, signals: Sequence[str], until: Nanos, how: MessageText | None = None, before: int = LAST) -> FoundCause:
+        """The last change among signals by a moment, before an order."""
+        found = [(change, signal) for signal in signals if (change := self._log.last_change(signal, until, before))]
         if not found:
             return None
-        change, signal = max(found, key=lambda one: (one[0].time, one[0].position))
+        change, signal = max(found, key=lambda one: (one[0].time, one[0].order))
         return self.change(signal, change, how)
 
     def power(self, axis: str, until: Nanos) -> FoundCause:
@@ -125,7 +103,7 @@ class Causes:
 
     def _of_change(self, signal: str, change: Change) -> FoundCause:
         owner, _, terminal = signal.partition(".")
-        fault = self._fault(owner, change.time, None if owner in self._parts else terminal)
+        fault = self._fault(owner, change, None if owner in self._parts else terminal)
         if fault is not None:
             return fault
         if owner in self._parts:
@@ -136,49 +114,50 @@ class Causes:
             return self.moved(owner, change.time)
         return self._operated(owner, change)
 
-    def _fault(self, owner: str, time: Nanos, named: str | None = None) -> FoundCause:
-        """A fault that began or ended at a moment at a controller or element; one that names a terminal, if that is given."""
+    def _fault(self, owner: str, change: Change, named: str | None = None) -> FoundCause:
+        """A fault that began or ended at a controller or element at the moment of a change, and is recorded after it; one that
+        names a terminal, if that is given."""
         for group in (self._log.group(owner), -1):
-            for _, record in self._log.at(group, time):
+            for order, record in self._log.at(group, change.time):
                 if (
                     record.kind == "fault"
                     and record.controller == owner
                     and (named is None or named in str(record.value).split())
                 ):
                     link = ChainLink(record.time, record.controller, FAULT(name=record.subject, what=record.value))
-                    return Cause(link, partial(self._of_fault, record))
+                    return Cause(link, Place(record.time, change.order, -1), self._of_fault(record, order))
         return None
 
-    def _of_fault(self, record: TraceRecord) -> FoundCause:
-        for act in self._log.acts_at(record.time):
+    def _of_fault(self, record: TraceRecord, order: int) -> Callable[[], FoundCause]:
+        """What finds the action that set or cleared a fault, unless its description begins or ends it."""
+        for act in self._log.acts_at(record.time, order):
             match act.what:
                 case do.SetFault(fault) if record.subject.startswith(fault.name or fault.kind.name):
-                    return _acted(act)
+                    return partial(_acted, act)
                 case do.ClearFault(name) if name == record.subject:
-                    return _acted(act)
-        return None
+                    return partial(_acted, act)
+        return nothing
 
-    def lasting(self, signals: Sequence[str], at: Nanos, first: FoundCause) -> FoundCause:
+    def lasting(self, signals: Sequence[str], at: Nanos, first: FoundCause, before: int = LAST) -> FoundCause:
         """The fault that holds one of these signals at a moment, or the output to which a pin is wired, if it began to after the
         change ``first``, which is the next cause then."""
         pins = [signal for signal in signals if signal.partition(".")[0] in self._world.controllers]
         wired = [source for pin in pins for source in self.drivers(pin, at)]
         named = dict.fromkeys((*signals, *wired))
-        holds = [(hold.time, signal, hold.held) for signal in named if (hold := self._log.hold(signal, at)) and hold.held]
-        time, signal, held = max(holds, default=(-1, "", None))
-        if held is None or (first is not None and time <= first.link.time):
+        holds = [(hold.time, signal, hold) for signal in named if (hold := self._log.hold(signal, at, before)) and hold.held]
+        time, signal, hold = max(holds, default=(-1, "", None))
+        if hold is None or hold.held is None or (first is not None and time <= first.link.time):
             return first
+        held, place = hold.held, Place(time, hold.order)
 
         link = ChainLink(time, signal.partition(".")[0], IS(signal=signal, value=held.description()))
 
-        def before() -> FoundCause:
-            return first or self._at_begin()
-
-        for act in self._log.acts_before(time, MOST_LOOKED_BACK):
+        older = self._at_begin if first is None else lambda: first
+        for act in self._log.acts_before(time, hold.order):
             match act.what:
                 case do.SetFault(fault) if held.fault.startswith(fault.name or fault.kind.name):
-                    return Cause(link, partial(Cause, _acted(act).link, before))
-        return Cause(link, nothing if first is None and self._log.is_whole else before)
+                    return Cause(link, place, partial(Cause, *_acted(act)[:2], older))
+        return Cause(link, place, older)
 
     def _of_element(self, name: str, change: Change) -> FoundCause:
         """Cause of a change of an element's output: an input at the same moment, or one before, as much earlier as it delays."""
@@ -193,16 +172,16 @@ class Causes:
                 if (found := self._before(source, change, change.time - delay)) and found[0].time == change.time - delay
             ]
             if exact:
-                latest, source = max(exact, key=lambda found: found[0].position)
+                latest, source = max(exact, key=lambda found: found[0].order)
                 return self.change(source, latest, FOLLOWS_AFTER(name=name, delay_ms=delay / SECOND * 1000) if delay else None)
         if not last:
             return None
-        latest, source = max(last, key=lambda found: (found[0].time, found[0].position))
+        latest, source = max(last, key=lambda found: (found[0].time, found[0].order))
         return self.change(source, latest, HAS_ACTED_SINCE(name=name))
 
     def _before(self, signal: str, change: Change, until: Nanos) -> tuple[Change, str] | None:
         """The last change of a signal by a moment and before ``change``."""
-        found = self._log.last_change(signal, until, None if until < change.time else change.position)
+        found = self._log.last_change(signal, until, change.order)
         return None if found is None else (found, signal)
 
     def _sources(self, target: PinName) -> Iterator[str]:
@@ -228,20 +207,21 @@ class Causes:
         channels = [found for channel in self._sources(pin) if (found := self._before(channel, change, change.time))]
         at_once = [found for found in channels if found[0].time == change.time]
         if at_once:
-            latest, channel = max(at_once, key=lambda found: found[0].position)
+            latest, channel = max(at_once, key=lambda found: found[0].order)
             return self.change(channel, latest, CONTACT_OF(pin=str(pin)))
-        act = next((act for act in self._log.acts_at(change.time) if _sets(act, pin)), None)
+        act = next((act for act in self._log.acts_at(change.time, change.order) if sets(act, pin)), None)
         if act is not None:
             return _acted(act)
         path = self._world.objects.driven.get(pin)
         if path is not None:
             where = self._world.spec.text.where(path)
-            return Cause(ChainLink(change.time, pin.controller, DRIVES(kind=path[0], where=where, pin=str(pin))), nothing)
+            link = ChainLink(change.time, pin.controller, DRIVES(kind=path[0], where=where, pin=str(pin)))
+            return Cause(link, Place(change.time, change.order, -1), nothing)
         return self.in_controller(pin.controller, change, Resource(ResourceKind.PIN, pin.pin))
 
     def _operated(self, name: str, change: Change) -> FoundCause:
         """Who pressed a button."""
-        for act in self._log.acts_at(change.time):
+        for act in self._log.acts_at(change.time, change.order):
             match act.what:
                 case do.Press(button) | do.Release(button) if button == name:
                     return _acted(act)
@@ -273,7 +253,7 @@ class Causes:
     def at_moment(self, controller: str, time: Nanos, wanted: Resource | None) -> FoundCause:
         """Cause of a change in a controller that no record shows."""
         group = self._log.group(controller)
-        found = self.in_controller(controller, Change(time, 0.0, group, len(self._log.records[group])), wanted)
+        found = self.in_controller(controller, Change(time, 0.0, group, self._log.position(group, time), LAST), wanted)
         if found is None and wanted is not None:
             return self.motion(controller, wanted.name, time)
         return found
@@ -281,13 +261,13 @@ class Causes:
     def in_controller(self, controller: str, change: Change, wanted: Resource | None) -> FoundCause:
         """Cause of a change in a controller at a moment; ``wanted``: the resource, if it is known."""
         index = self._statement_at(controller, change, wanted)
-        since = -1 if index is None else self._log.executed[controller][index].position
+        since = -1 if index is None else self._log.executed[controller][index].order
         outside = self._from_outside(controller, change, since)
         if outside is not None:
             return outside
         if index is not None:
             return self.statement(controller, index)
-        act = next((act for act in self._log.acts_at(change.time) if _changes(act, controller)), None)
+        act = next((act for act in self._log.acts_at(change.time, change.order) if _changes(act, controller)), None)
         if act is not None:
             return _acted(act)
         return self._asked_before(controller, change) or self._inside(controller, change, wanted)
@@ -298,17 +278,17 @@ class Causes:
         for index in range(self._log.last_executed(controller, change.time), -1, -1):
             if executed[index].time < change.time:
                 break
-            if executed[index].position <= change.position:
+            if executed[index].order < change.order:
                 return index if _matches(self.use(controller, index).writes, wanted) else None
         return None
 
     def _from_outside(self, controller: str, change: Change, since: int) -> FoundCause:
-        """A request or another action that reached a controller at the moment of a change, after the position ``since``."""
+        """A request or another action that reached a controller at the moment of a change, after the order ``since``."""
         on = self._world.objects.line_of.get(controller)
-        for position, record in self._log.at(change.group, change.time):
-            if position < since:
+        for order, record in self._log.at(change.group, change.time):
+            if order < since:
                 break
-            if position >= change.position:
+            if order >= change.order:
                 continue
             if (
                 on is not None
@@ -316,29 +296,28 @@ class Causes:
                 and record.controller == on[0].name
                 and self._frames.reaches(record, on[1])
             ):
-                return self._frame(record)
+                return self._frame(record, order)
             if record.controller == controller and record.kind == "input":
-                return self._input(record)
+                return self._input(record, order)
         return None
 
     def _inside(self, controller: str, change: Change, wanted: Resource | None) -> FoundCause:
         """Cause of an act of the controller itself: an input, or the end of what an earlier statement began."""
-        after: Callable[[], FoundCause] = partial(self._earlier, controller, change.time, wanted)
-        event: TraceRecord | None = None
-        for position, record in self._log.at(change.group, change.time):
-            if position >= change.position or record.controller != controller:
+        earlier = partial(self._earlier, controller, change.time, wanted)
+        after: Callable[[], FoundCause] = earlier
+        found: tuple[ChainLink, Place] | None = None
+        for order, record in self._log.at(change.group, change.time):
+            if order >= change.order or record.controller != controller:
                 continue
             if record.kind == "edge" and self._is_input(PinName(controller, record.subject)):
-                edge = next(one for one in self._log.changes[f"{controller}.{record.subject}"] if one.position == position)
+                edge = next(one for one in self._log.changes[f"{controller}.{record.subject}"] if one.order == order)
                 after = partial(self.change, f"{controller}.{record.subject}", edge)
             elif record.kind == "event":
-                event = record
-        if event is not None:
-            return Cause(
-                ChainLink(change.time, controller, text_of(event.value if isinstance(event.value, str) else str(event.value))),
-                after,
-            )
-        return self._fault(controller, change.time) or self._ended(controller, change.time, wanted) or after()
+                text = text_of(record.value if isinstance(record.value, str) else str(record.value))
+                found, after = (ChainLink(change.time, controller, text), Place(change.time, order)), earlier
+        if found is not None:
+            return Cause(*found, after)
+        return self._fault(controller, change) or self._ended(controller, change.time, wanted) or after()
 
     def _ended(self, controller: str, time: Nanos, wanted: Resource | None) -> FoundCause:
         """The motion of an axis that ended at a moment."""
@@ -358,7 +337,9 @@ class Causes:
         for position in range(change.position - 1, max(-1, change.position - MOST_LOOKED_BACK), -1):
             record = records[position]
             if record.kind == "frame" and record.controller == on[0].name:
-                return self._frame(record) if self._frames.reaches(record, on[1]) else None
+                return (
+                    self._frame(record, self._log.order(change.group, position)) if self._frames.reaches(record, on[1]) else None
+                )
         return None
 
     def _earlier(self, controller: str, time: Nanos, wanted: Resource | None) -> FoundCause:
@@ -375,32 +356,34 @@ class Causes:
     def _is_input(self, pin: PinName) -> bool:
         return pin in self._world.objects.driven or pin in self._world.objects.circuits
 
-    def _frame(self, record: TraceRecord) -> Cause:
-        client = record.subject.rpartition("/")[0]
+    def _frame(self, record: TraceRecord, order: int) -> Cause:
+        client, place = record.subject.rpartition("/")[0], Place(record.time, order)
         meaning = self._frames.meaning(record)
         if client == SCRIPTS:
-            return Cause(ChainLink(record.time, record.controller, REQUEST(meaning=meaning)), partial(self._requested, record))
-        return Cause(ChainLink(record.time, record.controller, CLIENT(client=client, meaning=meaning)), nothing)
+            link = ChainLink(record.time, record.controller, REQUEST(meaning=meaning))
+            return Cause(link, place, partial(self._requested, record, order))
+        return Cause(ChainLink(record.time, record.controller, CLIENT(client=client, meaning=meaning)), place, nothing)
 
-    def _requested(self, record: TraceRecord) -> FoundCause:
+    def _requested(self, record: TraceRecord, order: int) -> FoundCause:
         """The step that made a request, which a line with timing carries later."""
         members = {name for name, (line, _) in self._world.objects.line_of.items() if line.name == record.controller}
-        for act in self._log.acts_before(record.time, MOST_LOOKED_BACK):
+        for act in self._log.acts_before(record.time, order):
             if _requests(act, record.controller, members):
                 return _acted(act)
         return None
 
-    def _input(self, record: TraceRecord) -> Cause:
-        act = next(self._log.acts_at(record.time), None)
+    def _input(self, record: TraceRecord, order: int) -> Cause:
+        act = next(self._log.acts_at(record.time, order), None)
         if act is not None:
             return _acted(act)
-        return Cause(ChainLink(record.time, record.controller, FROM_OUTSIDE(what=f"{record.subject} {record.value}")), nothing)
+        link = ChainLink(record.time, record.controller, FROM_OUTSIDE(what=f"{record.subject} {record.value}"))
+        return Cause(link, Place(record.time, order), nothing)
 
     # ------------------------------------------------------------------ motions
 
-    def motion(self, controller: str, axis: str, until: Nanos, mechanics: str = "") -> FoundCause:
-        """The motion of an axis at a moment; of all axes the one that ends last, if ``axis`` is empty."""
-        plan = max(self._log.plans_in_force(controller, axis, until), key=self._end, default=None)
+    def motion(self, controller: str, axis: str, until: Nanos, mechanics: str = "", before: int = LAST) -> FoundCause:
+        """The motion of an axis at a moment, begun before an order; of all axes the one that ends last, if ``axis`` is empty."""
+        plan = max(self._log.plans_in_force(controller, axis, until, before), key=self._end, default=None)
         if plan is None:
             return None
         record = self._log.record(plan)
@@ -409,16 +392,19 @@ class Causes:
         shown = f"{mechanics} ({name})" if mechanics else name
         is_before = not self._log.is_whole and plan.time == self._log.begin
         if is_before and profile.start < plan.time and profile.segments:
-            return Cause(ChainLink(profile.start, controller, BEGAN_TO_MOVE(axis=shown)), unknown)
+            return Cause(ChainLink(profile.start, controller, BEGAN_TO_MOVE(axis=shown)), Place(profile.start), unknown)
         if is_before and not profile.segments:
             return None
+        place = Place(plan.time, plan.order)
         if not profile.segments:
-            link = ChainLink(plan.time, controller, STOPPED(axis=shown))
+            text = STOPPED(axis=shown)
         elif profile.end is not None and profile.end <= until:
-            link = ChainLink(profile.end, controller, MOTION_ENDED(axis=shown, time=plan.time / SECOND))
+            text = MOTION_ENDED(axis=shown, time=plan.time / SECOND)
+            place = max(place, Place(profile.end))
         else:
-            link = ChainLink(plan.time, controller, BEGAN_TO_MOVE(axis=shown))
-        return Cause(link, partial(self.in_controller, controller, plan, Resource(ResourceKind.AXIS, record.subject)))
+            text = BEGAN_TO_MOVE(axis=shown)
+        cause = partial(self.in_controller, controller, plan, Resource(ResourceKind.AXIS, record.subject))
+        return Cause(ChainLink(place.time, controller, text), place, cause)
 
     def _end(self, plan: Change) -> tuple[float, Nanos]:
         """When the motion of a plan ends, which may be never; of several at once, the one planned last."""
@@ -443,12 +429,11 @@ class Causes:
     def statement(self, controller: str, index: int) -> Cause:
         """A statement was executed."""
         executed = self._log.executed[controller][index]
-        text = statement(self._log, executed)
+        text, place = statement(self._log, executed), Place(executed.time, executed.order, 3 * index + 1)
         if self._log.is_in_progress(executed):
-            return Cause(ChainLink(executed.time, controller, WAS_IN_EXECUTION(statement=text)), unknown)
-        return Cause(
-            ChainLink(executed.time, controller, WAS_EXECUTED(statement=text)), partial(self._of_statement, controller, index)
-        )
+            return Cause(ChainLink(executed.time, controller, WAS_IN_EXECUTION(statement=text)), place, unknown)
+        link = ChainLink(executed.time, controller, WAS_EXECUTED(statement=text))
+        return Cause(link, place, partial(self._of_statement, controller, index))
 
     def _of_statement(self, controller: str, index: int) -> FoundCause:
         """The wait or condition that let a statement be executed."""
@@ -458,36 +443,40 @@ class Causes:
             use = self.use(controller, earlier)
             if use.jumps is not None and executed[earlier + 1].location.number == use.jumps <= number:
                 number = executed[earlier].location.number
-            ended = executed[earlier + 1].time
-            if use.waits and ended - executed[earlier].time > self._world.programs[controller].statement_time:
-                return self._decided(controller, earlier, ended, ENDED)
+            ended = executed[earlier + 1]
+            if use.waits and ended.time - executed[earlier].time > self._world.programs[controller].statement_time:
+                place = Place(ended.time, ended.order, 3 * (earlier + 1))
+                return self._decided(controller, earlier, place, ENDED)
             if number in use.governs or (use.is_loop and executed[earlier + 1].location.number >= use.governs.stop):
-                return self._decided(controller, earlier, executed[earlier].time, DECIDED)
+                place = Place(executed[earlier].time, executed[earlier].order, 3 * earlier + 2)
+                return self._decided(controller, earlier, place, DECIDED)
         self.is_far = index >= MOST_UNDECIDED
         return None if self.is_far else self._started(controller)
 
-    def _decided(self, controller: str, index: int, time: Nanos, how: Message) -> Cause:
+    def _decided(self, controller: str, index: int, place: Place, how: Message) -> Cause:
         executed, use = self._log.executed[controller][index], self.use(controller, index)
         if use.is_loop:  # its condition is written where it begins
             executed = executed._replace(location=executed.location._replace(number=use.governs.start - 1))
-        link = ChainLink(time, controller, how(statement=statement(self._log, executed)))
-        return Cause(link, partial(self._of_decision, controller, index, time))
+        link = ChainLink(place.time, controller, how(statement=statement(self._log, executed)))
+        return Cause(link, place, partial(self._of_decision, controller, index, place))
 
-    def _of_decision(self, controller: str, index: int, time: Nanos) -> FoundCause:
+    def _of_decision(self, controller: str, index: int, place: Place) -> FoundCause:
         found = [
-            cause for resource in self.use(controller, index).reads if (cause := self.resource(controller, resource, time, index))
+            cause
+            for resource in self.use(controller, index).reads
+            if (cause := self.resource(controller, resource, index, place.time, place.order))
         ]
-        return max(found, key=lambda cause: cause.link.time) if found else self._of_statement(controller, index)
+        return max(found, key=lambda cause: cause.place) if found else self._of_statement(controller, index)
 
-    def resource(self, controller: str, resource: Resource, time: Nanos, index: int) -> FoundCause:
-        """The last change of what a statement reads."""
+    def resource(self, controller: str, resource: Resource, index: int, time: Nanos, before: int = LAST) -> FoundCause:
+        """The last change of what a statement reads by a moment, before an order."""
         match resource.kind:
             case ResourceKind.PIN:
                 every = [name for name in self._log.changes if name.startswith(f"{controller}.")]
                 read = [f"{controller}.{resource.name}"] if resource.name else every
-                return self.lasting(read, time, self.last(read, time))
+                return self.lasting(read, time, self.last(read, time, before=before), before)
             case ResourceKind.AXIS:
-                return self.motion(controller, resource.name, time)
+                return self.motion(controller, resource.name, time, before=before)
             case ResourceKind.VALUE:
                 for earlier in range(index - 1, max(-1, index - MOST_LOOKED_BACK), -1):
                     if resource in self.use(controller, earlier).writes:
@@ -498,8 +487,8 @@ class Causes:
         """The statement that was executed first."""
         if not self._log.is_whole:
             return None
-        executed = self._log.executed[controller]
-        return Cause(ChainLink(executed[0].time, controller, PROGRAM_STARTED()), nothing)
+        first = self._log.executed[controller][0]
+        return Cause(ChainLink(first.time, controller, PROGRAM_STARTED()), Place(first.time, first.order), nothing)
 
 
 def _inputs(part: TerminalComponent) -> list[str]:
@@ -516,14 +505,7 @@ def _matches(writes: Sequence[Resource], wanted: Resource | None) -> bool:
 def _acted(act: Act) -> Cause:
     what = describe_input(act.what)
     text = SCRIPT(name=act.script, what=what) if act.script else FROM_OUTSIDE(what=what)
-    return Cause(ChainLink(act.time, act.script or "outside", text), nothing)
-
-
-def _sets(act: Act, pin: PinName) -> bool:
-    match act.what:
-        case do.Set(levels):
-            return any(controller == pin.controller and name.upper() == pin.pin for controller, name, _ in levels)
-    return False
+    return Cause(ChainLink(act.time, act.script or "outside", text), Place(act.time, act.order), nothing)
 
 
 def _requests(act: Act, line: str, members: Collection[str]) -> bool:

@@ -5,10 +5,12 @@ A running world does not note this. Its past is run again with the inputs that i
 
 from __future__ import annotations
 
+import sys
 from array import array
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import takewhile
 from typing import NamedTuple
 
@@ -19,6 +21,7 @@ from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.faults.active import HeldLevel
 from steptwin.simulation.kinds.programs import Programs, StatementLocation
 from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.inputs import Download, ExternalInput
 from steptwin.simulation.world.simulation import Simulation
@@ -29,17 +32,21 @@ from steptwin.why import points
 
 MOST_NOTED = 20_000_000
 """Limit of what is noted, because it is kept in memory."""
+MOST_LOOKED_BACK = 20_000
+"""Limit of the records, actions and statements that are searched for one cause."""
+LAST = sys.maxsize
+"""The order of what is after all that was noted."""
 STATEMENTS_AT_ONCE = 2000
 """Most statements of one program between two parts of a run."""
 
 
 class Executed(NamedTuple):
-    """A statement of a program. ``position``: how many records of its group were noted before it."""
+    """A statement of a program. ``order``: as that of a `Change`."""
 
     time: Nanos
     controller: str
     location: StatementLocation
-    position: int
+    order: int
 
 
 class ExecutedStatements:
@@ -47,14 +54,14 @@ class ExecutedStatements:
 
     def __init__(self, controller: str) -> None:
         self._controller = controller
-        self.times, self.positions = array("q"), array("q")
+        self.times, self.orders = array("q"), array("q")
         self.locations: list[StatementLocation] = []
 
     def __len__(self) -> int:
         return len(self.times)
 
     def __getitem__(self, index: int) -> Executed:
-        return Executed(self.times[index], self._controller, self.locations[index], self.positions[index])
+        return Executed(self.times[index], self._controller, self.locations[index], self.orders[index])
 
     def last(self, until: Nanos) -> int:
         """The number of the last one by a moment; -1 if there is none."""
@@ -62,20 +69,23 @@ class ExecutedStatements:
 
 
 class Act(NamedTuple):
-    """An action of a script; from outside if ``script`` is empty."""
+    """An action of a script; from outside if ``script`` is empty. ``order``: as that of a `Change`."""
 
     time: Nanos
     script: str
     what: ExternalInput
+    order: int
 
 
 class Change(NamedTuple):
-    """A signal took a value. ``position``: its number among the records of its group."""
+    """A signal took a value. ``position``: its number among the records of its group; ``order``: grows with all that is noted, in
+    every group; a cause has a lower one than its effect of the same nanosecond."""
 
     time: Nanos
     value: float
     group: int
     position: int
+    order: int
 
 
 class Hold(NamedTuple):
@@ -83,6 +93,7 @@ class Hold(NamedTuple):
 
     time: Nanos
     held: HeldLevel | None
+    order: int = 0
 
 
 TOO_MUCH_TO_SEARCH = Message(
@@ -107,6 +118,8 @@ class CauseLog:
         self._pins = {name: frozenset(controller.pins()) for name, controller in world.controllers.items()}
         self.first_levels = levels_of(world)
         self.records: dict[int, list[TraceRecord]] = defaultdict(list)
+        self._orders: dict[int, array[int]] = defaultdict(partial(array, "q"))
+        """The order of each record, by group."""
         self.changes: dict[str, list[Change]] = defaultdict(list)
         self.executed = {name: ExecutedStatements(name) for name in world.controllers}
         self.plans: dict[tuple[str, str], list[Change]] = defaultdict(list)
@@ -166,29 +179,54 @@ class CauseLog:
 
     def _take(self, record: TraceRecord) -> None:
         self._count()
-        group = self._group_of.get(record.controller, -1)
+        group, order = self._group_of.get(record.controller, -1), self._order
         records = self.records[group]
         match record.kind:
             case "edge":
-                change = Change(record.time, record.level(), group, len(records))
-                self.changes[self.signal_of(record)].append(change)
+                signal = self.signal_of(record)
+                order = self._of_input(record) if self._is_input(record, signal) else order
+                self.changes[signal].append(Change(record.time, record.level(), group, len(records), order))
             case "plan":
-                self.plans[record.controller, record.subject].append(Change(record.time, 0.0, group, len(records)))
+                self.plans[record.controller, record.subject].append(Change(record.time, 0.0, group, len(records), order))
             case "fault":
                 self._note_holds(record.controller, record.time)
         records.append(record)
+        self._orders[group].append(order)
+
+    @property
+    def _order(self) -> int:
+        """The order of what was noted last."""
+        return 4 * self._events
+
+    def _is_input(self, record: TraceRecord, signal: str) -> bool:
+        """Whether an edge of a pin came from outside its controller."""
+        pin, parts = PinName(record.controller, record.subject), self.world.objects
+        if record.subject not in self._pins.get(record.controller, ()):
+            return False
+        if pin in parts.driven or pin in parts.circuits or parts.scheduler_of[pin.controller].wire_to(pin) is not None:
+            return True
+        return bool(self.acts) and self.acts[-1].time == record.time and sets(self.acts[-1], pin)
+
+    def _of_input(self, record: TraceRecord) -> int:
+        """The order of an edge of an input, recorded after the statements and events that it led to."""
+        group, events = self._group_of[record.controller], self._events - 1
+        for order, earlier in self.at(group, record.time):
+            if order != 4 * events or earlier.kind != "event" or earlier.controller != record.controller:
+                break
+            events -= 1
+        return 4 * events + 1
 
     def _note_holds(self, owner: str, now: Nanos) -> None:
         held = self.world.objects.faults.held(owner)
         for signal in (*held, *(name for name in self._holds if name.startswith(f"{owner}.") and name not in held)):
             holds = self._holds[signal]
             if (holds[-1].held if holds else None) != held.get(signal):
-                holds.append(Hold(now, held.get(signal)))
+                holds.append(Hold(now, held.get(signal), self._order))
 
     def _act(self, script: str, what: ExternalInput) -> None:
-        self._count()
         self.world.sync_all()
-        self.acts.append(Act(self.world.now, script, what))
+        self._count()
+        self.acts.append(Act(self.world.now, script, what, self._order))
         match what:
             case Download(controller=controller):
                 self._replaced[controller] = self.world.now
@@ -196,17 +234,17 @@ class CauseLog:
             case do.ClearFault(name):
                 for holds in self._holds.values():
                     if (held := holds[-1].held) is not None and held.fault == name:
-                        holds.append(Hold(self.world.now, None))
+                        holds.append(Hold(self.world.now, None, self._order))
 
     def _executes(self, name: str, now: Nanos, location: StatementLocation) -> None:
         executed = self.executed[name]
         executed.times.append(now)
         executed.locations.append(location)
-        executed.positions.append(len(self.records[self._group_of[name]]))
+        executed.orders.append(self._order + 2)
 
     def _hook(self, name: str, programs: Programs) -> StatementHook:
-        executed, records = self.executed[name], self.records[self._group_of[name]]
-        add_time, add_location, add_position = executed.times.append, executed.locations.append, executed.positions.append
+        executed = self.executed[name]
+        add_time, add_location, add_order = executed.times.append, executed.locations.append, executed.orders.append
         location_of, keeping, points = programs.location, self._keeping[name], self.points
         before = False
         """Whether the last statement may have changed points."""
@@ -218,7 +256,7 @@ class CauseLog:
                 return
             add_time(now)
             add_location(location)
-            add_position(len(records))
+            add_order(4 * self._events + 2)
             keeps = keeping.get(location)
             if keeps is None:
                 keeps = keeping[location] = programs.use(location).keeps
@@ -252,17 +290,13 @@ class CauseLog:
         last = self.last_change(signal, now)
         return self.first_levels.get(signal, 0.0) if last is None else last.value
 
-    def last_change(self, signal: str, until: Nanos, before: int | None = None) -> Change | None:
-        """The last change of a signal by a moment; ``before``: before a position of its group at that moment."""
-        changes = self.changes.get(signal, [])
-        index = bisect_right(changes, until, key=lambda change: change.time)
-        while index and before is not None and changes[index - 1].time == until and changes[index - 1].position >= before:
-            index -= 1
-        return changes[index - 1] if index else None
+    def last_change(self, signal: str, until: Nanos, before: int = LAST) -> Change | None:
+        """The last change of a signal by a moment, before an order."""
+        return _last(self.changes.get(signal, []), until, before)
 
-    def hold(self, signal: str, at: Nanos) -> Hold | None:
-        """Cause that holds a signal at a moment, and since when."""
-        last = next((hold for hold in reversed(self._holds.get(signal, ())) if hold.time <= at), None)
+    def hold(self, signal: str, at: Nanos, before: int = LAST) -> Hold | None:
+        """Cause that holds a signal at a moment, before an order, and since when."""
+        last = next((hold for hold in reversed(self._holds.get(signal, ())) if hold.time <= at and hold.order < before), None)
         return None if last is None or last.held is None else last
 
     def changes_in(self, signal: str, after: Nanos, until: Nanos) -> Iterator[Nanos]:
@@ -291,37 +325,43 @@ class CauseLog:
         last = self.last_change(signal, until)
         return None if last is None or self.is_first(signal, last) else last.time
 
-    def plans_in_force(self, controller: str, axis: str, at: Nanos) -> Iterator[Change]:
-        """The plan of an axis that is in force at a moment; of each axis, if ``axis`` is empty."""
+    def plans_in_force(self, controller: str, axis: str, at: Nanos, before: int = LAST) -> Iterator[Change]:
+        """The plan of an axis that is in force at a moment, before an order; of each axis, if ``axis`` is empty."""
         for (name, number), plans in self.plans.items():
-            if name == controller and axis in ("", number):
-                index = bisect_right(plans, at, key=lambda plan: plan.time)
-                if index:
-                    yield plans[index - 1]
+            if name == controller and axis in ("", number) and (plan := _last(plans, at, before)) is not None:
+                yield plan
+
+    def order(self, group: int, position: int) -> int:
+        """The order of a record."""
+        return self._orders[group][position]
 
     def record(self, change: Change) -> TraceRecord:
         return self.records[change.group][change.position]
 
     def at(self, group: int, time: Nanos) -> Iterator[tuple[int, TraceRecord]]:
-        """The records of a group at a moment, with their positions, the last one first."""
-        records = self.records[group]
+        """The records of a group at a moment, with their orders, the last one first."""
+        records, orders = self.records[group], self._orders[group]
         for position in range(bisect_right(records, time, key=lambda record: record.time) - 1, -1, -1):
             if records[position].time < time:
                 break
-            yield position, records[position]
+            yield orders[position], records[position]
 
     def group(self, name: str) -> int:
         """The group of a controller, line or element."""
         return self._group_of.get(name, -1)
 
-    def acts_at(self, time: Nanos) -> Iterator[Act]:
-        """Acts of scripts and from outside at a moment, the last one first."""
-        return takewhile(lambda act: act.time == time, self.acts_before(time, len(self.acts)))
+    def acts_at(self, time: Nanos, before: int) -> Iterator[Act]:
+        """Acts of scripts and from outside at a moment, before an order, the last one first."""
+        return takewhile(lambda act: act.time == time, self.acts_before(time, before))
 
-    def acts_before(self, until: Nanos, most: int) -> Iterator[Act]:
-        """Acts of scripts and from outside by a moment, the last one first; ``most`` of them."""
-        last = bisect_right(self.acts, until, key=lambda act: act.time) - 1
-        return (self.acts[index] for index in range(last, max(-1, last - most), -1))
+    def acts_before(self, until: Nanos, before: int) -> Iterator[Act]:
+        """Acts of scripts and from outside by a moment, before an order, the last ones first."""
+        last = bisect_left(self.acts, (until, before), key=lambda act: (act.time, act.order)) - 1
+        return (self.acts[index] for index in range(last, max(-1, last - MOST_LOOKED_BACK), -1))
+
+    def position(self, group: int, time: Nanos) -> int:
+        """The number of the records of a group until the end of a moment."""
+        return bisect_right(self.records[group], time, key=lambda record: record.time)
 
     def is_of_present_text(self, executed: Executed) -> bool:
         """Whether the text of a statement is still in its controller."""
@@ -331,6 +371,19 @@ class CauseLog:
     def last_executed(self, controller: str, until: Nanos) -> int:
         """The number of the last statement of a controller by a moment; -1 if there is none."""
         return self.executed[controller].last(until)
+
+
+def sets(act: Act, pin: PinName) -> bool:
+    """Whether an action gives a pin a level."""
+    match act.what:
+        case do.Set(levels):
+            return any(controller == pin.controller and name.upper() == pin.pin for controller, name, _ in levels)
+    return False
+
+
+def _last(changes: Sequence[Change], until: Nanos, before: int) -> Change | None:
+    index = bisect_left(changes, (until, before), key=lambda change: (change.time, change.order))
+    return changes[index - 1] if index else None
 
 
 def in_parts(world: Simulation, inputs: Sequence[RecordedInput], end: Nanos) -> Iterator[bool]:

@@ -21,8 +21,9 @@ from steptwin.simulation.world.snapshot import RecordedInput
 from steptwin.simulation.world.snapshotlog import outside_past
 from steptwin.why import points
 from steptwin.why.answer import MOST_LINKS, Answer, ChainLink, since_before
-from steptwin.why.causes import IS, IS_SINCE, Cause, Causes, nothing
-from steptwin.why.log import MOST_NOTED, CauseLog, in_parts
+from steptwin.why.causes import IS, IS_SINCE, Causes
+from steptwin.why.chain import NOT_KNOWN, Cause, Place, broken, nothing
+from steptwin.why.log import LAST, MOST_NOTED, CauseLog, in_parts
 from steptwin.why.replayed import ReplayedSignals, TimeSeries, watch_truth, watch_value
 from steptwin.why.search import Asked
 from steptwin.why.sentences import statement
@@ -413,7 +414,7 @@ class Why:
         links = [link for resource in use.reads for link in self._awaited(controller, resource, at)]
         if not use.reads:
             links.append(ChainLink(here.time, controller, WAITS_FOR_A_TIME()))
-        found = [cause for resource in use.reads if (cause := causes.resource(controller, resource, at, index))]
+        found = [cause for resource in use.reads if (cause := causes.resource(controller, resource, index, at))]
         changed = [cause for cause in found if cause.link.time > here.time]
         first = max(changed, key=lambda cause: cause.link.time, default=None) or causes.statement(controller, index)
         answer = yield from self._answer(controller, at, WAITS(controller=controller, statement=text), since, first)
@@ -452,12 +453,20 @@ class Why:
     # ------------------------------------------------------------------ the chain
 
     def _answer(self, question: str, at: Nanos, state: MessageText, since: Nanos | None, first: Cause | None) -> Asking:
-        links: list[ChainLink] = []
-        cause, last = first, None
-        while cause is not None and len(links) < MOST_LINKS and cause.link not in links:
-            links.append(cause.link)
-            cause, last = cause.before(), cause
+        chain: list[Cause] = []
+        cause, effect = first, Place(at, LAST)
+        while cause is not None and len(chain) < MOST_LINKS:
+            chain.append(cause)
+            if broken(chain, effect, is_followed=False):
+                break
+            cause = cause.before()
             yield
-        is_followed = (cause is None or cause.link in links) and not self._causes.is_far
-        is_cut = is_followed and not self.log.is_whole and (last is None or last.before is not nothing)
-        return Answer(question, at, state, since, tuple(links), is_followed and not is_cut, self.log.begin, is_cut)
+        is_followed = cause is None and not self._causes.is_far
+        is_cut = is_followed and not self.log.is_whole and (not chain or chain[-1].before is not nothing)
+        is_owed = is_followed and not is_cut and (since is not None or bool(chain))
+        links, found = [one.link for one in chain], broken(chain, effect, is_followed=is_owed)
+        if found is None:
+            return Answer(question, at, state, since, tuple(links), is_followed and not is_cut, self.log.begin, is_cut)
+        first_link = ChainLink(at if since is None else since, question.partition(".")[0], state)
+        links[found.number :] = [(links[found.number - 1] if found.number else first_link)._replace(text=NOT_KNOWN())]
+        return Answer(question, at, state, since, tuple(links), True, self.log.begin, False, found.rule)
