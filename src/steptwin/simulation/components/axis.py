@@ -349,6 +349,16 @@ def load_motion(axis: BuiltAxis, per_pulse: Fraction) -> Motion:
     return Motion(mechanism.version, lambda now: geared(pieces_of_trajectory(mechanism.trajectory(now), now), gear))
 
 
+def summed_travel(axes: Sequence[BuiltAxis], shares: Sequence[float]) -> tuple[float, float] | None:
+    """Where a sum of shares of positions may be; None where the travel of an axis is not known."""
+    ends = [
+        (axis.spec.travel[0] * share, axis.spec.travel[1] * share)
+        for axis, share in zip(axes, shares, strict=True)
+        if axis.spec.travel is not None
+    ]
+    return (sum(map(min, ends)), sum(map(max, ends))) if len(ends) == len(axes) else None
+
+
 def moved_by(axis: BuiltAxis) -> tuple[str, str]:
     """What changes the motion of an axis."""
     return axis.mechanism.controller, axis.spec.name
@@ -359,9 +369,11 @@ def _moves(spec: AxisSpec, axis: BuiltAxis) -> Sequence[Movement]:
     if spec.kind == "rotary":
         degrees = degrees_per_unit(axis)
         motion = load_motion(axis, degrees / 90 / axis.scale.pulses_per_unit)
-        return (Movement("position", motion, spec.towards(UPRIGHT), float(degrees), blocks, sources, turns=True),)
+        return (
+            Movement("position", motion, spec.towards(UPRIGHT), float(degrees), blocks, sources, turns=True, travel=spec.travel),
+        )
     motion = load_motion(axis, nm_per_pulse(axis))
-    return (Movement("position", motion, spec.towards(), float(mm_per_unit(axis)), blocks, sources),)
+    return (Movement("position", motion, spec.towards(), float(mm_per_unit(axis)), blocks, sources, travel=spec.travel),)
 
 
 AXIS: Element[AxisSpec, BuiltAxis] = Element(

@@ -204,7 +204,7 @@ def _moves(spec: CylinderSpec, cylinder: Cylinder) -> Sequence[Movement]:
     travel = cylinder.travel
     gear = Gear(float(to_nm(spec.stroke)), float(travel.full))
     motion = Motion(travel.version, lambda now: geared(pieces_of_travel(travel, now), gear))
-    return (Movement("position", motion, spec.towards(), 1.0, (cylinder.obstruct,), (spec.name,)),)
+    return (Movement("position", motion, spec.towards(), 1.0, (cylinder.obstruct,), (spec.name,), travel=(0.0, spec.stroke)),)
 
 
 CYLINDER = with_terminals(

@@ -253,7 +253,8 @@ def _moves(spec: FollowerSpec, follower: Follower) -> Sequence[Movement]:
         raise Misuse(f"{spec.name!r} is lifted by {spec.unit}: in space a lift is in {', '.join(LENGTHS)}")
     mm, axis = metres * 1000, follower.shaft.axis
     sources = (*moved_by(axis), spec.shaft, spec.name)
-    return (Movement("position", follower.motion(mm * NM_PER_MM), spec.towards(), float(mm), (axis.mechanism.block,), sources),)
+    motion, blocks = follower.motion(mm * NM_PER_MM), (axis.mechanism.block,)
+    return (Movement("position", motion, spec.towards(), float(mm), blocks, sources, travel=(0.0, spec.highest)),)
 
 
 FOLLOWER: Element[FollowerSpec, Follower] = Element(

@@ -86,6 +86,10 @@ class Frames(Mapping[str, Mounted]):
         """What moves two frames against each other."""
         return [self._movements[step.frame] for step in path(one, other) if step.frame in self._movements]
 
+    def movement(self, frame: Frame) -> Movement | None:
+        """What moves a frame with a joint, if an element does."""
+        return self._movements.get(frame)
+
     def carrying(self, frame: Frame) -> list[Movement]:
         """What moves a frame, up to the floor."""
         return [self._movements[one] for one in frame.line() if one in self._movements]

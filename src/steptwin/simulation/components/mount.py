@@ -112,6 +112,8 @@ class Movement(NamedTuple):
     sources: tuple[str, ...]
     """Controllers and elements whose changes change the motion."""
     turns: bool = False
+    travel: tuple[float, float] | None = None
+    """Where the signal may be, if that is known."""
 
 
 def places(mounts: Mapping[str, MountSpec]) -> dict[str, MountSpec]:

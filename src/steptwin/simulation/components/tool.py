@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, mm_per_unit, moved_by
+from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, mm_per_unit, moved_by, summed_travel
 from steptwin.simulation.components.coordinate import GRID_PER_UNIT, Coordinate, Pulled, pulled_to
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementcontext import ElementContext
@@ -229,8 +229,8 @@ def _moves(spec: ToolSpec, tool: Tool) -> Sequence[Movement]:
     blocks = tuple(axis.mechanism.block for axis in tool.axes)
     sources = tuple(dict.fromkeys((*moved_by(tool.axes[0]), *moved_by(tool.axes[1]), spec.name)))
     return tuple(
-        Movement(name, its.motion, along, mm, blocks, sources)
-        for (name, its), along in zip(tool.coordinates.items(), spec.along, strict=True)
+        Movement(name, its.motion, along, mm, blocks, sources, travel=summed_travel(tool.axes, shares))
+        for (name, its), along, shares in zip(tool.coordinates.items(), spec.along, (spec.x, spec.y), strict=True)
     )
 
 

@@ -179,5 +179,17 @@ def _beyond_sides(one: Placed, other: Placed) -> list[list[float]]:
     ]
 
 
+def contains(outer: Placed, inner: Placed) -> bool:
+    """Whether a body lies inside another; faces may be common."""
+    its, (u, v, w), radius = outer.outline, outer.place, inner.outline.radius
+    if abs(inner.place[2] - w) + inner.outline.half_w > its.half_w:
+        return False
+    corners = [(x - u, y - v) for x, y in inner.corners()]
+    if its.radius:
+        return all(length(x, y) + radius <= its.radius for x, y in corners)
+    c, s = outer.cosine, outer.sine
+    return all(abs(c * x + s * y) + radius <= its.half_u and abs(c * y - s * x) + radius <= its.half_v for x, y in corners)
+
+
 OVERLAP_NM = -0.5
 """Bodies overlap that are less than this apart: by half of the unit of poses, so that faces that touch do not."""

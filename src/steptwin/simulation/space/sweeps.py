@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from bisect import bisect_left, insort
+from collections.abc import Callable
 from math import frexp, inf, isfinite, ldexp
 from typing import NamedTuple, TypeAlias
 
 from steptwin.controller import Nanos
 from steptwin.motion.trig import cosine, length, sine
 from steptwin.simulation.space.bodies import Body, Box
-from steptwin.simulation.space.frames import AXES, Joint
-from steptwin.simulation.space.pieces import span
+from steptwin.simulation.space.frames import AXES, Frame, Joint
+from steptwin.simulation.space.pieces import Range, span
 
 ROUNDING_NM = 1.0
 
@@ -27,13 +28,21 @@ class Sweep(NamedTuple):
 
 def sweep(body: Body, now: Nanos) -> Sweep:
     """Space that a body may occupy from a moment on, as everything below it moves now."""
+    return swept(body, lambda frame, joint: span(joint.motion.pieces(now)))
+
+
+def swept(body: Body, ranges: Callable[[Frame, Joint], Range], seen_from: Frame | None = None) -> Sweep:
+    """Space that a body may occupy while each joint below it is in a range, seen from a frame that it is on; without one from
+    the floor."""
     shape = body.shape
     half = shape.half if isinstance(shape, Box) else (shape.radius, shape.radius, shape.half)
     low = [float(c - h) for c, h in zip(body.centre, half, strict=True)]
     high = [float(c + h) for c, h in zip(body.centre, half, strict=True)]
     for frame in body.frame.line():
+        if frame is seen_from:
+            break
         if frame.joint is not None:
-            _carry(frame.joint, low, high, now)
+            _carry(frame.joint, low, high, ranges(frame, frame.joint))
         for axis, shift in enumerate(frame.at):
             low[axis] += shift
             high[axis] += shift
@@ -41,9 +50,9 @@ def sweep(body: Body, now: Nanos) -> Sweep:
     return Sweep((a - ROUNDING_NM, b - ROUNDING_NM, c - ROUNDING_NM), (d + ROUNDING_NM, e + ROUNDING_NM, f + ROUNDING_NM))
 
 
-def _carry(joint: Joint, low: list[float], high: list[float], now: Nanos) -> None:
+def _carry(joint: Joint, low: list[float], high: list[float], ends: Range) -> None:
     axis, sign = joint.along
-    least, most = (sign * end for end in span(joint.motion.pieces(now))[::sign])
+    least, most = (sign * end for end in ends[::sign])
     if not joint.turns:
         low[axis] += least
         high[axis] += most

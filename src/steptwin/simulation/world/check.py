@@ -11,6 +11,7 @@ from steptwin.errors import Misuse
 from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.description import describe
 from steptwin.simulation.describe.includes import is_include
+from steptwin.simulation.describe.overlaps import check_overlaps
 from steptwin.simulation.toml.reader import TomlText, WorldError
 from steptwin.simulation.world.simulation import Simulation
 
@@ -47,7 +48,8 @@ def diagnose(name: str, text: str, read: Callable[[str], bytes]) -> Diagnosis:
             except Misuse as error:
                 spec.text.wrong(key, "D009", str(error))
         blueprint = Blueprint(spec, files)
-        Simulation(blueprint, keep_trace=False, keep_inputs=False)
+        objects = Simulation(blueprint, keep_trace=False, keep_inputs=False).objects
+        check_overlaps(spec.text, objects)
         found: Sequence[Diagnostic] = in_order([*spec.text.findings, *spec.text.warnings])
     except WorldError as error:
         found = error.findings
