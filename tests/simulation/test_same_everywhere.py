@@ -11,10 +11,12 @@ import pytest
 
 from steptwin.files.world import World
 
-EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
+FOLDERS = Path(__file__).parents[2] / "examples" / "worlds", Path(__file__).parent / "one_dimensional"
+"""The examples, and worlds without keys of space."""
 GOLDEN = Path(__file__).parent / "golden" / "digests.txt"
 FAULTS = {
     "hoist": "worn-brake element=hold share=0.2",
+    "pick_and_place_1d": "leak element=cup from_s=8.2 until_s=8.4",
     "pick_and_place": "leak element=cup from_s=8.2 until_s=8.4",
     "plotter": "stall machine=cell axis=3 at_s=4 for_s=0.5",
     "winder": "stuck-follower element=guide from_s=8",
@@ -24,11 +26,12 @@ RUN_S = 20
 
 
 def names() -> list[str]:
-    return sorted(file.stem for file in EXAMPLES.rglob("*.toml") if "[parameters]" not in file.read_text())
+    files = (file for folder in FOLDERS for file in folder.rglob("*.toml"))
+    return sorted(file.stem for file in files if "[parameters]" not in file.read_text())
 
 
 def digest(name: str) -> str:
-    (file,) = EXAMPLES.rglob(f"{name}.toml")
+    (file,) = (file for folder in FOLDERS for file in folder.rglob(f"{name}.toml"))
     with World.load(file, seed=7) as world:
         if name in FAULTS:
             world.fault(FAULTS[name])

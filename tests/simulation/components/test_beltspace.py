@@ -171,6 +171,7 @@ def test_what_is_put_on_the_rear_of_another_one_falls_to_the_floor() -> None:
         "infeed.2 collides with infeed.1 on outfeed",
         "infeed.2 lies on the floor",
     ]
+    assert world.read("cup.dropped") == 1
 
 
 def test_it_can_be_restored(tmp_path: Path) -> None:

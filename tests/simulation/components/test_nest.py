@@ -195,6 +195,16 @@ def test_what_is_let_go_in_the_air_falls_for_as_long_as_it_does() -> None:
     assert rig.world.read("cup.dropped") == 1
 
 
+@pytest.mark.parametrize(("height", "lies"), [(1.9, True), (2.1, False)])
+def test_a_workpiece_may_be_pressed_a_little_into_what_it_is_put_on(height: float, lies: bool) -> None:
+    """The cup puts it down 1 mm above the table."""
+    text = MACHINE.replace("filled = 7", "filled = 1").replace("at = [400, 0, 80]", f"at = [400, 0, {81 + height}]")
+    rig = Rig(text + CUP)
+    rig.take(0.0)
+    rig.put(400.0)
+    assert rig.told()[-1] == ("tray.1 lies on table" if lies else "tray.1 lies on the floor")
+
+
 def test_a_workpiece_on_a_turntable_turns_with_it() -> None:
     rig = Rig(MACHINE.replace("filled = 7", "filled = 1") + CUP)
     rig.take(0.0)

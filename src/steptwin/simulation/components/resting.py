@@ -14,7 +14,7 @@ from steptwin.simulation.components.conveyor import CONVEYOR
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.frames import Frames, sources_of
 from steptwin.simulation.components.nesttable import NestSpec
-from steptwin.simulation.components.workpieces import REACH_NM, WORKPIECES, Lie, Rest, Workpieces, body_in, lie_in
+from steptwin.simulation.components.workpieces import REACH_NM, WORKPIECES, Below, Lie, Rest, Workpieces, body_in, lie_in
 from steptwin.simulation.mechanics.workpiece import Workpiece
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.space.bodies import Body, half_height
@@ -142,26 +142,24 @@ class Resting(Stateful):
         otherwise it falls."""
         found = self._workpieces.below(workpiece.name, frame, now)
         lie = lie_in(frame, FLOOR, now)
-        height = lie.at[2] if found is None else found[2]
+        height = lie.at[2] if found is None else found.gap
         if height <= REACH_NM:
-            self._lay(workpiece, frame, now)
-            return True
+            return self._lay(workpiece, frame, found, now)
         self._falls = (*self._falls, Fall(workpiece, lie, now + round(sqrt(2.0 * height / GRAVITY_NM_S2) * SECOND)))
         self._report(FALLS(workpiece=workpiece.name, height=height / NM_PER_MM), workpiece, "falls")
         return False
 
-    def _lay(self, workpiece: Workpiece, frame: Frame, now: Nanos) -> None:
-        """It lies on what is below it."""
-        found = self._workpieces.below(workpiece.name, frame, now)
+    def _lay(self, workpiece: Workpiece, frame: Frame, found: Below | None, now: Nanos) -> bool:
+        """It lies on what is below it, otherwise on the floor. Whether it does: not where another workpiece is in its way."""
         if found is not None:
-            holder, below, _ = found
-            (x, y, _), yaw_q = lie_in(frame, below.frame, now)
-            lie = Lie((x, y, below.centre[2] + half_height(below.shape)), yaw_q)
-            if (holder or self).put(workpiece, below, lie, now):
-                return
+            (x, y, _), yaw_q = lie_in(frame, found.body.frame, now)
+            lie = Lie((x, y, found.body.centre[2] + half_height(found.body.shape)), yaw_q)
+            if (found.holder or self).put(workpiece, found.body, lie, now):
+                return True
         (x, y, _), yaw_q = lie_in(frame, FLOOR, now)
         self._rests = (*self._rests, Rest(workpiece, "", Lie((x, y, 0), yaw_q)))
         self._report(LIES_ON_FLOOR(workpiece=workpiece.name), workpiece, "on the floor")
+        return found is None
 
     # ------------------------------------------------------------------ part of a scheduler
 
@@ -174,7 +172,8 @@ class Resting(Stateful):
         for fall in self._falls:
             if fall.ends <= now:
                 self._falls = tuple(one for one in self._falls if one is not fall)
-                self._lay(fall.workpiece, body_in(fall.workpiece, None, fall.lie).frame, now)
+                frame = body_in(fall.workpiece, None, fall.lie).frame
+                self._lay(fall.workpiece, frame, self._workpieces.below(fall.workpiece.name, frame, now), now)
 
     def deadline(self) -> Nanos | None:
         return min((fall.ends for fall in self._falls), default=None)

@@ -19,7 +19,7 @@ from steptwin.simulation.toml.values import number, permitting
 WORKPIECES = "workpieces"
 """What sensors call all of them; the name of the part that has those which rest."""
 REACH_NM = 2_000_000
-"""Height from which a workpiece is put down. From higher up it falls."""
+"""Height from which a workpiece is put down. From higher up it falls. As far may it be pressed into what it is put on."""
 
 
 class Lie(NamedTuple):
@@ -107,6 +107,16 @@ def lie_in(frame: Frame, seen_from: Frame, now: Nanos) -> Lie:
     return Lie(at.at, at.angle_q if at.about == Z else 0.0)
 
 
+class Below(NamedTuple):
+    """What a workpiece is put on."""
+
+    holder: Holder | None
+    """Its holder; None for another workpiece."""
+    body: Body
+    gap: int
+    """How far its top is below, nm; negative: the workpiece is pressed in."""
+
+
 class _Swept(NamedTuple):
     body: Body
     versions: tuple[Callable[[], object], ...]
@@ -166,14 +176,13 @@ class Workpieces:
         self.bodies()
         return self._holder_of[name].take(name, now)
 
-    def below(self, workpiece: str, frame: Frame, now: Nanos) -> tuple[Holder | None, Body, int] | None:
-        """What carries a workpiece whose lower face has its middle at the origin of a frame: its holder, None for another
-        workpiece, and how far it is below, in nm. None where nothing is."""
+    def below(self, workpiece: str, frame: Frame, now: Nanos) -> Below | None:
+        """What carries a workpiece whose lower face has its middle at the origin of a frame; None where nothing is."""
         supports = {body.name: (holder, body) for holder in self.holders for body in holder.supports()}
         others = {name: (None, body) for name, body in self.bodies().items() if name != workpiece and not _is_on(body, frame)}
         every = {**supports, **others}
-        found = top_below((body for _, body in every.values()), frame, (0, 0, 0), now)
-        return None if found is None else (every[found.body.name][0], found.body, found.gap)
+        found = top_below((body for _, body in every.values()), frame, (0, 0, REACH_NM), now)
+        return None if found is None else Below(every[found.body.name][0], found.body, found.gap - REACH_NM)
 
 
 def _is_on(body: Body, frame: Frame) -> bool:
