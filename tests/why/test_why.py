@@ -497,3 +497,89 @@ def test_a_world_without_its_inputs() -> None:
     world = World.from_toml(WAITS, {"p.prg": PROGRAM.encode()}, keep_inputs=False)
     with pytest.raises(Misuse, match="does not keep its inputs"):
         world.why("cell")
+
+
+TWO_AXES = """
+[[line]]
+name = "bus"
+TIMING
+[[mic488]]
+name = "c"
+line = "bus"
+PROGRAM
+"""
+WITH_PROGRAM = 'program = "p.prg"\nstart = true'
+
+
+def two_axes(program: str) -> World:
+    world = World.from_toml(TWO_AXES.replace("TIMING", "").replace("PROGRAM", WITH_PROGRAM), {"p.prg": program.encode()})
+    world.run(3.0)
+    return world
+
+
+def test_a_motion_that_ended_and_not_the_one_that_is_planned_behind_the_wait_for_it() -> None:
+    """In one nanosecond the wait ends and the next statement plans a motion of another axis."""
+    world = two_axes("M1 = ON\nM2 = ON\nPABS M1 200\nWAITPOS\nPABS M2 100\nWAITPOS\nOUT1 = ON\nWAIT IN8 = ON\n")
+    chain = [link.text for link in world.why("OUT1").links[1:]]
+    began = [link.time / 1e9 for link in world.why("OUT1").links if link.text.endswith("00` was executed")]
+    assert chain == [
+        "line 7 `OUT1 = ON` was executed",
+        "line 6 `WAITPOS` ended",
+        f"the motion of c.M2 ended, which began at {began[0]:.6f} s",
+        "line 5 `PABS M2 100` was executed",
+        "line 4 `WAITPOS` ended",
+        f"the motion of c.M1 ended, which began at {began[1]:.6f} s",
+        "line 3 `PABS M1 200` was executed",
+    ]
+
+
+@pytest.mark.parametrize(("end", "text"), [("", "the end of the program"), ("END\n", "line 3 `END`")])
+def test_what_the_end_of_a_program_switches_off(end: str, text: str) -> None:
+    world = two_axes("OUT1 = ON\nDELAY 0.5\n" + end)
+    assert [link.text for link in world.why("OUT1").links] == [
+        "c.OUT1 became 0",
+        f"{text} was executed",
+        "line 2 `DELAY 0.5` ended",
+        "the program started",
+    ]
+
+
+def test_the_output_that_enables_a_drive() -> None:
+    world = two_axes("M1 = ON\nDELAY 0.3\nM1 = OFF\nM2 = ON\nDELAY 5\n")
+    assert world.why("M1_EN == 0").links[1].text == "line 3 `M1 = OFF` was executed"
+    assert world.why("M1_EN == 1", 0.2).links[1].text == "line 1 `M1 = ON` was executed"
+    assert world.why("M2_EN == 1").links[1].text == "line 4 `M2 = ON` was executed"
+    assert world.why("M3_EN").links == ()
+
+
+REQUESTS = """
+[[script]]
+name = "s"
+steps = [{ wait = "0.1 s" }, { write = { "c.M1_EN" = 1 } }, { write = { "c.M1_POS_ABS" = 100 } }, { wait = "1 s" },
+  { write = { "c.M1_ACC" = 5000 } }, { write = { "c.M1_POS_REL" = -50 } }]
+"""
+
+
+@pytest.mark.parametrize("timing", ["off", "real"])
+@pytest.mark.parametrize("is_far", [False, True])
+def test_the_request_that_wrote_a_register(timing: str, is_far: bool) -> None:
+    """Others come in the same nanosecond; with timing nothing else happens at the moment at which it is written."""
+    text = TWO_AXES.replace("TIMING", f'timing = "{timing}"').replace("PROGRAM", "") + REQUESTS
+    world = World.from_toml(text)
+    world.run(30.0 if is_far else 3.0)
+    answer = world.why("c.M1_ACC")
+    assert [link.text for link in answer.links] == [
+        "request: write M1_ACC = 5000 imp/s²",
+        "script s: writes c.M1_ACC = 5000",
+    ]
+    request, script = answer.links
+    assert answer.since == request.time
+    before, after = World.from_toml(text), World.from_toml(text)
+    before.run_to(request.time - 1)
+    after.run_to(request.time)
+    assert (before.read("c.M1_ACC"), after.read("c.M1_ACC")) == (1000.0, 5000.0)
+    assert 1_100_000_000 <= script.time <= request.time
+    assert [link.text for link in world.why("M1_EN == 1").links[1:]] == [
+        "request: write M1_EN = ON",
+        "script s: writes c.M1_EN = 1",
+    ]

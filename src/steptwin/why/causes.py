@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
 
@@ -250,19 +251,19 @@ class Causes:
 
     # ------------------------------------------------------------------ controllers
 
-    def at_moment(self, controller: str, time: Nanos, wanted: Resource | None) -> FoundCause:
-        """Cause of a change in a controller that no record shows."""
+    def at_moment(self, controller: str, time: Nanos, wanted: Resource | None, point: str = "") -> FoundCause:
+        """Cause of a change in a controller that no record shows; ``point``: of that point of it."""
         group = self._log.group(controller)
-        found = self.in_controller(controller, Change(time, 0.0, group, self._log.position(group, time), LAST), wanted)
+        found = self.in_controller(controller, Change(time, 0.0, group, self._log.position(group, time), LAST), wanted, point)
         if found is None and wanted is not None:
             return self.motion(controller, wanted.name, time)
         return found
 
-    def in_controller(self, controller: str, change: Change, wanted: Resource | None) -> FoundCause:
-        """Cause of a change in a controller at a moment; ``wanted``: the resource, if it is known."""
+    def in_controller(self, controller: str, change: Change, wanted: Resource | None, point: str = "") -> FoundCause:
+        """Cause of a change in a controller at a moment; ``wanted``: the resource, if it is known; ``point``: that changed."""
         index = self._statement_at(controller, change, wanted)
         since = -1 if index is None else self._log.executed[controller][index].order
-        outside = self._from_outside(controller, change, since)
+        outside = self._from_outside(controller, change, since, point)
         if outside is not None:
             return outside
         if index is not None:
@@ -282,8 +283,10 @@ class Causes:
                 return index if _matches(self.use(controller, index).writes, wanted) else None
         return None
 
-    def _from_outside(self, controller: str, change: Change, since: int) -> FoundCause:
-        """A request or another action that reached a controller at the moment of a change, after the order ``since``."""
+    def _from_outside(self, controller: str, change: Change, since: int, point: str) -> FoundCause:
+        """A request or another action that reached a controller at the moment of a change, after the order ``since``: the last
+        that names the point that changed, or the last of all."""
+        found: list[Cause] = []
         on = self._world.objects.line_of.get(controller)
         for order, record in self._log.at(change.group, change.time):
             if order < since:
@@ -296,10 +299,11 @@ class Causes:
                 and record.controller == on[0].name
                 and self._frames.reaches(record, on[1])
             ):
-                return self._frame(record, order)
-            if record.controller == controller and record.kind == "input":
-                return self._input(record, order)
-        return None
+                found.append(self._frame(record, order))
+            elif record.controller == controller and record.kind == "input":
+                found.append(self._input(record, order))
+        naming = re.compile(rf"(?<!\w){re.escape(point.partition(':')[0])}(?!\w)") if point else None
+        return next((one for one in found if naming is not None and naming.search(one.link.text)), next(iter(found), None))
 
     def _inside(self, controller: str, change: Change, wanted: Resource | None) -> FoundCause:
         """Cause of an act of the controller itself: an input, or the end of what an earlier statement began."""

@@ -9,7 +9,7 @@ import sys
 from array import array
 from bisect import bisect_left, bisect_right
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from itertools import takewhile
 from typing import NamedTuple
@@ -115,6 +115,7 @@ class CauseLog:
         parts = world.objects
         numbers = {id(scheduler): number for number, scheduler in enumerate(world.schedulers)}
         self._group_of = {name: numbers[id(scheduler)] for name, scheduler in parts.scheduler_of.items()}
+        self._timed = on_timed_lines(world)
         self._pins = {name: frozenset(controller.pins()) for name, controller in world.controllers.items()}
         self.first_levels = levels_of(world)
         self.records: dict[int, list[TraceRecord]] = defaultdict(list)
@@ -188,6 +189,9 @@ class CauseLog:
                 self.changes[signal].append(Change(record.time, record.level(), group, len(records), order))
             case "plan":
                 self.plans[record.controller, record.subject].append(Change(record.time, 0.0, group, len(records), order))
+            case "frame":
+                for name in self._timed.get(record.controller, ()):
+                    self.points.executes(name, record.time, keeps=True)
             case "fault":
                 self._note_holds(record.controller, record.time)
         records.append(record)
@@ -371,6 +375,15 @@ class CauseLog:
     def last_executed(self, controller: str, until: Nanos) -> int:
         """The number of the last statement of a controller by a moment; -1 if there is none."""
         return self.executed[controller].last(until)
+
+
+def on_timed_lines(world: Simulation) -> Mapping[str, Sequence[str]]:
+    """The controllers on each line with timing, whose registers change at the moment of a frame without another event."""
+    found: dict[str, list[str]] = defaultdict(list)
+    for name, (line, _) in world.objects.line_of.items():
+        if line.is_timed:
+            found[line.name].append(name)
+    return found
 
 
 def sets(act: Act, pin: PinName) -> bool:

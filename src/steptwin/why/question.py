@@ -376,7 +376,7 @@ class Why:
         axis = _AXIS.match(rest)
         is_of_axis = axis is not None or (self._is_signal(signal) and world.signal(signal).continuous)
         wanted = Resource(ResourceKind.AXIS, (axis and axis[1]) or "") if is_of_axis else None
-        return causes.at_moment(owner, time, wanted)
+        return causes.at_moment(owner, time, wanted, rest)
 
     def _moving(self, signal: str, at: Nanos) -> Asking:
         """Cause of a quantity that changes all the time: the motion, or since when a point of a controller stands."""

@@ -3,6 +3,7 @@ an edge of it are passed over."""
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping
 from contextlib import ExitStack
 from functools import partial
@@ -19,7 +20,7 @@ from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
 from steptwin.simulation.world.snapshotlog import ACTED, MOVED, LoggedSnapshot
 from steptwin.statements import StatementHook
 from steptwin.why import points
-from steptwin.why.log import in_parts, levels_of
+from steptwin.why.log import in_parts, levels_of, on_timed_lines
 from steptwin.why.replayed import TimeSeries, watch_truth
 from steptwin.why.states import rest_of
 
@@ -232,6 +233,7 @@ class _Noted:
 
     def __init__(self, world: Simulation, asked: Asked, stack: ExitStack, *, is_replaced: bool) -> None:
         levels = levels_of(world) if asked.edges else {}
+        self._subscribers: dict[str, list[_Subscriber]] = defaultdict(list)
         self.series: dict[str, TimeSeries] = {name: [(world.now, levels.get(name, 0.0))] for name in asked.edges}
         if asked.edges:
             world.trace.subscribers.append(self._take)
@@ -241,12 +243,21 @@ class _Noted:
                 subscriber = _Subscriber(world, name)
                 self.series[name] = subscriber.series
                 subscriber.subscribe(stack, is_replaced=is_replaced)
+                self._subscribers[name.partition(".")[0]].append(subscriber)
+        self._timed = on_timed_lines(world)
+        if self._timed and self._subscribers and not asked.edges:
+            world.trace.subscribers.append(self._take)
+            stack.callback(world.trace.subscribers.remove, self._take)
 
     def _take(self, record: TraceRecord) -> None:
         if record.kind == "edge":
             series = self.series.get(record.subject) or self.series.get(f"{record.controller}.{record.subject}")
             if series is not None:
                 points.note_value(series, record.time, record.level())
+        elif record.kind == "frame":
+            for owner in self._timed.get(record.controller, ()):
+                for subscriber in self._subscribers.get(owner, ()):
+                    subscriber.executes(record.time, keeps=True)
 
 
 class _Subscriber:
@@ -282,13 +293,18 @@ class _Subscriber:
         """``keeping``: whether a statement keeps something, as far as that is known."""
 
         def hook(now: Nanos, number: int) -> None:
-            if self._keeping is not None:
-                self._compare(self._keeping)
             location = programs.location(number)
-            keeps = location is None or (keeping[location] if location in keeping else programs.use(location).keeps)
-            self._keeping = now if keeps else None
+            self.executes(
+                now, keeps=location is None or (keeping[location] if location in keeping else programs.use(location).keeps)
+            )
 
         return hook
+
+    def executes(self, now: Nanos, *, keeps: bool) -> None:
+        """A statement or request is executed next, which may change the signal without an event if it ``keeps``."""
+        if self._keeping is not None:
+            self._compare(self._keeping)
+        self._keeping = now if keeps else None
 
     def leave(self, moment: Nanos) -> None:
         """It need not know."""

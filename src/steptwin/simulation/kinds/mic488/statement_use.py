@@ -15,9 +15,9 @@ _ANY_PIN = Resource(ResourceKind.PIN, "")
 
 
 def use_of(steps: Sequence[s.ProgramStep], number: int) -> StatementUse:
-    """Use of a step by its number; the one after the last is the end of the program."""
+    """Use of a step by its number; the one after the last is the end of the program, which ends as with END."""
     if number >= len(steps):
-        return StatementUse()
+        return StatementUse(writes=(_ANY_AXIS, _ANY_PIN))
     step = steps[number]
     writes, keeps = _set_by(step) if isinstance(step, s.SetStep) else (tuple(_acted_on(step.effect())), False)
     return StatementUse(
@@ -76,9 +76,15 @@ def _set_by(step: s.SetStep) -> tuple[tuple[Resource, ...], bool]:
     """Resources that SET changes, and whether they are only kept."""
     (target,) = _operands((step.target,))
     if isinstance(step.target, s.Variable) or not ACCESS[step.target.row.key].quiet:
-        return (target,), False
+        return (target, *_pins_of_axis(step.target)), False
     register = Resource(ResourceKind.VALUE, step.target.name)
     return (target,) if target == register else (target, register), True
+
+
+def _pins_of_axis(target: s.AssignmentTarget) -> Iterable[Resource]:
+    """The output that enables an axis, which M switches."""
+    if isinstance(target, s.RegisterOperand) and target.row.key == "M":
+        yield Resource(ResourceKind.PIN, f"M{target.number}_EN")
 
 
 def _operands(values: Iterable[s.ValueSource]) -> Iterable[Resource]:
