@@ -107,11 +107,14 @@ BEGUN_MS = 25_000
 """Until the machine works in its cycle, and the curves fill the scope."""
 ALONE = [["machine"]]
 """Panels by columns."""
+SLOW_MS = 120_000
+"""Without a graphics processor."""
 GRAPHICS = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
 def opened(page: Page, url: str, columns: list[list[str]] | None = None) -> None:
     """The page with these panels, otherwise with those that it begins with, after its first minute."""
+    page.set_default_timeout(SLOW_MS)
     if columns is not None:
         choose(page, columns)
     page.goto(url)
@@ -141,6 +144,7 @@ def main() -> None:
         opened(page, url)
         page.wait_for_timeout(BEGUN_MS)
         picture(page, "studio-axes")
+        page.close()
         page = browser.new_page(viewport={"width": 1280, "height": 720})
         opened(page, url, ALONE)
         page.wait_for_timeout(BEGUN_MS)
@@ -148,7 +152,7 @@ def main() -> None:
         page.get_by_role("button", name="3D", exact=True).click()
         page.get_by_role("button", name="Follow", exact=True).wait_for()
         page.wait_for_timeout(5000)
-        picture(page.locator("main section canvas"), "studio-space")
+        picture(page.locator("canvas[data-engine]"), "studio-space")
         show(page, "Scope")
         page.wait_for_timeout(2000)
         picture(page, "studio-scope")

@@ -159,7 +159,7 @@ def graphics(browser: Browser) -> Iterator[Browser]:
 
 
 HAS_CONTEXT = """() => {
-  const canvas = document.querySelector("section canvas");
+  const canvas = document.querySelector("canvas[data-engine]");
   const gl = canvas.getContext("webgl2");
   return gl !== null && !gl.isContextLost();
 }"""
@@ -170,12 +170,12 @@ def test_three_dimensions_come_back_after_the_context_was_lost(start_studio: Cal
     page = studio.page(panel="Machine")
     button(page, "3D").click()
     expect(button(page, "Follow")).to_be_visible()
-    canvas = page.locator("section canvas")
+    canvas = page.locator("canvas[data-engine]")
     expect(canvas).to_be_visible()
     PICTURES.mkdir(parents=True, exist_ok=True)
     whole = canvas.screenshot(path=PICTURES / "space.png")
     page.evaluate("""() => {
-      const gl = document.querySelector("section canvas").getContext("webgl2");
+      const gl = document.querySelector("canvas[data-engine]").getContext("webgl2");
       window.lose = gl.getExtension("WEBGL_lose_context");
       window.lose.loseContext();
     }""")

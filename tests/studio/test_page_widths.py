@@ -43,7 +43,7 @@ def test_no_panel_is_wider_than_its_pane(start_studio: Callable[..., Process], b
     studio = Studio(process, browser)
     found: dict[str, list[str]] = {}
     for size, width, height in (("phone", 390, 844), ("two panes", 1440, 900)):
-        page = studio.page(panel=None, viewport={"width": width, "height": height})
+        page = studio.page(viewport={"width": width, "height": height})
         if size == "two panes":
             button(page, "Open beside").click()
         for panel in panels_of(page):

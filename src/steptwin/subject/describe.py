@@ -14,7 +14,7 @@ from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.mechanics.drawing import Drawing, SensorZone
 from steptwin.simulation.space.bodies import Box, half_height
-from steptwin.simulation.space.frames import FLOOR, NM_PER_MM, path, pose
+from steptwin.simulation.space.frames import FLOOR, NM_PER_MM, Vector, path, pose
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.wiring import connections, terminal_name
 from steptwin.subject.commands import COMMANDS
@@ -30,7 +30,15 @@ from steptwin.subject.contract import (
     SwitchDescription,
 )
 from steptwin.subject.controls import controls_of
-from steptwin.subject.scene import BodyDescription, FrameDescription, JointDescription, Point, SceneDescription, WorkpieceState
+from steptwin.subject.scene import (
+    BodyDescription,
+    BoxDescription,
+    FrameDescription,
+    JointDescription,
+    Point,
+    SceneDescription,
+    WorkpieceState,
+)
 
 
 def describe(world: Simulation) -> Description:
@@ -101,9 +109,19 @@ def _scene(world: Simulation) -> SceneDescription:
 def _frame(name: str, mounted: Mounted) -> FrameDescription:
     spec, place = mounted.spec, mounted.place
     joints = tuple(JointDescription(f"{name}.{one.signal}", str(one.along), one.turns, one.per_unit) for one in mounted.movements)
-    x, y, z = (one / NM_PER_MM for one in place.origin)
     along = str(spec.towards()) if isinstance(spec, MoverSpec) and not joints else None
-    return FrameDescription(name, str(spec.path[0]), place.on, (x, y, z), along, joints)
+    boxes = tuple(_box(one.centre, one.shape) for one in spec.boxes(mounted.frame) if isinstance(one.shape, Box))
+    return FrameDescription(name, str(spec.path[0]), place.on, _mm(place.origin), along, joints, boxes)
+
+
+def _box(centre: Vector, shape: Box) -> BoxDescription:
+    x, y, z = shape.half
+    return BoxDescription(_mm(centre), _mm((2 * x, 2 * y, 2 * z)))
+
+
+def _mm(vector: Vector) -> Point:
+    x, y, z = (one / NM_PER_MM for one in vector)
+    return x, y, z
 
 
 def workpiece_states(world: Simulation) -> Iterator[WorkpieceState]:

@@ -19,6 +19,14 @@ class JointDescription:
 
 
 @dataclass(frozen=True, slots=True)
+class BoxDescription:
+    """A box of an element, in its frame: a line of light or a face, where one or two of its sizes are 0."""
+
+    at: Annotated[Point, "Its middle [mm]"]
+    size: Annotated[Point, "Along x, y and z [mm]"]
+
+
+@dataclass(frozen=True, slots=True)
 class FrameDescription:
     """The frame of an element. What is on it is moved by its joints, the first of which is outermost."""
 
@@ -28,6 +36,8 @@ class FrameDescription:
     at: Annotated[Point, "Its origin there, while its joints are at 0 [mm]"]
     along: Annotated[str | None, "Direction of an element that moves workpieces, not what is on it"]
     joints: tuple[JointDescription, ...]
+    boxes: tuple[BoxDescription, ...] = ()
+    """The beams of a beam, the bottom of a nest."""
 
 
 @dataclass(frozen=True, slots=True)

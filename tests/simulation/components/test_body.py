@@ -173,8 +173,31 @@ def test_a_viewer_gets_the_frames_with_their_signals() -> None:
     assert by_name["left"].joints[0].per_unit == 10.0
     assert (by_name["turret"].joints[0].turns, by_name["turret"].joints[0].per_unit) == (True, 1.0)
     assert (by_name["belt"].along, by_name["belt"].joints) == ("+x", ())
+    assert by_name["tip"].boxes == ()
     assert (by_name["tip"].on, by_name["tip"].at) == ("z", (0.0, 0.0, -12.5))
     assert [(one.name, one.diameter, one.height, one.size) for one in scene.bodies] == [("tip", 8.0, 12.5, None)]
+
+
+def test_a_viewer_gets_the_lines_of_a_beam_and_the_bottom_of_a_nest() -> None:
+    more = """
+[[beam]]
+name = "curtain"
+at = [0, 0, 10]
+along = "-x"
+length = 100
+count = 2
+[[nest]]
+name = "tray"
+at = [0, 0, 10]
+cells = [3, 1]
+pitch = [60, 50]
+"""
+    by_name = {frame.name: frame for frame in describe(World.from_toml(MACHINE + more)).scene.frames}
+    assert [(one.at, one.size) for one in by_name["curtain"].boxes] == [
+        ((-50.0, 0.0, 0.0), (100.0, 0.0, 0.0)),
+        ((-50.0, 0.0, 20.0), (100.0, 0.0, 0.0)),
+    ]
+    assert [(one.at, one.size) for one in by_name["tray"].boxes] == [((60.0, 0.0, 0.0), (180.0, 50.0, 0.0))]
 
 
 HAND = """[[body]]

@@ -73,6 +73,9 @@ class BeamSpec(TerminalComponentSpec, MoverSpec):
         if self.along is not None and self.count > 1 and self.along.axis == self.across.axis:
             text.wrong((*self.path, "across"), "D007", f"across = '{self.across}' is along its beams")
 
+    def boxes(self, frame: Frame) -> Iterable[Body]:
+        return self.segments(frame)
+
     def segments(self, frame: Frame, more: float = 0.0) -> Iterator[Body]:
         """Its beams, ``more`` mm longer."""
         towards, half = self.towards(), to_nm(self.length + more) // 2

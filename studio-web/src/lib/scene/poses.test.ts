@@ -2,7 +2,7 @@ import { expect, test } from "vitest";
 import { POSE, Poses, type Scene } from "./poses";
 
 const frame = (name: string, on: string | null, at: [number, number, number], ...joints: [string, string, boolean][]) => ({
-  ...{ name, kind: "axis", on, at, along: null },
+  ...{ name, kind: "axis", on, at, along: null, boxes: [] },
   joints: joints.map(([signal, along, turns]) => ({ signal, along, turns, per_unit: turns ? 360 : 10 })),
 }); // prettier-ignore
 const poseOf = (poses: Poses, frame: number) =>

@@ -336,6 +336,30 @@ function vacuum(build: Builder): void {
   build.rod([0, 0, 4], 2, 8, 26, "moving", { isCarried: true });
 }
 
+/** Jaws that come together below their palm, with their tips at the origin. */
+function gripper(build: Builder, element: Element): void {
+  const open = element.drawing?.length ?? 20;
+  const [wide, high] = [between(6, 0.3 * open, 20), between(24, open, 60)];
+  build.box([0, 0, high + wide / 2], [open + 4 * wide, 2 * wide, wide], "moving");
+  for (const side of [1, -1])
+    build.box([(side * (open + wide)) / 2, 0, high / 2], [wide, 1.5 * wide, high], "rod", {
+      slide: { signal: `${element.name}.position`, by: times(build.along, -side / 2) },
+    });
+}
+
+/** What is said of it besides its kind: lines of light, and faces that workpieces lie on. */
+function boxes(build: Builder): void {
+  const MOST = 40;
+  const LEAST_MM = 2;
+  for (const { at, size } of build.frame.boxes.slice(0, MOST)) {
+    const thick = size.map((one) => Math.max(one, LEAST_MM)) as unknown as Vector;
+    const isLight = build.frame.kind === "beam";
+    const look = { pin: isLight ? `${build.frame.name}.seen` : null };
+    const down: Vector = [0, 0, isLight ? 0 : -LEAST_MM / 2];
+    build.put({ ...plain(build), at: plus(at as unknown as Vector, down), size: thick, material: isLight ? "lamp" : "frame", ...look }); // prettier-ignore
+  }
+}
+
 function body(build: Builder, { scene }: Known): void {
   const its = scene.bodies.find(({ name }) => name === build.frame.name);
   if (its === undefined) return;
@@ -374,6 +398,8 @@ export function solidsOf(scene: Scene, model: Model): Solid[] {
     else if (frame.kind === "shaft") shaft(build, known);
     else if (frame.kind === "carriage") carriage(build, element);
     else if (frame.kind === "vacuum") vacuum(build);
+    else if (frame.kind === "gripper") gripper(build, element);
+    boxes(build);
   });
   return solids;
 }
