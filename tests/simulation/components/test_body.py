@@ -260,6 +260,23 @@ def test_what_does_not_fit_is_refused(more: str, problem: str) -> None:
     assert problem in str(error.value)
 
 
+CUP = '[[vacuum]]\nname = "cup"\nejector = "c.OUT2"\non = "z"\n'
+TRAY = '[[nest]]\nname = "tray"\nat = [0, 0, 30]\n'
+
+
+@pytest.mark.parametrize("on", ["cup", "tray"])
+def test_what_is_on_an_element_that_moves_nothing_has_its_place_before_that_is_built(on: str) -> None:
+    frames = World.from_toml(f'{MACHINE}{CUP}{TRAY}{BODY}{SIZE}on = "{on}"\nat = [1, 2, 3]').objects.frames
+    assert pose(frames["b"].frame, frames[on].frame, 0).at == (1_000_000, 2_000_000, 3_000_000)
+
+
+def test_of_what_is_on_a_wrong_axis_nothing_is_reported() -> None:
+    axis = '[[axis]]\nname = "w"\ndrive = "c.M9"\npitch = 5.0\n'
+    with pytest.raises(WorldError) as error:
+        World.from_toml(f'{MACHINE}{CUP}{TRAY}{axis}{BODY}{SIZE}on = "w"')
+    assert [found.message for found in error.value.findings] == ["drive = 'c.M9': c has M1, M2, M3, M4"]
+
+
 def test_an_axis_that_counts_steps_says_how_long_one_is() -> None:
     world = World.from_toml(f"{MACHINE}{STEPS}mm_per_unit = 0.25\nstart = 8.0")
     mounted = world.objects.frames["w"]

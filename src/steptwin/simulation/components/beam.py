@@ -76,6 +76,11 @@ class BeamSpec(TerminalComponentSpec, MoverSpec):
     def boxes(self, frame: Frame) -> Iterable[Body]:
         return self.segments(frame)
 
+    @property
+    def moves_others(self) -> bool:
+        """Never: its direction is that of its beams."""
+        return False
+
     def segments(self, frame: Frame, more: float = 0.0) -> Iterator[Body]:
         """Its beams, ``more`` mm longer."""
         towards, half = self.towards(), to_nm(self.length + more) // 2

@@ -71,6 +71,11 @@ class ConveyorSpec(TerminalComponentSpec, MoverSpec):
         return True
 
     @property
+    def moves_others(self) -> bool:
+        """Only its workpieces."""
+        return False
+
+    @property
     def terminals(self) -> Terminals:
         stops = tuple(stop_terminal(n) for n in range(1, len(self.stops) + 1))
         return Terminals(digital_inputs=((FEED,) if self.speed is None else (RUN, FEED)) + stops)

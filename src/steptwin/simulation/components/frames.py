@@ -11,6 +11,7 @@ from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.components.mount import MountSpec, Movement, places
 from steptwin.simulation.space.bodies import Body
 from steptwin.simulation.space.frames import Frame, Joint, path
+from steptwin.simulation.toml.names import Unknown
 
 HAS_NO_PLACE = Message("simulation.has-no-place", "{name!r} has no place in space: give it on, at or along")
 
@@ -71,9 +72,9 @@ class Frames(Mapping[str, Mounted]):
 
     def _make(self, name: str) -> Mounted:
         frame = base = self.base(name)
-        if name not in self._moves:
-            raise Misuse(HAS_NO_PLACE(name=name))
-        place, movements = self._places[name], tuple(self._moves[name]())
+        if name not in self._moves and self.described[name].moves_others:
+            raise Unknown(name, HAS_NO_PLACE(name=name))
+        place, movements = self._places[name], tuple(self._moves[name]()) if name in self._moves else ()
         for n, one in enumerate(movements):
             # The first joint is at the origin of its element, each further one is on the one before.
             its = "" if n + 1 == len(movements) else f".{one.signal}"

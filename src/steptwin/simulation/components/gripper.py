@@ -52,6 +52,11 @@ class GripperSpec(CarrierSpec, MoverSpec):
     )
 
     @property
+    def moves_others(self) -> bool:
+        """Never: its direction is that of its jaws."""
+        return False
+
+    @property
     def terminals(self) -> Terminals:
         return Terminals(digital_inputs=(CLOSE, *self.places), outputs=(OPENED, CLOSED, HELD))
 

@@ -62,6 +62,11 @@ class MountSpec(TableSpec):
         return False
 
     @property
+    def moves_others(self) -> bool:
+        """Whether it may move what is on it. Otherwise that has its place before it is built."""
+        return False
+
+    @property
     def is_mounted(self) -> bool:
         return self.on is not None or self.at is not None
 
@@ -89,6 +94,10 @@ class MoverSpec(MountSpec):
         default=None,
         order=2,
     )
+
+    @property
+    def moves_others(self) -> bool:
+        return True
 
     @property
     def is_mounted(self) -> bool:

@@ -75,6 +75,10 @@ class ToolSpec(NamedSpec, MountSpec):
     y_switches: tuple[SwitchSpec, ...] = tables_in("y_switch", SwitchSpec, "[[tool.y_switch]]")
 
     @property
+    def moves_others(self) -> bool:
+        return True
+
+    @property
     def switches(self) -> Iterator[tuple[str, int, SwitchSpec]]:
         """The coordinate of each, its number there, from 1, and itself."""
         for name, those in zip(COORDINATES, (self.x_switches, self.y_switches), strict=True):
