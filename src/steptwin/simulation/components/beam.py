@@ -22,8 +22,8 @@ from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.scheduler.wires import PinName, Wire
 from steptwin.simulation.space.bodies import Body, Box
-from steptwin.simulation.space.contacts import Pair
 from steptwin.simulation.space.frames import Direction, Frame
+from steptwin.simulation.space.sweeps import SweptBody
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import INPUT_PIN, Terminal, name_value, naming_in_space, number, whole, word
@@ -130,20 +130,21 @@ def _make(spec: BeamSpec, context: ElementContext) -> Beam:
     if WORKPIECES in spec.sees:
         resting_of(context, block.scheduler)
     described = {one.name: one for one in context.objects.described.of(BODY)}
-    bodies = {name: body_of(one, frames) for name, one in described.items()}
-    seen = [name for wanted in spec.sees if wanted != WORKPIECES for name in bodies_on(frames[wanted], bodies, wanted)]
+    every = {name: body_of(one, frames) for name, one in described.items()}
+    seen = [name for wanted in spec.sees if wanted != WORKPIECES for name in bodies_on(frames[wanted], every, wanted)]
+    bodies = {name: SweptBody(every[name]) for name in seen}
     frame = frames.base(spec.name)
     pieces = workpieces if WORKPIECES in spec.sees else None
 
     def probe(segment: Body) -> Probe:
-        lasting = {}
+        lasting, swept = {}, SweptBody(segment)
         for name in seen:
             when = described[name].when
             whens = () if when is None else (condition_of(when, block, context),)
-            lasting[name] = BodyContact(Pair(segment, bodies[name]), whens)
+            lasting[name] = BodyContact(swept, bodies[name], whens)
         return Probe(segment, lasting, pieces)
 
-    moved = [movement for name in seen for movement in frames.between(frame, bodies[name].frame)]
+    moved = [movement for name in seen for movement in frames.between(frame, every[name].frame)]
     owners = [owner for name in seen for owner in described[name].owners]
     sources = (*sources_of(moved), *sources_of(frames.carrying(frame)), *owners)
     if WORKPIECES in spec.sees:

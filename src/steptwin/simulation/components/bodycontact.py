@@ -7,33 +7,39 @@ from collections.abc import Sequence
 from steptwin.controller import Nanos
 from steptwin.simulation.logic.condition import SignalCondition
 from steptwin.simulation.space.contacts import NEVER, Pair
+from steptwin.simulation.space.sweeps import SweptBody, meet
 
 
 class BodyContact:
     """A `steptwin.simulation.components.touch.Meeting`: they overlap while both are there.
 
-    Between two changes of the plans a moment is searched for once, and kept.
+    Between two changes of the plans a moment is searched for once, and kept; not where one does not come near the other by then.
     """
 
-    __slots__ = ("_found", "_overlap", "_version", "_whens", "pair")
+    __slots__ = ("_bodies", "_found", "_overlap", "_version", "_whens", "pair")
 
-    def __init__(self, pair: Pair, whens: Sequence[SignalCondition] = ()) -> None:
+    def __init__(self, one: SweptBody, other: SweptBody, whens: Sequence[SignalCondition] = ()) -> None:
         """``whens``: conditions under which they are there."""
-        self.pair = pair
+        self.pair = Pair(one.body, other.body)
+        self._bodies = one, other
         self._whens = tuple(whens)
         self.forget()
 
     def forget(self) -> None:
         self._version: object = None
         self._overlap, self._found = False, NEVER
-        for when in self._whens:
-            when.forget()
+        for one in (*self._bodies, *self._whens):
+            one.forget()
 
     def _search(self, now: Nanos) -> None:
         version, due = self.pair.version(), self._found.at
         if version != self._version or (due is not None and due <= now):
             self._version = version
-            self._overlap, self._found = self.pair.overlap(now), self.pair.next_change(now)
+            one, other = self._bodies
+            if meet(one.sweep(now), other.sweep(now)):
+                self._overlap, self._found = self.pair.overlap(now), self.pair.next_change(now)
+            else:
+                self._overlap, self._found = False, NEVER
 
     def holds(self, now: Nanos) -> bool:
         self._search(now)

@@ -32,6 +32,7 @@ from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.mechanics import Mechanism
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.space.contacts import Pair
+from steptwin.simulation.space.sweeps import SweptBody
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, flag, name_value, naming_in_space, text_value, word
@@ -122,6 +123,7 @@ class _Bodies:
         self._context = context
         self._described = {one.name: one for one in context.objects.described.of(BODY)}
         self._bodies = {name: body_of(one, context.frames) for name, one in self._described.items()}
+        self._swept = {name: SweptBody(body) for name, body in self._bodies.items()}
         self._moved: list[Movement] = []
         self.contacts = (*(self._contact(*pair) for pair in self._pairs()), *self._with_workpieces())
         if not self.contacts:
@@ -163,16 +165,18 @@ class _Bodies:
             yield Contact(probe, blocks, partial(_touching, spec.name, name, probe, block))
 
     def _contact(self, one: str, other: str) -> Contact:
-        bodies, context = (self._bodies[one], self._bodies[other]), self._context
-        pair, moved = Pair(*bodies), context.frames.between(bodies[0].frame, bodies[1].frame)
+        context = self._context
+        moved = context.frames.between(self._bodies[one].frame, self._bodies[other].frame)
         self._moved += moved
         block = context.terminal_block(self._spec.name)
         whens = [when for name in (one, other) if (when := self._described[name].when) is not None]
-        if not whens and not context.memo.is_checked and pair.overlap(block.scheduler.now):
+        conditions = [condition_of(when, block, context) for when in whens]
+        contact = BodyContact(self._swept[one], self._swept[other], conditions)
+        if not whens and not context.memo.is_checked and contact.pair.overlap(block.scheduler.now):
             raise Misuse(f"{one!r} and {other!r} overlap when the world begins")
         blocks = tuple(dict.fromkeys(drive for movement in moved for drive in movement.blocks))
         text = partial(BODIES_TOUCH, zone=self._spec.name, one=one, other=other)
-        return Contact(BodyContact(pair, [condition_of(when, block, context) for when in whens]), blocks, text)
+        return Contact(contact, blocks, text)
 
 
 def _touching(zone: str, body: str, probe: Probe, block: TerminalBlock) -> str:

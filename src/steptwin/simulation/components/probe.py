@@ -6,10 +6,9 @@ from collections.abc import Callable, Mapping
 
 from steptwin.controller import Nanos
 from steptwin.simulation.components.bodycontact import BodyContact
-from steptwin.simulation.components.workpieces import Workpieces, versions_of
+from steptwin.simulation.components.workpieces import Workpieces
 from steptwin.simulation.space.bodies import Body
-from steptwin.simulation.space.contacts import Pair
-from steptwin.simulation.space.sweeps import meet, sweep
+from steptwin.simulation.space.sweeps import SweptBody, meet, versions_of
 
 
 def whole(body: Body) -> Body | None:
@@ -24,7 +23,19 @@ class Probe:
     that does not come near before its plan changes is not searched for.
     """
 
-    __slots__ = ("_bodies", "_contacts", "_due", "_inner", "_lasting", "_met", "_state", "_versions", "_workpieces", "body")
+    __slots__ = (
+        "_bodies",
+        "_contacts",
+        "_due",
+        "_inner",
+        "_lasting",
+        "_met",
+        "_state",
+        "_swept",
+        "_versions",
+        "_workpieces",
+        "body",
+    )
 
     def __init__(
         self,
@@ -35,6 +46,7 @@ class Probe:
     ) -> None:
         """``lasting``: with parts of the machine. ``inner``: what it has to meet of a workpiece."""
         self.body = body
+        self._swept = SweptBody(body)
         self._lasting = lasting
         self._workpieces = workpieces
         self._inner = inner
@@ -48,8 +60,11 @@ class Probe:
         self._state: object = None
         self._met: tuple[str, ...] = ()
         self._due: Nanos | None = None
+        self._swept.forget()
         for contact in self._lasting.values():
             contact.forget()
+        if self._workpieces is not None:
+            self._workpieces.forget()
 
     def _search(self, workpieces: Workpieces, now: Nanos) -> None:
         """Find which workpieces it meets, and when that changes, unless it is known."""
@@ -62,16 +77,17 @@ class Probe:
         if state == self._state and (self._due is None or self._due > now):
             return
         self._state = state
-        around, known, self._contacts = sweep(self.body, now), self._contacts, {}
+        around, known, self._contacts = self._swept.sweep(now), self._contacts, {}
         met: list[str] = []
         self._due = None
         for name, body in bodies.items():
-            if not meet(around, workpieces.sweep_of(name, now)):
+            swept = workpieces.swept(name)
+            if not meet(around, swept.sweep(now)):
                 continue
             its, contact = known.get(name, (None, None))
             if its is not body:
                 inner = self._inner(body)
-                contact = None if inner is None else BodyContact(Pair(self.body, inner))
+                contact = None if inner is None else BodyContact(self._swept, swept if inner is body else SweptBody(inner))
             self._contacts[name] = body, contact
             if contact is None:
                 continue

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from steptwin.controller import Nanos
@@ -12,7 +12,7 @@ from steptwin.simulation.mechanics.workpiece import Workpiece
 from steptwin.simulation.space.bodies import Body, Box, Cylinder, Shape, half_height
 from steptwin.simulation.space.frames import Frame, Joint, Vector, Z, pose
 from steptwin.simulation.space.pieces import standing
-from steptwin.simulation.space.sweeps import Sweep, sweep
+from steptwin.simulation.space.sweeps import SweptBody
 from steptwin.simulation.space.tops import top_below
 from steptwin.simulation.toml.values import number, permitting
 
@@ -117,19 +117,6 @@ class Below(NamedTuple):
     """How far its top is below, nm; negative: the workpiece is pressed in."""
 
 
-class _Swept(NamedTuple):
-    body: Body
-    versions: tuple[Callable[[], object], ...]
-    state: list[object]
-    sweep: Sweep
-
-
-def versions_of(body: Body) -> tuple[Callable[[], object], ...]:
-    """The versions of all that moves a body."""
-    joints = (frame.joint for frame in body.frame.line())
-    return tuple(joint.motion.version for joint in joints if joint is not None and not joint.motion.is_still)
-
-
 class Workpieces:
     """The workpieces of all holders, in the order in which these were built."""
 
@@ -140,7 +127,7 @@ class Workpieces:
         self._version: object = None
         self._bodies: Mapping[str, Body] = {}
         self._holder_of: Mapping[str, Holder] = {}
-        self._sweeps: dict[str, _Swept] = {}
+        self._sweeps: dict[str, SweptBody] = {}
 
     @property
     def sources(self) -> tuple[str, ...]:
@@ -157,19 +144,16 @@ class Workpieces:
             self._version = version
         return self._bodies
 
-    def sweep_of(self, name: str, now: Nanos) -> Sweep:
-        """Where a workpiece may come before its plan changes."""
+    def swept(self, name: str) -> SweptBody:
+        """A workpiece, with where it may come before its plan changes."""
         known = self._sweeps.get(name)
         if known is None:
-            body = self._bodies[name]
-            versions = versions_of(body)
-        else:
-            body, versions, state, found = known
-            if state == [version() for version in versions]:
-                return found
-        found = sweep(body, now)
-        self._sweeps[name] = _Swept(body, versions, [version() for version in versions], found)
-        return found
+            known = self._sweeps[name] = SweptBody(self._bodies[name])
+        return known
+
+    def forget(self) -> None:
+        """Compute anew where they may come: a snapshot was restored."""
+        self._sweeps.clear()
 
     def take(self, name: str, now: Nanos) -> Workpiece:
         """Take one from where it is."""

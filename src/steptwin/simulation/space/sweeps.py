@@ -50,6 +50,35 @@ def swept(body: Body, ranges: Callable[[Frame, Joint], Range], seen_from: Frame 
     return Sweep((a - ROUNDING_NM, b - ROUNDING_NM, c - ROUNDING_NM), (d + ROUNDING_NM, e + ROUNDING_NM, f + ROUNDING_NM))
 
 
+def versions_of(body: Body) -> tuple[Callable[[], object], ...]:
+    """The versions of all that moves a body."""
+    joints = (frame.joint for frame in body.frame.line())
+    return tuple(joint.motion.version for joint in joints if joint is not None and not joint.motion.is_still)
+
+
+class SweptBody:
+    """A body with its sweep, which is computed once for each plan of its motion."""
+
+    __slots__ = ("_state", "_sweep", "_versions", "body")
+
+    def __init__(self, body: Body) -> None:
+        self.body = body
+        self._versions = versions_of(body)
+        self.forget()
+
+    def forget(self) -> None:
+        """Compute it anew: a snapshot was restored, whose moment may be before that of the sweep."""
+        self._state: list[object] | None = None
+        self._sweep: Sweep | None = None
+
+    def sweep(self, now: Nanos) -> Sweep:
+        """Where it may come before its plan changes."""
+        state = [version() for version in self._versions]
+        if self._sweep is None or state != self._state:
+            self._state, self._sweep = state, sweep(self.body, now)
+        return self._sweep
+
+
 def _carry(joint: Joint, low: list[float], high: list[float], ends: Range) -> None:
     axis, sign = joint.along
     least, most = (sign * end for end in ends[::sign])
