@@ -92,7 +92,7 @@ class Causes:
         return None if power is None else self.last((self._name(PinName(*power)),), until, GIVES_POWER(axis=axis))
 
     def moved(self, axis: str, until: Nanos) -> FoundCause:
-        """What moved the load of an axis last, or left it where it is: a motion, or the power of its motor meanwhile."""
+        """Cause that moved the load of an axis last, or left it where it is: a motion, or the power of its motor meanwhile."""
         built = self._world.axes[axis]
         controller, number = built.spec.drive[0], built.spec.drive[1].removeprefix("M")
         motion, power = self.motion(controller, number, until, axis), self.power(axis, until)
@@ -130,7 +130,7 @@ class Causes:
         return None
 
     def _of_fault(self, record: TraceRecord, order: int) -> Callable[[], FoundCause]:
-        """What finds the action that set or cleared a fault, unless its description begins or ends it."""
+        """Search for the action that set or cleared a fault, unless its description begins or ends it."""
         for act in self._log.acts_at(record.time, order):
             match act.what:
                 case do.SetFault(fault) if record.subject.startswith(fault.name or fault.kind.name):

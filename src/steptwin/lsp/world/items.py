@@ -32,7 +32,7 @@ from steptwin.symbols import SymbolKind
 
 _KEY = re.compile(r"[ \t]*([A-Za-z0-9_-]*)\Z")
 _VALUE = re.compile(r"[ \t]*([A-Za-z0-9_-]+)[ \t]*=[ \t]*(?:\[(?:[^#]*,)?[ \t\[]*)?([\"']?)([^\"'=,#\[\]]*)\Z")
-"""Of a key, or an item of its list in the same line."""
+"""Part of a key, or an item of its list in the same line."""
 _STEP = re.compile(r"[{,][ \t]*([A-Za-z_]*)\Z")
 _STEP_VALUE = re.compile(r"([A-Za-z_]+)[ \t]*=[ \t]*([\"'])([^\"']*)\Z")
 _STEP_NAMES = {

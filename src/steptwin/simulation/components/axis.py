@@ -360,7 +360,7 @@ def summed_travel(axes: Sequence[BuiltAxis], shares: Sequence[float]) -> tuple[f
 
 
 def moved_by(axis: BuiltAxis) -> tuple[str, str]:
-    """What changes the motion of an axis."""
+    """Names of what changes the motion of an axis."""
     return axis.mechanism.controller, axis.spec.name
 
 

@@ -150,7 +150,7 @@ class _Bodies:
                 yield one, other
 
     def _with_workpieces(self) -> Iterator[Contact]:
-        """Of each body with any workpiece."""
+        """Contacts of each body with any workpiece."""
         spec, context = self._spec, self._context
         if WORKPIECES not in spec.between:
             return

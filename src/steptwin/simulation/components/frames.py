@@ -41,7 +41,7 @@ class Frames(Mapping[str, Mounted]):
         self._bases: dict[str, Frame] = {}
         self._made: dict[str, Mounted] = {}
         self._movements: dict[Frame, Movement] = {}
-        """Of the frames with a joint."""
+        """Movements by the frames with a joint."""
 
     def add(self, name: str, moves: Callable[[], Sequence[Movement]]) -> None:
         """Add an element that was built. ``moves``: how it moves what is on it, outermost first."""
@@ -84,15 +84,15 @@ class Frames(Mapping[str, Mounted]):
         return Mounted(self.described[name], place, base, frame, movements)
 
     def between(self, one: Frame, other: Frame) -> list[Movement]:
-        """What moves two frames against each other."""
+        """Movements of two frames against each other."""
         return [self._movements[step.frame] for step in path(one, other) if step.frame in self._movements]
 
     def movement(self, frame: Frame) -> Movement | None:
-        """What moves a frame with a joint, if an element does."""
+        """Movement of a frame with a joint, if an element moves it."""
         return self._movements.get(frame)
 
     def carrying(self, frame: Frame) -> list[Movement]:
-        """What moves a frame, up to the floor."""
+        """Movements of a frame, up to the floor."""
         return [self._movements[one] for one in frame.line() if one in self._movements]
 
 

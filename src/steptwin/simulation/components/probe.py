@@ -1,4 +1,4 @@
-"""What a body of a sensor or a tool meets: bodies of the machine, and workpieces."""
+"""Contacts of a body of a sensor or a tool with bodies of the machine, and with workpieces."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from steptwin.simulation.space.tops import top_below
 from steptwin.simulation.toml.values import number, permitting
 
 WORKPIECES = "workpieces"
-"""What sensors call all of them; the name of the part that has those which rest."""
+"""Name by which sensors have all of them; the name of the part that has those which rest."""
 REACH_NM = 2_000_000
 """Height from which a workpiece is put down. From higher up it falls. As far may it be pressed into what it is put on."""
 
@@ -54,7 +54,7 @@ class Holder(Protocol):
         ...
 
     def supports(self) -> Iterable[Body]:
-        """What workpieces can be put on, besides workpieces."""
+        """Bodies on which workpieces can be put, besides workpieces."""
         ...
 
     def take(self, name: str, now: Nanos) -> Workpiece:
@@ -108,7 +108,7 @@ def lie_in(frame: Frame, seen_from: Frame, now: Nanos) -> Lie:
 
 
 class Below(NamedTuple):
-    """What a workpiece is put on."""
+    """Support on which a workpiece is put."""
 
     holder: Holder | None
     """Its holder; None for another workpiece."""
@@ -161,7 +161,7 @@ class Workpieces:
         return self._holder_of[name].take(name, now)
 
     def below(self, workpiece: str, frame: Frame, now: Nanos) -> Below | None:
-        """What carries a workpiece whose lower face has its middle at the origin of a frame; None where nothing is."""
+        """Support of a workpiece whose lower face has its middle at the origin of a frame; None where nothing is."""
         supports = {body.name: (holder, body) for holder in self.holders for body in holder.supports()}
         others = {name: (None, body) for name, body in self.bodies().items() if name != workpiece and not _is_on(body, frame)}
         every = {**supports, **others}

@@ -30,7 +30,7 @@ def connected_names(spec: WorldSpec, controllers: Iterable[str]) -> list[list[st
     placed = _placed(spec)
 
     def owner(name: str) -> str | None:
-        """What shares its scheduler with it; None for what stands on the floor."""
+        """Name of the one that shares its scheduler with it; None for what stands on the floor."""
         seen: set[str] = set()
         found: str | None = name
         while found is not None and found not in connected and found in placed and found not in seen:

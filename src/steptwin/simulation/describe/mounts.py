@@ -1,4 +1,4 @@
-"""What carries what in a description: nothing carries itself, and only what has a place carries anything."""
+"""Check of what carries what in a description: nothing carries itself, and only what has a place carries anything."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the motor of an axis does for its motion: speed, torque, and the torque that it has left, in closed form from the plans.
+"""Effort of the motor of an axis for its motion: speed, torque, and the torque that it has left, in closed form from the plans.
 
 Torques in N·m at the motor, positive towards higher positions; speeds in pulses/s of the mechanics.
 """
@@ -28,7 +28,7 @@ class Effort(NamedTuple):
     """From when on its motor has the reduced current of rest; None: never."""
 
     def speed(self, now: Nanos) -> float:
-        """Of the load."""
+        """Speed of the load."""
         trajectory = self.trajectory
         return trajectory.build.sign * self._lead.velocity(now) if trajectory.carries(now) else 0.0
 
@@ -66,7 +66,7 @@ class Effort(NamedTuple):
 
     @property
     def _lead(self) -> Profile:
-        """What the rotor follows."""
+        """Motion that the rotor follows."""
         trajectory = self.trajectory
         return profile_of(trajectory.plan) if trajectory.coasting is None else trajectory.coasting
 

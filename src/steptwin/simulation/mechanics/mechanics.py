@@ -90,7 +90,7 @@ STANDS = Message("simulation.stands-behind", "{axis} stands, {pulses} pulses beh
 
 
 NO_POWER = "no power"
-"""What blocks a rotor that stands without current; no element is called so."""
+"""Name of the blocker of a rotor that stands without current; no element is called so."""
 
 
 class Mechanism(Stateful):
@@ -409,7 +409,7 @@ class Mechanism(Stateful):
         return self._is_powered and self._drive.is_energised
 
     def effort(self, now: Nanos) -> Effort:
-        """What the motor does at ``now`` and later, as `trajectory` has it."""
+        """Effort of the motor at ``now`` and later, as `trajectory` has it."""
         trajectory = self.trajectory(now)
         reduced = None if self._hold is None else self._hold.reduced_from(profile_of(trajectory.plan))
         return Effort(trajectory, self.has_current, reduced)
