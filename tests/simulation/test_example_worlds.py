@@ -18,6 +18,7 @@ ENDS = {
     "plotter": "the octagon is drawn",
     "winder": "three layers are wound",
     "two_stations": "both stations served",
+    "palletizer": "the pallet is full",
 }
 
 
@@ -47,6 +48,7 @@ def test_it_does_what_it_is_for(name: str) -> None:
         ("labeller", "belt-stop element=belt from_s=4 until_s=5"),
         ("plotter", "stiff-guides element=beam factor=2"),
         ("winder", "stuck machine=chip pin=B4 value=0 from_s=13 until_s=18"),
+        ("palletizer", "worn-brake element=hold share=0.6"),
     ],
 )
 def test_it_survives_a_fault(name: str, fault: str) -> None:
@@ -66,6 +68,11 @@ def test_it_survives_a_fault(name: str, fault: str) -> None:
         ("plotter", "stall machine=cell axis=3 at_s=4 for_s=0.5", "not cell.OUT1 and not cell.OUT3 and beam.count == 0"),
         ("winder", "stuck-follower element=guide from_s=8", "abs(guide.position - (20 - abs(spool.position % 40 - 20))) < 0.02"),
         ("indexer", "lost-steps machine=cell at_s=5 pulses=640", "abs(table.position - 720) < 1"),
+        (
+            "palletizer",
+            "welded-contact element=sto",
+            "x_axis.speed == 0 and y_axis.speed == 0 and z_axis.speed == 0 and danger.count == 0",
+        ),
     ],
 )
 def test_it_reports_another(name: str, fault: str, failure: str) -> None:
