@@ -290,7 +290,7 @@ size = [10, 10, 10]
 
 [[body]]
 name = "workpiece"
-at = [500, 0, 0]
+at = [90, 0, -35]
 size = [10, 10, 10]
 
 [[nest]]
@@ -314,7 +314,7 @@ except = [["lift", "post"]]
 
 [[beam]]
 name = "gate"
-at = [0, 0, 10]
+at = [0, 0, -30]
 length = 100
 sees = ["workpieces", "head", "workpiece"]
 to = "table.IN8"

@@ -27,6 +27,7 @@ at = [0, 500, 0]
 name = "cup"
 ejector = "m.OUT1"
 at = [0, 0, 500]
+reach = 1000
 """
 
 

@@ -12,6 +12,7 @@ from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.description import describe
 from steptwin.simulation.describe.includes import is_include
 from steptwin.simulation.describe.overlaps import check_overlaps
+from steptwin.simulation.describe.reach import check_reach
 from steptwin.simulation.toml.reader import TomlText, WorldError
 from steptwin.simulation.world.simulation import Simulation
 
@@ -50,6 +51,7 @@ def diagnose(name: str, text: str, read: Callable[[str], bytes]) -> Diagnosis:
         blueprint = Blueprint(spec, files)
         objects = Simulation(blueprint, keep_trace=False, keep_inputs=False).objects
         check_overlaps(spec.text, objects)
+        check_reach(spec.text, objects)
         found: Sequence[Diagnostic] = in_order([*spec.text.findings, *spec.text.warnings])
     except WorldError as error:
         found = error.findings

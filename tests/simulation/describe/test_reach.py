@@ -1,0 +1,124 @@
+"""Warnings about cups, jaws and beams that are of no use where they are."""
+
+from __future__ import annotations
+
+import pytest
+
+from steptwin.simulation.describe.includes import no_files
+from steptwin.simulation.world.check import diagnose
+
+AXES = """\
+[[mic488]]
+name = "m"
+[[axis]]
+name = "x"
+drive = "m.M1"
+pitch = 5.0
+travel = [0, 300]
+at = [0, 0, 400]
+[[cylinder]]
+name = "lift"
+extend = "m.OUT1"
+stroke = 50
+on = "x"
+along = "-z"
+"""
+TRAY = """\
+[[nest]]
+name = "tray"
+at = [100, 0, 300]
+workpiece = [40, 40, 20]
+filled = 1
+"""
+
+
+def cup(at: str, name: str = "cup") -> str:
+    return f'[[vacuum]]\nname = "{name}"\nejector = "m.OUT2"\non = "lift"\nat = {at}\n'
+
+
+def jaws(at: str) -> str:
+    return f'[[gripper]]\nname = "jaws"\nclose = "m.OUT3"\noverlap = 5\nstroke = 50\non = "lift"\nat = {at}\n'
+
+
+def beam(at: str, sees: str, name: str = "gate") -> str:
+    return f'[[beam]]\nname = "{name}"\nat = {at}\nlength = 100\nalong = "+y"\nsees = {sees}\nto = "m.IN1"\n'
+
+
+def warnings(text: str) -> list[tuple[str, str]]:
+    """Each with the line that it is about."""
+    found = diagnose("m.toml", text, no_files).findings
+    return [(one.message, text[one.span.start :].partition("\n")[0]) for one in found]
+
+
+HEAD = '[[body]]\nname = "head"\non = "x"\nat = [0, 0, 100]\nsize = [20, 20, 20]\n'
+
+
+SEES_NO_HEAD = ("gate never sees head: along x they stay 40 mm apart", 'sees = ["head"]')
+
+
+@pytest.mark.parametrize(
+    ("text", "messages"),
+    [
+        # The cylinder lowers from 400 to 350, tops are at 320.
+        (TRAY + cup("[0, 0, -28]"), []),
+        (
+            TRAY + cup("[0, 0, -27]"),
+            [("cup never comes to a workpiece: it stays 1 mm too high for those on tray", "at = [0, 0, -27]")],
+        ),
+        (
+            TRAY + cup("[0, 0, -120]"),
+            [("cup never comes to a workpiece: it stays 20 mm too low for those on tray", "at = [0, 0, -120]")],
+        ),
+        (TRAY + cup("[-250, 0, -30]"), []),
+        (
+            TRAY + cup("[-400, 0, -30]"),
+            [("cup never comes to a workpiece: along x it stays 95 mm beside those on tray", "at = [-400, 0, -30]")],
+        ),
+        (TRAY.replace("filled = 1", "filled = 3") + cup("[0, 0, 2]"), []),  # three layers
+        # Jaws go over a workpiece.
+        (TRAY + jaws("[0, 0, -35]"), []),
+        (
+            TRAY + jaws("[0, 0, -34]"),
+            [("jaws never comes to a workpiece: it stays 1 mm too high for those on tray", "at = [0, 0, -34]")],
+        ),
+        # Where another one may have stacked workpieces there is no limit.
+        (TRAY + cup("[0, 0, -28]") + cup("[0, 0, 100]", "other"), []),
+        (
+            TRAY + cup("[0, 0, -28]") + cup("[0, 500, 100]", "other"),
+            [("other never comes to a workpiece: along y it stays 395 mm beside those on tray", "at = [0, 500, 100]")],
+        ),
+        # Without workpieces, and without an end of the travel, nothing is known.
+        (TRAY.replace("filled = 1", "") + cup("[0, 0, 500]"), []),
+        (
+            TRAY
+            + '[[axis]]\nname = "z"\ndrive = "m.M3"\npitch = 5.0\non = "x"\nalong = "-z"\n'
+            + cup("[0, 0, 500]").replace('on = "lift"', 'on = "z"'),
+            [],
+        ),
+        # Beams see what is carried past them, and what falls.
+        (TRAY + cup("[0, 0, -28]") + beam("[250, -50, 200]", '["workpieces"]'), []),
+        (
+            TRAY + cup("[0, 0, -28]") + beam("[250, -50, 400]", '["workpieces"]'),
+            [("gate never sees workpieces: along z they stay 8 mm apart", 'sees = ["workpieces"]')],
+        ),
+        (
+            HEAD + beam("[350, -50, 510]", '["head"]'),
+            [SEES_NO_HEAD],
+        ),
+        (HEAD + beam("[305, -50, 510]", '["head"]'), []),
+        (HEAD + beam("[350, -50, 510]", '["head"]').replace("length", "hysteresis = 1\nlength"), [SEES_NO_HEAD]),
+    ],
+)
+def test_what_is_of_no_use_is_warned_of(text: str, messages: list[tuple[str, str]]) -> None:
+    assert warnings(AXES + text) == messages
+
+
+def test_what_turns_comes_all_around() -> None:
+    """An arm of 100 mm with a cup on its end."""
+    arm = '[[axis]]\nname = "arm"\nkind = "rotary"\ndrive = "m.M1"\nunit = "degree"\npulses_per_unit = 100\nat = [0, 0, 300]\n'
+    text = '[[mic488]]\nname = "m"\n' + arm + cup("[100, 0, 21]").replace('on = "lift"', 'on = "arm"')
+    assert warnings(text + TRAY) == []
+    assert warnings(text + TRAY.replace("[100, 0, 300]", "[0, -100, 300]")) == []
+    assert warnings(text + TRAY.replace("[100, 0, 300]", "[0, -250, 300]")) == [
+        ("cup never comes to a workpiece: along y it stays 45 mm beside those on tray", "at = [100, 0, 21]")
+    ]
