@@ -166,6 +166,7 @@ def test_a_workpiece_that_is_put_near_a_cell_is_aligned() -> None:
     rig.take(60.0)
     rig.put(67.0)
     assert rig.told()[-1] == "tray.1 lies crooked on tray"
+    assert rig.world.read("tray.crooked") == 1.0
     assert rig.place("tray.1") == (67, 0, 100)
 
 

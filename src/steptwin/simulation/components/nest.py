@@ -15,24 +15,24 @@ from steptwin.simulation.scheduler.scheduler import TerminalBlock
 
 
 class Nest(TerminalComponent):
-    """Counts the workpieces in it, those on others too."""
+    """Counts the workpieces in it, those on others too, and which of them lie crooked."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("_resting",)
-    __slots__ = (*FIXED, "count")
+    __slots__ = (*FIXED, "count", "crooked")
 
     def __init__(self, block: TerminalBlock, resting: Resting) -> None:
         super().__init__(block)
         self._resting = resting
-        self.count = 0
+        self.count = self.crooked = 0
 
     @property
     def depends_on(self) -> tuple[str, ...]:
         return (self.block.name, WORKPIECES)
 
     def update(self, now: Nanos) -> None:
-        count = self._resting.count(self.block.name)
-        if count != self.count:
-            self.count = count
+        count, crooked = self._resting.count(self.block.name), self._resting.crooked(self.block.name)
+        if (count, crooked) != (self.count, self.crooked):
+            self.count, self.crooked = count, crooked
             self.block.scheduler.notify(self.block.name)
 
 
@@ -44,6 +44,9 @@ def _make(spec: NestSpec, context: ElementContext) -> Nest:
 NEST = with_terminals(
     NestSpec,
     make=_make,
-    signals=lambda nest: {"count": SignalOf((nest.block.source,), lambda now: float(nest.count))},
+    signals=lambda nest: {
+        "count": SignalOf((nest.block.source,), lambda now: float(nest.count)),
+        "crooked": SignalOf((nest.block.source,), lambda now: float(nest.crooked)),
+    },
     moves=lambda spec, nest: (),
 )

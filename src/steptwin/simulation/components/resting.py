@@ -116,13 +116,19 @@ class Resting(Stateful):
 
     def put(self, workpiece: Workpiece, on: Body, lie: Lie, now: Nanos) -> bool:
         """It lies on a support, or on another workpiece; aligned, where that is a nest, or in one."""
-        nest = self._nests.get(self._lowest(on.name))
-        found = None if nest is None else nest.aligned(lie) if on.name in self._nests else nest.snapped(lie, (0, 0))
+        found = self._aligned(on.name, lie)
         self._rests = (*self._rests, Rest(workpiece, on.name, found or lie))
-        is_crooked = nest is not None and found is None
+        is_crooked = found is None
         text = (LIES_CROOKED if is_crooked else LIES_ON)(workpiece=workpiece.name, on=on.name)
         self._report(text, workpiece, "crooked" if is_crooked else "on")
         return True
+
+    def _aligned(self, on: str, lie: Lie) -> Lie | None:
+        """Where a workpiece is that is put on something; None where it lies crooked, in a nest."""
+        nest = self._nests.get(self._lowest(on))
+        if nest is None:
+            return lie
+        return nest.aligned(lie) if on in self._nests else nest.snapped(lie, (0, 0))
 
     def _lowest(self, name: str) -> str:
         """The element that a workpiece lies on, through others; itself for an element."""
@@ -134,6 +140,11 @@ class Resting(Stateful):
     def count(self, name: str) -> int:
         """The workpieces on an element, those on others too."""
         return sum(self._lowest(rest.workpiece.name) == name for rest in self._rests)
+
+    def crooked(self, name: str) -> int:
+        """Those among them that are aligned neither to a cell nor to the one below."""
+        here = (rest for rest in self._rests if self._lowest(rest.workpiece.name) == name)
+        return sum(self._aligned(rest.on, rest.lie) != rest.lie for rest in here)
 
     # ------------------------------------------------------------------ letting go
 
