@@ -122,3 +122,31 @@ def test_what_turns_comes_all_around() -> None:
     assert warnings(text + TRAY.replace("[100, 0, 300]", "[0, -250, 300]")) == [
         ("cup never comes to a workpiece: along y it stays 45 mm beside those on tray", "at = [100, 0, 21]")
     ]
+
+
+@pytest.mark.parametrize(
+    ("switch", "messages"),
+    [
+        ("above = 300.0", []),
+        ("above = 301.0", [("this switch is never on: x goes from 0 to 300", "above = 301.0")]),
+        ("below = 0.0", []),
+        ("below = -1.0", [("this switch is never on: x goes from 0 to 300", "below = -1.0")]),
+        ("below = 300.0", [("this switch is always on: x goes from 0 to 300", "below = 300.0")]),
+        ("below = 299.0", []),
+        ("position = 303.0\nwidth = 6.0", []),
+        ("position = 304.0\nwidth = 6.0", [("this switch is never on: x goes from 0 to 300", "position = 304.0")]),
+        ("position = 304.0\nwidth = 6.0\nperiod = 100.0", []),
+    ],
+)
+def test_switches_beyond_the_travel_are_warned_of(switch: str, messages: list[tuple[str, str]]) -> None:
+    head, mark, tail = AXES.partition("[[cylinder]]")
+    text = f'{head}[[axis.switch]]\nto = "m.IN1"\n{switch}\n{mark}{tail}'
+    assert warnings(text) == messages
+    assert warnings(text.replace("travel = [0, 300]", "")) == []
+    turning = text.replace("pitch = 5.0", 'kind = "rotary"\nunit = "degree"\npulses_per_unit = 100')
+    assert warnings(turning) == ([] if "position" in switch else messages)
+
+
+def test_switches_beyond_the_stroke_are_warned_of() -> None:
+    text = AXES + '[[cylinder.switch]]\nto = "m.IN1"\nabove = 51.0\n'
+    assert warnings(text) == [("this switch is never on: lift goes from 0 to 50", "above = 51.0")]

@@ -18,7 +18,7 @@ from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, 
 from steptwin.simulation.components.encoder import EncoderSpec
 from steptwin.simulation.components.motor import MotorSpec, motor_of
 from steptwin.simulation.components.mount import UPRIGHT, Movement, MoverSpec
-from steptwin.simulation.components.switch import SwitchSpec, channel_of, put_switch, zone_of
+from steptwin.simulation.components.switch import SwitchSpec, channel_of, put_switch, warn_of_useless, zone_of
 from steptwin.simulation.kinds.kind import EncoderInputs
 from steptwin.simulation.logic.contacts import Switch, Zone
 from steptwin.simulation.logic.signal import SignalOf, SignalsOf
@@ -110,6 +110,9 @@ class AxisSpec(NamedSpec, MoverSpec):
         start, travel = (*self.path, "start"), self.travel
         if travel is not None and not travel[0] <= self.start <= travel[1] and not text.is_wrong(start):
             text.wrong(start, "D007", f"start = {self.start:g} is outside travel = {list(travel)}")
+        if travel is not None:
+            lasting = [one for one in self.switches if self.kind != "rotary" or one.position is None]
+            warn_of_useless(text, lasting, self.name, travel)
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import Reference
 from steptwin.simulation.components.logic import STUCK, Joint, TerminalComponent, TerminalComponentSpec, with_terminals
 from steptwin.simulation.components.mount import Movement, MoverSpec, to_nm
-from steptwin.simulation.components.switch import SwitchSpec, channel_of, put_switch, zone_of
+from steptwin.simulation.components.switch import SwitchSpec, channel_of, put_switch, warn_of_useless, zone_of
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.kinds.kind import Terminals
@@ -63,6 +63,7 @@ class CylinderSpec(TerminalComponentSpec, MoverSpec):
             text.wrong(
                 (*self.path, "start"), "D007", "a valve with a single coil keeps its cylinder retracted until it is switched"
             )
+        warn_of_useless(text, self.switches, self.name, (0.0, self.stroke))
 
 
 class Cylinder(TerminalComponent):

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from fractions import Fraction
 
+from steptwin.messages import Message
 from steptwin.simulation.components.contact import ContactSpec
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.logic.contacts import MovingPart, Switch, Zone
@@ -45,6 +46,25 @@ class SwitchSpec(ContactSpec):
     def check(self, text: TomlText) -> None:
         if sum(text.is_given((*self.path, name)) for name in ("below", "above", "position")) != 1:
             text.wrong(self.path, "D007", "a switch needs one of below, above and position")
+
+
+NEVER_ON = Message("simulation.switch-never-on", "this switch is never on: {name} goes from {low:g} to {high:g}")
+ALWAYS_ON = Message("simulation.switch-always-on", "this switch is always on: {name} goes from {low:g} to {high:g}")
+
+
+def warn_of_useless(text: TomlText, switches: Iterable[SwitchSpec], name: str, travel: tuple[float, float]) -> None:
+    """Warn of switches that do not change within a travel. Those with a period are somewhere in it."""
+    least, most = travel
+    for one in switches:
+        _, low, high, period = one.zone
+        if period is not None:
+            continue
+        is_never = (low is not None and low > most) or (high is not None and high < least)
+        is_always = (low is None or low <= least) and (high is None or high >= most)
+        given = next((key for key in ("below", "above", "position") if text.is_given((*one.path, key))), None)
+        if given is not None and is_never is not is_always:
+            message = (NEVER_ON if is_never else ALWAYS_ON)(name=name, low=least, high=most)
+            text.warn((*one.path, given), "D011", message)
 
 
 def channel_of(axis: str, number: int) -> str:
