@@ -251,6 +251,30 @@ def test_a_workpiece_that_is_carried_against_something_is_a_collision() -> None:
     assert rig.world.read("bump.hit") == 0
 
 
+def test_what_is_carried_against_a_workpiece_is_a_collision() -> None:
+    """It is carried 1 mm above the nest through the next one: their middles are 60 mm apart, they are 40 mm long."""
+    bump = '[[collision]]\nname = "bump"\nbetween = ["cup", "workpieces", "table"]\neffect = "jam"\n'
+    rig = Rig(MACHINE.replace("filled = 7", "filled = 2") + CUP + bump)
+    cell = rig.world.mic488["c"]
+    rig.take(0.0)
+    assert rig.world.read("bump.count") == 0  # what touches with its sides does not overlap
+    cell.write("OUT1", 1)
+    rig.world.run(for_=0.5)
+    cell.write("M1_POS_ABS", 60.0)
+    rig.world.run(for_=3.0)
+    (touch,) = (record for record in rig.world.trace.of("event") if record.subject == "collision")
+    assert touch.value == "bump: tray.1 and tray.2 touch"
+    assert rig.world.axis["x"].position == pytest.approx(20.0, abs=0.01)
+
+
+def test_a_workpiece_that_is_put_partly_into_another_one_is_said_to_collide() -> None:
+    """Cells are 60 mm apart, workpieces 40 mm long: at 30 mm from the next one it is crooked, and overlaps it by 10 mm."""
+    rig = Rig(MACHINE.replace("filled = 7", "filled = 2") + CUP)
+    rig.take(0.0)
+    rig.put(30.0)
+    assert rig.told()[-2:] == ["tray.1 lies crooked on tray", "tray.1 collides with tray.2 on tray"]
+
+
 def test_jaws_without_anything_between_them_close() -> None:
     rig = Rig(MACHINE + JAWS)
     rig.take(250.0)

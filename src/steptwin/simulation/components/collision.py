@@ -13,11 +13,13 @@ from steptwin.simulation.components.axis import AXIS
 from steptwin.simulation.components.body import BODY, body_of
 from steptwin.simulation.components.bodycontact import BodyContact
 from steptwin.simulation.components.carriage import CARRIAGE
+from steptwin.simulation.components.carriedcontact import CarriedContact
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.components.follower import FOLLOWER
 from steptwin.simulation.components.frames import bodies_on, sources_of
 from steptwin.simulation.components.gantry import GANTRY
+from steptwin.simulation.components.grasp import Grasp
 from steptwin.simulation.components.logic import STUCK, Joint, TerminalComponentSpec, with_terminals
 from steptwin.simulation.components.mount import Movement
 from steptwin.simulation.components.probe import Probe
@@ -28,6 +30,7 @@ from steptwin.simulation.components.tool import TOOL
 from steptwin.simulation.components.touch import HIT, JAM, REPORT, RESET, Contact, Touch
 from steptwin.simulation.components.workpieces import WORKPIECES
 from steptwin.simulation.kinds.kind import Terminals
+from steptwin.simulation.logic.condition import SignalCondition
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.mechanics import Mechanism
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
@@ -59,7 +62,7 @@ class CollisionSpec(TerminalComponentSpec):
     )
     between: tuple[str, ...] = key(
         _names,
-        f"bodies, elements with the bodies on them, or '{WORKPIECES}': those of one touch those of another",
+        f"bodies, elements with the bodies on them, a cup or jaws with what they carry, or '{WORKPIECES}': one touches another",
         default=(),
         excludes=("when",),
     )
@@ -125,7 +128,12 @@ class _Bodies:
         self._bodies = {name: body_of(one, context.frames) for name, one in self._described.items()}
         self._swept = {name: SweptBody(body) for name, body in self._bodies.items()}
         self._moved: list[Movement] = []
-        self.contacts = (*(self._contact(*pair) for pair in self._pairs()), *self._with_workpieces())
+        grasps = (holder for holder in context.objects.workpieces.holders if isinstance(holder, Grasp))
+        self._grasps = {grasp.name: grasp for grasp in grasps if grasp.name in spec.between}
+        """Cups and jaws, with what they carry."""
+        self._named = [name for name in spec.between if name != WORKPIECES and name not in self._grasps]
+        bodies = (self._contact(*pair) for pair in self._pairs())
+        self.contacts = (*bodies, *self._with_workpieces(), *self._carried())
         if not self.contacts:
             raise Misuse("nothing moves these bodies against each other")
 
@@ -133,7 +141,8 @@ class _Bodies:
     def depends_on(self) -> tuple[str, ...]:
         """Names of what changes whether they touch."""
         owners = (owner for one in self._described.values() for owner in one.owners)
-        pieces = self._context.objects.workpieces.sources if WORKPIECES in self._spec.between else ()
+        has_workpieces = self._grasps or WORKPIECES in self._spec.between
+        pieces = self._context.objects.workpieces.sources if has_workpieces else ()
         return tuple(dict.fromkeys((self._spec.name, *sources_of(self._moved), *owners, *pieces)))
 
     def _on(self, name: str) -> list[str]:
@@ -141,7 +150,7 @@ class _Bodies:
 
     def _pairs(self) -> Iterator[tuple[str, str]]:
         spec = self._spec
-        named = [self._on(name) for name in spec.between if name != WORKPIECES]
+        named = [self._on(name) for name in self._named]
         groups: Sequence[Sequence[str]] = [[name] for name in self._bodies] if spec.all else named
         those = {frozenset(pair) for one, other in combinations(groups, 2) for pair in product(one, other)}
         those -= {frozenset(pair) for one, other in spec.apart_from for pair in product(self._on(one), self._on(other))}
@@ -156,7 +165,7 @@ class _Bodies:
             return
         block = context.terminal_block(spec.name)
         resting_of(context, block.scheduler)
-        for name in dict.fromkeys(one for wanted in spec.between if wanted != WORKPIECES for one in self._on(wanted)):
+        for name in dict.fromkeys(one for wanted in self._named for one in self._on(wanted)):
             body = self._bodies[name]
             moved = context.frames.carrying(body.frame)
             self._moved += moved
@@ -164,15 +173,31 @@ class _Bodies:
             blocks = tuple(dict.fromkeys(drive for movement in moved for drive in movement.blocks))
             yield Contact(probe, blocks, partial(_touching, spec.name, name, probe, block))
 
+    def _carried(self) -> Iterator[Contact]:
+        """Contacts of what each cup or gripper carries with the others."""
+        spec, context = self._spec, self._context
+        block = context.terminal_block(spec.name)
+        for grasp in self._grasps.values():
+            moved = context.frames.carrying(grasp.frame)
+            self._moved += moved
+            parts = {name: (self._swept[name], self._whens(name)) for wanted in self._named for name in self._on(wanted)}
+            others = WORKPIECES in spec.between or len(self._grasps) > 1
+            meeting = CarriedContact(grasp, parts, context.objects.workpieces if others else None)
+            blocks = tuple(dict.fromkeys(drive for movement in moved for drive in movement.blocks))
+            yield Contact(meeting, blocks, partial(_carrying, spec.name, meeting, block))
+
+    def _whens(self, name: str) -> list[SignalCondition]:
+        when = self._described[name].when
+        return [] if when is None else [condition_of(when, self._context.terminal_block(self._spec.name), self._context)]
+
     def _contact(self, one: str, other: str) -> Contact:
         context = self._context
         moved = context.frames.between(self._bodies[one].frame, self._bodies[other].frame)
         self._moved += moved
         block = context.terminal_block(self._spec.name)
-        whens = [when for name in (one, other) if (when := self._described[name].when) is not None]
-        conditions = [condition_of(when, block, context) for when in whens]
+        conditions = [*self._whens(one), *self._whens(other)]
         contact = BodyContact(self._swept[one], self._swept[other], conditions)
-        if not whens and not context.memo.is_checked and contact.pair.overlap(block.scheduler.now):
+        if not conditions and not context.memo.is_checked and contact.pair.overlap(block.scheduler.now):
             raise Misuse(f"{one!r} and {other!r} overlap when the world begins")
         blocks = tuple(dict.fromkeys(drive for movement in moved for drive in movement.blocks))
         text = partial(BODIES_TOUCH, zone=self._spec.name, one=one, other=other)
@@ -181,6 +206,11 @@ class _Bodies:
 
 def _touching(zone: str, body: str, probe: Probe, block: TerminalBlock) -> str:
     return BODIES_TOUCH(zone=zone, one=body, other=", ".join(probe.met(block.scheduler.now)))
+
+
+def _carrying(zone: str, meeting: CarriedContact, block: TerminalBlock) -> str:
+    one, other = meeting.told(block.scheduler.now)
+    return BODIES_TOUCH(zone=zone, one=one, other=other)
 
 
 def _axes_of(spec: CollisionSpec, context: ElementContext) -> Iterator[tuple[str, Mechanism]]:

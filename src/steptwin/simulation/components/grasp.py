@@ -18,7 +18,7 @@ from steptwin.simulation.components.workpieces import Lie, body_in, lie_in
 from steptwin.simulation.mechanics.workpiece import Workpiece
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.space.bodies import Body, Box, Cylinder
-from steptwin.simulation.space.frames import NM_PER_MM, Direction
+from steptwin.simulation.space.frames import NM_PER_MM, Direction, Frame
 from steptwin.simulation.space.tops import height_over
 from steptwin.state import Plain, Stateful
 
@@ -100,6 +100,14 @@ class Grasp(Stateful):
         return None
 
     # ------------------------------------------------------------------ holding
+
+    @property
+    def name(self) -> str:
+        return self._block.name
+
+    @property
+    def frame(self) -> Frame:
+        return self._frame
 
     @property
     def workpiece(self) -> Workpiece | None:

@@ -10,7 +10,7 @@ from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.beltspace import BeltSpace
 from steptwin.simulation.components.body import BODY, body_of
-from steptwin.simulation.components.conveyor import CONVEYOR
+from steptwin.simulation.components.conveyor import COLLIDES, CONVEYOR
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.frames import Frames, sources_of
 from steptwin.simulation.components.nesttable import NestSpec
@@ -18,7 +18,9 @@ from steptwin.simulation.components.workpieces import REACH_NM, WORKPIECES, Belo
 from steptwin.simulation.mechanics.workpiece import Workpiece
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.space.bodies import Body, half_height
+from steptwin.simulation.space.contacts import Pair
 from steptwin.simulation.space.frames import FLOOR, NM_PER_MM, Frame
+from steptwin.simulation.space.sweeps import meet
 from steptwin.state import Plain, Stateful
 
 GRAVITY_NM_S2 = 9.80665e9
@@ -121,6 +123,8 @@ class Resting(Stateful):
         is_crooked = found is None
         text = (LIES_CROOKED if is_crooked else LIES_ON)(workpiece=workpiece.name, on=on.name)
         self._report(text, workpiece, "crooked" if is_crooked else "on")
+        for name in self._overlapping(workpiece.name, now):
+            self._report(COLLIDES(workpiece=workpiece.name, other=name, belt=on.name), workpiece, "collides")
         return True
 
     def _aligned(self, on: str, lie: Lie) -> Lie | None:
@@ -129,6 +133,13 @@ class Resting(Stateful):
         if nest is None:
             return lie
         return nest.aligned(lie) if on in self._nests else nest.snapped(lie, (0, 0))
+
+    def _overlapping(self, name: str, now: Nanos) -> list[str]:
+        """The workpieces that one overlaps."""
+        every = self._workpieces.bodies()
+        own, around = every[name], self._workpieces.swept(name).sweep(now)
+        near = [other for other in every if other != name and meet(around, self._workpieces.swept(other).sweep(now))]
+        return [other for other in near if Pair(own, every[other]).overlap(now)]
 
     def _lowest(self, name: str) -> str:
         """The element that a workpiece lies on, through others; itself for an element."""
