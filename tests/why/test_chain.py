@@ -9,13 +9,13 @@ from compositions import composed, finish
 
 from steptwin.errors import Misuse
 from steptwin.messages import MessageText
-from steptwin.why.answer import ChainLink, ChainRule
+from steptwin.why.answer import ChainLink, ChainRule, Cover
 from steptwin.why.chain import BrokenRule, Cause, Place, broken, nothing
 
 
 def cause(time: int, order: int = 0, number: int = 0, *, is_root: bool = False) -> Cause:
     link = ChainLink(time, "a", MessageText("something"))
-    return Cause(link, Place(time, order, number), nothing if is_root else lambda: None)
+    return Cause(link, Place(time, order, number), nothing if is_root else lambda: None, Cover.DELAY)
 
 
 @pytest.mark.parametrize(
@@ -37,6 +37,12 @@ def test_rules(chain: list[Cause], found: BrokenRule | None) -> None:
 def test_a_link_has_the_moment_of_its_place() -> None:
     other = cause(9)._replace(place=Place(8))
     assert broken([other], Place(10), is_followed=False) == BrokenRule(0, ChainRule.ORDER)
+
+
+def test_what_comes_later_is_covered() -> None:
+    at_once, later = (cause(time, 1, is_root=True)._replace(cover=None) for time in (10, 9))
+    assert broken([at_once], Place(10, 2), is_followed=True) is None
+    assert broken([later], Place(10, 2), is_followed=True) == BrokenRule(0, ChainRule.COVER)
 
 
 def test_a_chain_that_goes_on_needs_no_root() -> None:

@@ -544,6 +544,24 @@ def test_what_the_end_of_a_program_switches_off(end: str, text: str) -> None:
     ]
 
 
+def test_a_wait_for_a_place_is_ended_by_the_motion() -> None:
+    world = two_axes("M1 = ON\nPABS M1 2000\nWAIT PosM1 > 50\nOUT1 = ON\nWAITPOS\nWAIT IN8 = ON\n")
+    assert [link.text for link in world.why("OUT1").links[2:5]] == [
+        "line 3 `WAIT PosM1 > 50` ended",
+        "c.M1 began to move",
+        "line 2 `PABS M1 2000` was executed",
+    ]
+
+
+def test_a_terminal_follows_what_drives_it_and_an_output_that_was_before_is_no_cause() -> None:
+    world = waits()
+    for terminal in ("guard.coil", "both.in2"):
+        world.mic488["cell"].write("OUT3", 1)
+        driver = {"guard.coil": "cell.OUT1", "both.in2": "cell.OUT3"}[terminal]
+        assert world.why(terminal).links[0].text == f"{driver} became 1"
+        assert world.why(terminal).since == world.why(driver).since
+
+
 def test_the_output_that_enables_a_drive() -> None:
     world = two_axes("M1 = ON\nDELAY 0.3\nM1 = OFF\nM2 = ON\nDELAY 5\n")
     assert world.why("M1_EN == 0").links[1].text == "line 3 `M1 = OFF` was executed"

@@ -20,7 +20,22 @@ class ChainRule(enum.Enum):
 
     ORDER = "a cause comes before its effect"
     """So a chain never returns to what it has named."""
+    COVER = "something lasts from a cause until its effect, if that comes later"
     ROOT = "what changed has a cause, unless it comes from outside or holds from the beginning"
+
+
+class Cover(enum.Enum):
+    """What lasts from a cause until its effect, if that comes later."""
+
+    LEVEL = "a signal, variable or register keeps its value"
+    DELAY = "a delay of an element or wire"
+    ACTION = "an element acts, such as a cylinder that moves"
+    BOUNCE = "a contact bounces"
+    MOTION = "an axis moves"
+    PROGRAM = "a program executes statements"
+    WAIT = "a statement waits, or what it began lasts"
+    FRAME = "a frame is on the line"
+    FAULT = "a fault holds a level"
 
 
 class ChainLink(NamedTuple):

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
 
-from steptwin.controller import SECOND, Nanos
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.messages import Message, MessageText, text_of
 from steptwin.motion.divisions import profile_of
 from steptwin.simulation.components.logic import TerminalComponent
@@ -19,8 +19,8 @@ from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.control import Halt
 from steptwin.simulation.world.inputs import Download, See, SetVariable
-from steptwin.why.answer import ChainLink, since_before
-from steptwin.why.chain import Cause, FoundCause, Place, nothing, unknown
+from steptwin.why.answer import ChainLink, Cover, since_before
+from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing, unknown
 from steptwin.why.log import LAST, MOST_LOOKED_BACK, Act, CauseLog, Change, sets
 from steptwin.why.sentences import Frames, describe_input, statement
 
@@ -47,6 +47,8 @@ WAS_IN_EXECUTION = Message("why.was-in-execution", "{statement} was in execution
 ENDED = Message("why.ended", "{statement} ended")
 DECIDED = Message("why.decided", "{statement} decided")
 PROGRAM_STARTED = Message("why.program-started", "the program started")
+LONGEST_REACTION_NS: Nanos = 510 * MILLISECOND
+"""Limit of the time after which a statement goes on when what it waits for has come: inputs may be filtered for 500 ms."""
 MOST_UNDECIDED = 5000
 """Limit of the statements among which the one that decided is looked for."""
 
@@ -89,7 +91,8 @@ class Causes:
     def power(self, axis: str, until: Nanos) -> FoundCause:
         """The last change by a moment of the output that gives the motor of an axis power; None for one that always has some."""
         power = self._world.axes[axis].spec.power
-        return None if power is None else self.last((self._name(PinName(*power)),), until, GIVES_POWER(axis=axis))
+        found = None if power is None else self.last((self._name(PinName(*power)),), until, GIVES_POWER(axis=axis))
+        return covered(found, Cover.MOTION)
 
     def moved(self, axis: str, until: Nanos) -> FoundCause:
         """Cause that moved the load of an axis last, or left it where it is: a motion, or the power of its motor meanwhile."""
@@ -153,12 +156,25 @@ class Causes:
 
         link = ChainLink(time, signal.partition(".")[0], IS(signal=signal, value=held.description()))
 
-        older = self._at_begin if first is None else lambda: first
+        older = self._at_begin if first is None else lambda: covered(first, Cover.LEVEL)
         for act in self._log.acts_before(time, hold.order):
             match act.what:
                 case do.SetFault(fault) if held.fault.startswith(fault.name or fault.kind.name):
-                    return Cause(link, place, partial(Cause, *_acted(act)[:2], older))
-        return Cause(link, place, older)
+                    return Cause(link, place, partial(Cause, *_acted(act)[:2], older, Cover.FAULT), Cover.FAULT)
+        return Cause(link, place, older, Cover.FAULT)
+
+    def of_element(self, name: str, signal: str, time: Nanos) -> FoundCause:
+        """Cause of a change of an element that no record shows: what drives a terminal, an output at the same moment, or an
+        input."""
+        part = self._parts.get(name)
+        if part is not None and signal.upper() in _inputs(part):
+            return self.last(list(self._sources(PinName(name, signal.upper()))), time)
+        channels = [one for one in self._log.changes if one == name or one.startswith(f"{name}.")]
+        last = self.last(channels, time)
+        if part is None or (last is not None and last.place.time == time):
+            return last
+        group = self._log.group(name)
+        return self._of_element(name, Change(time, 0.0, group, self._log.position(group, time), LAST))
 
     def _of_element(self, name: str, change: Change) -> FoundCause:
         """Cause of a change of an element's output: an input at the same moment, or one before, as much earlier as it delays."""
@@ -174,11 +190,13 @@ class Causes:
             ]
             if exact:
                 latest, source = max(exact, key=lambda found: found[0].order)
-                return self.change(source, latest, FOLLOWS_AFTER(name=name, delay_ms=delay / SECOND * 1000) if delay else None)
+                how = FOLLOWS_AFTER(name=name, delay_ms=delay / SECOND * 1000) if delay else None
+                return covered(self.change(source, latest, how), Cover.DELAY)
         if not last:
             return None
         latest, source = max(last, key=lambda found: (found[0].time, found[0].order))
-        return self.change(source, latest, HAS_ACTED_SINCE(name=name))
+        acts = type(part).deadline is not TerminalComponent.deadline
+        return covered(self.change(source, latest, HAS_ACTED_SINCE(name=name)), Cover.ACTION if acts else None)
 
     def _before(self, signal: str, change: Change, until: Nanos) -> tuple[Change, str] | None:
         """The last change of a signal by a moment and before ``change``."""
@@ -204,7 +222,7 @@ class Causes:
         if wire is not None:
             found = self._before(self._name(wire.source), change, change.time - wire.delay)
             if found is not None and found[0].time == change.time - wire.delay:
-                return self.change(found[1], found[0], IS_WIRED_TO(pin=str(pin)))
+                return covered(self.change(found[1], found[0], IS_WIRED_TO(pin=str(pin))), Cover.DELAY)
         channels = [found for channel in self._sources(pin) if (found := self._before(channel, change, change.time))]
         at_once = [found for found in channels if found[0].time == change.time]
         if at_once:
@@ -228,7 +246,7 @@ class Causes:
                     return _acted(act)
         earlier = self._log.last_change(name, change.time - 1)
         if earlier is not None and change.time - earlier.time < SECOND:
-            return self.change(name, earlier, CONTACT_BOUNCED())
+            return covered(self.change(name, earlier, CONTACT_BOUNCED()), Cover.BOUNCE)
         return None
 
     def drivers(self, signal: str, at: Nanos) -> list[str]:
@@ -302,8 +320,7 @@ class Causes:
                 found.append(self._frame(record, order))
             elif record.controller == controller and record.kind == "input":
                 found.append(self._input(record, order))
-        naming = re.compile(rf"(?<!\w){re.escape(point.partition(':')[0])}(?!\w)") if point else None
-        return next((one for one in found if naming is not None and naming.search(one.link.text)), next(iter(found), None))
+        return next((one for one in found if point and _name_of(point).search(one.link.text)), next(iter(found), None))
 
     def _inside(self, controller: str, change: Change, wanted: Resource | None) -> FoundCause:
         """Cause of an act of the controller itself: an input, or the end of what an earlier statement began."""
@@ -341,9 +358,8 @@ class Causes:
         for position in range(change.position - 1, max(-1, change.position - MOST_LOOKED_BACK), -1):
             record = records[position]
             if record.kind == "frame" and record.controller == on[0].name:
-                return (
-                    self._frame(record, self._log.order(change.group, position)) if self._frames.reaches(record, on[1]) else None
-                )
+                found = self._frame(record, self._log.order(change.group, position))
+                return covered(found, Cover.FRAME) if self._frames.reaches(record, on[1]) else None
         return None
 
     def _earlier(self, controller: str, time: Nanos, wanted: Resource | None) -> FoundCause:
@@ -353,9 +369,16 @@ class Causes:
         executed = self._log.executed[controller]
         last = self._log.last_executed(controller, time)
         for index in range(last, max(-1, last - MOST_LOOKED_BACK), -1):
-            if executed[index].time < time and _matches(self.use(controller, index).writes, wanted):
-                return self.statement(controller, index)
+            use = self.use(controller, index)
+            if executed[index].time < time and _matches(use.writes, wanted):
+                is_waiting = use.waits and (index == last or executed[index + 1].time >= time)
+                is_of_axis = wanted.kind is ResourceKind.AXIS and self._is_moving(controller, wanted.name, time)
+                return covered(self.statement(controller, index), Cover.WAIT if use.lasts or is_waiting or is_of_axis else None)
         return None
+
+    def _is_moving(self, controller: str, axis: str, time: Nanos) -> bool:
+        """Whether an axis moves until a moment, or longer."""
+        return any(self._end(plan)[0] >= time for plan in self._log.plans_in_force(controller, axis, time))
 
     def _is_input(self, pin: PinName) -> bool:
         return pin in self._world.objects.driven or pin in self._world.objects.circuits
@@ -371,10 +394,10 @@ class Causes:
     def _requested(self, record: TraceRecord, order: int) -> FoundCause:
         """The step that made a request, which a line with timing carries later."""
         members = {name for name, (line, _) in self._world.objects.line_of.items() if line.name == record.controller}
-        for act in self._log.acts_before(record.time, order):
-            if _requests(act, record.controller, members):
-                return _acted(act)
-        return None
+        meaning = self._frames.meaning(record)
+        acts = [act for act in self._log.acts_before(record.time, order) if _requests(act, record.controller, members)]
+        act = next((act for act in acts if _names(act, meaning)), next(iter(acts), None))
+        return None if act is None else covered(_acted(act), Cover.FRAME)
 
     def _input(self, record: TraceRecord, order: int) -> Cause:
         act = next(self._log.acts_at(record.time, order), None)
@@ -396,19 +419,24 @@ class Causes:
         shown = f"{mechanics} ({name})" if mechanics else name
         is_before = not self._log.is_whole and plan.time == self._log.begin
         if is_before and profile.start < plan.time and profile.segments:
-            return Cause(ChainLink(profile.start, controller, BEGAN_TO_MOVE(axis=shown)), Place(profile.start), unknown)
+            return Cause(
+                ChainLink(profile.start, controller, BEGAN_TO_MOVE(axis=shown)), Place(profile.start), unknown, Cover.MOTION
+            )
         if is_before and not profile.segments:
             return None
         place = Place(plan.time, plan.order)
+        cover: Cover | None = None
         if not profile.segments:
             text = STOPPED(axis=shown)
         elif profile.end is not None and profile.end <= until:
-            text = MOTION_ENDED(axis=shown, time=plan.time / SECOND)
-            place = max(place, Place(profile.end))
+            text, place = MOTION_ENDED(axis=shown, time=plan.time / SECOND), max(place, Place(profile.end))
         else:
-            text = BEGAN_TO_MOVE(axis=shown)
-        cause = partial(self.in_controller, controller, plan, Resource(ResourceKind.AXIS, record.subject))
-        return Cause(ChainLink(place.time, controller, text), place, cause)
+            text, cover = BEGAN_TO_MOVE(axis=shown), Cover.MOTION
+
+        def planned() -> FoundCause:
+            return covered(self.in_controller(controller, plan, Resource(ResourceKind.AXIS, record.subject)), Cover.MOTION)
+
+        return Cause(ChainLink(place.time, controller, text), place, planned, cover)
 
     def _end(self, plan: Change) -> tuple[float, Nanos]:
         """When the motion of a plan ends, which may be never; of several at once, the one planned last."""
@@ -443,12 +471,13 @@ class Causes:
         """The wait or condition that let a statement be executed."""
         executed = self._log.executed[controller]
         number = executed[index].location.number
+        at_once = self._world.programs[controller].statement_time
         for earlier in range(index - 1, max(-1, index - MOST_UNDECIDED), -1):
             use = self.use(controller, earlier)
             if use.jumps is not None and executed[earlier + 1].location.number == use.jumps <= number:
                 number = executed[earlier].location.number
             ended = executed[earlier + 1]
-            if use.waits and ended.time - executed[earlier].time > self._world.programs[controller].statement_time:
+            if use.waits and ended.time - executed[earlier].time > at_once:
                 place = Place(ended.time, ended.order, 3 * (earlier + 1))
                 return self._decided(controller, earlier, place, ENDED)
             if number in use.governs or (use.is_loop and executed[earlier + 1].location.number >= use.governs.stop):
@@ -462,15 +491,35 @@ class Causes:
         if use.is_loop:  # its condition is written where it begins
             executed = executed._replace(location=executed.location._replace(number=use.governs.start - 1))
         link = ChainLink(place.time, controller, how(statement=statement(self._log, executed)))
-        return Cause(link, place, partial(self._of_decision, controller, index, place))
+        ended = self._of_wait if how is ENDED else self._of_decision
+        return Cause(link, place, partial(ended, controller, index, place), Cover.PROGRAM)
+
+    def _read(self, controller: str, index: int, place: Place) -> Iterator[Cause]:
+        """The last changes of what a statement reads."""
+        for resource in self.use(controller, index).reads:
+            cause = self.resource(controller, resource, index, place.time, place.order)
+            if cause is not None:
+                yield cause
 
     def _of_decision(self, controller: str, index: int, place: Place) -> FoundCause:
-        found = [
+        """What a condition reads has its value since then."""
+        last = max(self._read(controller, index, place), key=lambda cause: cause.place, default=None)
+        return self._of_statement(controller, index) if last is None else covered(last, Cover.LEVEL)
+
+    def _of_wait(self, controller: str, index: int, place: Place) -> FoundCause:
+        """What a statement waits for came while it did, at most `LONGEST_REACTION_NS` before its end. A wait for a time depends
+        on what led to it."""
+        reads = self.use(controller, index).reads
+        if all(resource.kind is ResourceKind.VALUE for resource in reads):
+            return covered(self._of_statement(controller, index), Cover.WAIT)
+        latest = place.time - LONGEST_REACTION_NS
+        passes = any(resource.kind is ResourceKind.AXIS and resource.name for resource in reads)  # a place, not the end
+        came = [
             cause
-            for resource in self.use(controller, index).reads
-            if (cause := self.resource(controller, resource, index, place.time, place.order))
+            for cause in self._read(controller, index, place)
+            if (cause.place.time >= latest if cause.cover is None else passes and cause.cover is Cover.MOTION)
         ]
-        return max(found, key=lambda cause: cause.place) if found else self._of_statement(controller, index)
+        return covered(max(came, key=lambda cause: cause.place, default=None), Cover.WAIT)
 
     def resource(self, controller: str, resource: Resource, index: int, time: Nanos, before: int = LAST) -> FoundCause:
         """The last change of what a statement reads by a moment, before an order."""
@@ -484,7 +533,7 @@ class Causes:
             case ResourceKind.VALUE:
                 for earlier in range(index - 1, max(-1, index - MOST_LOOKED_BACK), -1):
                     if resource in self.use(controller, earlier).writes:
-                        return self.statement(controller, earlier)
+                        return covered(self.statement(controller, earlier), Cover.LEVEL)
         return None
 
     def _started(self, controller: str) -> FoundCause:
@@ -492,7 +541,7 @@ class Causes:
         if not self._log.is_whole:
             return None
         first = self._log.executed[controller][0]
-        return Cause(ChainLink(first.time, controller, PROGRAM_STARTED()), Place(first.time, first.order), nothing)
+        return Cause(ChainLink(first.time, controller, PROGRAM_STARTED()), Place(first.time, first.order), nothing, Cover.PROGRAM)
 
 
 def _inputs(part: TerminalComponent) -> list[str]:
@@ -510,6 +559,19 @@ def _acted(act: Act) -> Cause:
     what = describe_input(act.what)
     text = SCRIPT(name=act.script, what=what) if act.script else FROM_OUTSIDE(what=what)
     return Cause(ChainLink(act.time, act.script or "outside", text), Place(act.time, act.order), nothing)
+
+
+def _names(act: Act, meaning: str) -> bool:
+    """Whether an action writes what a request is about."""
+    match act.what:
+        case do.Write(values):
+            return any(_name_of(name).search(meaning) for _, name, _ in values)
+    return False
+
+
+def _name_of(point: str) -> re.Pattern[str]:
+    """Pattern of a point in the words of a request."""
+    return re.compile(rf"(?<!\w){re.escape(point.partition(':')[0])}(?!\w)", re.IGNORECASE)
 
 
 def _requests(act: Act, line: str, members: Collection[str]) -> bool:

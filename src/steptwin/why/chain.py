@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeAlias
 
 from steptwin.controller import Nanos
 from steptwin.messages import Message
-from steptwin.why.answer import ChainLink, ChainRule
+from steptwin.why.answer import ChainLink, ChainRule, Cover
 
 NOT_KNOWN = Message("why.not-known", "what caused this is not known from here")
 
@@ -22,14 +22,20 @@ class Place(NamedTuple):
 
 
 class Cause(NamedTuple):
-    """A link with its place, and what finds the cause of it."""
+    """A link with its place, and what finds the cause of it. ``cover``: what lasts until its effect, if anything does."""
 
     link: ChainLink
     place: Place
     before: Callable[[], Cause | None]
+    cover: Cover | None = None
 
 
 FoundCause: TypeAlias = "Cause | None"
+
+
+def covered(cause: FoundCause, by: Cover | None) -> FoundCause:
+    """A cause whose effect comes later by what lasts."""
+    return cause if cause is None or by is None else cause._replace(cover=by)
 
 
 def nothing() -> FoundCause:
@@ -55,6 +61,8 @@ def broken(chain: Sequence[Cause], effect: Place, *, is_followed: bool) -> Broke
     for number, cause in enumerate(chain):
         if cause.link.time != cause.place.time or cause.place >= effect:
             return BrokenRule(number, ChainRule.ORDER)
+        if cause.place.time < effect.time and cause.cover is None:
+            return BrokenRule(number, ChainRule.COVER)
         effect = cause.place
     if is_followed and (not chain or chain[-1].before is not nothing):
         return BrokenRule(len(chain), ChainRule.ROOT)

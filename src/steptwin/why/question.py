@@ -20,9 +20,9 @@ from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput
 from steptwin.simulation.world.snapshotlog import outside_past
 from steptwin.why import points
-from steptwin.why.answer import MOST_LINKS, Answer, ChainLink, since_before
+from steptwin.why.answer import MOST_LINKS, Answer, ChainLink, Cover, since_before
 from steptwin.why.causes import IS, IS_SINCE, Causes
-from steptwin.why.chain import NOT_KNOWN, Cause, Place, broken, nothing
+from steptwin.why.chain import NOT_KNOWN, Cause, Place, broken, covered, nothing
 from steptwin.why.log import LAST, MOST_NOTED, CauseLog, in_parts
 from steptwin.why.replayed import ReplayedSignals, TimeSeries, watch_truth, watch_value
 from steptwin.why.search import Asked
@@ -371,8 +371,7 @@ class Why:
                 return switched
             return causes.at_moment(drive[0], time, Resource(ResourceKind.AXIS, drive[1].removeprefix("M")))
         if owner not in world.controllers:
-            channels = [name for name in self.log.changes if name == owner or name.startswith(f"{owner}.")]
-            return causes.last(channels, time)
+            return causes.of_element(owner, rest, time)
         axis = _AXIS.match(rest)
         is_of_axis = axis is not None or (self._is_signal(signal) and world.signal(signal).continuous)
         wanted = Resource(ResourceKind.AXIS, (axis and axis[1]) or "") if is_of_axis else None
@@ -410,13 +409,16 @@ class Why:
         text, since = statement(log, here), None if log.is_in_progress(here) else here.time
         if not use.waits or at - here.time <= log.world.programs[controller].statement_time:
             state = DOES_NOT_WAIT(controller=controller, statement=text)
-            return (yield from self._answer(controller, at, state, since, causes.statement(controller, index)))
+            return (
+                yield from self._answer(controller, at, state, since, covered(causes.statement(controller, index), Cover.PROGRAM))
+            )
         links = [link for resource in use.reads for link in self._awaited(controller, resource, at)]
         if not use.reads:
             links.append(ChainLink(here.time, controller, WAITS_FOR_A_TIME()))
         found = [cause for resource in use.reads if (cause := causes.resource(controller, resource, index, at))]
         changed = [cause for cause in found if cause.link.time > here.time]
-        first = max(changed, key=lambda cause: cause.link.time, default=None) or causes.statement(controller, index)
+        last = max(changed, key=lambda cause: cause.link.time, default=None)
+        first = covered(causes.statement(controller, index), Cover.WAIT) if last is None else covered(last, Cover.LEVEL)
         answer = yield from self._answer(controller, at, WAITS(controller=controller, statement=text), since, first)
         return answer._replace(links=tuple(dict.fromkeys((*links, *answer.links)))[:MOST_LINKS])
 
@@ -454,7 +456,8 @@ class Why:
 
     def _answer(self, question: str, at: Nanos, state: MessageText, since: Nanos | None, first: Cause | None) -> Asking:
         chain: list[Cause] = []
-        cause, effect = first, Place(at, LAST)
+        # What it is lasts since then.
+        cause, effect = covered(first, Cover.LEVEL if first is not None and first.link.time == since else None), Place(at, LAST)
         while cause is not None and len(chain) < MOST_LINKS:
             chain.append(cause)
             if broken(chain, effect, is_followed=False):

@@ -62,6 +62,8 @@ class StatementUse(NamedTuple):
     writes: tuple[Resource, ...] = ()
     waits: bool = False
     """Whether the program goes on only when what it reads permits it, or, if it reads nothing, after a time."""
+    lasts: bool = False
+    """Whether what it began changes something once more when the program has gone on."""
     governs: range = range(0)
     """Numbers of the statements of which it decides whether they are executed."""
     is_loop: bool = False

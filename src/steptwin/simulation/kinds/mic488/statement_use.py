@@ -24,6 +24,7 @@ def use_of(steps: Sequence[s.ProgramStep], number: int) -> StatementUse:
         (*_awaited(step), *_operands(step.sources())),
         writes,
         waits=step.waits is not s.StepWait.NOTHING,
+        lasts=isinstance(step, s.PulseStep),
         governs=_governed(steps, number),
         is_loop=isinstance(step, s.WhileStep | s.EndWhileStep),
         jumps=step.target if isinstance(step, s.JumpStep) else None,
