@@ -313,7 +313,7 @@ def test_the_machine_is_drawn_and_its_button_pressed(start_studio: Callable[...,
     expect(place).not_to_have_text("–")
     shown = place.inner_text()
     expect(place).not_to_have_text(shown)  # the program moves it
-    expect(page.locator("svg .piece[data-element=infeed]").first).to_be_visible()  # a workpiece
+    expect(page.locator("svg .piece").filter(visible=True).first).to_be_visible()  # a workpiece
     press = button(page, "Press part")
     press.hover()
     page.mouse.down()

@@ -79,6 +79,11 @@ def part(element: str, material: str) -> str:
     return f'svg .solid.{material}[data-element="{element}"]'
 
 
+def _lefts(page: Page) -> list[float]:
+    found = page.locator("svg .solid.piece").filter(visible=True).all()
+    return [box["x"] for piece in found if (box := piece.bounding_box()) is not None]
+
+
 def left(page: Page, element: str, material: str) -> float:
     box = page.locator(part(element, material)).first.bounding_box()
     assert box is not None
@@ -114,10 +119,14 @@ def test_what_moves_is_drawn_where_it_is(studio: Studio) -> None:
     scale = pixels["width"] / float(page.locator(".ruler").inner_text().split()[0])
     assert left(page, "x", "moving") - before == pytest.approx(120.0 * scale, abs=2.0)
     assert left(page, "lift", "moving") - hanging == pytest.approx(120.0 * scale, abs=2.0)
-    hand, pieces = page.locator(part("hand", "frame")), page.locator(part("belt", "piece"))
+    hand, pieces = page.locator(part("hand", "frame")), page.locator("svg .solid.piece")
     expect(hand).to_be_hidden()
-    expect(pieces.first).to_be_visible()
-    expect(pieces.last).to_be_hidden()  # there is room for it
+    expect(pieces.first).to_be_visible()  # it waits where it was fed
+    waits = pieces.first.bounding_box()
+    studio.master.coil(6001, True)
+    assert waits is not None
+    until(lambda: max(_lefts(page)) > waits["x"] + 30 * scale, "it goes on")
+    studio.master.coil(6001, False)
     button(page, "Press door").hover()
     page.mouse.down()
     expect(hand).to_be_visible()

@@ -145,7 +145,7 @@ class Hub:
         self._moment: tuple[Nanos, str] = (-1, "")
         self._workpieces: Sequence[WorkpieceState] = ()
         """As they were sent."""
-        self.shared = SharedState(lost=None, control=None, viewers=0, leases=[], clock=None)
+        self.shared = SharedState(lost=None, control=None, viewers=0, leases=[], workpieces=[], clock=None)
 
     def _describe(self) -> None:
         if self.subject.description is not self._described:

@@ -1,3 +1,4 @@
+import type { Hello } from "../protocol/connection";
 import type { Element, Mechanics, Model } from "../state/model";
 import { directionOf, type Scene } from "./poses";
 
@@ -27,6 +28,8 @@ export interface Solid {
   pin: string | null;
 }
 
+/** A workpiece, and where it is. */
+export type Piece = Hello["workpieces"][number];
 type Frame = Scene["frames"][number];
 type Look = Partial<Omit<Solid, "element" | "frame" | "at" | "size">>;
 
@@ -210,7 +213,7 @@ function cylinder(build: Builder, element: Element): void {
 
 const BELT_MM = 100;
 
-/** A belt about two rollers between its sides. Arrows are lit while it runs; workpieces lie where their fronts are. */
+/** A belt about two rollers between its sides. Arrows are lit while it runs. */
 function conveyor(build: Builder, element: Element): void {
   const drawing = element.drawing;
   if (drawing === null) return;
@@ -230,12 +233,9 @@ function conveyor(build: Builder, element: Element): void {
   const run = element.inputs.includes("run") ? `${element.name}.run` : null;
   for (let n = 0; n < arrows; n++) build.arrow([((n + 0.5) / arrows) * length, 0, 0.2], 0.3 * wide, { pin: run });
   for (const name of drawing.places) {
-    const long = drawing.size;
-    const signal = `${element.name}.${name}`;
-    build.box([-long / 2, 0, long / 2], [long, long, long], "piece", {
-      slide: { signal, by: build.along },
-      shown: signal,
-    });
+    const [long, signal] = [drawing.size, `${element.name}.${name}`];
+    const slide = { signal, by: build.along };
+    build.box([-long / 2, 0, long / 2], [long, long, long], "piece", { slide, shown: signal });
   }
   for (const { pin, low } of drawing.switches) {
     const place = low ?? 0;
@@ -375,6 +375,17 @@ function body(build: Builder, { scene }: Known): void {
     color: its.color,
     shown: its.when === null ? null : `${its.name}.present`,
   });
+}
+
+/** One of a workpiece with this size; what it is on is said where it is. */
+export function pieceOf({ size, diameter, height }: Pick<Piece, "size" | "diameter" | "height">): Solid {
+  const wide = diameter ?? 0;
+  return {
+    ...{ element: "", frame: 0, isCarried: true, at: [0, 0, height / 2], material: "piece" },
+    ...{ color: null, slide: null, shown: null, pin: null },
+    size: size === null ? [wide, wide, height] : (size as unknown as Vector),
+    prism: size === null ? { axis: 2, corners: ROUND, towards: [1, 0, 0] } : null,
+  };
 }
 
 /** All solids of a scene: what elements are drawn with, by their kinds. */

@@ -82,6 +82,7 @@ export class Studio {
   control = $state.raw<Holder>(null);
   viewers = $state(0);
   leases = $state.raw<Hello["leases"]>([]);
+  private workpieces = $state.raw<Hello["workpieces"]>([]);
   /** Why the device does not answer. */
   lost = $state<string | null>(null);
   pace = $state.raw<Pace>({ running: false, speed: 1 });
@@ -141,6 +142,11 @@ export class Studio {
   /** Where the world is. Virtual time. [ns] */
   present(): bigint {
     return this.clock.now(performance.now());
+  }
+
+  /** The workpieces in space at the moment that is shown. */
+  get pieces(): Hello["workpieces"] {
+    return this.timeTravel.past?.workpieces ?? this.workpieces;
   }
 
   get isVirtual(): boolean {
@@ -247,6 +253,7 @@ export class Studio {
     this.control = hello.control;
     this.viewers = hello.viewers;
     this.leases = hello.leases;
+    this.workpieces = hello.workpieces;
     this.tellClock(BigInt(hello.time_ns), hello.pace, true);
     this.forgetAfter(BigInt(hello.time_ns));
     if (isNew || JSON.stringify(hello.description) !== this.description) this.describe(hello);
@@ -308,6 +315,7 @@ export class Studio {
     else if ("past" in message) this.timeTravel.take(message.past);
     else if ("control" in message) this.control = message.control;
     else if ("viewers" in message) this.viewers = message.viewers;
+    else if ("workpieces" in message) this.workpieces = message.workpieces;
     else if ("leases" in message) this.leases = message.leases;
     else if ("lost" in message) this.lost = message.lost;
   }

@@ -61,7 +61,10 @@ export class Drawing {
     this.spots = new Float64Array(count * 2).fill(NaN);
     this.order = new Order(stage, view);
     stage.solids.forEach(({ element, material }, n) => {
-      if (material !== "frame" || stage.solids.some((one) => one.element === element && one.material !== "frame"))
+      if (
+        element !== "" &&
+        (material !== "frame" || stage.solids.some((one) => one.element === element && one.material !== "frame"))
+      )
         this.named.set(element, [...(this.named.get(element) ?? []), n]);
     });
     const words = create("g", svg, "labels");
@@ -110,7 +113,7 @@ export class Drawing {
       const { classList } = this.parts[n] as SVGGElement;
       classList.toggle("on", pin !== null && levelOf(pin) === 1);
       classList.toggle("stalled", material === "moving" && isStalled(element));
-      classList.toggle("selected", element === selected);
+      classList.toggle("selected", element !== "" && element === selected);
     });
     for (const [name, label] of this.labels) {
       label.classList.toggle("selected", name === selected);

@@ -119,7 +119,7 @@ export class Space {
       const mesh = this.meshes[n] as Mesh<BufferGeometry, MeshStandardMaterial>;
       const isOn = solid.pin !== null && levelOf(solid.pin) === 1;
       const look = solid.material === "moving" && isStalled(solid.element) ? "stalled" : isOn ? "on" : solid.material;
-      mesh.material = this.materialOf(look, solid.color, solid.element === selected);
+      mesh.material = this.materialOf(look, solid.color, selected !== "" && solid.element === selected);
     });
   }
 
