@@ -180,3 +180,44 @@ def test_an_error_in_one_connection_ends_that_connection_only(monkeypatch: pytes
         other.serving.cancel()
 
     with_viewer(story)
+
+
+SPACE = """
+[[mic488]]
+name = "c"
+[[conveyor]]
+name = "belt"
+length = 100
+speed = 50
+run = "c.OUT1"
+feed_every = "1 s"
+workpiece = [20, 20, 20]
+at = [0, 0, 50]
+[[beam]]
+name = "end"
+at = [90, -50, 60]
+along = "+y"
+length = 100
+"""
+
+
+def test_a_viewer_is_sent_the_workpieces_when_one_comes_or_goes_and_not_while_they_move() -> None:
+    studio = Studio(SPACE)
+    tab = studio.open()
+
+    def sent() -> list[list[dict[str, Any]]]:
+        tab.read()
+        return [message["workpieces"] for message in tab.messages if "workpieces" in message]
+
+    assert tab.newest("hello")["workpieces"] == []
+    studio.run(1100)
+    ((piece,),) = sent()
+    assert (piece["name"], piece["on"], piece["travel"]) == ("belt.1", "belt", "belt.travel")
+    tab.ok("write", values={"c.OUT1": 1})
+    studio.run(500)
+    assert len(sent()) == 1
+    late = studio.open()
+    (there,) = late.newest("hello")["workpieces"]
+    assert there == piece
+    studio.run(3000)
+    assert [[one["name"] for one in found] for found in sent()[1:]] == [["belt.3", "belt.4"]]
