@@ -3,16 +3,17 @@
 #cup OUT1
 #unbrake OUT2
 #full OUT3
+#holdBelt OUT4
 #isThere IN4
 #isHeld IN5
 #hasPower IN6
 #start IN7
-#homeSpeed -100
+#homeSpeed -150
 
-// In mm. Home is above the box that waits on the belt.
+// In mm. Home is above the box that waits on the belt, so high that a box in the cup passes over it.
 #top 0
-#atBelt 49
-#atPallet 199
+#atBelt 109
+#atPallet 259
 #firstX 300
 #firstY 60
 #pitchX 130
@@ -36,8 +37,10 @@ WHILE n < boxes
     JUMP GO
     cup = ON
     WAIT isHeld = ON
+    holdBelt = ON
     z = top
     JUMP GO
+    holdBelt = OFF
     JUMP PLACE_OF_N
     JUMP GO
     z = atPallet - lift
