@@ -231,6 +231,29 @@ def test_jaws_take_what_is_between_them_and_centre_it() -> None:
     assert rig.place("tray.1") == (395, 0, 100)
 
 
+@pytest.mark.parametrize(
+    ("tool", "told"),
+    [
+        (CUP + "reach = 1.0\n", ["cup holds tray.1"]),
+        (CUP + "reach = 0.999\n", []),
+        (JAWS.replace("overlap = 8.0", "overlap = 10.0"), ["jaws holds tray.1"]),
+        (JAWS.replace("overlap = 8.0", "overlap = 10.001"), []),
+    ],
+)
+def test_what_is_just_within_reach_is_taken(tool: str, told: list[str]) -> None:
+    """The top of the workpiece is at 120 mm; the cup is lowered to 121, the tips of the jaws to 110."""
+    rig = Rig(MACHINE.replace("filled = 7", "filled = 1") + tool)
+    rig.take(0.0)
+    assert rig.told() == told
+
+
+def test_a_nest_on_a_plate_is_before_the_plate() -> None:
+    rig = Rig(MACHINE.replace("filled = 7", "filled = 1") + '[[nest]]\nname = "zone"\non = "table"\nat = [0, 0, 20]\n' + CUP)
+    rig.take(0.0)
+    rig.put(400.0)
+    assert rig.told()[-1] == "tray.1 lies on zone"
+
+
 def test_a_workpiece_that_is_carried_against_something_is_a_collision() -> None:
     """The cup is at 400 mm; what it holds is 40 mm long and comes to a wall, 10 mm long, at 300 mm."""
     wall = """

@@ -72,7 +72,9 @@ class GripperSpec(CarrierSpec, MoverSpec):
 
 
 def _grasp(block: TerminalBlock, spec: GripperSpec, context: ElementContext) -> Grasp:
-    probe = Body(spec.name, context.frames.base(spec.name), Box((0, 0, 0)), (0, 0, to_nm(spec.overlap)))
+    probe = Body(
+        spec.name, context.frames.base(spec.name), Box((0, 0, 0)), (0, 0, to_nm(spec.overlap) - 1)
+    )  # just so much touches
     across = spec.towards().axis
 
     def centred(lie: Lie, body: Body) -> Lie:

@@ -60,7 +60,7 @@ class VacuumSpec(CarrierSpec):
 def _grip(block: TerminalBlock, spec: VacuumSpec, context: ElementContext) -> Grip:
     if not spec.is_mounted:
         return BeltGrip(block, spec, context)
-    half = to_nm(spec.reach) // 2
+    half = to_nm(spec.reach) // 2 + 1  # of a nm more than its reach: a face that is just that far away only touches
     probe = Body(spec.name, context.frames.base(spec.name), Box((0, 0, half)), (0, 0, -half))
     return Grasp(block, context, probe, _drawn, to_nm(spec.diameter) // 2)
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from steptwin.controller import Nanos
-from steptwin.simulation.space.bodies import Body, Box
+from steptwin.simulation.space.bodies import Body, Box, half_height
 from steptwin.simulation.space.frames import TURN_Q, Frame, Vector, Z, in_plane, placement, whole
 
 
@@ -35,13 +35,13 @@ def height_over(body: Body, frame: Frame, point: Vector, now: Nanos, radius: int
 def top_below(
     bodies: Iterable[Body], frame: Frame, point: Vector, now: Nanos, *, radius: int = 0, reach: int | None = None
 ) -> Above | None:
-    """The highest top face that a point of a frame is on or above, by at most ``reach``; of those that are equally high, that of
-    the body whose name is first.
+    """The highest top face that a point of a frame is on or above, by at most ``reach``. Of those that are equally high, a mere
+    face, such as a nest on a plate, is before a body; then the name that is first.
 
     ``radius`` 0 and the centre of a lower face: what carries a workpiece. The radius and the middle of a cup: what it holds.
     """
     found: Above | None = None
-    for body in sorted(bodies, key=lambda one: one.name):
+    for body in sorted(bodies, key=lambda one: (half_height(one.shape) > 0, one.name)):
         gap = height_over(body, frame, point, now, radius)
         if gap is not None and gap >= 0 and (reach is None or gap <= reach) and (found is None or gap < found.gap):
             found = Above(gap, body)
