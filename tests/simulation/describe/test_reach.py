@@ -125,6 +125,26 @@ def test_what_turns_comes_all_around() -> None:
 
 
 @pytest.mark.parametrize(
+    ("on", "at", "by"),
+    [
+        (None, "[500, 0, 700]", None),
+        (None, "[620, 0, 700]", None),  # half of both widths, and a workpiece
+        (None, "[720, 0, 700]", "x it"),
+        (None, "[500, 0, 650]", None),  # it goes down by less than a workpiece
+        (None, "[500, 0, 500]", "z it"),
+        ("lift", "[300, 0, 320]", None),  # from 250 to 700 mm and more
+        ("lift", "[300, 0, 500]", "z it"),
+    ],
+)
+def test_belts_that_are_apart_are_warned_of(on: str | None, at: str, by: str | None) -> None:
+    belt = '[[conveyor]]\nname = "{}"\nlength = 500\nspeed = 100\nrun = "m.OUT1"\n'
+    place = f"at = {at}\n" + ("" if on is None else f'on = "{on}"\n')
+    found = warnings(AXES + belt.format("a") + 'at = [0, 0, 700]\nnext = "b"\n' + belt.format("b") + place)
+    assert [line for _, line in found] == ([] if by is None else ['next = "b"'])
+    assert by is None or f"a goes on to b, but along {by}s end stays" in found[0][0]
+
+
+@pytest.mark.parametrize(
     ("switch", "messages"),
     [
         ("above = 300.0", []),

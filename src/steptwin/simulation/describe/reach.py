@@ -38,6 +38,10 @@ BESIDE = Message(
 )
 SEES_NOTHING = Message("simulation.beam-never-sees", "{beam} never sees {what}: along {axis} they stay {by:g} mm apart")
 
+BELTS_APART = Message(
+    "simulation.belts-apart", "{belt} goes on to {next}, but along {axis} its end stays {by:g} mm away from the beginning of that"
+)
+
 
 def check_reach(text: TomlText, objects: BuiltObjects) -> None:
     """Warn of cups, jaws and beams that are of no use."""
@@ -118,6 +122,7 @@ class _Reach:
         if self._heights:
             self._check_tools()
         self._check_beams()
+        self._check_belts()
 
     # ------------------------------------------------------------------ cups and jaws
 
@@ -192,6 +197,29 @@ class _Reach:
                 places.append(Sweep(low, (x, y, max(z, highest))))
         for ray in rays:
             yield from (_apart(swept(ray, self._range), place) for place in places)
+
+    # ------------------------------------------------------------------ belts
+
+    def _check_belts(self) -> None:
+        """Warn where workpieces would fly from belt to belt: over more than the largest of them, besides half of both widths."""
+        belts = {belt.name: belt for belt in self._described.of(CONVEYOR)}
+        for belt in belts.values():
+            following = None if belt.next is None else belts.get(belt.next)
+            if following is None or belt.name not in self._frames or following.name not in self._frames:
+                continue
+            end, begin = [0, 0, 0], self._point(following.name)
+            towards = belt.towards()
+            end[towards.axis] = towards.sign * to_nm(belt.length)
+            last = Body(belt.name, self._frames.base(belt.name), Box((0, 0, 0)), (end[0], end[1], end[2]))
+            around, there = self._together(last, begin)
+            largest = max(self._aside, *self._heights)
+            room = largest + (to_nm(belt.width) + to_nm(following.width)) // 2
+            (x, y, z), (u, v, w) = there
+            grown = Sweep((x - room, y - room, z - largest), (u + room, v + room, w + largest))
+            if _apart(around, grown) is not None and (miss := _apart(around, there)) is not None:
+                by = miss.by / NM_PER_MM
+                message = BELTS_APART(belt=belt.name, next=following.name, by=by, axis=AXES[miss.axis])
+                self._text.warn((*belt.path, "next"), DOUBTFUL, message)
 
     # ------------------------------------------------------------------ where things may be
 
