@@ -193,11 +193,6 @@ run = "c.OUT1"
 feed_every = "1 s"
 workpiece = [20, 20, 20]
 at = [0, 0, 50]
-[[beam]]
-name = "end"
-at = [90, -50, 60]
-along = "+y"
-length = 100
 """
 
 

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from fractions import Fraction
 
 from steptwin.controller import SECOND, Nanos
-from steptwin.simulation.components.conveyor import Conveyor
+from steptwin.simulation.components.builtobjects import BuiltObjects
+from steptwin.simulation.components.conveyor import CONVEYOR, Conveyor
 from steptwin.simulation.components.frames import Frames, sources_of
 from steptwin.simulation.components.mount import to_nm
 from steptwin.simulation.components.workpieces import Lie, body_in
@@ -108,3 +109,10 @@ def _pieces_of_drive(drive: BeltDrive, now: Nanos) -> Iterator[Piece]:
         yield SteadyPiece(now, None, drive.grid_position, float(drive.whole_speed * SECOND))
     else:
         yield StillPiece(now, None, float(drive.grid_position(now)))
+
+
+def add_belts(objects: BuiltObjects) -> None:
+    """Add the conveyors that have a place to what has workpieces in space, unless they are there."""
+    holders, frames = objects.workpieces.holders, objects.frames
+    if not any(isinstance(one, BeltSpace) for one in holders):
+        holders += (BeltSpace(one, frames) for name, one in objects.built(CONVEYOR).items() if name in frames)

@@ -8,9 +8,9 @@ from typing import ClassVar, NamedTuple
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message
-from steptwin.simulation.components.beltspace import BeltSpace
+from steptwin.simulation.components.beltspace import add_belts
 from steptwin.simulation.components.body import BODY, body_of
-from steptwin.simulation.components.conveyor import COLLIDES, CONVEYOR
+from steptwin.simulation.components.conveyor import COLLIDES
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.frames import Frames, sources_of
 from steptwin.simulation.components.nesttable import NestSpec
@@ -223,8 +223,7 @@ def resting_of(context: ElementContext, scheduler: Scheduler) -> Resting:
     supports = {one.name: body_of(one, frames) for one in described.of(BODY) if one.holds_workpieces}
     supports |= {name: nest.bottom(frames.base(name)) for name, nest in nests.items()}
     made = Resting(scheduler, frames, workpieces, supports, nests)
-    conveyors = context.objects.built(CONVEYOR)
-    workpieces.holders += (BeltSpace(one, frames) for name, one in conveyors.items() if name in frames)
+    add_belts(context.objects)
     workpieces.holders.append(made)
     scheduler.add_part(made, None, WORKPIECES)
     return made

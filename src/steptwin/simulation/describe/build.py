@@ -8,6 +8,7 @@ from typing import Any
 
 from steptwin.controller import ControllerEvent, Nanos
 from steptwin.errors import Misuse
+from steptwin.simulation.components.beltspace import add_belts
 from steptwin.simulation.components.builtobjects import BuiltObjects
 from steptwin.simulation.components.element import AnyElement
 from steptwin.simulation.components.elementcontext import ElementContext
@@ -159,6 +160,7 @@ class _Builder:
         frames, text = self.objects.frames, self.spec.text
         for name in () if self.blueprint.memo.is_checked else frames:
             text.unless_wrong(frames.described[name].path, partial(frames.__getitem__, name))
+        add_belts(self.objects)
 
     def _waits(self, element: AnyElement, spec: TableSpec) -> bool:
         """Whether it is over a signal of an element that is not built yet."""
