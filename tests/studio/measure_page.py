@@ -92,6 +92,46 @@ def studio(text: str) -> Generator[str]:
                 process.terminate()
 
 
+BELTS = 5
+WORKPIECES = 300
+SPENT = """window.spent = [];
+const ask = window.requestAnimationFrame.bind(window);
+window.requestAnimationFrame = (draw) => ask((now) => {
+  const begin = performance.now();
+  draw(now);
+  window.spent.push(performance.now() - begin);
+});"""
+
+
+def belts() -> str:
+    """Belts in space, which are full of workpieces after 30 s."""
+    parts = ['[world]\nname = "belts"\n[[line]]\nname = "bus"\nkind = "modbus"\ntcp = "127.0.0.1:0"\n']
+    parts.append('[[mic488]]\nname = "table"\nline = "bus"\n')
+    each = WORKPIECES // BELTS
+    for n in range(1, BELTS + 1):
+        parts.append(f'[[conveyor]]\nname = "belt{n}"\nrun = "table.OUT1"\nat = [0, {120 * n}, 100]\nwidth = 60\n')
+        parts.append(f'length = {50 * each}\nspeed = 100.0\nfeed_every = "500 ms"\nworkpiece = [30, 20, 20]\n')
+    parts.append('[[script]]\nname = "go"\nat = "0 s"\nsteps = [{ write = { "table.OUT1" = 1 } }]\n')
+    return "".join(parts)
+
+
+def workpieces(page: Page, url: str) -> None:
+    """What the code of the page takes for a picture in which all of them move; in three dimensions that includes WebGL."""
+    page.add_init_script(SPENT)
+    page.goto(url)
+    show(page, "Machine")
+    page.wait_for_timeout(35_000)
+    for what in ("drawing", "three dimensions"):
+        page.evaluate("window.spent.length = 0")
+        page.wait_for_timeout(SECONDS * 1000)
+        spent = sorted(page.evaluate("window.spent"))
+        count = page.locator("svg .piece").count()
+        middle, most = statistics.median(spent), spent[int(0.95 * len(spent))]
+        print(f"{what} of {count} workpieces: median {middle:.1f} ms, p95 {most:.1f} ms of {len(spent)} pictures")
+        page.get_by_role("button", name="3D", exact=True).click()
+        page.wait_for_timeout(5000)
+
+
 def show(page: Page, panel: str) -> None:
     page.get_by_role("navigation").get_by_role("button", name=panel, exact=True).click()
 
@@ -178,6 +218,8 @@ def main() -> None:
             page.wait_for_timeout(2000)
             pictures(page, f"{CONTROLLERS} controllers, scope with {CURVES} curves")
             page.close()
+        with studio(belts()) as url:
+            workpieces(browser.new_page(viewport={"width": 1920, "height": 1080}, locale="en-US"), url)
         browser.close()
 
 

@@ -6,11 +6,14 @@ from collections.abc import Iterator
 from typing import cast
 
 from steptwin.simulation.components.axis import AXIS, MECHANICS
+from steptwin.simulation.components.beam import BEAM
 from steptwin.simulation.components.body import BODY
 from steptwin.simulation.components.button import BUTTON
 from steptwin.simulation.components.frames import Mounted
 from steptwin.simulation.components.mount import MoverSpec
+from steptwin.simulation.components.nest import NEST
 from steptwin.simulation.components.registry import ELEMENTS
+from steptwin.simulation.components.vacuum import VACUUM
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.mechanics.drawing import Drawing, SensorZone
 from steptwin.simulation.space.bodies import Box, half_height
@@ -31,10 +34,12 @@ from steptwin.subject.contract import (
 )
 from steptwin.subject.controls import controls_of
 from steptwin.subject.scene import (
+    BeamDescription,
     BodyDescription,
-    BoxDescription,
+    CupDescription,
     FrameDescription,
     JointDescription,
+    NestDescription,
     Point,
     SceneDescription,
     WorkpieceState,
@@ -96,12 +101,16 @@ def _element(world: Simulation, kind: str, name: str) -> ElementDescription:
 
 
 def _scene(world: Simulation) -> SceneDescription:
-    frames = world.objects.frames
+    frames, elements = world.objects.frames, world.spec.elements
     return SceneDescription(
         tuple(_frame(name, one) for name, one in frames.items()),
+        tuple(BodyDescription(one.name, one.size, one.diameter, one.height, one.color, one.when) for one in elements.of(BODY)),
+        tuple(CupDescription(one.name, one.diameter) for one in elements.of(VACUUM) if one.name in frames),
+        tuple(NestDescription(one.name, one.cells, one.pitch, one.cell or one.pitch) for one in elements.of(NEST)),
         tuple(
-            BodyDescription(one.name, one.size, one.diameter, one.height, one.color, one.when)
-            for one in world.spec.elements.of(BODY)
+            BeamDescription(one.name, one.length, one.count, one.pitch, str(one.across))
+            for one in elements.of(BEAM)
+            if one.name in frames
         ),
     )
 
@@ -110,13 +119,7 @@ def _frame(name: str, mounted: Mounted) -> FrameDescription:
     spec, place = mounted.spec, mounted.place
     joints = tuple(JointDescription(f"{name}.{one.signal}", str(one.along), one.turns, one.per_unit) for one in mounted.movements)
     along = str(spec.towards()) if isinstance(spec, MoverSpec) and not joints else None
-    boxes = tuple(_box(one.centre, one.shape) for one in spec.boxes(mounted.frame) if isinstance(one.shape, Box))
-    return FrameDescription(name, str(spec.path[0]), place.on, _mm(place.origin), along, joints, boxes)
-
-
-def _box(centre: Vector, shape: Box) -> BoxDescription:
-    x, y, z = shape.half
-    return BoxDescription(_mm(centre), _mm((2 * x, 2 * y, 2 * z)))
+    return FrameDescription(name, str(spec.path[0]), place.on, _mm(place.origin), along, joints)
 
 
 def _mm(vector: Vector) -> Point:
@@ -131,7 +134,6 @@ def workpiece_states(world: Simulation) -> Iterator[WorkpieceState]:
     for name, body in world.objects.workpieces.bodies().items():
         carrier = next((one for one in body.frame.line() if one in owners), None)
         there = pose(body.frame, FLOOR if carrier is None else carrier, world.now)
-        x, y, z = (one / NM_PER_MM for one in there.at)
         shape, height = body.shape, 2 * half_height(body.shape) / NM_PER_MM
         size = tuple(2 * one / NM_PER_MM for one in shape.half) if isinstance(shape, Box) else None
         moves = any(one.motion is not None and not one.motion.is_still for one in path(carrier or FLOOR, body.frame))
@@ -143,7 +145,7 @@ def workpiece_states(world: Simulation) -> Iterator[WorkpieceState]:
             None if isinstance(shape, Box) else 2 * shape.radius / NM_PER_MM,
             height,
             on,
-            (x, y, z),
+            _mm(there.at),
             there.angle_q * 90.0,
             travel,
             0.0 if travel is None else world.read(travel),

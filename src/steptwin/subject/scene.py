@@ -1,4 +1,4 @@
-"""The machine in space, as a viewer draws it: frames that carry each other, and the bodies on them. Lengths in mm, z is up."""
+"""The machine in space, as a viewer draws it: frames that carry each other, and what is on them. Lengths in mm, z is up."""
 
 from __future__ import annotations
 
@@ -19,14 +19,6 @@ class JointDescription:
 
 
 @dataclass(frozen=True, slots=True)
-class BoxDescription:
-    """A box of an element, in its frame: a line of light or a face, where one or two of its sizes are 0."""
-
-    at: Annotated[Point, "Its middle [mm]"]
-    size: Annotated[Point, "Along x, y and z [mm]"]
-
-
-@dataclass(frozen=True, slots=True)
 class FrameDescription:
     """The frame of an element. What is on it is moved by its joints, the first of which is outermost."""
 
@@ -36,8 +28,6 @@ class FrameDescription:
     at: Annotated[Point, "Its origin there, while its joints are at 0 [mm]"]
     along: Annotated[str | None, "Direction of an element that moves workpieces, not what is on it"]
     joints: tuple[JointDescription, ...]
-    boxes: tuple[BoxDescription, ...] = ()
-    """The beams of a beam, the bottom of a nest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +40,35 @@ class BodyDescription:
     height: float | None
     color: Annotated[str | None, "#RRGGBB"]
     when: Annotated[str | None, "The condition under which it is there"]
+
+
+@dataclass(frozen=True, slots=True)
+class CupDescription:
+    """A suction cup that points down, with the middle of its lip at the origin of the frame of its name."""
+
+    name: str
+    diameter: Annotated[float, "Of its lip [mm]"]
+
+
+@dataclass(frozen=True, slots=True)
+class NestDescription:
+    """Cells for workpieces, the first of which has the middle of its bottom at the origin of the frame of its name."""
+
+    name: str
+    cells: Annotated[tuple[int, int], "Along x and along y"]
+    pitch: Annotated[tuple[float, float], "From one to the next, along x and along y [mm]"]
+    cell: Annotated[tuple[float, float], "Size of one, along x and along y [mm]"]
+
+
+@dataclass(frozen=True, slots=True)
+class BeamDescription:
+    """A line of light from the origin of the frame of its name along the direction of that, or several beside each other."""
+
+    name: str
+    length: Annotated[float, "To the receiver [mm]"]
+    count: int
+    pitch: Annotated[float, "From one line to the next [mm]"]
+    across: Annotated[str, "Direction from one line to the next: +x, -z ..."]
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +92,9 @@ class SceneDescription:
 
     frames: tuple[FrameDescription, ...] = ()
     bodies: tuple[BodyDescription, ...] = ()
+    cups: tuple[CupDescription, ...] = ()
+    nests: tuple[NestDescription, ...] = ()
+    beams: tuple[BeamDescription, ...] = ()
 
 
 NO_SCENE = SceneDescription()

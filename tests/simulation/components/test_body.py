@@ -12,6 +12,7 @@ from steptwin.files.world import World
 from steptwin.simulation.space.frames import pose
 from steptwin.simulation.toml.reader import WorldError
 from steptwin.subject.describe import describe
+from steptwin.subject.scene import BeamDescription, CupDescription, NestDescription
 
 MACHINE = """
 [[mic488]]
@@ -173,12 +174,11 @@ def test_a_viewer_gets_the_frames_with_their_signals() -> None:
     assert by_name["left"].joints[0].per_unit == 10.0
     assert (by_name["turret"].joints[0].turns, by_name["turret"].joints[0].per_unit) == (True, 1.0)
     assert (by_name["belt"].along, by_name["belt"].joints) == ("+x", ())
-    assert by_name["tip"].boxes == ()
     assert (by_name["tip"].on, by_name["tip"].at) == ("z", (0.0, 0.0, -12.5))
     assert [(one.name, one.diameter, one.height, one.size) for one in scene.bodies] == [("tip", 8.0, 12.5, None)]
 
 
-def test_a_viewer_gets_the_lines_of_a_beam_and_the_bottom_of_a_nest() -> None:
+def test_a_viewer_gets_the_sizes_of_beams_nests_and_cups() -> None:
     more = """
 [[beam]]
 name = "curtain"
@@ -186,18 +186,25 @@ at = [0, 0, 10]
 along = "-x"
 length = 100
 count = 2
+to = "c.IN1"
 [[nest]]
 name = "tray"
 at = [0, 0, 10]
 cells = [3, 1]
 pitch = [60, 50]
+[[vacuum]]
+name = "cup"
+at = [0, 0, 200]
+ejector = "c.OUT1"
+diameter = 12
+[[vacuum]]
+name = "nowhere"
+ejector = "c.OUT2"
 """
-    by_name = {frame.name: frame for frame in describe(World.from_toml(MACHINE + more)).scene.frames}
-    assert [(one.at, one.size) for one in by_name["curtain"].boxes] == [
-        ((-50.0, 0.0, 0.0), (100.0, 0.0, 0.0)),
-        ((-50.0, 0.0, 20.0), (100.0, 0.0, 0.0)),
-    ]
-    assert [(one.at, one.size) for one in by_name["tray"].boxes] == [((60.0, 0.0, 0.0), (180.0, 50.0, 0.0))]
+    scene = describe(World.from_toml(MACHINE + more)).scene
+    assert scene.beams == (BeamDescription("curtain", length=100.0, count=2, pitch=20.0, across="+z"),)
+    assert scene.nests == (NestDescription("tray", cells=(3, 1), pitch=(60.0, 50.0), cell=(60.0, 50.0)),)
+    assert scene.cups == (CupDescription("cup", diameter=12.0),)
 
 
 HAND = """[[body]]

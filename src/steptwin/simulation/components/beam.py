@@ -73,9 +73,6 @@ class BeamSpec(TerminalComponentSpec, MoverSpec):
         if self.along is not None and self.count > 1 and self.along.axis == self.across.axis:
             text.wrong((*self.path, "across"), "D007", f"across = '{self.across}' is along its beams")
 
-    def boxes(self, frame: Frame) -> Iterable[Body]:
-        return self.segments(frame)
-
     @property
     def moves_others(self) -> bool:
         """Never: its direction is that of its beams."""

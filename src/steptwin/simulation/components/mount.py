@@ -5,7 +5,7 @@ An element that is mounted has a frame (`steptwin.simulation.space`), which is a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from fractions import Fraction
 from math import floor
 from typing import Any, NamedTuple, TypeAlias
@@ -13,8 +13,7 @@ from typing import Any, NamedTuple, TypeAlias
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.simulation.mechanics.scale import exact_fraction
-from steptwin.simulation.space.bodies import Body
-from steptwin.simulation.space.frames import AXES, NM_PER_MM, Direction, Frame, Vector, X, Z
+from steptwin.simulation.space.frames import AXES, NM_PER_MM, Direction, Vector, X, Z
 from steptwin.simulation.space.pieces import Motion
 from steptwin.simulation.toml.table import TableSpec, key, table
 from steptwin.simulation.toml.values import frame_name, number, permitting
@@ -73,10 +72,6 @@ class MountSpec(TableSpec):
     @property
     def origin(self) -> Vector:
         return self.at or (0, 0, 0)
-
-    def boxes(self, frame: Frame) -> Iterable[Body]:
-        """Boxes by which a viewer knows it, besides what its kind looks like."""
-        return ()
 
     @property
     def mounted_as(self) -> str | None:

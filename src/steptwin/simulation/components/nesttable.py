@@ -68,9 +68,6 @@ class NestSpec(TerminalComponentSpec, MountSpec):
     def joints(self) -> Iterable[Joint]:
         return ()
 
-    def boxes(self, frame: Frame) -> Iterable[Body]:
-        return (self.bottom(frame),)
-
     def bottom(self, frame: Frame) -> Body:
         """The face that workpieces lie on."""
         (nx, ny), (px, py), (cx, cy) = self.cells, self.pitch, self.cell or self.pitch

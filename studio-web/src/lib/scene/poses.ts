@@ -5,7 +5,6 @@ export type Scene = Description["scene"];
 /** Numbers of a pose: a turn as a matrix of 3 × 3, row by row, then a place [mm]. */
 export const POSE = 12;
 const PLACE = 9;
-export const FLOOR = Float64Array.of(1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0);
 const AXES = "xyz";
 const SIGNS: Readonly<Record<string, number>> = { "+": 1, "-": -1 };
 
@@ -67,6 +66,7 @@ export class Poses {
   private readonly carriers: Int32Array;
   private readonly origins: Float64Array;
   private readonly joints: readonly (readonly Joint[])[];
+  readonly floor = Float64Array.of(1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0);
 
   constructor({ frames }: Scene, more: readonly string[] = []) {
     const places = new Map(frames.map(({ name }, place) => [name, place]));
@@ -103,7 +103,7 @@ export class Poses {
       const frame = this.order[n] as number;
       const from = frame * POSE;
       const carrier = this.carriers[frame] as number;
-      if (carrier < 0) copyPose(this.bases, from, FLOOR, 0);
+      if (carrier < 0) copyPose(this.bases, from, this.floor, 0);
       else copyPose(this.bases, from, this.carried, carrier * POSE);
       const at = 3 * frame;
       const { origins } = this;

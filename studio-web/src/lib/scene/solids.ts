@@ -1,98 +1,7 @@
-import type { Hello } from "../protocol/connection";
 import type { Element, Mechanics, Model } from "../state/model";
-import { directionOf, type Scene } from "./poses";
-
-export type Vector = readonly [x: number, y: number, z: number];
-
-/** What a solid is made of; how that looks is said by who draws it. */
-export type Material = "frame" | "rail" | "drive" | "moving" | "rod" | "belt" | "piece" | "mark" | "lamp";
-
-/** A box or a prism that an element is drawn with: it stands on its frame, or is carried by it. */
-export interface Solid {
-  element: string;
-  /** Of the scene. */
-  frame: number;
-  isCarried: boolean;
-  /** Its middle, in that frame, and its extent along x, y and z. [mm] */
-  at: Vector;
-  size: Vector;
-  /** Of a prism: the axis it is upright on, its corners, and the direction of the first of them. Null: a box. */
-  prism: { axis: number; corners: number; towards: Vector } | null;
-  material: Material;
-  color: string | null;
-  /** A signal by which it moves besides, and how far for a unit. */
-  slide: { signal: string; by: Vector } | null;
-  /** A signal: it is there while that is known, and above 0 if it is not moved by it. */
-  shown: string | null;
-  /** It is lit while this is on. */
-  pin: string | null;
-}
-
-/** A workpiece, and where it is. */
-export type Piece = Hello["workpieces"][number];
-type Frame = Scene["frames"][number];
-type Look = Partial<Omit<Solid, "element" | "frame" | "at" | "size">>;
-
-const ROUND = 32;
-const unit = (axis: number, length: number): Vector => [+(axis === 0) * length, +(axis === 1) * length, +(axis === 2) * length]; // prettier-ignore
-const plus = (...vectors: readonly Vector[]): Vector =>
-  vectors.reduce((one, other) => [one[0] + other[0], one[1] + other[1], one[2] + other[2]]);
-const times = (vector: Vector, by: number): Vector => [vector[0] * by, vector[1] * by, vector[2] * by];
-const between = (low: number, value: number, high: number) => Math.min(high, Math.max(low, value));
-
-/** The solids of one frame, in directions of what it moves: along it, across it, and upwards or in the third direction. */
-class Builder {
-  readonly axis: number;
-  readonly sign: number;
-  readonly along: Vector;
-  readonly across: Vector;
-  readonly up: Vector;
-
-  constructor(
-    readonly frame: Frame,
-    readonly place: number,
-    readonly put: (solid: Solid) => void,
-    along = frame.joints[0]?.along ?? frame.along ?? "+x",
-  ) {
-    [this.axis, this.sign] = directionOf(along);
-    this.along = unit(this.axis, this.sign);
-    // Across is to the left of where it goes; of what is upright it is to the right of who stands before it.
-    this.across = this.axis === 0 ? [0, this.sign, 0] : this.axis === 1 ? [-this.sign, 0, 0] : [1, 0, 0];
-    this.up = this.axis === 2 ? [0, -1, 0] : [0, 0, 1];
-  }
-
-  /** Lengths along, across and up; `at` likewise. */
-  box(at: Vector, size: Vector, material: Material, look: Look = {}): void {
-    this.add(this.vector(at), this.vector(size).map(Math.abs) as unknown as Vector, material, look);
-  }
-
-  /** A cylinder about `axis`: 0 along, 1 across, 2 up. */
-  rod(at: Vector, axis: number, length: number, diameter: number, material: Material, look: Look = {}): void {
-    const size: Vector = [
-      axis === 0 ? length : diameter,
-      axis === 1 ? length : diameter,
-      axis === 2 ? length : diameter,
-    ];
-    const about = this.vector(unit(axis, 1)).findIndex((one) => one !== 0);
-    const towards: Vector = about === 0 ? [0, 1, 0] : [1, 0, 0];
-    this.box(at, size, material, { prism: { axis: about, corners: ROUND, towards }, ...look });
-  }
-
-  /** An arrow that lies, and shows along. */
-  arrow(at: Vector, size: number, look: Look): void {
-    const about = this.vector([0, 0, 1]).findIndex((one) => one !== 0);
-    this.box(at, [size, size, 1], "lamp", { prism: { axis: about, corners: 3, towards: this.along }, ...look });
-  }
-
-  vector([along, across, up]: Vector): Vector {
-    return plus(times(this.along, along), times(this.across, across), times(this.up, up));
-  }
-
-  private add(at: Vector, size: Vector, material: Material, look: Look): void {
-    const nothing = { prism: null, color: null, slide: null, shown: null, pin: null, isCarried: false };
-    this.put({ ...nothing, element: this.frame.name, frame: this.place, at, size, material, ...look });
-  }
-}
+import { between, Builder, plain, plus, ROUND, times, unit, type Solid, type Vector } from "./builder";
+import { beam, gripper, nest, vacuum } from "./handling";
+import type { Scene } from "./poses";
 
 interface Known {
   scene: Scene;
@@ -232,11 +141,6 @@ function conveyor(build: Builder, element: Element): void {
   const arrows = between(2, Math.round(length / 150), 8);
   const run = element.inputs.includes("run") ? `${element.name}.run` : null;
   for (let n = 0; n < arrows; n++) build.arrow([((n + 0.5) / arrows) * length, 0, 0.2], 0.3 * wide, { pin: run });
-  for (const name of drawing.places) {
-    const [long, signal] = [drawing.size, `${element.name}.${name}`];
-    const slide = { signal, by: build.along };
-    build.box([-long / 2, 0, long / 2], [long, long, long], "piece", { slide, shown: signal });
-  }
   for (const { pin, low } of drawing.switches) {
     const place = low ?? 0;
     if (pin.toLowerCase().startsWith(`${element.name.toLowerCase()}.stop`))
@@ -269,11 +173,6 @@ function gantry(build: Builder, element: Element, { scene }: Known): void {
   const at = plus(times(way, 0.5), [0, 0, 1.2 * width]);
   build.put({ ...plain(build), at, size, material: "moving", isCarried: true });
 }
-
-const plain = ({ frame, place }: Builder) => ({
-  ...{ element: frame.name, frame: place, isCarried: false },
-  ...{ prism: null, color: null, slide: null, shown: null, pin: null },
-}); // prettier-ignore
 
 /** Two rails beside a plane, a beam between them that goes with y, and a head on the beam. */
 function tool(build: Builder, element: Element): void {
@@ -331,35 +230,6 @@ function carriage(build: Builder, element: Element): void {
   build.box([0, 0, 0.9 * width], [0.8 * long, 2 * width, 0.5 * width], "moving", { isCarried: true });
 }
 
-function vacuum(build: Builder): void {
-  build.rod([0, 0, 22], 2, 28, 10, "rod", { isCarried: true });
-  build.rod([0, 0, 4], 2, 8, 26, "moving", { isCarried: true });
-}
-
-/** Jaws that come together below their palm, with their tips at the origin. */
-function gripper(build: Builder, element: Element): void {
-  const open = element.drawing?.length ?? 20;
-  const [wide, high] = [between(6, 0.3 * open, 20), between(24, open, 60)];
-  build.box([0, 0, high + wide / 2], [open + 4 * wide, 2 * wide, wide], "moving");
-  for (const side of [1, -1])
-    build.box([(side * (open + wide)) / 2, 0, high / 2], [wide, 1.5 * wide, high], "rod", {
-      slide: { signal: `${element.name}.position`, by: times(build.along, -side / 2) },
-    });
-}
-
-/** What is said of it besides its kind: lines of light, and faces that workpieces lie on. */
-function boxes(build: Builder): void {
-  const MOST = 40;
-  const LEAST_MM = 2;
-  for (const { at, size } of build.frame.boxes.slice(0, MOST)) {
-    const thick = size.map((one) => Math.max(one, LEAST_MM)) as unknown as Vector;
-    const isLight = build.frame.kind === "beam";
-    const look = { pin: isLight ? `${build.frame.name}.seen` : null };
-    const down: Vector = [0, 0, isLight ? 0 : -LEAST_MM / 2];
-    build.put({ ...plain(build), at: plus(at as unknown as Vector, down), size: thick, material: isLight ? "lamp" : "frame", ...look }); // prettier-ignore
-  }
-}
-
 function body(build: Builder, { scene }: Known): void {
   const its = scene.bodies.find(({ name }) => name === build.frame.name);
   if (its === undefined) return;
@@ -375,17 +245,6 @@ function body(build: Builder, { scene }: Known): void {
     color: its.color,
     shown: its.when === null ? null : `${its.name}.present`,
   });
-}
-
-/** One of a workpiece with this size; what it is on is said where it is. */
-export function pieceOf({ size, diameter, height }: Pick<Piece, "size" | "diameter" | "height">): Solid {
-  const wide = diameter ?? 0;
-  return {
-    ...{ element: "", frame: 0, isCarried: true, at: [0, 0, height / 2], material: "piece" },
-    ...{ color: null, slide: null, shown: null, pin: null },
-    size: size === null ? [wide, wide, height] : (size as unknown as Vector),
-    prism: size === null ? { axis: 2, corners: ROUND, towards: [1, 0, 0] } : null,
-  };
 }
 
 /** All solids of a scene: what elements are drawn with, by their kinds. */
@@ -408,9 +267,10 @@ export function solidsOf(scene: Scene, model: Model): Solid[] {
     else if (frame.kind === "follower") follower(build, element);
     else if (frame.kind === "shaft") shaft(build, known);
     else if (frame.kind === "carriage") carriage(build, element);
-    else if (frame.kind === "vacuum") vacuum(build);
+    else if (frame.kind === "vacuum") vacuum(build, scene);
     else if (frame.kind === "gripper") gripper(build, element);
-    boxes(build);
+    else if (frame.kind === "nest") nest(build, scene);
+    else if (frame.kind === "beam") beam(build, scene);
   });
   return solids;
 }

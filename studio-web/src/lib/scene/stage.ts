@@ -1,6 +1,8 @@
 import type { Model } from "../state/model";
-import { copyPose, directionOf, FLOOR, POSE, Poses, shift, turn, type Scene } from "./poses";
-import { pieceOf, solidsOf, travelOf, type Piece, type Solid, type Vector } from "./solids";
+import type { Solid, Vector } from "./builder";
+import { Pieces, type Piece } from "./pieces";
+import { copyPose, POSE, Poses, shift, type Scene } from "./poses";
+import { solidsOf, travelOf } from "./solids";
 
 /** The least box about everything. [mm] */
 export interface Extent {
@@ -10,100 +12,63 @@ export interface Extent {
 
 /** Where all solids of a scene are at one moment. Nothing is allocated for a picture. */
 export class Stage {
-  readonly solids: readonly Solid[];
+  /** Those of elements, then workpieces. */
+  solids: readonly Solid[];
   readonly poses: Poses;
+  readonly pieces: Pieces;
+  /** Solids of elements. */
+  readonly fixed: number;
+  /** Changes with the workpieces. */
+  revision = 0;
   /** Poses of the middles of the solids. */
-  readonly places: Float64Array;
+  places = new Float64Array();
   /** 0: a solid is not there. */
-  readonly isThere: Uint8Array;
+  isThere = new Uint8Array();
   /** Ends of the least upright box about each solid: x, y, z. */
-  readonly lows: Float64Array;
-  readonly highs: Float64Array;
+  lows = new Float64Array();
+  highs = new Float64Array();
   /** Of all, wherever they may be. */
   readonly extent: Extent;
-  /** Places in `solids` for workpieces, from here on. */
-  private readonly first: number;
-  private readonly keys: readonly string[];
-  /** Of the workpiece that is drawn there. */
-  private readonly pieces: (Piece | null)[];
-  /** Where nothing takes workpieces in space, belts have places of fronts only. */
-  private areListed = false;
-  private readonly frames: Int32Array;
-  private readonly travels: Int32Array;
   private readonly slides: Int32Array;
   private readonly shown: Int32Array;
 
-  /** With room for twice as many workpieces. */
-  constructor(
-    private readonly scene: Scene,
-    model: Model,
-    pieces: readonly Piece[] = [],
-  ) {
-    const own = solidsOf(scene, model);
-    const room = [...pieces, ...pieces].sort((one, other) => keyOf(one).localeCompare(keyOf(other)));
-    this.first = own.length;
-    this.keys = room.map(keyOf);
-    this.pieces = room.map(() => null);
-    this.frames = new Int32Array(room.length);
-    this.travels = new Int32Array(room.length);
-    this.areListed = pieces.length > 0;
-    this.solids = [...own, ...room.map(pieceOf)];
-    const belts = scene.frames.filter(({ kind }) => kind === "conveyor").map(({ name }) => `${name}.travel`);
+  constructor(scene: Scene, model: Model, pieces: readonly Piece[] = []) {
+    this.solids = solidsOf(scene, model);
+    this.fixed = this.solids.length;
+    this.pieces = new Pieces(scene);
     const more = this.solids.flatMap(({ slide, shown }) => [slide?.signal ?? [], shown ?? []].flat());
-    this.poses = new Poses(scene, [...more, ...belts]);
+    this.poses = new Poses(scene, more);
     const place = (signal: string | undefined | null) => (signal ? this.poses.signals.indexOf(signal) : -1);
-    const count = this.solids.length;
-    this.places = new Float64Array(count * POSE);
-    this.isThere = new Uint8Array(count);
-    this.lows = new Float64Array(3 * count);
-    this.highs = new Float64Array(3 * count);
     this.slides = Int32Array.from(this.solids, ({ slide }) => place(slide?.signal));
     this.shown = Int32Array.from(this.solids, ({ shown }) => place(shown));
+    this.take(pieces);
     this.extent = this.widest(rangesOf(scene, model));
     this.poses.values.fill(NaN);
     this.update();
   }
 
-  /** Where workpieces are from now on. Whether there is room for all of them. */
-  take(pieces: readonly Piece[]): boolean {
-    this.areListed ||= pieces.length > 0;
-    this.pieces.fill(null);
-    return pieces.every((piece) => {
-      const key = keyOf(piece);
-      const place = this.keys.findIndex((one, n) => one === key && this.pieces[n] === null);
-      if (place < 0) return false;
-      this.pieces[place] = piece;
-      this.frames[place] = this.scene.frames.findIndex(({ name }) => name === piece.on);
-      this.travels[place] = this.poses.signals.indexOf(piece.travel ?? "");
-      return true;
-    });
+  /** The workpieces from now on. */
+  take(pieces: readonly Piece[]): void {
+    this.pieces.take(pieces);
+    this.solids = [...this.solids.slice(0, this.fixed), ...this.pieces.solids];
+    const count = this.solids.length;
+    this.places = new Float64Array(count * POSE);
+    this.isThere = new Uint8Array(count);
+    this.lows = new Float64Array(3 * count);
+    this.highs = new Float64Array(3 * count);
+    this.revision++;
   }
 
-  private updatePiece(n: number): void {
-    const piece = this.pieces[n] ?? null;
-    const at = this.first + n;
-    this.isThere[at] = piece === null ? 0 : 1;
-    if (piece === null) return;
-    const { places, poses } = this;
-    const [from, frame] = [at * POSE, this.frames[n] as number];
-    if (frame < 0) copyPose(places, from, FLOOR, 0);
-    else copyPose(places, from, poses.carried, frame * POSE);
-    shift(places, from, piece.at[0] as number, piece.at[1] as number, piece.at[2] as number);
-    // A belt goes on by what its signal has grown.
-    const travel = (poses.values[this.travels[n] as number] as number) - piece.travel_at || 0;
-    const [axis, sign] = directionOf(this.scene.frames[frame]?.along ?? "+x");
-    shift(places, from, axis === 0 ? sign * travel : 0, axis === 1 ? sign * travel : 0, axis === 2 ? sign * travel : 0);
-    turn(places, from, 2, piece.yaw);
-    shift(places, from, 0, 0, piece.height / 2);
-    this.bound(at);
-  }
-
-  /** Everything from the values of `poses`. */
+  /** Everything from the values of `poses` and `pieces`. */
   update(): void {
     const { poses, places } = this;
     poses.update();
-    for (let n = 0; n < this.pieces.length; n++) this.updatePiece(n);
-    for (let n = 0; n < this.first; n++) {
+    for (let n = this.fixed; n < this.solids.length; n++) {
+      this.pieces.place(n - this.fixed, poses, places, n * POSE);
+      this.isThere[n] = 1;
+      this.bound(n);
+    }
+    for (let n = 0; n < this.fixed; n++) {
       const { isCarried, frame, at, slide } = this.solids[n] as Solid;
       const from = n * POSE;
       copyPose(places, from, isCarried ? poses.carried : poses.bases, frame * POSE);
@@ -113,8 +78,7 @@ export class Stage {
         shift(places, from, slide.by[0] * value, slide.by[1] * value, slide.by[2] * value);
       }
       const shown = this.shown[n] as number;
-      const value = shown < 0 ? 1 : (poses.values[shown] as number);
-      this.isThere[n] = (slide === null || shown < 0 ? value > 0 : !this.areListed && !Number.isNaN(value)) ? 1 : 0;
+      this.isThere[n] = shown < 0 || (poses.values[shown] as number) > 0 ? 1 : 0;
       this.bound(n);
     }
   }
@@ -141,7 +105,7 @@ export class Stage {
         this.poses.values[k] = from + ((to - from) * step) / STEPS;
       });
       this.update();
-      for (let k = 0; k < 3 * this.first; k++) {
+      for (let k = 0; k < this.lows.length; k++) {
         low[k % 3] = Math.min(low[k % 3] as number, this.lows[k] as number);
         high[k % 3] = Math.max(high[k % 3] as number, this.highs[k] as number);
       }
@@ -149,9 +113,6 @@ export class Stage {
     return { low: low as unknown as Vector, high: high as unknown as Vector };
   }
 }
-
-/** Equal for workpieces of one size. */
-const keyOf = ({ size, diameter, height }: Piece) => `${size?.join(" ")} ${diameter} ${height}`;
 
 /** Where signals of motion may be, in their units. */
 function rangesOf({ frames }: Scene, model: Model): Map<string, readonly [number, number]> {

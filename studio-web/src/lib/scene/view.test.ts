@@ -7,10 +7,10 @@ import { facesOf, frameOf, Order, spotX, spotY, VIEWS, type ViewName } from "./v
 type Box = readonly [name: string, at: readonly number[], size: readonly number[], on?: string];
 
 function stageOf(boxes: readonly Box[], more: Scene["frames"] = []): Stage {
-  const frames = boxes.map(([name, at, , on = null]) => ({ name, kind: "body", on, at: [...at], along: null, joints: [], boxes: [] })); // prettier-ignore
+  const frames = boxes.map(([name, at, , on = null]) => ({ name, kind: "body", on, at: [...at], along: null, joints: [] })); // prettier-ignore
   const bodies = boxes.map(([name, , size]) => ({ name, size: [...size], diameter: null, height: null, color: null, when: null })); // prettier-ignore
   const model = { mechanics: [], elements: [] } as unknown as Model;
-  return new Stage({ frames: [...frames, ...more], bodies } as unknown as Scene, model);
+  return new Stage({ frames: [...frames, ...more], bodies, cups: [], nests: [], beams: [] } as unknown as Scene, model);
 }
 
 function orderOf(stage: Stage, view: ViewName): string[] {
@@ -48,7 +48,7 @@ test("what turns is drawn turned, and stands where its carrier has it", () => {
   const turns = [{ signal: "table.position", along: "+z", turns: true, per_unit: 1 }];
   const stage = stageOf(
     [["box", [100, 0, 0], [20, 10, 30], "table"]],
-    [{ name: "table", kind: "axis", on: null, at: [10, 0, 5], along: null, joints: turns, boxes: [] }],
+    [{ name: "table", kind: "axis", on: null, at: [10, 0, 5], along: null, joints: turns }],
   );
   stage.poses.values[0] = 90;
   stage.update();

@@ -1,5 +1,5 @@
 import { POSE } from "./poses";
-import type { Solid, Vector } from "./solids";
+import type { Solid, Vector } from "./builder";
 import type { Extent, Stage } from "./stage";
 
 /** A parallel view: where right, up, and towards who looks are in space. */
@@ -125,22 +125,31 @@ interface Ends {
 
 /** In what order solids are drawn, those behind first. */
 export class Order {
-  readonly drawn: Int32Array;
-  private readonly state: Uint8Array;
+  drawn = new Int32Array();
+  private state = new Uint8Array();
+  /** Ends of each along right and up, in the picture. */
+  private spans = new Float64Array();
   private readonly both: Ends = { low: 0, high: 0, from: 0, to: 0 };
   private count = 0;
 
   constructor(
     private readonly stage: Stage,
     private readonly view: View,
-  ) {
-    this.drawn = new Int32Array(stage.solids.length);
-    this.state = new Uint8Array(stage.solids.length);
-  }
+  ) {}
 
   update(): void {
+    const count = this.stage.solids.length;
+    if (this.drawn.length !== count) {
+      this.drawn = new Int32Array(count);
+      this.state = new Uint8Array(count);
+      this.spans = new Float64Array(4 * count);
+    }
     this.state.fill(0);
     this.count = 0;
+    for (let n = 0; n < count; n++) {
+      this.span(n, this.view.right, 4 * n);
+      this.span(n, this.view.up, 4 * n + 2);
+    }
     for (let n = 0; n < this.drawn.length; n++) this.visit(n);
   }
 
@@ -155,18 +164,29 @@ export class Order {
 
   /** Whether two cover each other in the picture, or might. */
   private meets(one: number, other: number): boolean {
-    return this.meetsAlong(one, other, this.view.right) && this.meetsAlong(one, other, this.view.up);
+    const { spans } = this;
+    const a = 4 * one;
+    const b = 4 * other;
+    return (
+      (spans[a] as number) < (spans[b + 1] as number) &&
+      (spans[b] as number) < (spans[a + 1] as number) &&
+      (spans[a + 2] as number) < (spans[b + 3] as number) &&
+      (spans[b + 2] as number) < (spans[a + 3] as number)
+    );
   }
 
-  private meetsAlong(one: number, other: number, direction: Vector): boolean {
-    let apart = 0;
-    let reach = 0;
+  private span(n: number, direction: Vector, to: number): void {
+    const { lows, highs } = this.stage;
+    let middle = 0;
+    let half = 0;
     for (let k = 0; k < 3; k++) {
-      const its = this.ends(one, other, k);
-      apart += ((its.low + its.high - its.from - its.to) / 2) * (direction[k] as number);
-      reach += ((its.high - its.low + its.to - its.from) / 2) * Math.abs(direction[k] as number);
+      const low = lows[3 * n + k] as number;
+      const high = highs[3 * n + k] as number;
+      middle += ((low + high) / 2) * (direction[k] as number);
+      half += ((high - low) / 2) * Math.abs(direction[k] as number);
     }
-    return Math.abs(apart) < reach;
+    this.spans[to] = middle - half;
+    this.spans[to + 1] = middle + half;
   }
 
   /** Of both along an axis. */

@@ -32,7 +32,7 @@ const EMPTY: Model = {
   buttons: [],
   elements: [],
   connections: [],
-  scene: { frames: [], bodies: [] },
+  scene: { frames: [], bodies: [], cups: [], nests: [], beams: [] },
   commands: new Set(),
 };
 /** Frames and statements are as frequent as requests: a panel that shows them follows them itself. */
@@ -82,7 +82,7 @@ export class Studio {
   control = $state.raw<Holder>(null);
   viewers = $state(0);
   leases = $state.raw<Hello["leases"]>([]);
-  private workpieces = $state.raw<Hello["workpieces"]>([]);
+  private present_workpieces = $state.raw<Hello["workpieces"]>([]);
   /** Why the device does not answer. */
   lost = $state<string | null>(null);
   pace = $state.raw<Pace>({ running: false, speed: 1 });
@@ -144,9 +144,9 @@ export class Studio {
     return this.clock.now(performance.now());
   }
 
-  /** The workpieces in space at the moment that is shown. */
-  get pieces(): Hello["workpieces"] {
-    return this.timeTravel.past?.workpieces ?? this.workpieces;
+  /** Those in space, at the moment that is shown. */
+  get workpieces(): Hello["workpieces"] {
+    return this.timeTravel.past?.workpieces ?? this.present_workpieces;
   }
 
   get isVirtual(): boolean {
@@ -253,7 +253,7 @@ export class Studio {
     this.control = hello.control;
     this.viewers = hello.viewers;
     this.leases = hello.leases;
-    this.workpieces = hello.workpieces;
+    this.present_workpieces = hello.workpieces;
     this.tellClock(BigInt(hello.time_ns), hello.pace, true);
     this.forgetAfter(BigInt(hello.time_ns));
     if (isNew || JSON.stringify(hello.description) !== this.description) this.describe(hello);
@@ -315,8 +315,8 @@ export class Studio {
     else if ("past" in message) this.timeTravel.take(message.past);
     else if ("control" in message) this.control = message.control;
     else if ("viewers" in message) this.viewers = message.viewers;
-    else if ("workpieces" in message) this.workpieces = message.workpieces;
     else if ("leases" in message) this.leases = message.leases;
+    else if ("workpieces" in message) this.present_workpieces = message.workpieces;
     else if ("lost" in message) this.lost = message.lost;
   }
 

@@ -1,3 +1,4 @@
+import { isLike, type Solid } from "../../lib/scene/builder";
 import { POSE } from "../../lib/scene/poses";
 import type { Stage } from "../../lib/scene/stage";
 import { facesOf, frameOf, Order, spotX, spotY, type View } from "../../lib/scene/view";
@@ -25,11 +26,24 @@ const create = <K extends keyof SVGElementTagNameMap>(name: K, parent: Element, 
   return made;
 };
 
+const valueOf = (color: string) => (color.startsWith("--") ? `var(${color})` : color);
+
+/** At least so long; what is new is not known. */
+function grown(numbers: Float64Array<ArrayBuffer>, length: number): Float64Array<ArrayBuffer> {
+  if (numbers.length >= length) return numbers;
+  const longer = new Float64Array(length).fill(NaN);
+  longer.set(numbers);
+  return longer;
+}
+
 /** A scene in one parallel view, as lines and areas of an SVG that are moved, and drawn anew only where they have turned. */
 export class Drawing {
-  private readonly parts: SVGGElement[];
-  private readonly turns: Float64Array;
-  private readonly spots: Float64Array;
+  private readonly parts: SVGGElement[] = [];
+  private solids: readonly Solid[] = [];
+  private turns = new Float64Array();
+  private spots = new Float64Array();
+  /** Of the stage, the workpieces of which have parts. */
+  private revision = -1;
   private readonly order: Order;
   private readonly all: SVGGElement;
   private readonly labels = new Map<string, SVGTextElement>();
@@ -49,22 +63,11 @@ export class Drawing {
     this.frame = [left - room, top - room, width + 2 * room, height + 2 * room];
     svg.setAttribute("viewBox", this.frame.join(" "));
     this.all = create("g", svg);
-    this.parts = stage.solids.map(({ element, material, color }) => {
-      const part = create("g", this.all, `solid ${material}`);
-      part.dataset["element"] = element;
-      for (const light of LIGHTS) create("path", part, light);
-      if (color !== null) part.style.setProperty("--fill", color);
-      return part;
-    });
-    const count = stage.solids.length;
-    this.turns = new Float64Array(count * 9).fill(NaN);
-    this.spots = new Float64Array(count * 2).fill(NaN);
     this.order = new Order(stage, view);
-    stage.solids.forEach(({ element, material }, n) => {
-      if (
-        element !== "" &&
-        (material !== "frame" || stage.solids.some((one) => one.element === element && one.material !== "frame"))
-      )
+    this.renew();
+    const fixed = stage.solids.slice(0, stage.fixed);
+    fixed.forEach(({ element, material }, n) => {
+      if (material !== "frame" || fixed.some((one) => one.element === element && one.material !== "frame"))
         this.named.set(element, [...(this.named.get(element) ?? []), n]);
     });
     const words = create("g", svg, "labels");
@@ -90,6 +93,7 @@ export class Drawing {
 
   draw(now_ms: number): void {
     const { stage } = this;
+    if (this.revision !== stage.revision) this.renew();
     for (let n = 0; n < this.parts.length; n++) {
       const part = this.parts[n] as SVGGElement;
       const display = stage.isThere[n] ? "" : "none";
@@ -109,16 +113,44 @@ export class Drawing {
   }
 
   mark({ levelOf, isStalled, selected, labels }: Marks): void {
-    this.stage.solids.forEach(({ element, pin, material }, n) => {
+    for (let n = 0; n < this.stage.fixed; n++) {
+      const { element, pin, material } = this.stage.solids[n] as Solid;
       const { classList } = this.parts[n] as SVGGElement;
       classList.toggle("on", pin !== null && levelOf(pin) === 1);
       classList.toggle("stalled", material === "moving" && isStalled(element));
-      classList.toggle("selected", element !== "" && element === selected);
-    });
+      classList.toggle("selected", element === selected);
+    }
     for (const [name, label] of this.labels) {
       label.classList.toggle("selected", name === selected);
       label.style.display = labels || name === selected ? "" : "none";
     }
+  }
+
+  /** A part for each solid. Those of other workpieces than before are drawn anew. */
+  private renew(): void {
+    const { stage, parts } = this;
+    const { solids } = stage;
+    while (parts.length > solids.length) parts.pop()?.remove();
+    this.turns = grown(this.turns, 9 * solids.length);
+    this.spots = grown(this.spots, 2 * solids.length);
+    for (let n = this.revision < 0 ? 0 : stage.fixed; n < solids.length; n++) {
+      const solid = solids[n] as Solid;
+      const part = (parts[n] ??= this.part(solid));
+      part.dataset["element"] = solid.element;
+      if (solid.color !== null) part.style.setProperty("--fill", valueOf(solid.color));
+      if (n >= stage.fixed) (part.lastChild as Element).textContent = stage.pieces.names[n - stage.fixed] ?? "";
+      if (!isLike(solid, this.solids[n])) this.turns.fill(NaN, 9 * n, 9 * n + 9);
+    }
+    this.solids = solids;
+    this.revision = stage.revision;
+    this.ordered_ms = -ORDER_MS;
+  }
+
+  private part({ material }: Solid): SVGGElement {
+    const part = create("g", this.all, `solid ${material}`);
+    for (const light of LIGHTS) create("path", part, light);
+    if (material === "piece") create("title", part);
+    return part;
   }
 
   private hasTurned(n: number): boolean {

@@ -20,7 +20,7 @@ import {
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { POSE } from "../../lib/scene/poses";
-import type { Material, Solid } from "../../lib/scene/solids";
+import type { Material, Solid } from "../../lib/scene/builder";
 import type { Stage } from "../../lib/scene/stage";
 import { frameOf, VIEWS, type ViewName } from "../../lib/scene/view";
 import type { Marks } from "./drawing";
@@ -28,13 +28,19 @@ import type { Marks } from "./drawing";
 /** Of the camera, upright. [degrees] */
 const ANGLE = 20;
 
+type SolidMesh = Mesh<BufferGeometry, MeshStandardMaterial>;
+
 /** A scene in three dimensions, of the same solids as the drawing. */
 export class Space {
   private readonly renderer: WebGLRenderer;
   private readonly scene = new Scene();
   private readonly camera = new PerspectiveCamera(ANGLE);
   private readonly controls: OrbitControls;
-  private readonly meshes: readonly Mesh<BufferGeometry, MeshStandardMaterial>[];
+  private readonly meshes: SolidMesh[] = [];
+  /** Of each shape itself and its edges. */
+  private readonly geometries = new Map<string, readonly [BufferGeometry, BufferGeometry]>();
+  /** Of the stage, the workpieces of which have meshes. */
+  private revision = -1;
   private readonly lines = new LineBasicMaterial();
   private readonly looks = new Map<string, MeshStandardMaterial>();
   private readonly middle = new Vector3();
@@ -61,7 +67,7 @@ export class Space {
     this.camera.far = this.size * 20;
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.addEventListener("change", this.change);
-    this.meshes = stage.solids.map((solid) => this.mesh(solid));
+    this.renew();
     this.light();
     canvas.addEventListener("webglcontextrestored", this.change);
   }
@@ -100,8 +106,9 @@ export class Space {
 
   draw(): void {
     const { places, isThere } = this.stage;
+    if (this.revision !== this.stage.revision) this.renew();
     for (let n = 0; n < this.meshes.length; n++) {
-      const mesh = this.meshes[n] as Mesh;
+      const mesh = this.meshes[n] as SolidMesh;
       const isVisible = isThere[n] === 1;
       if (setMatrix(mesh.matrixWorld, places, n * POSE) || mesh.visible !== isVisible) this.isStale = true;
       mesh.visible = isVisible;
@@ -113,14 +120,18 @@ export class Space {
   }
 
   mark({ levelOf, isStalled, selected }: Marks): void {
-    this.goes = this.stage.solids.map((one) => one.element === selected && one.isCarried).lastIndexOf(true);
+    this.goes = this.stage.solids
+      .slice(0, this.stage.fixed)
+      .map((one) => one.element === selected && one.isCarried)
+      .lastIndexOf(true);
     this.isStale = true;
-    this.stage.solids.forEach((solid, n) => {
-      const mesh = this.meshes[n] as Mesh<BufferGeometry, MeshStandardMaterial>;
-      const isOn = solid.pin !== null && levelOf(solid.pin) === 1;
-      const look = solid.material === "moving" && isStalled(solid.element) ? "stalled" : isOn ? "on" : solid.material;
-      mesh.material = this.materialOf(look, solid.color, selected !== "" && solid.element === selected);
-    });
+    for (let n = 0; n < this.stage.fixed; n++) {
+      const { element, pin, material, color } = this.stage.solids[n] as Solid;
+      const isOn = pin !== null && levelOf(pin) === 1;
+      const on = material === "light" ? "interrupted" : "on";
+      const look = material === "moving" && isStalled(element) ? "stalled" : isOn ? on : material;
+      (this.meshes[n] as SolidMesh).material = this.materialOf(look, color, element === selected);
+    }
   }
 
   /** The colours of the page, as they are now. */
@@ -128,7 +139,8 @@ export class Space {
     const style = getComputedStyle(this.canvas);
     for (const [name, material] of this.looks) {
       const [look, own, selected] = name.split(" ");
-      material.color.set(own || style.getPropertyValue(`--${COLOURS[look as Material]}`));
+      const property = own?.startsWith("--") ? own : `--${COLOURS[look as Material]}`;
+      material.color.set(own && own !== property ? own : style.getPropertyValue(property));
       material.emissive.set(selected ? style.getPropertyValue("--trace-6") : "#000000");
       material.emissiveIntensity = 0.45;
     }
@@ -149,7 +161,10 @@ export class Space {
   end(): void {
     this.canvas.removeEventListener("webglcontextrestored", this.change);
     this.controls.dispose();
-    for (const mesh of this.meshes) mesh.geometry.dispose();
+    for (const [shape, edges] of this.geometries.values()) {
+      shape.dispose();
+      edges.dispose();
+    }
     for (const material of this.looks.values()) material.dispose();
     this.renderer.dispose();
   }
@@ -175,10 +190,38 @@ export class Space {
     this.scene.add(new HemisphereLight(0xffffff, 0x777777, 1.2), new AmbientLight(0xffffff, 0.5), sun);
   }
 
-  private mesh(solid: Solid): Mesh<BufferGeometry, MeshStandardMaterial> {
-    const geometry = geometryOf(solid);
-    const mesh = new Mesh(geometry, this.materialOf(solid.material, solid.color, false));
-    const edges = new LineSegments(new EdgesGeometry(geometry, 40), this.lines);
+  /** A mesh for each solid. */
+  private renew(): void {
+    const { stage, meshes } = this;
+    const { solids } = stage;
+    for (const mesh of meshes.splice(solids.length)) this.scene.remove(mesh);
+    for (let n = this.revision < 0 ? 0 : stage.fixed; n < solids.length; n++) {
+      const solid = solids[n] as Solid;
+      const [shape, edges] = this.shapesOf(solid);
+      const mesh = (meshes[n] ??= this.mesh(shape, edges));
+      mesh.geometry = shape;
+      const lines = mesh.children[0] as LineSegments;
+      lines.geometry = edges;
+      lines.visible = solid.material !== "light";
+      mesh.material = this.materialOf(solid.material, solid.color, false);
+    }
+    this.revision = stage.revision;
+    this.isStale = true;
+  }
+
+  private shapesOf(solid: Solid): readonly [BufferGeometry, BufferGeometry] {
+    const name = JSON.stringify([solid.size, solid.prism]);
+    const found = this.geometries.get(name);
+    if (found !== undefined) return found;
+    const shape = geometryOf(solid);
+    const made = [shape, new EdgesGeometry(shape, 40)] as const;
+    this.geometries.set(name, made);
+    return made;
+  }
+
+  private mesh(shape: BufferGeometry, lines: BufferGeometry): SolidMesh {
+    const mesh: SolidMesh = new Mesh(shape);
+    const edges = new LineSegments(lines, this.lines);
     // Poses are set as they are, not computed from others.
     mesh.matrixAutoUpdate = mesh.matrixWorldAutoUpdate = false;
     edges.matrixAutoUpdate = edges.matrixWorldAutoUpdate = false;
@@ -195,6 +238,8 @@ export class Space {
     if (found === undefined) {
       const isMetal = look === "rod" || look === "rail";
       found = new MeshStandardMaterial({ roughness: isMetal ? 0.35 : 0.7, metalness: isMetal ? 0.25 : 0 });
+      found.transparent = look === "light";
+      found.opacity = look === "light" ? 0.3 : 1;
       this.looks.set(name, found);
       this.paint();
     }
@@ -203,7 +248,7 @@ export class Space {
 }
 
 /** Properties of app.css. */
-const COLOURS: Readonly<Record<Material | "on" | "stalled", string>> = {
+const COLOURS: Readonly<Record<Material | "on" | "stalled" | "interrupted", string>> = {
   frame: "metal-strong",
   rail: "metal",
   drive: "motor",
@@ -213,6 +258,8 @@ const COLOURS: Readonly<Record<Material | "on" | "stalled", string>> = {
   piece: "trace-2",
   mark: "dim",
   lamp: "rubber",
+  light: "danger",
+  interrupted: "danger",
   on: "good",
   stalled: "danger-fill",
 };
