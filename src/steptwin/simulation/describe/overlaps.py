@@ -18,7 +18,9 @@ from steptwin.simulation.components.nest import NEST
 from steptwin.simulation.components.nesttable import NestSpec
 from steptwin.simulation.space.bodies import OVERLAP_NM, Body, Box, Placed, contains, gap
 from steptwin.simulation.space.contacts import Pair
-from steptwin.simulation.space.frames import HERE, NM_PER_MM, Z, along
+from steptwin.simulation.space.frames import HERE, NM_PER_MM, Frame, Joint, Z, along
+from steptwin.simulation.space.pieces import Range
+from steptwin.simulation.space.sweeps import meet, swept
 from steptwin.simulation.toml.reader import TomlText
 
 DOUBTFUL = "D011"
@@ -44,12 +46,18 @@ def check_overlaps(text: TomlText, objects: BuiltObjects) -> None:
         for one, other in collision.apart_from
         for pair in product(*(bodies_on(frames[name], every, name) for name in (one, other)))
     }
+    around = {name: swept(every[name], _present) for name in lasting}
     for one, other in combinations(lasting.values(), 2):
-        if frozenset((one.name, other.name)) not in permitted:
+        if meet(around[one.name], around[other.name]) and frozenset((one.name, other.name)) not in permitted:
             _check_pair(text, frames, (one, every[one.name]), (other, every[other.name]))
     for nest in objects.described.of(NEST):
         for name in lasting:
             _check_nest(text, frames, nest, every[name])
+
+
+def _present(frame: Frame, joint: Joint) -> Range:
+    position = joint.motion.at(START)
+    return position, position
 
 
 def _pair(one: Body, other: Body) -> Pair | None:
