@@ -601,3 +601,85 @@ def test_the_request_that_wrote_a_register(timing: str, is_far: bool) -> None:
         "request: write M1_EN = ON",
         "script s: writes c.M1_EN = 1",
     ]
+
+
+COUNTS = """\
+n = 0
+CFGINT_IN1 = RIS
+MAIN:
+$R0 = n
+IF $R4 > 0
+    PABS M1 $R4
+    WAITPOS
+    OUT2 = ON
+    WAIT IN8 = ON
+ENDIF
+DELAY 0.05
+JUMP MAIN
+INT_IN1:
+n = n + 1
+RETURN
+"""
+HANDS = """
+[[button]]
+name = "go"
+to = "c.IN1"
+[[script]]
+name = "hand"
+steps = [{ wait = "0.4 s" }, { press = "go" }, { wait = "0.4 s" }, { write = { "c.USER_REGISTER[4]:real" = 12 } }]
+"""
+
+
+@pytest.fixture(scope="module")
+def counts() -> World:
+    text = TWO_AXES.replace("TIMING", "").replace("PROGRAM", WITH_PROGRAM + "\n[mic488.M1]\nmot_resol = 200")
+    world = World.from_toml(text + HANDS, {"p.prg": b"M1 = ON\n" + COUNTS.encode()})
+    world.run(3.0)
+    return world
+
+
+def test_a_count_leads_to_the_interrupt_in_which_it_is_made(counts: World) -> None:
+    assert [link.text for link in counts.why("$R0").links] == [
+        "line 5 `$R0 = n` was executed",
+        "line 15 `n = n + 1` was executed",
+        "line 14 `INT_IN1:` decided",
+        "c.IN1 became 1",
+        "go became 1, a contact of c.IN1",
+        "script hand: presses go",
+    ]
+
+
+def test_a_position_and_a_register_lead_to_who_wrote_the_register(counts: World) -> None:
+    written = ["request: write USER_REGISTER 4 … 5 = 0, 16704", "script hand: writes c.USER_REGISTER[4]:REAL = 12"]
+    assert [link.text for link in counts.why("$R4").links] == written
+    assert [link.text for link in counts.why("M1.position").links[1:]] == [
+        "line 7 `PABS M1 $R4` was executed",
+        "line 6 `IF $R4 > 0` decided",
+        *written,
+    ]
+
+
+def test_an_interrupt_does_not_end_the_wait_that_it_comes_in() -> None:
+    program = b"CFGINT_IN1 = RIS\nDELAY 1\nOUT1 = ON\nWAIT IN8 = ON\nINT_IN1:\nOUT2 = ON\nRETURN\n"
+    text = TWO_AXES.replace("TIMING", "").replace("PROGRAM", WITH_PROGRAM)
+    world = World.from_toml(text + HANDS.partition('{ wait = "0.4 s" }, { write')[0].rstrip(", ") + "]\n", {"p.prg": program})
+    world.run(3.0)
+    answer = world.why("OUT1")
+    assert [link.text for link in answer.links[2:]] == ["line 2 `DELAY 1` ended", "the program started"]
+    assert answer.links[2].time == answer.since
+
+
+def test_a_workpiece_is_counted_because_it_came_and_not_because_of_an_output() -> None:
+    world = World.from_toml(
+        "[[mic488]]\nname = 'c'\n[[conveyor]]\nname = 'belt'\nlength = 200\nspeed = 150\nfeed = 'c.OUT1'\nrun = 'c.OUT2'\n"
+        "[[conveyor.sensor]]\nat = 60\nto = 'c.IN4'\n"
+    )
+    for output in ("OUT2", "OUT1"):
+        world.run(for_=0.5)
+        world.mic488["c"].write(output, 1)
+    world.run(for_=0.2)
+    assert [link.text for link in world.why("belt.count").links] == [
+        "belt.1 is on belt",
+        "c.OUT1 became 1",
+        "from outside: writes c.OUT1 = 1",
+    ]

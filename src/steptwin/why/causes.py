@@ -19,6 +19,7 @@ from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.control import Halt
 from steptwin.simulation.world.inputs import Download, See, SetVariable
+from steptwin.why import points
 from steptwin.why.answer import ChainLink, Cover, since_before
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing, unknown
 from steptwin.why.log import LAST, MOST_LOOKED_BACK, Act, CauseLog, Change, sets
@@ -60,6 +61,7 @@ class Causes:
         self._log = log
         self._world = log.world
         self._frames = Frames(log.world)
+        self._interrupts: dict[tuple[str, str], Sequence[range]] = {}
         self._uses: dict[tuple[str, StatementLocation], StatementUse] = {}
         built = log.world.objects.elements
         self._at_begin = nothing if log.is_whole else unknown
@@ -169,12 +171,35 @@ class Causes:
         part = self._parts.get(name)
         if part is not None and signal.upper() in _inputs(part):
             return self.last(list(self._sources(PinName(name, signal.upper()))), time)
+        group = self._log.group(name)
+        change = Change(time, 0.0, group, self._log.position(group, time), LAST)
+        workpiece = self._of_workpiece(name, change)
+        if workpiece is not None:
+            return workpiece
         channels = [one for one in self._log.changes if one == name or one.startswith(f"{name}.")]
         last = self.last(channels, time)
-        if part is None or (last is not None and last.place.time == time):
-            return last
-        group = self._log.group(name)
-        return self._of_element(name, Change(time, 0.0, group, self._log.position(group, time), LAST))
+        return last if part is None or (last is not None and last.place.time == time) else self._of_element(name, change)
+
+    def _of_workpiece(self, name: str, change: Change) -> FoundCause:
+        """What happened to a workpiece at an element at the moment of a change, before it, or to the only one anywhere."""
+        found = [
+            (order, str(dict(record.facts).get("element")), record)
+            for order, record in self._log.at(change.group, change.time)
+            if order < change.order and record.kind == "event" and record.subject == "workpiece"
+        ]
+        mine = [one for one in found if one[1] == name] or (found if len(found) == 1 else [])
+        if not mine:
+            return None
+        order, owner, record = mine[0]
+        text = text_of(record.value if isinstance(record.value, str) else str(record.value))
+
+        def before() -> FoundCause:
+            cause = self._of_element(owner, change._replace(order=order)) if owner in self._parts else None
+            # What comes onto a belt does not by what moves that.
+            comes = ("what", "on") in record.facts and cause is not None and cause.place.time < record.time
+            return None if comes else cause
+
+        return Cause(ChainLink(record.time, owner, text), Place(record.time, order), before)
 
     def _of_element(self, name: str, change: Change) -> FoundCause:
         """Cause of a change of an element's output: an input at the same moment, or one before, as much earlier as it delays."""
@@ -192,8 +217,9 @@ class Causes:
                 latest, source = max(exact, key=lambda found: found[0].order)
                 how = FOLLOWS_AFTER(name=name, delay_ms=delay / SECOND * 1000) if delay else None
                 return covered(self.change(source, latest, how), Cover.DELAY)
-        if not last:
-            return None
+        workpiece = self._of_workpiece(name, change)
+        if workpiece is not None or not last:
+            return workpiece
         latest, source = max(last, key=lambda found: (found[0].time, found[0].order))
         acts = type(part).deadline is not TerminalComponent.deadline
         return covered(self.change(source, latest, HAS_ACTED_SINCE(name=name)), Cover.ACTION if acts else None)
@@ -465,24 +491,56 @@ class Causes:
         if self._log.is_in_progress(executed):
             return Cause(ChainLink(executed.time, controller, WAS_IN_EXECUTION(statement=text)), place, unknown)
         link = ChainLink(executed.time, controller, WAS_EXECUTED(statement=text))
-        return Cause(link, place, partial(self._of_statement, controller, index))
+        return Cause(link, place, partial(self._of_executed, controller, index))
+
+    def _of_executed(self, controller: str, index: int) -> FoundCause:
+        """What a statement reads, if that has changed since it was executed last, so that it wrote another value; otherwise what
+        let it be executed."""
+        use = self.use(controller, index)
+        reads = [one for one in use.reads if one not in use.writes]
+        before = self._executed_before(controller, index) if reads and use.writes and not use.waits else None
+        if before is None:
+            return self._of_statement(controller, index)
+        here, last = self._log.executed[controller][index], self._log.executed[controller][before]
+        found = [cause for one in reads if (cause := self.resource(controller, one, index, here.time, here.order))]
+        changed = [cause for cause in found if cause.place > Place(last.time, last.order, 3 * before + 2)]
+        if not changed:
+            return self._of_statement(controller, index)
+        return covered(max(changed, key=lambda cause: cause.place), Cover.LEVEL)
+
+    def _executed_before(self, controller: str, index: int) -> int | None:
+        """The number of the execution of a statement before this one."""
+        locations = self._log.executed[controller].locations
+        here = locations[index]
+        return next((one for one in range(index - 1, max(-1, index - MOST_LOOKED_BACK), -1) if locations[one] == here), None)
+
+    def _handlers(self, controller: str, text: str) -> Sequence[range]:
+        """The statements of each interrupt of a text, with the one that it begins with."""
+        key = controller, text
+        if key not in self._interrupts:
+            programs = self._world.programs[controller]
+            found = [programs.use(StatementLocation(text, number)) for number in programs.labels(text).values()]
+            self._interrupts[key] = [range(use.governs.start - 1, use.governs.stop) for use in found if use.waits and use.governs]
+        return self._interrupts[key]
 
     def _of_statement(self, controller: str, index: int) -> FoundCause:
         """The wait or condition that let a statement be executed."""
         executed = self._log.executed[controller]
         number = executed[index].location.number
-        at_once = self._world.programs[controller].statement_time
+        at_once, after = self._world.programs[controller].statement_time, index
+        is_present = self._log.is_of_present_text(executed[index])
+        handlers = self._handlers(controller, executed[index].location.text) if is_present else ()
         for earlier in range(index - 1, max(-1, index - MOST_UNDECIDED), -1):
-            use = self.use(controller, earlier)
-            if use.jumps is not None and executed[earlier + 1].location.number == use.jumps <= number:
-                number = executed[earlier].location.number
-            ended = executed[earlier + 1]
-            if use.waits and ended.time - executed[earlier].time > at_once:
-                place = Place(ended.time, ended.order, 3 * (earlier + 1))
-                return self._decided(controller, earlier, place, ENDED)
-            if number in use.governs or (use.is_loop and executed[earlier + 1].location.number >= use.governs.stop):
-                place = Place(executed[earlier].time, executed[earlier].order, 3 * earlier + 2)
-                return self._decided(controller, earlier, place, DECIDED)
+            use, here, ended = self.use(controller, earlier), executed[earlier], executed[after]
+            if any(here.location.number in handler and number not in handler for handler in handlers):
+                continue  # an interrupt that came and returned
+            if use.jumps is not None and ended.location.number == use.jumps <= number:
+                number = here.location.number
+            if use.waits and ended.time - here.time > at_once:
+                return self._decided(controller, earlier, Place(ended.time, ended.order, 3 * after), ENDED)
+            if number in use.governs or (use.is_loop and ended.location.number >= use.governs.stop):
+                return self._decided(controller, earlier, Place(here.time, here.order, 3 * earlier + 2), DECIDED)
+            after = earlier
         self.is_far = index >= MOST_UNDECIDED
         return None if self.is_far else self._started(controller)
 
@@ -511,13 +569,18 @@ class Causes:
         on what led to it."""
         reads = self.use(controller, index).reads
         if all(resource.kind is ResourceKind.VALUE for resource in reads):
-            return covered(self._of_statement(controller, index), Cover.WAIT)
+            began = self._log.executed[controller][index]
+            came = [
+                cause for cause in self._read(controller, index, place) if cause.place > Place(began.time, began.order, 3 * index)
+            ]
+            last = max(came, key=lambda cause: cause.place, default=None)
+            return covered(last or self._of_statement(controller, index), Cover.WAIT)
         latest = place.time - LONGEST_REACTION_NS
         passes = any(resource.kind is ResourceKind.AXIS and resource.name for resource in reads)  # a place, not the end
         came = [
             cause
             for cause in self._read(controller, index, place)
-            if (cause.place.time >= latest if cause.cover is None else passes and cause.cover is Cover.MOTION)
+            if (passes if cause.cover is Cover.MOTION else cause.place.time >= latest)
         ]
         return covered(max(came, key=lambda cause: cause.place, default=None), Cover.WAIT)
 
@@ -531,10 +594,24 @@ class Causes:
             case ResourceKind.AXIS:
                 return self.motion(controller, resource.name, time, before=before)
             case ResourceKind.VALUE:
+                written = self._register(controller, resource, time, before)
+                if written is not None:
+                    return written
                 for earlier in range(index - 1, max(-1, index - MOST_LOOKED_BACK), -1):
                     if resource in self.use(controller, earlier).writes:
                         return covered(self.statement(controller, earlier), Cover.LEVEL)
         return None
+
+    def _register(self, controller: str, resource: Resource, time: Nanos, before: int) -> FoundCause:
+        """The last change of a register of a controller that a program has a name for, by a moment, before an order."""
+        point = self._world.programs[controller].point(resource.name)
+        series = None if point is None else self._log.points.series(f"{controller}.{point}")
+        since = None if series is None else points.since(series, time)
+        if point is None or since is None:
+            return None
+        group = self._log.group(controller)
+        change = Change(since, 0.0, group, self._log.position(group, since), before if since == time else LAST)
+        return covered(self.in_controller(controller, change, resource, point), Cover.LEVEL)
 
     def _started(self, controller: str) -> FoundCause:
         """The statement that was executed first."""
