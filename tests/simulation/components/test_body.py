@@ -251,6 +251,8 @@ GATE = '[[gate]]\nname = "g"\nkind = "or"\ninputs = ["c.OUT1", "c.OUT2"]\n'
         (f'{BODY}{SIZE}on = "nowhere"', "no element with a place in space is called 'nowhere'"),
         (f'{BODY}{SIZE}on = "g"\n{GATE}', "a [[gate]] has no place in space, and carries nothing"),
         (f'{BODY}{SIZE}on = "e"\n[[body]]\nname = "e"\non = "b"\n{SIZE}', "'b' is on 'e' is on 'b'"),
+        (f'[[body]]\nname = "workpieces"\n{SIZE}', "in space 'workpieces' are all workpieces: choose another name"),
+        (f'{BODY}{SIZE}on = "c"', "a [[mic488]] has no place in space, and carries nothing"),
         (BODY, "a body needs size, or diameter and height"),
         (f"{BODY}diameter = 4.0", "diameter means nothing without height"),
         (f"{BODY}size = [1, 1]", "expected [length, width, height] in mm"),

@@ -90,7 +90,7 @@ def describe(
         service.check(toml)
     named_elements = [one for element in ELEMENTS.values() for one in element.named(spec.elements[element.name])]
     _check_names(spec, named_elements)
-    check_mounts(toml, spec.elements, named_elements)
+    check_mounts(toml, spec.elements, (*spec.lines, *spec.controllers, *named_elements))
     check_drawing(toml, placed, [one.name for one in named_elements])
     return spec if seed is None else replace(spec, seed=_seed(seed))
 

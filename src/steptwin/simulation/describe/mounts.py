@@ -3,16 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Protocol
 
-from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec
+from steptwin.simulation.components.elementspec import ElementSpecs
+from steptwin.simulation.components.mount import places
+from steptwin.simulation.components.workpieces import WORKPIECES
+from steptwin.simulation.toml.keypaths import Path
 from steptwin.simulation.toml.reader import TomlText
 
 
-def check_mounts(text: TomlText, described: ElementSpecs, named: Iterable[NamedSpec]) -> None:
-    """Report elements that are on what has no place, or on themselves. A name that does not exist is reported where what belongs
-    together is found (`steptwin.simulation.describe.connected`)."""
+class Named(Protocol):
+    """A controller, a line or an element."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def path(self) -> Path: ...
+
+
+def check_mounts(text: TomlText, described: ElementSpecs, named: Iterable[Named]) -> None:
+    """Report elements that are on what has no place, or on themselves, and what is called as all workpieces are. A name that does
+    not exist is reported where what belongs together is found (`steptwin.simulation.describe.connected`)."""
     mounts = described.mounts
-    kinds = {one.name: one.path[0] for one in named}
+    paths = {one.name: one.path for one in named}
+    if WORKPIECES in paths and places(mounts):
+        message = f"in space {WORKPIECES!r} are all workpieces: choose another name"
+        text.wrong((*paths[WORKPIECES], "name"), "D006", message)
+    kinds = {name: path[0] for name, path in paths.items()}
     for name, spec in mounts.items():
         if spec.on is None:
             continue
