@@ -683,3 +683,17 @@ def test_a_workpiece_is_counted_because_it_came_and_not_because_of_an_output() -
         "c.OUT1 became 1",
         "from outside: writes c.OUT1 = 1",
     ]
+
+
+def test_a_supply_that_is_off_leads_to_its_fault_or_to_what_switches_it() -> None:
+    world = World.from_toml(
+        "[[mic488]]\nname = 'c'\n[[supply]]\nname = 'p'\nfeeds = 'c'\n"
+        "[[fault]]\nkind = 'brown-out'\nelement = 'p'\nfrom_s = 0.9\nuntil_s = 1.0\n"
+    )
+    world.run(0.5)
+    world.mic488["c"].write("OUT2", 1)
+    world.run(1.5)
+    links = [link.text for link in world.why("OUT2").links]
+    assert links[:2] == ["c.OUT2 became 0", "p is off, with c"]
+    assert links[2].startswith("fault brown-out")
+    assert len(links) == 3

@@ -180,6 +180,10 @@ class Causes:
         last = self.last(channels, time)
         return last if part is None or (last is not None and last.place.time == time) else self._of_element(name, change)
 
+    def _at_element(self, name: str, change: Change) -> FoundCause:
+        """Cause of an event of an element."""
+        return self._fault(name, change) or self._of_element(name, change)
+
     def _of_workpiece(self, name: str, change: Change) -> FoundCause:
         """What happened to a workpiece at an element at the moment of a change, before it, or to the only one anywhere."""
         found = [
@@ -218,11 +222,16 @@ class Causes:
                 how = FOLLOWS_AFTER(name=name, delay_ms=delay / SECOND * 1000) if delay else None
                 return covered(self.change(source, latest, how), Cover.DELAY)
         workpiece = self._of_workpiece(name, change)
-        if workpiece is not None or not last:
+        if workpiece is not None:
             return workpiece
-        latest, source = max(last, key=lambda found: (found[0].time, found[0].order))
-        acts = type(part).deadline is not TerminalComponent.deadline
-        return covered(self.change(source, latest, HAS_ACTED_SINCE(name=name)), Cover.ACTION if acts else None)
+        acts = Cover.ACTION if type(part).deadline is not TerminalComponent.deadline else None
+        latest, source = max(last, key=lambda found: (found[0].time, found[0].order), default=(None, ""))
+        fault = self._log.last_fault(name, change.time, change.order)
+        if fault is not None and (latest is None or (fault.time, fault.order) > (latest.time, latest.order)):
+            record = self._log.record(fault)
+            link = ChainLink(record.time, record.controller, FAULT(name=record.subject, what=record.value))
+            return Cause(link, Place(fault.time, fault.order), self._of_fault(record, fault.order), acts)
+        return None if latest is None else covered(self.change(source, latest, HAS_ACTED_SINCE(name=name)), acts)
 
     def _before(self, signal: str, change: Change, until: Nanos) -> tuple[Change, str] | None:
         """The last change of a signal by a moment and before ``change``."""
@@ -362,6 +371,9 @@ class Causes:
             elif record.kind == "event":
                 text = text_of(record.value if isinstance(record.value, str) else str(record.value))
                 found, after = (ChainLink(change.time, controller, text), Place(change.time, order)), earlier
+                element = str(dict(record.facts).get("element"))
+                if element in self._parts:  # such as a supply that is off
+                    after = partial(self._at_element, element, change._replace(order=order))
         if found is not None:
             return Cause(*found, after)
         return self._fault(controller, change) or self._ended(controller, change.time, wanted) or after()

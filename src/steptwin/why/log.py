@@ -125,6 +125,8 @@ class CauseLog:
         self.executed = {name: ExecutedStatements(name) for name in world.controllers}
         self.plans: dict[tuple[str, str], list[Change]] = defaultdict(list)
         """Moments and positions of the plans of an axis, by controller and number."""
+        self.faults: dict[str, list[Change]] = defaultdict(list)
+        """Moments at which faults began or ended, by controller or element."""
         self.acts: list[Act] = []
         self._holds: dict[str, list[Hold]] = defaultdict(list)
         self._replaced: dict[str, Nanos] = {}
@@ -193,6 +195,7 @@ class CauseLog:
                 for name in self._timed.get(record.controller, ()):
                     self.points.executes(name, record.time, keeps=True)
             case "fault":
+                self.faults[record.controller].append(Change(record.time, 0.0, group, len(records), order))
                 self._note_holds(record.controller, record.time)
         records.append(record)
         self._orders[group].append(order)
@@ -297,6 +300,10 @@ class CauseLog:
     def last_change(self, signal: str, until: Nanos, before: int = LAST) -> Change | None:
         """The last change of a signal by a moment, before an order."""
         return _last(self.changes.get(signal, []), until, before)
+
+    def last_fault(self, owner: str, until: Nanos, before: int) -> Change | None:
+        """When a fault of a controller or element last began or ended by a moment, before an order."""
+        return _last(self.faults.get(owner, []), until, before)
 
     def hold(self, signal: str, at: Nanos, before: int = LAST) -> Hold | None:
         """Cause that holds a signal at a moment, before an order, and since when."""
