@@ -447,6 +447,8 @@ def general_way() -> Generator[Callable[[World], World]]:
         stack.enter_context(patch.object(Trajectory, "_keeps_distance", lambda trajectory, profile: False))
         stack.enter_context(patch("steptwin.wbc.compile.straight_of", lambda codes, steps, cell: [None] * len(steps)))
         stack.enter_context(patch("steptwin.simulation.kinds.mic488.build._loaded", _loaded.__wrapped__))
+        for room in ("bodycontact", "probe"):
+            stack.enter_context(patch(f"steptwin.simulation.components.{room}.meet", lambda one, other: True))
         yield general
 
 
