@@ -697,3 +697,17 @@ def test_a_supply_that_is_off_leads_to_its_fault_or_to_what_switches_it() -> Non
     assert links[:2] == ["c.OUT2 became 0", "p is off, with c"]
     assert links[2].startswith("fault brown-out")
     assert len(links) == 3
+
+
+def test_an_element_that_acts_on_a_level_from_the_beginning() -> None:
+    world = World.from_toml(
+        "[[mic488]]\nname = 'c'\n[[gate]]\nname = 'n'\nkind = 'not'\ninputs = ['c.OUT1']\n"
+        "[[cylinder]]\nname = 'z'\nextend = 'n.out'\nextend_time = '60 ms'\n"
+    )
+    world.run(1.0)
+    answer = world.why("z.extended")
+    assert [link.text for link in answer.links] == [
+        "z.extended became 1",
+        "n.out is 1 from the beginning, on which z has acted since",
+    ]
+    assert answer.broken is None

@@ -231,6 +231,15 @@ class Causes:
             record = self._log.record(fault)
             link = ChainLink(record.time, record.controller, FAULT(name=record.subject, what=record.value))
             return Cause(link, Place(fault.time, fault.order), self._of_fault(record, fault.order), acts)
+        if latest is None and len(sources) == 1 and self._log.level(sources[0], change.time):
+            text = IS_SINCE(
+                signal=sources[0],
+                value=self._log.level(sources[0], change.time),
+                since=since_before(self._log.begin),
+                how=HAS_ACTED_SINCE(name=name),
+            )
+            link = ChainLink(self._log.begin, sources[0].partition(".")[0], text)
+            return Cause(link, Place(self._log.begin), self._at_begin, acts)
         return None if latest is None else covered(self.change(source, latest, HAS_ACTED_SINCE(name=name)), acts)
 
     def _before(self, signal: str, change: Change, until: Nanos) -> tuple[Change, str] | None:
