@@ -336,3 +336,35 @@ def test_it_can_be_restored_while_it_carries_a_workpiece(tool: str, tmp_path: Pa
     world = World.from_toml(text + script)
     check_it_can_be_restored(world, World.from_toml(text + script), 1.0, 6.0, tmp_path)
     assert [record.subject for record in world.trace.edges() if record.subject == "b.seen"] == ["b.seen"] * 3
+
+
+def test_it_can_be_restored_in_place_while_a_stack_is_carried() -> None:
+    """What lies on a workpiece that is carried belongs to it after that, too: it does not collide with it."""
+    tools = JAWS + '[[collision]]\nname = "bump"\nbetween = ["jaws", "workpieces"]\n'
+    text = MACHINE.replace("cells = [3, 2]", "").replace("filled = 7", "filled = 2") + tools
+    writes = [(0.1, "OUT1", 1), (0.3, "OUT2", 1), (0.6, "OUT1", 0), (0.9, "M1_POS_ABS", 100.0), (2.0, "OUT2", 0)]
+
+    def go(world: World, begin: float, end: float) -> None:
+        for moment, name, value in writes:
+            if begin <= moment < end:
+                world.run(until=moment)
+                world.mic488["c"].write(name, value)
+        world.run(until=end)
+
+    def begun() -> World:
+        world = World.from_toml(text)
+        world.mic488["c"].write("M1_EN", 1)
+        return world
+
+    straight = begun()
+    go(straight, 0.0, 3.0)
+    assert straight.read("bump.count") == 0
+    for moment in (0.2, 0.35, 0.65, 1.0, 1.5, 1.99, 2.05, 2.5):
+        for ahead in (0.0, 0.01, 0.6):
+            world = begun()
+            go(world, 0.0, moment)
+            snapshot = world.snapshot()
+            go(world, moment, moment + ahead)
+            world.restore(snapshot)
+            go(world, moment, 3.0)
+            assert world.trace.digest() == straight.trace.digest(), (moment, ahead)

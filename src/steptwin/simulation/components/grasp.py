@@ -122,9 +122,9 @@ class Grasp(Stateful):
 
     def release(self, now: Nanos) -> None:
         """Let go of what it holds, which lies on what is below it, or falls."""
-        body = next(iter(self.bodies().values()), None)
-        if body is not None and self._held is not None:
-            workpiece, self._held = self._held.workpiece, None
+        if self._held is not None:
+            workpiece, body = self._held.workpiece, self._workpieces.bodies()[self._held.workpiece.name]
+            self._held = None
             self._report(LETS_GO, workpiece.name, "released")
             if not self._resting.release(workpiece, body.frame, now):
                 self.dropped += 1

@@ -203,6 +203,7 @@ class Resting(Stateful):
     def set_state(self, plain: Plain) -> None:
         super().set_state(plain)
         self._bodies.clear()
+        self._workpieces.forget()
 
     def _report(self, text: str, workpiece: Workpiece, what: str) -> None:
         scheduler = self._scheduler

@@ -152,7 +152,8 @@ class Workpieces:
         return known
 
     def forget(self) -> None:
-        """Compute anew where they may come: a snapshot was restored."""
+        """Find them and where they may come anew: a snapshot was restored, and holders make other bodies."""
+        self._version = None
         self._sweeps.clear()
 
     def take(self, name: str, now: Nanos) -> Workpiece:
