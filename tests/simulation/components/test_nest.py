@@ -134,6 +134,13 @@ def test_a_nest_is_filled_cell_by_cell_and_layer_by_layer() -> None:
     ]
 
 
+def test_a_nest_of_thousands_is_counted_in_one_pass() -> None:
+    """In 30 layers; without that this takes a minute."""
+    rig = Rig(MACHINE.replace("[3, 2]", "[20, 10]").replace("filled = 7", "filled = 6000") + CUP)
+    assert rig.world.read("tray.count") == 6000
+    assert rig.place("tray.6000") == (19 * 60, 9 * 50, 100 + 29 * 20)
+
+
 def test_a_cup_takes_the_highest_one_below_it_and_puts_it_down_as_it_took_it() -> None:
     """The upper one of two is 19 mm higher than the cup reaches down to: 1 mm below its tip is the top of the lower one."""
     rig = Rig(MACHINE.replace("filled = 7", "filled = 6") + CUP)

@@ -30,7 +30,8 @@ class Nest(TerminalComponent):
         return (self.block.name, WORKPIECES)
 
     def update(self, now: Nanos) -> None:
-        count, crooked = self._resting.count(self.block.name), self._resting.crooked(self.block.name)
+        name, piles = self.block.name, self._resting.piles()
+        count, crooked = piles.count.get(name, 0), piles.crooked.get(name, 0)
         if (count, crooked) != (self.count, self.crooked):
             self.count, self.crooked = count, crooked
             self.block.scheduler.notify(self.block.name)

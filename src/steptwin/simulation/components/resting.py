@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from math import sqrt
 from typing import ClassVar, NamedTuple
@@ -41,6 +42,18 @@ class Fall(NamedTuple):
     ends: Nanos
 
 
+class Piles(NamedTuple):
+    """What follows from the workpieces that rest, found once for each change of them."""
+
+    rests: tuple[Rest, ...]
+    lowest: Mapping[str, str]
+    """What each of them lies on, through others."""
+    count: Mapping[str, int]
+    """By what they lie on, through others."""
+    crooked: Mapping[str, int]
+    """Those among them that are aligned neither to a cell nor to the one below."""
+
+
 class Resting(Stateful):
     """A `steptwin.simulation.components.workpieces.Holder`, and a part of a scheduler.
 
@@ -48,7 +61,15 @@ class Resting(Stateful):
     `REACH_NM` above what is below it, falls straight down for √(2 h / g), and lies on what is below it then.
     """
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_bodies", "_frames", "_nests", "_scheduler", "_supports", "_workpieces")
+    FIXED: ClassVar[tuple[str, ...]] = (
+        "_bodies",
+        "_frames",
+        "_nests",
+        "_piles",
+        "_scheduler",
+        "_supports",
+        "_workpieces",
+    )
     __slots__ = (*FIXED, "_falls", "_rests")
 
     def __init__(
@@ -68,6 +89,7 @@ class Resting(Stateful):
         self._falls: tuple[Fall, ...] = ()
         self._bodies: dict[str, tuple[Rest, Frame | None, Body]] = {}
         """As they were made: a body stays the same while nothing below it changes."""
+        self._piles: Piles | None = None
 
     # ------------------------------------------------------------------ a holder
 
@@ -129,10 +151,8 @@ class Resting(Stateful):
 
     def _aligned(self, on: str, lie: Lie) -> Lie | None:
         """Where a workpiece is that is put on something; None where it lies crooked, in a nest."""
-        nest = self._nests.get(self._lowest(on))
-        if nest is None:
-            return lie
-        return nest.aligned(lie) if on in self._nests else nest.snapped(lie, (0, 0))
+        nest = self._nests.get(self.piles().lowest.get(on, on))
+        return lie if nest is None else _aligned(nest, on, lie)
 
     def _overlapping(self, name: str, now: Nanos) -> list[str]:
         """The workpieces that one overlaps."""
@@ -141,21 +161,27 @@ class Resting(Stateful):
         near = [other for other in every if other != name and meet(around, self._workpieces.swept(other).sweep(now))]
         return [other for other in near if Pair(own, every[other]).overlap(now)]
 
-    def _lowest(self, name: str) -> str:
-        """The element that a workpiece lies on, through others; itself for an element."""
+    def piles(self) -> Piles:
+        found = self._piles
+        if found is None or found.rests is not self._rests:
+            found = self._piles = self._piled()
+        return found
+
+    def _piled(self) -> Piles:
         on = {rest.workpiece.name: rest.on for rest in self._rests}
-        while name in on:
-            name = on[name]
-        return name
-
-    def count(self, name: str) -> int:
-        """The workpieces on an element, those on others too."""
-        return sum(self._lowest(rest.workpiece.name) == name for rest in self._rests)
-
-    def crooked(self, name: str) -> int:
-        """Those among them that are aligned neither to a cell nor to the one below."""
-        here = (rest for rest in self._rests if self._lowest(rest.workpiece.name) == name)
-        return sum(self._aligned(rest.on, rest.lie) != rest.lie for rest in here)
+        lowest: dict[str, str] = {}
+        for name, below in on.items():
+            through, last = [name], below
+            while last in on and last not in lowest:
+                through.append(last)
+                last = on[last]
+            lowest |= dict.fromkeys(through, lowest.get(last, last))
+        crooked: Counter[str] = Counter()
+        for rest in self._rests:
+            nest = self._nests.get(lowest[rest.workpiece.name])
+            if nest is not None and _aligned(nest, rest.on, rest.lie) != rest.lie:
+                crooked[nest.name] += 1
+        return Piles(self._rests, lowest, Counter(lowest.values()), crooked)
 
     # ------------------------------------------------------------------ letting go
 
@@ -210,6 +236,10 @@ class Resting(Stateful):
         facts = ("workpiece", workpiece.name), ("element", WORKPIECES), ("what", what)
         scheduler.record(next(iter(scheduler.controllers)), "event", "workpiece", text, *facts)
         scheduler.notify(WORKPIECES)
+
+
+def _aligned(nest: NestSpec, on: str, lie: Lie) -> Lie | None:
+    return nest.aligned(lie) if on == nest.name else nest.snapped(lie, (0, 0))
 
 
 def resting_of(context: ElementContext, scheduler: Scheduler) -> Resting:
