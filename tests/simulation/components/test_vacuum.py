@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import exp, log
 from pathlib import Path
+from textwrap import dedent
 
 import pytest
 
@@ -234,3 +235,37 @@ def test_the_example_can_be_restored_anywhere(moment_s: float) -> None:
         other.restore(snapshot)
         other.run(until=15.0)
         assert other.trace.digest() == world.trace.digest()
+
+
+def test_a_transducer_of_the_pressure_follows_from_the_moment_at_which_the_ejector_switches() -> None:
+    """Nothing else happens until the cup holds. The belt is moved by what comes later."""
+    text = """
+    [[mic488]]
+    name = "c"
+    [[conveyor]]
+    name = "p"
+    length = 200
+    speed = 100
+    run = "cup.held"
+    feed = "c.OUT6"
+    [[vacuum]]
+    name = "cup"
+    ejector = "c.OUT1"
+    pick = "c.OUT2"
+    from = "p"
+    build_up = "100 ms"
+    [[transducer]]
+    name = "air"
+    of = "cup.pressure"
+    to = "c.AIN1"
+    points = [[0, 1], [70, 8]]
+    """
+    world = World.from_toml(dedent(text))
+    for output in ("OUT2", "OUT6", "OUT1"):
+        world.mic488["c"].write(output, 1)
+    world.run(for_=0.07)
+    pressure = world.read("cup.pressure")
+    assert world.read("cup.held") == 0
+    assert pressure > 30.0
+    assert world.read("c.AIN1") == pytest.approx(1.0 + pressure / 10.0, abs=0.2)
+    assert world.branch().read("c.AIN1") == world.read("c.AIN1")

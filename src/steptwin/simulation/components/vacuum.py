@@ -114,6 +114,7 @@ class Vacuum(Carrier):
     def _go(self, goal: float, now: Nanos) -> None:
         """Let the pressure go to another value."""
         self._first, self._begin, self._goal = self.pressure(now), now, goal
+        self.block.scheduler.notify(self.block.name)
         threshold = self.spec.threshold
         self._due = None
         if (goal > threshold) is not self._is_held:
