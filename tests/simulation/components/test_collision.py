@@ -351,3 +351,143 @@ def test_what_cannot_be_compared_is_refused(more: str, problem: str) -> None:
 
 def test_contacts_of_bodies_can_be_restored(tmp_path: Path) -> None:
     check_it_can_be_restored(lowered(BODIES + JAMS), World.from_toml(BODIES + JAMS), 3.0, 8.0, tmp_path)
+
+
+TWO = """
+[[mic488]]
+name = "c"
+[[mic488]]
+name = "d"
+[[body]]
+name = "plate"
+at = [0, 0, -20]
+size = [500, 500, 20]
+[[cylinder]]
+name = "x"
+extend = "c.OUT1"
+stroke = 60
+on = "plate"
+at = [0, 0, 20]
+[[body]]
+name = "h1"
+on = "x"
+size = [10, 10, 10]
+[[cylinder]]
+name = "y"
+extend = "d.OUT1"
+stroke = 60
+on = "plate"
+at = [0, 100, 20]
+[[body]]
+name = "h2"
+on = "y"
+size = [10, 10, 10]
+[[body]]
+name = "post"
+at = [50, 100, 0]
+size = [10, 10, 10]
+[[collision]]
+name = "k"
+between = ["plate", "post"]
+[[beam]]
+name = "b"
+sees = ["plate"]
+at = [30, 80, 5]
+along = "+y"
+length = 40
+"""
+
+
+def test_what_stands_on_a_body_of_the_floor_shares_a_scheduler_with_what_compares_it() -> None:
+    """Two controllers that nothing else joins."""
+    world = World.from_toml(TWO)
+    assert len(world.schedulers) == 1
+    world.run(until=0.5)
+    world.mic488["d"].write("OUT1", 1)
+    world.run(until=2.0)
+    assert world.read("k.count") == 1
+    assert [one.value for one in world.trace.edges() if one.subject == "b.seen"] == [0.0, 1.0, 0.0]
+
+
+CARRIED = """
+[[mic488]]
+name = "c"
+[[cylinder]]
+name = "lift"
+extend = "c.OUT1"
+stroke = 60
+extend_time = "100 ms"
+at = [0, 0, 199]
+along = "-z"
+[[vacuum]]
+name = "cup"
+ejector = "c.OUT2"
+on = "lift"
+[[nest]]
+name = "tray"
+at = [0, 0, 120]
+workpiece = [40, 40, 20]
+filled = 1
+[[cylinder]]
+name = "push"
+extend = "c.OUT3"
+stroke = 100
+extend_time = "100 ms"
+at = [-100, 0, 0]
+[[body]]
+name = "ram"
+on = "push"
+at = [0, 0, 160]
+size = [40, 40, 40]
+[[body]]
+name = "rack"
+at = [35, 0, 170]
+size = [40, 40, 20]
+"""
+
+
+def carrying(more: str, ram: str = "") -> World:
+    """The cup has lifted a workpiece of 40 mm to 200 mm above the floor."""
+    world = World.from_toml(CARRIED.replace('name = "ram"', f'name = "ram"\n{ram}') + more)
+    for register, value in (("OUT1", 1), ("OUT2", 1), ("OUT1", 0)):
+        world.mic488["c"].write(register, value)
+        world.run(for_=0.4)
+    return world
+
+
+@pytest.mark.parametrize(("ram", "stands"), [("", True), ('when = "c.OUT4"', True)])
+def test_a_part_that_is_driven_into_what_is_carried_stands(ram: str, stands: bool) -> None:
+    """The ram, 40 mm long, starts 100 mm before: they touch after 60 mm."""
+    jam = '[[collision]]\nname = "k"\nbetween = ["cup", "ram"]\neffect = "jam"\n'
+    world = carrying(jam, ram)
+    world.mic488["c"].write("OUT4", 1)
+    world.mic488["c"].write("OUT3", 1)
+    world.run(for_=1.0)
+    assert [text for _, text in hits(world)] == ["k: tray.1 and ram touch"]
+    assert world.read("push.position") == pytest.approx(60.0, abs=0.001)
+
+
+def test_a_body_that_is_not_there_touches_no_workpiece() -> None:
+    world = carrying('[[collision]]\nname = "k"\nbetween = ["workpieces", "ram"]\n', 'when = "c.OUT4"')
+    world.mic488["c"].write("OUT3", 1)
+    world.run(for_=1.0)
+    assert world.read("k.count") == 0
+    world.mic488["c"].write("OUT4", 1)
+    world.run(for_=0.1)
+    assert world.read("k.count") == 1
+
+
+def test_what_carries_a_workpiece_against_a_fixed_part_stands() -> None:
+    """The workpiece, 40 mm wide, is lifted along the rack, 5 mm into it: its top comes to 170 mm after 30 mm."""
+    jam = '[[collision]]\nname = "k"\nbetween = ["workpieces", "rack"]\neffect = "jam"\n'
+    world = carrying(jam)
+    assert [text for _, text in hits(world)] == ["k: tray.1 and rack touch"]
+    assert world.read("lift.position") == pytest.approx(29.0, abs=0.001)
+
+
+def test_pairs_are_left_out_by_any_name() -> None:
+    apart = '[[collision]]\nname = "k"\nbetween = ["workpieces", "rack", "ram"]\nexcept = [["workpieces", "rack"]]\n'
+    world = carrying(apart)
+    world.mic488["c"].write("OUT3", 1)
+    world.run(for_=1.0)
+    assert [text for _, text in hits(world)] == ["k: tray.1 and ram touch", "k: ram and rack touch"]

@@ -86,6 +86,21 @@ overlap = 8.0
 """
 
 
+FAN = """
+[[axis]]
+name = "fan"
+drive = "c.M3"
+kind = "rotary"
+pulses_per_unit = 40.0
+at = [400, 10, 300]
+along = "+y"
+[[body]]
+name = "blade"
+on = "fan"
+size = [10, 100, 10]
+"""
+
+
 class Rig:
     def __init__(self, text: str) -> None:
         self.world = World.from_toml(text)
@@ -213,6 +228,14 @@ def test_a_workpiece_may_be_pressed_a_little_into_what_it_is_put_on(height: floa
     assert rig.told()[-1] == ("tray.1 lies on table" if lies else "tray.1 lies on the floor")
 
 
+def test_what_turns_about_another_axis_carries_no_workpiece() -> None:
+    """It stands in the way of none, and asking for what is below one is no error."""
+    rig = Rig(MACHINE.replace("filled = 7", "filled = 1") + CUP + FAN)
+    rig.take(0.0)
+    rig.put(400.0)
+    assert rig.told()[-1] == "tray.1 lies on table"
+
+
 def test_a_workpiece_on_a_turntable_turns_with_it() -> None:
     rig = Rig(MACHINE.replace("filled = 7", "filled = 1") + CUP)
     rig.take(0.0)
@@ -276,7 +299,7 @@ def test_a_workpiece_that_is_carried_against_something_is_a_collision() -> None:
     rig.take(0.0)
     rig.go(400.0)
     (first, *_) = (record for record in rig.world.trace.of("event") if record.subject == "collision")
-    assert first.value == "bump: wall and tray.1 touch"
+    assert first.value == "bump: tray.1 and wall touch"
     assert rig.world.read("bump.count") == 1
     assert rig.world.read("bump.hit") == 0
 
@@ -317,6 +340,12 @@ def test_jaws_without_anything_between_them_close() -> None:
     [
         (CUP + 'pick = "c.OUT3"\n', "pick and on exclude each other"),
         (CUP.replace("diameter", "diametre"), "diametre"),
+        (
+            CUP.replace('on = "lift"', 'on = "fan"') + FAN,
+            "'cup' turns about y: what has to do with workpieces only turns about z",
+        ),
+        ('[[nest]]\nname = "n"\non = "fan"\n' + FAN, "'n' turns about y"),
+        (FAN + '[[beam]]\nname = "b"\non = "fan"\nlength = 9\n', "'b' turns about y"),
         ('[[nest]]\nname = "n"\nfilled = 2', "filled means nothing without workpiece"),
         ('[[nest]]\nname = "n"\ncells = [0, 1]', "permitted are whole numbers from 1 to 1000"),
         ('[[nest]]\nname = "n"\nworkpiece = [1, 2, 3, 4]', "expected [length, width, height] or [diameter, height]"),

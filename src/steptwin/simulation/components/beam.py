@@ -11,7 +11,7 @@ from steptwin.simulation.components.body import BODY, body_of
 from steptwin.simulation.components.bodycontact import BodyContact
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, Reference
-from steptwin.simulation.components.frames import bodies_on, sources_of
+from steptwin.simulation.components.frames import bodies_on, check_upright, sources_of
 from steptwin.simulation.components.logic import STUCK_OUTPUT, Joint, TerminalComponent, TerminalComponentSpec, with_terminals
 from steptwin.simulation.components.mount import UPRIGHT, MoverSpec, direction, to_nm
 from steptwin.simulation.components.probe import Probe
@@ -65,7 +65,8 @@ class BeamSpec(TerminalComponentSpec, MoverSpec):
         return ()
 
     def others(self, described: ElementSpecs) -> Iterator[tuple[str, str]]:
-        yield from (("sees", name) for name in self.sees if name != WORKPIECES)
+        for wanted in self.sees:
+            yield from (("sees", name) for name in described.carried_by(wanted) if wanted != WORKPIECES)
         if WORKPIECES in self.sees:
             yield from (("sees", name) for name in described.holders)
 
@@ -126,6 +127,7 @@ def _make(spec: BeamSpec, context: ElementContext) -> Beam:
     block, frames, workpieces = context.terminal_block(spec.name), context.frames, context.objects.workpieces
     if WORKPIECES in spec.sees:
         resting_of(context, block.scheduler)
+        check_upright(spec.name, frames.base(spec.name))
     described = {one.name: one for one in context.objects.described.of(BODY)}
     every = {name: body_of(one, frames) for name, one in described.items()}
     seen = [name for wanted in spec.sees if wanted != WORKPIECES for name in bodies_on(frames[wanted], every, wanted)]

@@ -8,7 +8,7 @@ from fractions import Fraction
 from steptwin.controller import SECOND, Nanos
 from steptwin.simulation.components.builtobjects import BuiltObjects
 from steptwin.simulation.components.conveyor import CONVEYOR, Conveyor
-from steptwin.simulation.components.frames import Frames, sources_of
+from steptwin.simulation.components.frames import Frames, check_upright, sources_of
 from steptwin.simulation.components.mount import to_nm
 from steptwin.simulation.components.workpieces import Lie, body_in
 from steptwin.simulation.mechanics.belt import Belt, BeltDrive, ConstantDrive, Placed
@@ -31,6 +31,7 @@ class BeltSpace:
         self._frames = frames
         spec = conveyor.spec
         self._frame = frames.base(spec.name)
+        check_upright(spec.name, self._frame)
         self._along = spec.towards()
         self._belt_q = float((self._along.axis + 2 * (self._along.sign < 0)) % 4)
         """The direction of the belt, quarter turns from +x."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from steptwin.controller import Nanos
+from steptwin.simulation.components.touch import Meeting
 from steptwin.simulation.logic.condition import SignalCondition
 from steptwin.simulation.space.contacts import NEVER, Pair
 from steptwin.simulation.space.sweeps import SweptBody, meet
@@ -48,4 +49,25 @@ class BodyContact:
     def change(self, now: Nanos) -> Nanos | None:
         self._search(now)
         changes = (self._found.at, *(when.change(now) for when in self._whens))
+        return min((due for due in changes if due is not None), default=None)
+
+
+class ConditionalContact:
+    """Another `steptwin.simulation.components.touch.Meeting`, while conditions hold."""
+
+    __slots__ = ("_meeting", "_whens")
+
+    def __init__(self, meeting: Meeting, whens: Sequence[SignalCondition]) -> None:
+        self._meeting = meeting
+        self._whens = tuple(whens)
+
+    def forget(self) -> None:
+        for one in (self._meeting, *self._whens):
+            one.forget()
+
+    def holds(self, now: Nanos) -> bool:
+        return all(when.holds(now) for when in self._whens) and self._meeting.holds(now)
+
+    def change(self, now: Nanos) -> Nanos | None:
+        changes = (one.change(now) for one in (self._meeting, *self._whens))
         return min((due for due in changes if due is not None), default=None)

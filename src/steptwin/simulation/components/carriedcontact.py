@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from steptwin.controller import Nanos
 from steptwin.simulation.components.bodycontact import BodyContact, SweptBody
@@ -15,20 +15,22 @@ from steptwin.simulation.space.bodies import Body, Box, Cylinder
 
 class CarriedContact:
     """A `steptwin.simulation.components.touch.Meeting` of what is carried, whatever that is, with parts of the machine and with
-    workpieces, but for those that lie on it."""
+    workpieces."""
 
-    __slots__ = ("_carried", "_parts", "_probe", "_workpieces", "grasp")
+    __slots__ = ("_among", "_carried", "_parts", "_probe", "_workpieces", "grasp")
 
     def __init__(
         self,
         grasp: Grasp,
         parts: Mapping[str, tuple[SweptBody, Sequence[SignalCondition]]],
         workpieces: Workpieces | None,
+        among: Callable[[Body], Body | None],
     ) -> None:
-        """``parts``: with the conditions under which they are there."""
+        """``parts``: with the conditions under which they are there; ``among``: what it may touch of a workpiece."""
         self.grasp = grasp
         self._parts = parts
         self._workpieces = workpieces
+        self._among = among
         self.forget()
 
     def forget(self) -> None:
@@ -46,13 +48,8 @@ class CarriedContact:
                 body = _without_bottom(carried)
                 swept = SweptBody(body)
                 contacts = {name: BodyContact(swept, part, whens) for name, (part, whens) in self._parts.items()}
-                self._probe = Probe(body, contacts, self._workpieces, self._beside)
+                self._probe = Probe(body, contacts, self._workpieces, self._among)
         return self._probe
-
-    def _beside(self, body: Body) -> Body | None:
-        """A workpiece, unless it is carried, too."""
-        carried = self._carried
-        return None if carried is None or any(one is carried.frame for one in body.frame.line()) else body
 
     def holds(self, now: Nanos) -> bool:
         probe = self._of_carried()

@@ -46,6 +46,13 @@ class ElementSpecs(dict[str, tuple[TableSpec, ...]]):
         placed = places(self.mounts)
         return [name for name, its in self.mounts.items() if name in placed and its.holds_workpieces]
 
+    def carried_by(self, name: str) -> list[str]:
+        """Itself, and all that it carries, directly or through others."""
+        mounts, found = self.mounts, [name]
+        for one in found:
+            found += (other for other, its in mounts.items() if its.on == one and other not in found)
+        return found
+
     @property
     def mounts(self) -> dict[str, MountSpec]:
         """Those that may have a place in space, by name."""

@@ -10,7 +10,7 @@ from steptwin.messages import Message
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.components.mount import MountSpec, Movement, places
 from steptwin.simulation.space.bodies import Body
-from steptwin.simulation.space.frames import Frame, Joint, path
+from steptwin.simulation.space.frames import AXES, Frame, Joint, Z, path
 from steptwin.simulation.toml.names import Unknown
 
 HAS_NO_PLACE = Message("simulation.has-no-place", "{name!r} has no place in space: give it on, at or along")
@@ -94,6 +94,23 @@ class Frames(Mapping[str, Mounted]):
     def carrying(self, frame: Frame) -> list[Movement]:
         """Movements of a frame, up to the floor."""
         return [self._movements[one] for one in frame.line() if one in self._movements]
+
+
+TILTS = Message("simulation.tilts", "{name!r} turns about {axis}: what has to do with workpieces only turns about z")
+
+
+def tilting_axis(frame: Frame) -> int | None:
+    """The axis about which a frame turns, up to the floor, so that it is not always upright; None: it is."""
+    joints = (one.joint for one in frame.line() if one.joint is not None and one.joint.turns)
+    return next((joint.along.axis for joint in joints if joint.along.axis != Z), None)
+
+
+def check_upright(name: str, frame: Frame) -> None:
+    """Raise `Misuse` for what does not stay upright: workpieces may lie at any angle about z, and turns are only compared where
+    they are about one direction."""
+    axis = tilting_axis(frame)
+    if axis is not None:
+        raise Misuse(TILTS(name=name, axis=AXES[axis]))
 
 
 NO_BODIES = Message("simulation.carries-no-bodies", "{name!r} is no [[body]], and carries none")

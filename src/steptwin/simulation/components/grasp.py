@@ -11,7 +11,7 @@ from steptwin.controller import Nanos
 from steptwin.messages import Message
 from steptwin.motion.trig import cosine, sine
 from steptwin.simulation.components.elementcontext import ElementContext
-from steptwin.simulation.components.frames import sources_of
+from steptwin.simulation.components.frames import check_upright, sources_of
 from steptwin.simulation.components.probe import Probe
 from steptwin.simulation.components.resting import resting_of
 from steptwin.simulation.components.workpieces import Lie, body_in, lie_in
@@ -58,6 +58,7 @@ class Grasp(Stateful):
     def __init__(self, block: TerminalBlock, context: ElementContext, probe: Body, draw: Draw, margin: int = 0) -> None:
         """``draw``: where a workpiece is when it is held, of where it was in the frame of the probe."""
         self._block = block
+        check_upright(block.name, probe.frame)
         self._frames = context.frames
         self._frame = probe.frame
         self._workpieces = context.objects.workpieces

@@ -13,7 +13,7 @@ from steptwin.simulation.components.beltspace import add_belts
 from steptwin.simulation.components.body import BODY, body_of
 from steptwin.simulation.components.conveyor import COLLIDES
 from steptwin.simulation.components.elementcontext import ElementContext
-from steptwin.simulation.components.frames import Frames, sources_of
+from steptwin.simulation.components.frames import Frames, check_upright, sources_of, tilting_axis
 from steptwin.simulation.components.nesttable import NestSpec
 from steptwin.simulation.components.workpieces import REACH_NM, WORKPIECES, Below, Lie, Rest, Workpieces, body_in, lie_in
 from steptwin.simulation.mechanics.workpiece import Workpiece
@@ -251,8 +251,11 @@ def resting_of(context: ElementContext, scheduler: Scheduler) -> Resting:
         return there
     described = context.objects.described
     nests = {spec.name: spec for spec in described.mounts.values() if isinstance(spec, NestSpec)}
-    supports = {one.name: body_of(one, frames) for one in described.of(BODY) if one.holds_workpieces}
-    supports |= {name: nest.bottom(frames.base(name)) for name, nest in nests.items()}
+    bodies = (body_of(one, frames) for one in described.of(BODY) if one.holds_workpieces)
+    supports = {body.name: body for body in bodies if tilting_axis(body.frame) is None}
+    for name, nest in nests.items():
+        check_upright(name, frames.base(name))
+        supports[name] = nest.bottom(frames.base(name))
     made = Resting(scheduler, frames, workpieces, supports, nests)
     add_belts(context.objects)
     workpieces.holders.append(made)
