@@ -119,20 +119,20 @@ class Grasp(Stateful):
         if body is not None:
             lie = self._draw(lie_in(body.frame, self._frame, now), body)
             self._held = Held(self._workpieces.take(body.name, now), lie)
-            self._report(HOLDS, body.name, "held")
+            self.report(HOLDS(cup=self.name, workpiece=body.name), body.name, "held")
 
     def release(self, now: Nanos) -> None:
         """Let go of what it holds, which lies on what is below it, or falls."""
         if self._held is not None:
             workpiece, body = self._held.workpiece, self._workpieces.bodies()[self._held.workpiece.name]
             self._held = None
-            self._report(LETS_GO, workpiece.name, "released")
+            self.report(LETS_GO(cup=self.name, workpiece=workpiece.name), workpiece.name, "released")
             if not self._resting.release(workpiece, body.frame, now):
                 self.dropped += 1
 
-    def _report(self, message: Message, name: str, what: str) -> None:
+    def report(self, text: str, name: str, what: str) -> None:
+        """Record an event with a workpiece."""
         block = self._block
-        text = message(cup=block.name, workpiece=name)
         facts = ("workpiece", name), ("element", block.name), ("what", what)
         block.scheduler.record(block.scheduler.owner(block.name), "event", "workpiece", text, *facts)
         block.scheduler.notify(block.name)

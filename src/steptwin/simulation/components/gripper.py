@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from fractions import Fraction
 from math import floor
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from steptwin.controller import MILLISECOND, Nanos
 from steptwin.messages import Message
@@ -84,12 +84,24 @@ def _grasp(block: TerminalBlock, spec: GripperSpec, context: ElementContext) -> 
     return Grasp(block, context, probe, centred)
 
 
+TOO_WIDE = Message("simulation.workpiece-is-too-wide", "{jaws}: {workpiece} is too wide")
+
+
+class Between(NamedTuple):
+    """A workpiece in space that is between the jaws while they close."""
+
+    workpiece: str
+    at: int | None
+    """The place of the jaws at which they come to it. It follows from its width when they began to close, or when it came between
+    them. None: they do not come to it, because they are closer already, or never as far apart."""
+
+
 class Gripper(Carrier):
     """The jaws move at constant speeds. They hold a workpiece that is between them when they come to its width, until they open.
     Without one they close."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("_at", "_grasp", "_spec")
-    __slots__ = (*FIXED, "_is_narrow", "is_held", "slips", "travel")
+    __slots__ = (*FIXED, "_between", "_is_narrow", "is_held", "slips", "travel")
 
     def __init__(self, block: TerminalBlock, spec: GripperSpec, context: ElementContext) -> None:
         self._grasp = _grasp(block, spec, context) if spec.is_mounted else None
@@ -99,7 +111,8 @@ class Gripper(Carrier):
         self._at = self._closed_at(exact_fraction(spec.width))
         """The place of the jaws at a workpiece, without a place in space."""
         self._is_narrow = False
-        """Whether the jaws are closer than a workpiece is wide, or hold one."""
+        """Without a place in space: whether the jaws are closer than a workpiece is wide, or hold one."""
+        self._between: Between | None = None
         self.is_held = False
         self.slips = False
         """Fault: the jaws hold nothing."""
@@ -108,24 +121,36 @@ class Gripper(Carrier):
         """The place of the jaws, this far apart in mm."""
         return floor((1 - width / exact_fraction(self._spec.stroke)) * self.travel.full)
 
-    def _meets_at(self, now: Nanos) -> int | None:
-        """The place of the jaws at what is between them; None where nothing is."""
-        if self._grasp is None:
-            return self._at
-        body = self._grasp.met(now)
-        return None if body is None else self._closed_at(self._grasp.width_of(body, self._spec.towards(), now))
+    def _comes_to_one(self, now: Nanos) -> bool:
+        """Whether the jaws, without a place in space, come to a workpiece."""
+        was_narrow, self._is_narrow = self._is_narrow, self.is_held or self.travel.grid_position(now) >= self._at
+        return self.block.is_on(CLOSE) and self._is_narrow and not was_narrow and self.is_occupied(now)
+
+    def _comes_to_one_in_space(self, grasp: Grasp, now: Nanos) -> bool:
+        between, self._between = self._between, None
+        body = grasp.met(now) if self.block.is_on(CLOSE) and not self.is_held else None
+        if body is None:
+            return False
+        position = self.travel.grid_position(now)
+        if between is None or between.workpiece != body.name:
+            at = self._closed_at(grasp.width_of(body, self._spec.towards(), now))
+            if at <= 0:
+                grasp.report(TOO_WIDE(jaws=grasp.name, workpiece=body.name), body.name, "too wide")
+            self._between = Between(body.name, at if at > position else None)
+            return False
+        comes = between.at is not None and position >= between.at
+        self._between = Between(body.name, None) if comes else between
+        return comes
 
     def update(self, now: Nanos) -> None:
         closes = self.block.is_on(CLOSE)
-        at = None if self.is_held else self._meets_at(now)
-        is_narrow = self.is_held or (at is not None and self.travel.grid_position(now) >= at)
+        comes = self._comes_to_one(now) if self._grasp is None else self._comes_to_one_in_space(self._grasp, now)
         if self.is_held and (not closes or self.slips):
             self.is_held = False
             self.let_go(now)
-        elif closes and is_narrow and not self._is_narrow and not self.slips and self.is_occupied(now):
+        elif comes and not self.slips:
             self.is_held = True
             self.take(now)
-        self._is_narrow = is_narrow
         direction = 0 if self.is_held else 1 if closes else -1
         if direction != self.travel.direction:
             self.travel.send(direction, now)
@@ -137,7 +162,8 @@ class Gripper(Carrier):
 
     def deadline(self) -> Nanos | None:
         now = self.block.scheduler.now
-        at = None if self.is_held else self._meets_at(now)
+        place = self._at if self._grasp is None else None if self._between is None else self._between.at
+        at = None if self.is_held else place
         moments = (
             *self.travel.turning_points(now),
             None if at is None else self.travel.reaches(at, now, 1),

@@ -1,0 +1,128 @@
+"""Cups and jaws in space: which workpieces they take, and which of two has a workpiece that both hold."""
+
+from __future__ import annotations
+
+import pytest
+
+from steptwin.controller import MILLISECOND
+from steptwin.files.world import World
+
+LIFT = """
+[[mic488]]
+name = "c"
+[[cylinder]]
+name = "lift"
+extend = "c.OUT1"
+stroke = 60
+extend_time = "100 ms"
+retract_time = "100 ms"
+at = [0, 0, 200]
+along = "-z"
+"""
+"""Its end is at 200 mm, lowered at 140 mm."""
+JAWS = """
+[[gripper]]
+name = "jaws"
+close = "c.OUT2"
+on = "lift"
+at = [0, 0, -35]
+stroke = 60
+"""
+"""Lowered, their tips are at 105 mm."""
+
+
+def nest(*size: float, more: str = "") -> str:
+    """A workpiece whose top is at 120 mm."""
+    return f'[[nest]]\nname = "n"\nat = [0, 0, {120 - size[-1]}]\nworkpiece = {[*size]}\nfilled = 1\n{more}'
+
+
+def run(text: str, *steps: tuple[int, str], end: int = 2000) -> World:
+    """``steps``: milliseconds, and what is done then: ``+OUT1`` switches an output on, ``bt`` presses a button."""
+    world = World.from_toml(text)
+    cell = world.mic488["c"]
+    for at, what in sorted(steps):
+        world.run(until=at / 1000)
+        if what[0] in "+-":
+            cell.write(what[1:], int(what[0] == "+"))
+        else:
+            world.press(what)
+    world.run(until=end / 1000)
+    return world
+
+
+def told(world: World) -> list[str]:
+    return [str(record.value) for record in world.trace.of("event") if record.subject == "workpiece"]
+
+
+# ---------------------------------------------------------------------- jaws
+
+
+@pytest.mark.parametrize(("lowered", "is_held"), [(140, True), (160, False)])
+def test_jaws_that_are_closer_than_a_workpiece_is_wide_do_not_take_it(lowered: int, is_held: bool) -> None:
+    """It is between the jaws 83 ms after the lift begins; they are 40 of 60 mm apart at 233 ms."""
+    world = run(LIFT + JAWS + nest(40, 40, 20), (200, "+OUT2"), (lowered, "+OUT1"))
+    assert told(world) == (["jaws holds n.1"] if is_held else [])
+    assert world.read("jaws.held") == is_held
+    assert world.read("jaws.closed") == (not is_held)
+
+
+def test_jaws_that_opened_around_a_workpiece_take_it() -> None:
+    world = run(LIFT + JAWS + nest(40, 40, 20), (0, "+OUT2"), (200, "+OUT1"), (400, "-OUT2"), (600, "+OUT2"))
+    assert told(world) == ["jaws holds n.1"]
+
+
+@pytest.mark.parametrize(("width", "events"), [(60, ["jaws: n.1 is too wide"]), (59.999, ["jaws holds n.1"])])
+def test_a_workpiece_that_is_as_wide_as_the_open_jaws_is_an_event(width: float, events: list[str]) -> None:
+    world = run(LIFT + JAWS + nest(width, 40, 20), (0, "+OUT1"), (300, "+OUT2"))
+    assert told(world) == events
+    assert world.read("jaws.held") == (width < 60)
+
+
+TURNING = """
+[[mic488]]
+name = "c"
+[mic488.M1]
+unit = "degree"
+gear = 100.0
+[[axis]]
+name = "r"
+kind = "rotary"
+drive = "c.M1"
+pulses_per_unit = 100.0
+[[button]]
+name = "bt"
+to = "c.IN3"
+[[gripper]]
+name = "jaws"
+close = "c.OUT2"
+at = [0, 0, 115]
+stroke = 60
+close_time = "2 s"
+"""
+
+
+@pytest.mark.parametrize("presses", [(), (613, 655)])
+def test_the_width_of_a_workpiece_that_turns_counts_when_the_jaws_begin_to_close(presses: tuple[int, ...]) -> None:
+    """40 mm of 60 at first: 20 mm of 60 in 2 s, whatever else happens while it turns."""
+    world = World.from_toml(TURNING + nest(40, 20, 20, more='on = "r"\n'))
+    world.mic488["c"].write("M1_EN", 1)
+    world.mic488["c"].write("OUT2", 1)
+    world.mic488["c"].write("M1_POS_ABS", 90.0)
+    for press in presses:
+        world.run(until=press / 1000)
+        world.press("bt")
+    world.run(until=1.0)
+    (held,) = (record for record in world.trace.of("event") if record.subject == "workpiece")
+    assert held.time / MILLISECOND == pytest.approx(2000 / 3, abs=1e-5)
+
+
+@pytest.mark.parametrize("moment_s", [0.22, 0.3])
+def test_jaws_with_a_workpiece_between_them_can_be_restored(moment_s: float) -> None:
+    text = LIFT + JAWS + nest(40, 40, 20)
+    world = run(text, (0, "+OUT1"), (200, "+OUT2"), end=int(moment_s * 1000))
+    other = World.from_toml(text)
+    other.restore(world.snapshot())
+    for one in (world, other):
+        one.run(until=1.0)
+    assert told(other) == ["jaws holds n.1"]
+    assert other.trace.digest() == world.trace.digest()
