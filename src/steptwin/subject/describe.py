@@ -138,7 +138,7 @@ def workpiece_states(world: Simulation) -> Iterator[WorkpieceState]:
         size = tuple(2 * one / NM_PER_MM for one in shape.half) if isinstance(shape, Box) else None
         moves = any(one.motion is not None and not one.motion.is_still for one in path(carrier or FLOOR, body.frame))
         on = None if carrier is None else owners[carrier]
-        travel = f"{on}.travel" if moves else None
+        travel = f"{on}.travel" if moves and on is not None else None
         yield WorkpieceState(
             name,
             cast("Point | None", size),

@@ -11,6 +11,7 @@ from steptwin.controller import SECOND
 from steptwin.files.world import World
 from steptwin.simulation.space.frames import FLOOR, pose
 from steptwin.simulation.toml.reader import WorldError
+from steptwin.subject.describe import workpiece_states
 
 MACHINE = """
 [[mic488]]
@@ -216,6 +217,119 @@ def test_what_is_let_go_in_the_air_falls_for_as_long_as_it_does() -> None:
     assert (lies.time - falls.time) / SECOND == pytest.approx((2 * 0.161 / 9.80665) ** 0.5, abs=1e-9)
     assert rig.place("tray.1") == (200, 0, 0)
     assert rig.world.read("cup.dropped") == 1
+
+
+BEAM = """
+[[beam]]
+name = "low"
+at = [200, -50, 61]
+along = "+y"
+length = 100.0
+[[body]]
+name = "hand"
+at = [200, 0, 5]
+size = [10, 10, 10]
+[[collision]]
+name = "bump"
+between = ["workpieces", "hand"]
+"""
+
+
+def fallen(way: float) -> float:
+    """Seconds of a fall, mm."""
+    return (2 * way / 9806.65) ** 0.5
+
+
+def test_what_falls_is_seen_on_its_way_and_nothing_takes_it() -> None:
+    """From 161 mm; it is 20 mm high. The beam at 61 mm sees it after 100 mm, until after 120 mm; it comes to a hand of 15 mm. The
+    cup leaks just above it, and holds nothing again."""
+    text = MACHINE.replace("filled = 7", "filled = 1") + CUP + BEAM
+    rig = Rig(text)
+    world = rig.world
+    rig.take(0.0)
+    rig.go(200.0)
+    world.fault("leak element=cup name=hole")
+    world.run(until=world.now / SECOND + 0.2)
+    begin = next(one.time for one in world.trace.of("event") if str(one.value).endswith("falls 146 mm"))
+    edges = [(one.time - begin) / SECOND for one in world.trace.edges() if one.subject == "low.seen"][1:]
+    assert edges == pytest.approx([fallen(100.0), fallen(120.0)], abs=2e-9)
+    assert rig.told()[1:] == ["cup lets go of tray.1", "tray.1 falls 146 mm", "tray.1 lies on hand"]
+    assert world.read("cup.held") == 0
+
+
+def test_what_falls_can_be_drawn_and_restored() -> None:
+    text = MACHINE.replace("filled = 7", "filled = 1") + CUP + BEAM.replace("at = [200, 0, 5]", "at = [220, 0, 5]")
+    rig, other = Rig(text), World.from_toml(text)
+    rig.take(0.0)
+    rig.go(200.0)
+    rig.world.mic488["c"].write("OUT2", 0)
+    rig.world.run(for_=0.1)
+    (state,) = workpiece_states(rig.world)
+    assert (state.on, state.travel, state.at[:2]) == (None, None, (200.0, 0.0))
+    assert 0.0 < state.at[2] < 161.0
+    snapshot = rig.world.snapshot()
+    rig.world.run(for_=1.0)
+    assert [str(one.value) for one in rig.world.trace.of("event") if one.subject == "collision"] == [
+        "bump: hand and tray.1 touch"
+    ]
+    for world in (rig.world, other):
+        digest = rig.world.trace.digest()
+        world.restore(snapshot)
+        world.run(for_=1.0)
+        assert world.trace.digest() == digest
+
+
+def test_what_lies_on_a_workpiece_falls_with_it() -> None:
+    """Two on each other; jaws take the lower one, and let go of both 60 mm above the nest."""
+    text = MACHINE.replace("cells = [3, 2]", "").replace("filled = 7", "filled = 2")
+    rig = Rig(text + JAWS)
+    rig.lower(hold=True)
+    rig.world.mic488["c"].write("OUT2", 0)
+    rig.world.run(for_=0.05)
+    (_, _, low), (_, _, high) = (rig.place(f"tray.{n}") for n in (1, 2))
+    assert 100 < low < 160
+    assert high - low == 20
+    rig.world.run(for_=0.5)
+    assert rig.told()[1:] == ["jaws lets go of tray.1", "tray.1 falls 60 mm", "tray.1 lies on tray"]
+    assert (rig.place("tray.1")[2], rig.place("tray.2")[2], rig.world.read("tray.count")) == (100, 120, 2)
+
+
+def test_what_falls_goes_on_where_what_it_falls_on_has_gone() -> None:
+    """A drawer 100 mm below it is drawn away while it falls."""
+    drawer = """
+    [[cylinder]]
+    name = "pull"
+    extend = "c.OUT3"
+    stroke = 200.0
+    extend_time = "100 ms"
+    at = [200, 0, 0]
+    [[body]]
+    name = "drawer"
+    on = "pull"
+    at = [0, 0, 51]
+    size = [50, 50, 10]
+    """
+    rig = Rig(MACHINE.replace("filled = 7", "filled = 1") + CUP + drawer)
+    rig.take(0.0)
+    rig.go(200.0)
+    rig.world.mic488["c"].write("OUT2", 0)
+    rig.world.run(for_=0.05)
+    rig.world.mic488["c"].write("OUT3", 1)
+    rig.world.run(for_=1.0)
+    _, falls, lies = (
+        one for one in rig.world.trace.of("event") if one.subject == "workpiece" and one.value != "cup holds tray.1"
+    )
+    assert (falls.value, lies.value) == ("tray.1 falls 100 mm", "tray.1 lies on the floor")
+    assert (lies.time - falls.time) / SECOND == pytest.approx(fallen(161.0), abs=1e-9)
+    assert rig.place("tray.1") == (200, 0, 0)
+
+
+def test_in_a_pit_it_lies_where_it_is_let_go() -> None:
+    rig = Rig(MACHINE.replace("filled = 7", "filled = 1").replace("0, 200]", "0, -200]").replace("0, 100]", "0, -300]") + CUP)
+    rig.take(0.0)
+    rig.put(200.0)
+    assert rig.told()[1:] == ["cup lets go of tray.1", "tray.1 lies on the floor"]
+    assert rig.place("tray.1") == (200, 0, -299)
 
 
 @pytest.mark.parametrize(("height", "lies"), [(1.9, True), (2.1, False)])

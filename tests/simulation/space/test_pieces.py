@@ -20,6 +20,7 @@ from steptwin.simulation.mechanics.travel import Travel
 from steptwin.simulation.space.pieces import (
     Gear,
     Piece,
+    falling,
     geared,
     pieces_of_cam,
     pieces_of_profile,
@@ -68,6 +69,11 @@ MOTIONS: dict[str, tuple[Callable[[Nanos], Iterator[Piece]], Callable[[Nanos], f
         lambda now: pieces_of_cam(CAM, pieces_of_profile(THERE, now)),
         lambda now: float(CAM.lift(THERE.count(now))),
         9 / 40 + 1e-9,  # the most that it lifts in a pulse
+    ),
+    "fall": (
+        falling(0, 800 * MILLISECOND, 9806.65).pieces,
+        lambda now: 4903.325 * (min(now, 800 * MILLISECOND) / SECOND) ** 2,
+        1e-9,
     ),
     "sum": (summing, lambda now: 0.5 * (THERE.position(now) + BACK.position(now) + ARC.position(now)) + 0.75, 1e-9),
 }

@@ -75,8 +75,9 @@ class Grasp(Stateful):
 
     def met(self, now: Nanos) -> Body | None:
         """The workpiece that it would take: the highest, then the first by name."""
-        bodies = self._workpieces.bodies()
-        tops = [(height_over(bodies[name], self._frame, (0, 0, 0), now, self._margin), name) for name in self._probe.met(now)]
+        bodies, falling = self._workpieces.bodies(), self._workpieces.falling()
+        there = (name for name in self._probe.met(now) if name not in falling)
+        tops = [(height_over(bodies[name], self._frame, (0, 0, 0), now, self._margin), name) for name in there]
         found = min(((top, name) for top, name in tops if top is not None), default=None)
         return None if found is None else bodies[found[1]]
 

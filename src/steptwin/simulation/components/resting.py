@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from math import sqrt
 from typing import ClassVar, NamedTuple
 
@@ -20,11 +20,13 @@ from steptwin.simulation.mechanics.workpiece import Workpiece
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.space.bodies import Body, half_height
 from steptwin.simulation.space.contacts import Pair
-from steptwin.simulation.space.frames import FLOOR, NM_PER_MM, Frame
+from steptwin.simulation.space.frames import FLOOR, NM_PER_MM, Direction, Frame, Joint, Z
+from steptwin.simulation.space.pieces import falling
 from steptwin.simulation.space.sweeps import meet
 from steptwin.state import Plain, Stateful
 
 GRAVITY_NM_S2 = 9.80665e9
+DOWN = Direction(Z, -1)
 
 FALLS = Message("simulation.workpiece-falls", "{workpiece} falls {height:g} mm")
 LIES_ON = Message("simulation.workpiece-lies-on", "{workpiece} lies on {on}")
@@ -35,11 +37,23 @@ LIES_CROOKED = Message("simulation.workpiece-lies-crooked", "{workpiece} lies cr
 
 
 class Fall(NamedTuple):
-    """A workpiece in the air, which falls straight down. ``lie``: on the floor of the world, where it began to fall."""
+    """A workpiece in the air, which falls straight down. ``lie``: from the floor of the world, where it began to fall."""
 
     workpiece: Workpiece
     lie: Lie
+    begins: Nanos
     ends: Nanos
+
+    @classmethod
+    def of(cls, workpiece: Workpiece, lie: Lie, height: int, begins: Nanos) -> Fall:
+        """``height`` in nm."""
+        return cls(workpiece, lie, begins, begins + round(sqrt(2.0 * height / GRAVITY_NM_S2) * SECOND))
+
+    @property
+    def body(self) -> Body:
+        way = falling(self.begins, self.ends, GRAVITY_NM_S2)
+        frame = Frame(f"{self.workpiece.name}.fall", None, self.lie.at, Joint(way, DOWN))
+        return body_in(self.workpiece, frame, Lie((0, 0, 0), self.lie.yaw_q))
 
 
 class Piles(NamedTuple):
@@ -58,7 +72,8 @@ class Resting(Stateful):
     """A `steptwin.simulation.components.workpieces.Holder`, and a part of a scheduler.
 
     What lies on a workpiece goes wherever that goes. What loses what it lies on, and what is let go of higher than
-    `REACH_NM` above what is below it, falls straight down for √(2 h / g), and lies on what is below it then.
+    `REACH_NM` above what is below it, falls straight down for √(2 h / g), and lies on what is below it then; if that is lower, it
+    falls on.
     """
 
     FIXED: ClassVar[tuple[str, ...]] = (
@@ -87,7 +102,7 @@ class Resting(Stateful):
         self._nests = nests
         self._rests = tuple(rest for nest in nests.values() for rest in nest.workpieces())
         self._falls: tuple[Fall, ...] = ()
-        self._bodies: dict[str, tuple[Rest, Frame | None, Body]] = {}
+        self._bodies: dict[str, tuple[Rest | Fall, Frame | None, Body]] = {}
         """As they were made: a body stays the same while nothing below it changes."""
         self._piles: Piles | None = None
 
@@ -105,30 +120,29 @@ class Resting(Stateful):
 
     def bodies(self) -> Mapping[str, Body]:
         others = {name: body for one in self._workpieces.holders if one is not self for name, body in one.bodies().items()}
-        rests = {rest.workpiece.name: rest for rest in self._rests}
+        its = {one.workpiece.name: one for one in (*self._rests, *self._falls)}
         made: dict[str, Body] = {}
-        for name in rests:
-            self._make(name, rests, others, made)
+        for name in its:
+            self._make(name, its, others, made)
         self._bodies = {name: one for name, one in self._bodies.items() if name in made}
         return made
 
-    def _make(self, name: str, rests: Mapping[str, Rest], others: Mapping[str, Body], made: dict[str, Body]) -> Body | None:
-        """The body of one that rests, as are those below it; None where what it lies on is gone."""
+    def _make(self, name: str, its: Mapping[str, Rest | Fall], others: Mapping[str, Body], made: dict[str, Body]) -> Body | None:
+        """The body of one that rests or falls, as are those below it; None where what it lies on is gone."""
         if name in others or name in made:
             return others.get(name) or made[name]
-        rest = rests.get(name)
-        if rest is None:
+        one, known = its.get(name), self._bodies.get(name)
+        if one is None:
             return None
         frame: Frame | None = None
-        if rest.on in self._supports:
-            frame = self._supports[rest.on].frame
-        elif rest.on:
-            below = self._make(rest.on, rests, others, made)
-            known = self._bodies.get(name)
+        if isinstance(one, Rest) and one.on in self._supports:
+            frame = self._supports[one.on].frame
+        elif isinstance(one, Rest) and one.on:
+            below = self._make(one.on, its, others, made)
             frame = below.frame if below is not None else known[1] if known is not None else None
-        known = self._bodies.get(name)
-        if known is None or known[0] != rest or known[1] is not frame:
-            self._bodies[name] = known = rest, frame, body_in(rest.workpiece, frame, rest.lie)
+        if known is None or known[0] != one or known[1] is not frame:
+            body = one.body if isinstance(one, Fall) else body_in(one.workpiece, frame, one.lie)
+            self._bodies[name] = known = one, frame, body
         made[name] = known[2]
         return known[2]
 
@@ -167,6 +181,11 @@ class Resting(Stateful):
             found = self._piles = self._piled()
         return found
 
+    def falling(self) -> Collection[str]:
+        """Names of those that fall, and of those on them."""
+        falls = {fall.workpiece.name for fall in self._falls}
+        return falls | {name for name, lowest in self.piles().lowest.items() if lowest in falls} if falls else falls
+
     def _piled(self) -> Piles:
         on = {rest.workpiece.name: rest.on for rest in self._rests}
         lowest: dict[str, str] = {}
@@ -190,10 +209,10 @@ class Resting(Stateful):
         otherwise it falls."""
         found = self._workpieces.below(workpiece.name, frame, now)
         lie = lie_in(frame, FLOOR, now)
-        height = lie.at[2] if found is None else found.gap
+        height = _height(lie, found)
         if height <= REACH_NM:
             return self._lay(workpiece, frame, found, now)
-        self._falls = (*self._falls, Fall(workpiece, lie, now + round(sqrt(2.0 * height / GRAVITY_NM_S2) * SECOND)))
+        self._falls = (*self._falls, Fall.of(workpiece, lie, height, now))
         self._report(FALLS(workpiece=workpiece.name, height=height / NM_PER_MM), workpiece, "falls")
         return False
 
@@ -204,24 +223,34 @@ class Resting(Stateful):
             lie = Lie((x, y, found.body.centre[2] + half_height(found.body.shape)), yaw_q)
             if (found.holder or self).put(workpiece, found.body, lie, now):
                 return True
-        (x, y, _), yaw_q = lie_in(frame, FLOOR, now)
-        self._rests = (*self._rests, Rest(workpiece, "", Lie((x, y, 0), yaw_q)))
+        (x, y, z), yaw_q = lie_in(frame, FLOOR, now)
+        self._rests = (*self._rests, Rest(workpiece, "", Lie((x, y, z if z < -REACH_NM else 0), yaw_q)))
         self._report(LIES_ON_FLOOR(workpiece=workpiece.name), workpiece, "on the floor")
         return found is None
 
     # ------------------------------------------------------------------ part of a scheduler
 
     def update(self, now: Nanos) -> None:
+        there = self._workpieces.bodies()
         for rest in self._rests:
-            if rest.on and rest.on not in self._supports and rest.on not in self._workpieces.bodies():
-                body = self._bodies[rest.workpiece.name][2]
-                self.take(rest.workpiece.name, now)
-                self.release(rest.workpiece, body.frame, now)
+            if rest.on and rest.on not in self._supports and rest.on not in there:
+                self.release(self.take(rest.workpiece.name, now), there[rest.workpiece.name].frame, now)
         for fall in self._falls:
             if fall.ends <= now:
-                self._falls = tuple(one for one in self._falls if one is not fall)
-                frame = body_in(fall.workpiece, None, fall.lie).frame
-                self._lay(fall.workpiece, frame, self._workpieces.below(fall.workpiece.name, frame, now), now)
+                self._land(fall, now)
+
+    def _land(self, fall: Fall, now: Nanos) -> None:
+        """End a fall, unless what was below it has gone lower."""
+        workpiece, begun = fall.workpiece, body_in(fall.workpiece, None, fall.lie).frame
+        frame, found = self._workpieces.bodies()[workpiece.name].frame, self._workpieces.below(workpiece.name, begun, now)
+        height = _height(fall.lie, found)
+        others = tuple(one for one in self._falls if one is not fall)
+        if height > fall.lie.at[2] - lie_in(frame, FLOOR, now).at[2] + REACH_NM:
+            self._falls = (*others, Fall.of(workpiece, fall.lie, height, fall.begins))
+            self._scheduler.notify(WORKPIECES)
+        else:
+            self._falls = others
+            self._lay(workpiece, frame, found, now)
 
     def deadline(self) -> Nanos | None:
         return min((fall.ends for fall in self._falls), default=None)
@@ -236,6 +265,11 @@ class Resting(Stateful):
         facts = ("workpiece", workpiece.name), ("element", WORKPIECES), ("what", what)
         scheduler.record(next(iter(scheduler.controllers)), "event", "workpiece", text, *facts)
         scheduler.notify(WORKPIECES)
+
+
+def _height(lie: Lie, found: Below | None) -> int:
+    """How far a workpiece may fall, nm: to what is below it, or to the floor, which ends nothing that is lower."""
+    return found.gap if found is not None else max(lie.at[2], 0)
 
 
 def _aligned(nest: NestSpec, on: str, lie: Lie) -> Lie | None:
@@ -259,5 +293,6 @@ def resting_of(context: ElementContext, scheduler: Scheduler) -> Resting:
     made = Resting(scheduler, frames, workpieces, supports, nests)
     add_belts(context.objects)
     workpieces.holders.append(made)
+    workpieces.falling = made.falling
     scheduler.add_part(made, None, WORKPIECES)
     return made

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
 from steptwin.controller import Nanos
@@ -120,10 +120,12 @@ class Below(NamedTuple):
 class Workpieces:
     """The workpieces of all holders, in the order in which these were built."""
 
-    __slots__ = ("_bodies", "_holder_of", "_sweeps", "_version", "holders")
+    __slots__ = ("_bodies", "_holder_of", "_sweeps", "_version", "falling", "holders")
 
     def __init__(self) -> None:
         self.holders: list[Holder] = []
+        self.falling: Callable[[], Collection[str]] = frozenset
+        """Names of those that fall, and of those on them: nothing takes them, and nothing can be put on them."""
         self._version: object = None
         self._bodies: Mapping[str, Body] = {}
         self._holder_of: Mapping[str, Holder] = {}
@@ -164,7 +166,9 @@ class Workpieces:
     def below(self, workpiece: str, frame: Frame, now: Nanos) -> Below | None:
         """Support of a workpiece whose lower face has its middle at the origin of a frame; None where nothing is."""
         supports = {body.name: (holder, body) for holder in self.holders for body in holder.supports()}
-        others = {name: (None, body) for name, body in self.bodies().items() if name != workpiece and not _is_on(body, frame)}
+        bodies, falling = self.bodies(), self.falling()
+        there = {name: body for name, body in bodies.items() if name != workpiece and name not in falling}
+        others = {name: (None, body) for name, body in there.items() if not _is_on(body, frame)}
         every = {**supports, **others}
         found = top_below((body for _, body in every.values()), frame, (0, 0, REACH_NM), now)
         return None if found is None else Below(every[found.body.name][0], found.body, found.gap - REACH_NM)

@@ -215,6 +215,18 @@ def standing(position: float) -> Motion:
     return Motion(lambda: None, lambda now: iter((StillPiece(now, None, position),)), is_still=True)
 
 
+def falling(begin: Nanos, end: Nanos, acceleration: float) -> Motion:
+    """A way from rest at ``begin`` with an acceleration per second², up to ``end``, where it stands."""
+    fall = PlanPiece(begin, end, begin, Segment(inf, 0.0, 0.0, 0.0, acceleration / 2.0, 0.0, 1), 0.0, 1)
+
+    def pieces(now: Nanos) -> Iterator[Piece]:
+        if now < end:
+            yield replace(fall, begin=now)
+        yield StillPiece(max(now, end), None, fall.at(end))
+
+    return Motion(lambda: None, pieces)
+
+
 # ---------------------------------------------------------------------- what moves in a controller
 
 
