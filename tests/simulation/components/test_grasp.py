@@ -6,6 +6,7 @@ import pytest
 
 from steptwin.controller import MILLISECOND
 from steptwin.files.world import World
+from steptwin.simulation.space.frames import FLOOR, pose
 
 LIFT = """
 [[mic488]]
@@ -52,6 +53,40 @@ def run(text: str, *steps: tuple[int, str], end: int = 2000) -> World:
 
 def told(world: World) -> list[str]:
     return [str(record.value) for record in world.trace.of("event") if record.subject == "workpiece"]
+
+
+def place(world: World, name: str) -> tuple[float, ...]:
+    """The middle of the lower face of a workpiece, mm from the floor."""
+    body = world.objects.workpieces.bodies()[name]
+    return tuple(one / 1e6 for one in pose(body.frame, FLOOR, world.now).at)
+
+
+# ---------------------------------------------------------------------- cups
+
+
+def cup(name: str, ejector: str, *at: float, diameter: float = 18, on: str = "lift", more: str = "") -> str:
+    place = f'on = "{on}"\nat = {[*at]}\ndiameter = {diameter}\nbuild_up = "50 ms"\nrelease = "20 ms"\n'
+    return f'[[vacuum]]\nname = "{name}"\nejector = "c.{ejector}"\n{place}{more}'
+
+
+@pytest.mark.parametrize(
+    ("height", "diameter", "is_held"),
+    [(2, 18, True), (2.001, 18, False), (-2, 18, True), (-2.001, 18, False), (-15, 18, False), (0, 40, True), (0, 40.002, False)],
+)
+def test_a_cup_takes_what_closes_it_at_most_its_reach_below_or_pressed_in(height: float, diameter: float, is_held: bool) -> None:
+    """The top is at 120 mm, and 40 mm long and wide. What is taken comes to the cup."""
+    world = run(LIFT + cup("cup", "OUT2", 0, 0, height - 20, diameter=diameter) + nest(40, 40, 20), (0, "+OUT1"), (300, "+OUT2"))
+    assert told(world) == (["cup holds n.1"] if is_held else [])
+    assert world.read("cup.held") == is_held
+    assert place(world, "n.1") == (0, 0, 100 + height * is_held)
+
+
+@pytest.mark.parametrize(("size", "by", "events"), [(20, 15, []), (20, 1, ["cup holds n.2"]), (1, 2.5, [])])
+def test_a_cup_in_a_stack_takes_none_from_the_middle(size: float, by: float, events: list[str]) -> None:
+    """The lower of two is within reach, too."""
+    tool = cup("cup", "OUT2", 0, 0, size - 20 - by, more="reach = 30\n")
+    world = run(LIFT + tool + nest(40, 40, size).replace("filled = 1", "filled = 2"), (0, "+OUT1"), (300, "+OUT2"))
+    assert told(world) == events
 
 
 # ---------------------------------------------------------------------- jaws

@@ -67,7 +67,7 @@ SEES_NO_HEAD = ("gate never sees head: along x they stay 40 mm apart", 'sees = [
         ),
         (
             TRAY + cup("[0, 0, -120]"),
-            [("cup never comes to a workpiece: it stays 20 mm too low for those on tray", "at = [0, 0, -120]")],
+            [("cup never comes to a workpiece: it stays 18 mm too low for those on tray", "at = [0, 0, -120]")],
         ),
         (TRAY + cup("[-250, 0, -30]"), []),
         (

@@ -14,10 +14,10 @@ from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.frames import check_upright, sources_of
 from steptwin.simulation.components.probe import Probe
 from steptwin.simulation.components.resting import resting_of
-from steptwin.simulation.components.workpieces import Lie, body_in, lie_in
+from steptwin.simulation.components.workpieces import REACH_NM, Lie, body_in, lie_in
 from steptwin.simulation.mechanics.workpiece import Workpiece
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
-from steptwin.simulation.space.bodies import Body, Box, Cylinder
+from steptwin.simulation.space.bodies import Body, Box, Cylinder, half_height
 from steptwin.simulation.space.frames import NM_PER_MM, Direction, Frame
 from steptwin.simulation.space.tops import height_over
 from steptwin.state import Plain, Stateful
@@ -39,7 +39,7 @@ class Held(NamedTuple):
 class Grasp(Stateful):
     """A `steptwin.simulation.components.workpieces.Holder` of one workpiece, with those that lie on it.
 
-    It takes one that its probe meets. ``margin``: how far the middle of the probe is inside of that, nm.
+    Jaws take one that their probe meets; a cup one whose top face closes it and meets its probe.
     """
 
     FIXED: ClassVar[tuple[str, ...]] = (
@@ -48,15 +48,16 @@ class Grasp(Stateful):
         "_draw",
         "_frame",
         "_frames",
-        "_margin",
+        "_inside",
         "_probe",
+        "_radius",
         "_resting",
         "_workpieces",
     )
     __slots__ = (*FIXED, "_held", "dropped")
 
-    def __init__(self, block: TerminalBlock, context: ElementContext, probe: Body, draw: Draw, margin: int = 0) -> None:
-        """``draw``: where a workpiece is when it is held, of where it was in the frame of the probe."""
+    def __init__(self, block: TerminalBlock, context: ElementContext, probe: Body, draw: Draw, radius: int | None = None) -> None:
+        """``draw``: where a workpiece is when it is held, of where it was in the frame of the probe. ``radius``: of a cup, nm."""
         self._block = block
         check_upright(block.name, probe.frame)
         self._frames = context.frames
@@ -64,8 +65,15 @@ class Grasp(Stateful):
         self._workpieces = context.objects.workpieces
         self._resting = resting_of(context, block.scheduler)
         self._draw = draw
-        self._margin = margin
-        self._probe = Probe(probe, {}, self._workpieces, lambda body: _without_margin(body, margin))
+        self._radius = radius or 0
+        self._inside: Probe | None = None
+        """Meets what a cup is deeper in than it may be pressed."""
+        if radius is None:
+            self._probe = Probe(probe, {}, self._workpieces)
+        else:
+            self._probe = Probe(probe, {}, self._workpieces, lambda body: _closing(body, radius))
+            deep = Body(probe.name, probe.frame, Box((0, 0, 1)), (0, 0, REACH_NM + 1))
+            self._inside = Probe(deep, {}, self._workpieces)
         self._held: Held | None = None
         self._body: tuple[Held, Body] | None = None
         self.dropped = 0
@@ -77,9 +85,9 @@ class Grasp(Stateful):
         """The workpiece that it would take: the highest, then the first by name."""
         bodies, falling = self._workpieces.bodies(), self._workpieces.falling()
         there = (name for name in self._probe.met(now) if name not in falling)
-        tops = [(height_over(bodies[name], self._frame, (0, 0, 0), now, self._margin), name) for name in there]
+        tops = [(height_over(bodies[name], self._frame, (0, 0, 0), now, self._radius), name) for name in there]
         found = min(((top, name) for top, name in tops if top is not None), default=None)
-        return None if found is None else bodies[found[1]]
+        return None if found is None or (self._inside is not None and self._inside.holds(now)) else bodies[found[1]]
 
     def width_of(self, body: Body, along: Direction, now: Nanos) -> Fraction:
         """mm of a workpiece in a direction of its frame."""
@@ -94,7 +102,10 @@ class Grasp(Stateful):
         return self.met(now) is not None
 
     def change(self, now: Nanos) -> Nanos | None:
-        return self._probe.change(now)
+        changes = [self._probe.change(now)]
+        if self._inside is not None and self._probe.holds(now):
+            changes.append(self._inside.change(now))
+        return min((change for change in changes if change is not None), default=None)
 
     @property
     def depends_on(self) -> None:
@@ -172,14 +183,16 @@ class Grasp(Stateful):
         super().set_state(plain)
         self._body = None
         self._probe.forget()
+        if self._inside is not None:
+            self._inside.forget()
 
 
-def _without_margin(body: Body, margin: int) -> Body | None:
-    """A body that is smaller by a margin all around, but as high; None where nothing is left."""
-    shape = body.shape
-    if isinstance(shape, Box):
-        x, y, z = shape.half
-        inner = Box((x - margin, y - margin, z))
-        return body if not margin else None if min(inner.half[:2]) < 0 else Body(body.name, body.frame, inner, body.centre)
-    left = shape.radius - margin
-    return None if left < 0 else Body(body.name, body.frame, Cylinder(left, shape.half), body.centre)
+def _closing(body: Body, radius: int) -> Body | None:
+    """The part of a top face over which the middle of a cup is closed by it; None where the face is too small."""
+    shape, (x, y, z) = body.shape, body.centre
+    half_x, half_y = shape.half[:2] if isinstance(shape, Box) else (shape.radius, shape.radius)
+    if min(half_x, half_y) < radius:
+        return None
+    room_x, room_y = half_x - radius + 1, half_y - radius + 1  # 1 nm more: its edge belongs to it
+    part = Box((room_x, room_y, 0)) if isinstance(shape, Box) else Cylinder(room_x, 0)
+    return Body(body.name, body.frame, part, (x, y, z + half_height(shape)))

@@ -15,7 +15,7 @@ from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.grasp import Grasp
 from steptwin.simulation.components.logic import STUCK, Joint, with_terminals
 from steptwin.simulation.components.mount import to_nm
-from steptwin.simulation.components.workpieces import Lie
+from steptwin.simulation.components.workpieces import REACH_NM, Lie
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.kinds.kind import Terminals
@@ -60,8 +60,9 @@ class VacuumSpec(CarrierSpec):
 def _grip(block: TerminalBlock, spec: VacuumSpec, context: ElementContext) -> Grip:
     if not spec.is_mounted:
         return BeltGrip(block, spec, context)
-    half = to_nm(spec.reach) // 2 + 1  # of a nm more than its reach: a face that is just that far away only touches
-    probe = Body(spec.name, context.frames.base(spec.name), Box((0, 0, half)), (0, 0, -half))
+    reach = to_nm(spec.reach)
+    half = (reach + REACH_NM) // 2 + 1  # 1 nm more at both ends: a face that is just there only touches
+    probe = Body(spec.name, context.frames.base(spec.name), Box((0, 0, half)), (0, 0, (REACH_NM - reach) // 2))
     return Grasp(block, context, probe, _drawn, to_nm(spec.diameter) // 2)
 
 

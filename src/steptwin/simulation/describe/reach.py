@@ -21,7 +21,7 @@ from steptwin.simulation.components.gripper import GRIPPER
 from steptwin.simulation.components.mount import to_nm
 from steptwin.simulation.components.nest import NEST
 from steptwin.simulation.components.vacuum import VACUUM
-from steptwin.simulation.components.workpieces import WORKPIECES
+from steptwin.simulation.components.workpieces import REACH_NM, WORKPIECES
 from steptwin.simulation.describe.overlaps import DOUBTFUL
 from steptwin.simulation.space.bodies import Body, Box, half_height
 from steptwin.simulation.space.frames import AXES, NM_PER_MM, TURN_Q, Frame, Joint, Z
@@ -93,7 +93,7 @@ class _Reach:
     def _find_tools(self) -> Iterator[_Tool]:
         for cup in self._described.of(VACUUM):
             if cup.is_mounted:
-                yield _Tool(cup.name, cup.path, self._point(cup.name), to_nm(cup.reach), 0)
+                yield _Tool(cup.name, cup.path, self._point(cup.name), to_nm(cup.reach), REACH_NM)
         for jaws in self._described.of(GRIPPER):
             if jaws.is_mounted:
                 yield _Tool(jaws.name, jaws.path, self._point(jaws.name), -to_nm(jaws.overlap), to_nm(jaws.overlap))
