@@ -305,6 +305,36 @@ def test_an_output_that_is_stuck() -> None:
         there.fault("stuck-output element=it output=no")
 
 
+def test_of_several_faults_of_one_terminal_the_newest_that_lasts_decides() -> None:
+    there = world('[[gate]]\nname = "it"\nkind = "or"\ninputs = 2\n')
+    for name, terminal, level, end in (("one", "output", 1, 0.3), ("two", "output", 0, 0.3), ("other", "input", 1, 0.15)):
+        which = "out" if terminal == "output" else "in1"
+        there.fault(f"stuck-{terminal} element=it {terminal}={which} level={level} until_s={end} name={name}")
+        there.run(for_=0.1)
+    there.fault("stuck-output element=it output=OUT level=0 name=late")
+    seen = []
+    for moment in (0.31, 0.34, 0.36, 0.41):
+        there.run(until=moment)
+        seen.append((there.read("it.out"), there.read("it.in1")))
+    assert seen == [(0, 1), (0, 1), (0, 0), (0, 0)]
+    there.clear_fault("late")
+    assert there.read("it.out") == 0
+    assert "it ends, but fault late lasts" in [str(record.value) for record in there.trace.of("fault")]
+
+
+def test_a_relay_stays_welded_until_the_last_fault_ends() -> None:
+    there = World.from_toml('[[mic488]]\nname = "a"\n[[relay]]\nname = "r"\ncoil = "a.OUT1"\n')
+    there.mic488["a"].write("OUT1", 1)
+    there.fault("welded-contact element=r until_s=0.1")
+    there.fault("welded-contact element=r until_s=0.2 name=other")
+    there.run(until=0.05)
+    there.mic488["a"].write("OUT1", 0)
+    there.run(until=0.15)
+    assert there.read("r.no") == 1
+    there.run(until=0.25)
+    assert there.read("r.no") == 0
+
+
 def test_a_contact_that_is_stuck_at_an_input_of_an_element() -> None:
     there = World.from_toml(
         '[[mic488]]\nname = "a"\n[[button]]\nname = "stop1"\nto = "safety.coil"\ncontact = "NC"\n'

@@ -13,6 +13,7 @@ from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.files.world import World
 from steptwin.mic488.config import AxisConfig, ControllerConfig
+from steptwin.mic488.core import ANALOG_PINS, INPUT_PINS
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.status import AxisStatus
 from steptwin.simulation.faults import Faults, FaultyController, prepare_for_faults, read
@@ -374,8 +375,8 @@ def test_worn_bytes_keep_what_they_have() -> None:
         ("stall axis=5", "fault stall: axis = 5: permitted are 1 to 4"),
         ("stuck pin=IN21", "fault stuck: pin = 'IN21': '1' has IN1,"),
         ("stuck pin=OUT1 value=0.5", "fault stuck: value = 0.5: an output is 0 or 1"),
-        ("stuck pin=M1_EN", "no input pin 'M1_EN'"),
-        ("bounce pin=OUT1", "no input pin 'OUT1'"),
+        ("stuck pin=M1_EN", f"fault stuck: pin = 'M1_EN': '1' has {', '.join((*INPUT_PINS, *ANALOG_PINS))}, OUT1, "),
+        ("bounce pin=OUT1", "fault bounce: pin = 'OUT1': '1' has IN1, "),
         ("stuck pin=IN1 value=0.5", "IN1 = 0.5: a digital input is 0 or 1"),
         ("stuck pin=IN1 machine=7", "fault stuck: machine = '7': there are 1"),
     ],
@@ -635,3 +636,44 @@ def test_two_faults_hold_an_output_one_after_the_other() -> None:
     )
     world.run(until=1.0)
     assert levels(world, "OUT1") == [(SECOND // 2, 0.0)]
+
+
+@pytest.mark.parametrize("pin", ["OUT1", "IN3"])
+def test_of_several_stuck_faults_the_newest_that_lasts_decides(pin: str) -> None:
+    world = World.from_toml('[[mic488]]\nname = "a"\n[[relay]]\nname = "r"\ncoil = "a.OUT1"\n')
+    for name, level, begin, end in (("one", 1, 0.1, 0.5), ("two", 0, 0.2, 0.9), ("three", 1, 0.3, 0.4), ("four", 0, 0.8, 1.0)):
+        world.fault(f"stuck machine=a pin={pin} value={level} from_s={begin} until_s={end} name={name}")
+    if pin == "OUT1":
+        world.mic488["a"].write("OUT1", 1)
+    else:
+        world.apply_input(do.Set((("a", pin, 1.0),)))
+    seen = []
+    for tenths in range(1, 11):
+        world.run(until=tenths / 10 + 0.05)
+        held = world.objects.faults.held("a").get(f"a.{pin}")
+        seen.append((world.read(f"a.{pin}"), None if held is None else held.fault))
+    by = ["one", "two", "three", "two", "two", "two", "two", "four", "four", None]
+    assert seen == [(1.0 if name in ("one", "three", None) else 0.0, name) for name in by]
+    assert [str(record.value) for record in world.trace if record.kind == "fault" and record.time >= SECOND // 2] == [
+        "it ends, but fault two lasts",
+        f"{pin} is stuck at 0",
+        "it ends, but fault four lasts",
+        f"{pin} is free",
+    ]
+
+
+def test_a_pin_stays_stuck_when_one_of_two_faults_is_removed() -> None:
+    world = World.from_toml('[[mic488]]\nname = "a"\n')
+    world.apply_input(do.Set((("a", "IN3", 1.0),)))
+    world.fault("stuck machine=a pin=IN3 value=0 name=one")
+    world.run(for_=0.1)
+    world.fault("stuck machine=a pin=IN3 value=0 name=two")
+    world.run(for_=0.1)
+    snapshot = world.snapshot()
+    for _ in range(2):
+        world.clear_fault("two")
+        world.run(for_=0.1)
+        assert world.read("a.IN3") == 0.0
+        world.clear_fault("one")
+        assert world.read("a.IN3") == 1.0
+        world.restore(snapshot)

@@ -114,6 +114,7 @@ def addresses(pdu: bytes) -> range | None:
     return range(first, first + (1 if single else pdu[3] << 8 | pdu[4]))
 
 
+ANOTHER_LASTS = Message("simulation.another-fault-lasts", "it ends, but fault {other} lasts")
 HELD_AT = Message("simulation.held-at", "held at {level:g} by fault {fault}")
 
 

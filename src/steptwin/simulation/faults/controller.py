@@ -9,7 +9,7 @@ from steptwin.controller import Nanos, PinEdge
 from steptwin.errors import Misuse
 from steptwin.messages import Message, text_of
 from steptwin.motioncontroller import Drive, MotionController
-from steptwin.simulation.faults.active import ActiveFault, Faults, HeldLevel
+from steptwin.simulation.faults.active import ANOTHER_LASTS, ActiveFault, Faults, HeldLevel
 from steptwin.simulation.faults.answers import NEVER_SENT
 from steptwin.simulation.faults.table import Fault, FaultKind, Occasion
 from steptwin.simulation.scheduler.scheduler import Scheduler
@@ -134,8 +134,8 @@ class FaultyController(Stateful):
         """The level of each input with a fault, without the fault."""
         self._bounces: list[tuple[Nanos, str, float]] = []
         """Scheduled levels."""
-        self._stuck: dict[str, str] = {}
-        """The fault that holds each pin."""
+        self._stuck: dict[str, tuple[HeldLevel, ...]] = {}
+        """The faults that hold each pin, the one that decides last."""
         self.held_outputs: dict[str, float] = {}
         """The level of each output that a fault holds."""
         self._edges: list[PinEdge] = []
@@ -307,11 +307,13 @@ class FaultyController(Stateful):
         levels = self.inner.pins()
         if "." in pin:
             raise Misuse(PIN_WITH_ITS_CONTROLLER(name=fault.kind.name, pin=pin))
-        if pin not in levels:
-            raise Misuse(UNKNOWN_PIN_OF_A_FAULT(name=fault.kind.name, pin=pin, controller=self.name, names=list(levels)))
+        outputs = self.body.outputs if fault.kind.occasion is Occasion.ALWAYS else ()
+        permitted = [name for name in levels if name in self.body.inputs or name in outputs]
+        if pin not in permitted:
+            raise Misuse(UNKNOWN_PIN_OF_A_FAULT(name=fault.kind.name, pin=pin, controller=self.name, names=permitted))
         value = fault.get("value")
         level = value if isinstance(value, float) else levels[pin]
-        if fault.kind.occasion is not Occasion.ALWAYS or pin in self.body.inputs or pin not in self.body.outputs:
+        if pin in self.body.inputs:
             self.body.check_pin(pin, level)
         elif level not in (0.0, 1.0):
             raise Misuse(LEVEL_OF_AN_OUTPUT(name=fault.kind.name, value=level))
@@ -333,8 +335,7 @@ class FaultyController(Stateful):
         if active.fault.kind.parameter("pin") is not None:
             pin = self.pin_of(active.fault)
             self._bounces = [b for b in self._bounces if b[1] != pin]
-            if self._stuck.get(pin, active.name) == active.name:
-                self._free(pin, now)
+            self._let_act(pin, self._others(pin, active), now)
             if not any(other.fault.get("pin") and self.pin_of(other.fault) == pin for other in self._mine()):
                 self._outer.pop(pin, None)
         for released in [r for r in self._released if r[1] == active.name]:
@@ -348,8 +349,8 @@ class FaultyController(Stateful):
 
     def held(self) -> Iterator[tuple[str, HeldLevel]]:
         """The pins that faults hold."""
-        for pin, fault in self._stuck.items():
-            yield pin, HeldLevel(fault, self.pin(pin))
+        for pin, held in self._stuck.items():
+            yield pin, HeldLevel(held[-1].fault, self.pin(pin))
 
     def pin_of(self, fault: Fault) -> str:
         """The pin that a fault names, under its one name."""
@@ -388,21 +389,33 @@ class FaultyController(Stateful):
         self.changed()
 
     def stick(self, active: ActiveFault, now: Nanos) -> None:
-        """The first moment sticks, the second lets go."""
+        """The first moment sticks, the second lets go. Of several faults the newest that lasts decides."""
         pin = self.pin_of(active.fault)
-        if self._stuck.get(pin) != active.name:
+        others = self._others(pin, active)
+        if others == self._stuck.get(pin, ()):
             wanted = active.fault.get("value")
             level = wanted if isinstance(wanted, float) else self.pin(pin)
             self._bounces = [b for b in self._bounces if b[1] != pin]
-            self._stuck[pin] = active.name
-            self._hold(pin, level, now)
+            self._let_act(pin, (*others, HeldLevel(active.name, level)), now)
             active.struck += 1
             self.report(active, now, PIN_IS_STUCK(pin=pin, level=level))
             active.due = active.end
         else:
             active.due = None
+            self._let_act(pin, others, now)
+            self.report(active, now, ANOTHER_LASTS(other=others[-1].fault) if others else PIN_IS_FREE(pin=pin))
+
+    def _others(self, pin: str, active: ActiveFault) -> tuple[HeldLevel, ...]:
+        """What the other faults hold a pin at."""
+        return tuple(held for held in self._stuck.get(pin, ()) if held.fault != active.name)
+
+    def _let_act(self, pin: str, faults: tuple[HeldLevel, ...], now: Nanos) -> None:
+        """Let these faults hold a pin; without any it is free."""
+        if faults:
+            self._stuck[pin] = faults
+            self._hold(pin, faults[-1].level, now)
+        else:
             self._free(pin, now)
-            self.report(active, now, PIN_IS_FREE(pin=pin))
 
     def _hold(self, pin: str, level: float, now: Nanos) -> None:
         """Give a pin a level that it keeps."""

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import NONE, Message
-from steptwin.simulation.faults.active import ActiveFault, Faults, HeldLevel
+from steptwin.simulation.faults.active import ANOTHER_LASTS, ActiveFault, Faults, HeldLevel
 from steptwin.simulation.faults.table import Fault, FaultKind
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.state import Stateful
@@ -31,7 +31,7 @@ class FaultyElement(Stateful):
         self._kinds = tuple(kinds)
         self._part = part
         self._lasting: tuple[str, ...] = ()
-        """Names of the faults that have begun."""
+        """Names of the faults that have begun, in this order."""
 
     def check(self, fault: Fault) -> None:
         """`Misuse` for a fault of another kind of element."""
@@ -53,9 +53,9 @@ class FaultyElement(Stateful):
 
     def held(self) -> Iterator[tuple[str, HeldLevel]]:
         """The terminals that faults hold, in small letters."""
-        for active in self._faults.of_element(self.name):
+        for active in self._begun():
             holds = active.fault.kind.effect.holds
-            if holds and active.name in self._lasting:
+            if holds:
                 yield str(active.fault.get(holds)).lower(), HeldLevel(active.name, active.fault.number("level"))
 
     def update(self, now: Nanos) -> None:
@@ -69,11 +69,32 @@ class FaultyElement(Stateful):
         self._lasting = (*others, active.name) if begins else others
         if begins:
             active.struck += 1
-        text = active.fault.kind.effect.act(active, self._part, begins, now)
+        act = active.fault.kind.effect.act
+        other = None if begins else self._newest_like(active)
+        if other is None:
+            text = act(active, self._part, begins, now)
+        else:
+            act(other, self._part, True, now)
+            text = ANOTHER_LASTS(other=other.name)
         self._scheduler.notify()  # the part may have been updated already at this moment
         self._faults.report(active, self.name, now, text)
+
+    def _begun(self) -> list[ActiveFault]:
+        """Those that have begun, in this order."""
+        begun = (active for active in self._faults.of_element(self.name) if active.name in self._lasting)
+        return sorted(begun, key=lambda active: self._lasting.index(active.name))
+
+    def _newest_like(self, ended: ActiveFault) -> ActiveFault | None:
+        """The fault of the same kind and part of the element that has begun last."""
+        return next((other for other in reversed(self._begun()) if _part_of(other.fault) == _part_of(ended.fault)), None)
 
     def deadline(self) -> Nanos | None:
         now = self._scheduler.now
         moments = (moment for active in self._faults.of_element(self.name) for moment in (active.begin, active.end))
         return min((moment for moment in moments if moment is not None and moment > now), default=None)
+
+
+def _part_of(fault: Fault) -> tuple[object, ...]:
+    """The part of its element that a fault concerns: words name it, numbers are what happens to it."""
+    given = (fault.get(parameter.name) for parameter in fault.kind.parameters)
+    return (fault.kind.name, *(word.lower() for word in given if isinstance(word, str)))
