@@ -152,9 +152,17 @@ def test_a_nest_is_filled_cell_by_cell_and_layer_by_layer() -> None:
 
 def test_a_nest_of_thousands_is_counted_in_one_pass() -> None:
     """In 30 layers; without that this takes a minute."""
-    rig = Rig(MACHINE.replace("[3, 2]", "[20, 10]").replace("filled = 7", "filled = 6000") + CUP)
+    rig = Rig(MACHINE.replace("[3, 2]", "[20, 10]").replace("filled = 7", "filled = 6000"))
     assert rig.world.read("tray.count") == 6000
     assert rig.place("tray.6000") == (19 * 60, 9 * 50, 100 + 29 * 20)
+
+
+def test_a_nest_needs_nothing_that_takes_from_it(tmp_path: Path) -> None:
+    text = '[[mic488]]\nname = "c"\n[[nest]]\nname = "tray"\nat = [0, 0, 100]\nworkpiece = 20\nfilled = 3\n'
+    world = World.from_toml(text)
+    check_it_can_be_restored(world, World.from_toml(text), 1.0, 2.0, tmp_path)
+    assert world.read("tray.count") == 3
+    assert [state.on for state in workpiece_states(world)] == ["tray"] * 3
 
 
 def test_a_cup_takes_the_highest_one_below_it_and_puts_it_down_as_it_took_it() -> None:
@@ -462,6 +470,7 @@ def test_jaws_without_anything_between_them_close() -> None:
         (FAN + '[[beam]]\nname = "b"\non = "fan"\nlength = 9\n', "'b' turns about y"),
         ('[[nest]]\nname = "n"\nfilled = 2', "filled means nothing without workpiece"),
         ('[[nest]]\nname = "n"\ncells = [0, 1]', "permitted are whole numbers from 1 to 1000"),
+        ('[[nest]]\nname = "n"\npitch = [1e-7, 50]', "permitted are numbers from 0.001 to 100000"),
         ('[[nest]]\nname = "n"\nworkpiece = [1, 2, 3, 4]', "expected [length, width, height] or [diameter, height]"),
     ],
 )

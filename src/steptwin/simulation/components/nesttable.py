@@ -17,7 +17,7 @@ from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import number, permitting, whole
 
 _COUNT = whole(1, 1000)
-_LENGTH = number(0.0, 100_000.0, above=True)
+_LENGTH = number(0.001, 100_000.0)
 
 
 @permitting("[along x, along y], whole numbers from 1")
@@ -28,7 +28,7 @@ def _grid(value: Any) -> tuple[int, int]:
     return x, y
 
 
-@permitting("[along x, along y] in mm, above 0")
+@permitting("[along x, along y] in mm, from 0.001")
 def _lengths(value: Any) -> tuple[float, float]:
     if not isinstance(value, list) or len(value) != 2:
         raise Misuse(f"{value!r}: expected [along x, along y] in mm")

@@ -97,7 +97,8 @@ class _Builder:
                     yield spec, element.terminals(spec)
 
     def _add_terminal_block(self, spec: NamedSpec, terminals: Terminals, scheduler: Scheduler) -> None:
-        if not scheduler.controllers and not self.spec.text.findings:
+        # What has none, such as a nest that no cup comes to, needs no controller.
+        if terminals != Terminals() and not scheduler.controllers and not self.spec.text.findings:
             self.spec.text.wrong(spec.path, "D009", f"nothing joins {spec.name!r} to a controller")
         self.objects.terminals[spec.name] = terminals
         scheduler.add_terminal_block(
