@@ -41,7 +41,7 @@ def run(text: str, *steps: tuple[int, str], end: int = 2000) -> World:
     """``steps``: milliseconds, and what is done then: ``+OUT1`` switches an output on, ``bt`` presses a button."""
     world = World.from_toml(text)
     cell = world.mic488["c"]
-    for at, what in sorted(steps):
+    for at, what in sorted(step for step in steps if step[0] <= end):
         world.run(until=at / 1000)
         if what[0] in "+-":
             cell.write(what[1:], int(what[0] == "+"))
@@ -161,3 +161,84 @@ def test_jaws_with_a_workpiece_between_them_can_be_restored(moment_s: float) -> 
         one.run(until=1.0)
     assert told(other) == ["jaws holds n.1"]
     assert other.trace.digest() == world.trace.digest()
+
+
+# ---------------------------------------------------------------------- two on one workpiece
+
+
+CUPS = LIFT + cup("one", "OUT2", -10, 0, -19) + cup("two", "OUT3", 10, 0, -19.5) + nest(40, 40, 20, more="mass = 0.5\n")
+"""Lowered, their tips are 1 and 0.5 mm above the workpiece."""
+BOTH = (0, "+OUT1"), (300, "+OUT2"), (310, "+OUT3"), (600, "-OUT1")
+
+
+def state(world: World) -> list[tuple[float, float, float]]:
+    return [(world.read(f"{name}.held"), world.read(f"{name}.mass"), world.read(f"{name}.dropped")) for name in ("one", "two")]
+
+
+def test_the_first_of_two_cups_has_the_workpiece_and_the_second_is_closed_by_it() -> None:
+    world = run(CUPS, *BOTH)
+    assert told(world) == ["one holds n.1"]
+    assert state(world) == [(1, 0.5, 0), (1, 0, 0)]
+    assert place(world, "n.1") == (0, 0, 161)
+
+
+def test_the_second_of_two_cups_lets_go_of_nothing() -> None:
+    world = run(CUPS, *BOTH, (1000, "-OUT3"))
+    assert told(world) == ["one holds n.1"]
+    assert state(world) == [(1, 0.5, 0), (0, 0, 0)]
+
+
+@pytest.mark.parametrize("saved", [500, 1010])
+def test_the_second_of_two_cups_takes_it_over_where_it_is(saved: int) -> None:
+    steps = (*BOTH, (1000, "-OUT2"))
+    done = [step for step in steps if step[0] <= saved]
+    world = run(CUPS, *done, end=saved)
+    other = World.from_toml(CUPS)
+    other.restore(world.snapshot())
+    for one in (world, other):
+        for at, what in [step for step in steps if step[0] > saved]:
+            one.run(until=at / 1000)
+            one.mic488["c"].write(what[1:], int(what[0] == "+"))
+        one.run(until=2.0)
+        assert told(one) == ["one holds n.1", "one lets go of n.1", "two holds n.1"]
+        assert state(one) == [(0, 0, 0), (1, 0.5, 0)]
+        assert place(one, "n.1") == (0, 0, 161)
+    assert other.trace.digest() == world.trace.digest()
+
+
+def test_a_cup_whose_workpiece_another_one_takes_away_takes_the_next_one() -> None:
+    """It holds its vacuum for 400 ms; what comes under it 150 ms later closes it again."""
+    fixed = '[[body]]\nname = "post"\nat = [0, 0, 300]\nsize = [10, 10, 10]\n'
+    slide = '[[cylinder]]\nname = "y"\nextend = "c.OUT4"\nstroke = 100\nextend_time = "20 ms"\nalong = "+y"\n'
+    tray = '[[nest]]\nname = "m"\non = "y"\nat = [0, -100, 100]\nworkpiece = [40, 40, 20]\nfilled = 1\n'
+    second = cup("second", "OUT3", -10, 0, -180, diameter=4, on="post").replace("20 ms", "400 ms")
+    text = LIFT + fixed + slide + tray + second + cup("first", "OUT2", 10, 0, -20, diameter=4) + nest(40, 40, 20)
+    steps = (0, "+OUT1"), (300, "+OUT2"), (400, "+OUT3"), (1000, "-OUT1"), (1150, "+OUT4")
+    world = run(text, *steps, end=1140)
+    assert told(world) == ["first holds n.1"]
+    assert world.read("second.held") == 1
+    world = run(text, *steps)
+    assert told(world) == ["first holds n.1", "second holds m.1"]
+    assert run(text, *steps[:-1]).read("second.held") == 0
+
+
+JAWS_AND_CUP = LIFT + JAWS.replace('on = "lift"\nat = [0, 0, -35]', "at = [5, 0, 110]") + cup("cup", "OUT3", 0, 0, -20)
+"""The jaws do not move; 5 mm beside the middle of the workpiece."""
+
+
+@pytest.mark.parametrize(("release", "events"), [(True, ["cup lets go of n.1", "jaws holds n.1"]), (False, [])])
+def test_jaws_close_on_what_a_cup_holds_and_take_it_over_or_lose_it(release: bool, events: list[str]) -> None:
+    text = JAWS_AND_CUP + nest(40, 40, 20)
+    steps = (0, "+OUT1"), (300, "+OUT3"), (400, "+OUT2"), (800, "-OUT3" if release else "+OUT3"), (1000, "-OUT1")
+    world = run(text, *steps, end=700)
+    assert (world.read("jaws.held"), world.read("jaws.position")) == (1, pytest.approx(20))
+    world = run(text, *steps)
+    assert told(world) == ["cup holds n.1", *events]
+    assert place(world, "n.1") == ((0, 0, 100) if release else (0, 0, 160))
+    assert (world.read("jaws.held"), world.read("jaws.closed")) == ((1, 0) if release else (0, 1))
+
+
+def test_a_cup_does_not_take_from_jaws() -> None:
+    world = run(JAWS_AND_CUP + nest(40, 40, 20), (0, "+OUT2"), (300, "+OUT1"), (500, "+OUT3"), (700, "-OUT1"))
+    assert told(world) == ["jaws holds n.1"]
+    assert (world.read("jaws.held"), world.read("cup.held")) == (1, 0)

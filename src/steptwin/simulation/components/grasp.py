@@ -1,4 +1,7 @@
-"""Taking workpieces in space: a suction cup takes what closes it, jaws take what is between them."""
+"""Taking workpieces in space: a suction cup takes what closes it, jaws take what is between them.
+
+Of several that hold the same workpiece the first has it. When that lets go of it, the next one takes it over where it is.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +57,7 @@ class Grasp(Stateful):
         "_resting",
         "_workpieces",
     )
-    __slots__ = (*FIXED, "_held", "dropped")
+    __slots__ = (*FIXED, "_held", "_holds", "dropped")
 
     def __init__(self, block: TerminalBlock, context: ElementContext, probe: Body, draw: Draw, radius: int | None = None) -> None:
         """``draw``: where a workpiece is when it is held, of where it was in the frame of the probe. ``radius``: of a cup, nm."""
@@ -74,6 +77,8 @@ class Grasp(Stateful):
             self._probe = Probe(probe, {}, self._workpieces, lambda body: _closing(body, radius))
             deep = Body(probe.name, probe.frame, Box((0, 0, 1)), (0, 0, REACH_NM + 1))
             self._inside = Probe(deep, {}, self._workpieces)
+        self._holds = False
+        """Whether it takes what it meets, also when another one lets go of that."""
         self._held: Held | None = None
         self._body: tuple[Held, Body] | None = None
         self.dropped = 0
@@ -127,20 +132,34 @@ class Grasp(Stateful):
         return None if self._held is None else self._held.workpiece
 
     def hold(self, now: Nanos) -> None:
+        """Take what it meets, unless another one has it."""
+        self._holds = True
         body = self.met(now)
-        if body is not None:
-            lie = self._draw(lie_in(body.frame, self._frame, now), body)
-            self._held = Held(self._workpieces.take(body.name, now), lie)
-            self.report(HOLDS(cup=self.name, workpiece=body.name), body.name, "held")
+        if body is not None and not any(body.name in one.bodies() for one in self._others()):
+            self._take(body, self._draw(lie_in(body.frame, self._frame, now), body), now)
 
     def release(self, now: Nanos) -> None:
-        """Let go of what it holds, which lies on what is below it, or falls."""
+        """Let go of what it has. Another one that holds it, too, takes it over; else it lies on what is below it, or falls."""
+        self._holds = False
         if self._held is not None:
             workpiece, body = self._held.workpiece, self._workpieces.bodies()[self._held.workpiece.name]
-            self._held = None
             self.report(LETS_GO(cup=self.name, workpiece=workpiece.name), workpiece.name, "released")
+            following = next(
+                (one for one in self._others() if one.workpiece is None and one._holds and one.met(now) is body), None
+            )
+            if following is not None:
+                following._take(body, lie_in(body.frame, following.frame, now), now)
+                return
+            self._held = None
             if not self._resting.release(workpiece, body.frame, now):
                 self.dropped += 1
+
+    def _others(self) -> Iterable[Grasp]:
+        return (one for one in self._workpieces.holders if isinstance(one, Grasp) and one is not self)
+
+    def _take(self, body: Body, lie: Lie, now: Nanos) -> None:
+        self._held = Held(self._workpieces.take(body.name, now), lie)
+        self.report(HOLDS(cup=self.name, workpiece=body.name), body.name, "held")
 
     def report(self, text: str, name: str, what: str) -> None:
         """Record an event with a workpiece."""

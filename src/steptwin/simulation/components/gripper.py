@@ -145,7 +145,8 @@ class Gripper(Carrier):
     def update(self, now: Nanos) -> None:
         closes = self.block.is_on(CLOSE)
         comes = self._comes_to_one(now) if self._grasp is None else self._comes_to_one_in_space(self._grasp, now)
-        if self.is_held and (not closes or self.slips):
+        has_lost = self.is_held and self._grasp is not None and not self.is_occupied(now)
+        if self.is_held and (not closes or self.slips or has_lost):
             self.is_held = False
             self.let_go(now)
         elif comes and not self.slips:

@@ -10,7 +10,7 @@ from steptwin.controller import MILLISECOND, Nanos
 from steptwin.messages import Message
 from steptwin.motion.exponential import decay, logarithm
 from steptwin.simulation.components.beltgrip import BeltGrip
-from steptwin.simulation.components.carrier import HELD, Carrier, CarrierSpec, Grip, carrier_signals
+from steptwin.simulation.components.carrier import HELD, Carrier, CarrierSpec, carrier_signals
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.grasp import Grasp
 from steptwin.simulation.components.logic import STUCK, Joint, with_terminals
@@ -57,9 +57,7 @@ class VacuumSpec(CarrierSpec):
             )
 
 
-def _grip(block: TerminalBlock, spec: VacuumSpec, context: ElementContext) -> Grip:
-    if not spec.is_mounted:
-        return BeltGrip(block, spec, context)
+def _grasp(block: TerminalBlock, spec: VacuumSpec, context: ElementContext) -> Grasp:
     reach = to_nm(spec.reach)
     half = (reach + REACH_NM) // 2 + 1  # 1 nm more at both ends: a face that is just there only touches
     probe = Body(spec.name, context.frames.base(spec.name), Box((0, 0, half)), (0, 0, (REACH_NM - reach) // 2))
@@ -78,11 +76,12 @@ class Vacuum(Carrier):
     from the threshold on.
     """
 
-    FIXED: ClassVar[tuple[str, ...]] = ("spec",)
+    FIXED: ClassVar[tuple[str, ...]] = ("_grasp", "spec")
     __slots__ = (*FIXED, "_begin", "_due", "_first", "_goal", "_is_held", "leaks")
 
     def __init__(self, block: TerminalBlock, spec: VacuumSpec, context: ElementContext) -> None:
-        super().__init__(block, _grip(block, spec, context))
+        self._grasp = _grasp(block, spec, context) if spec.is_mounted else None
+        super().__init__(block, self._grasp or BeltGrip(block, spec, context))
         self.spec = spec
         self.leaks = False
         self._is_held = False
@@ -135,6 +134,8 @@ class Vacuum(Carrier):
                 self.take(now)
             else:
                 self.let_go(now)
+        elif self._grasp is not None and self._is_held and goal > 0.0:
+            self.take(now)  # what closes it after it lost another one that it did not carry
         self.block.put(HELD, float(self._is_held))
 
     def deadline(self) -> Nanos | None:
