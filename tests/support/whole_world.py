@@ -228,6 +228,18 @@ build_up = "40 ms"
 [[wire]]
 from = "cup.held"
 to = "table.IN12"
+[[vacuum]]
+name = "lifter"
+ejector = "clamp.extended"
+on = "x"
+at = [0, 0, 11]
+diameter = 8
+[[conveyor]]
+name = "away"
+length = 100
+run = "power.no"
+speed = 100.0
+ramp_up = "80 ms"
 [[gripper]]
 name = "jaws"
 close = "clamp.extended"
