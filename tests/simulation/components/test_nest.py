@@ -250,19 +250,22 @@ def fallen(way: float) -> float:
 
 def test_what_falls_is_seen_on_its_way_and_nothing_takes_it() -> None:
     """From 161 mm; it is 20 mm high. The beam at 61 mm sees it after 100 mm, until after 120 mm; it comes to a hand of 15 mm. The
-    cup leaks just above it, and holds nothing again."""
-    text = MACHINE.replace("filled = 7", "filled = 1") + CUP + BEAM
-    rig = Rig(text)
+    cup leaks just above it, and jaws close on it while its top passes them."""
+    catch = JAWS.replace("jaws", "catch").replace('on = "lift"\nat = [0, 0, -30]', "at = [200, 0, 60]").replace("OUT2", "OUT4")
+    rig = Rig(MACHINE.replace("filled = 7", "filled = 1") + CUP + catch + BEAM)
     world = rig.world
     rig.take(0.0)
     rig.go(200.0)
     world.fault("leak element=cup name=hole")
-    world.run(until=world.now / SECOND + 0.2)
+    world.run(for_=0.06)
     begin = next(one.time for one in world.trace.of("event") if str(one.value).endswith("falls 146 mm"))
+    world.run(until=begin / SECOND + fallen(107.0) - 0.04)  # the jaws are as wide as it is then
+    world.mic488["c"].write("OUT4", 1)
+    world.run(for_=0.2)
     edges = [(one.time - begin) / SECOND for one in world.trace.edges() if one.subject == "low.seen"][1:]
     assert edges == pytest.approx([fallen(100.0), fallen(120.0)], abs=2e-9)
     assert rig.told()[1:] == ["cup lets go of tray.1", "tray.1 falls 146 mm", "tray.1 lies on hand"]
-    assert world.read("cup.held") == 0
+    assert (world.read("cup.held"), world.read("catch.held")) == (0, 0)
 
 
 def test_what_falls_can_be_drawn_and_restored() -> None:
