@@ -107,6 +107,54 @@ def test_what_hangs_falls_from_the_speed_that_it_has() -> None:
     assert world.read("c.M1.position") == pytest.approx(9.0 / 2 + 90 * 0.25, abs=0.01)
 
 
+HIGHEST = (2 * 0.8 / 50 * (1 - ((LOAD + FRICTION) / 0.8) ** 2) ** 0.5 / INERTIA) ** 0.5
+"""rad/s at which a field of 0.8 N·m still catches what hangs: √(2·T·λ/2π·√(1 − r²)/J)."""
+
+
+@pytest.mark.parametrize("way", ["power", "EN"])
+@pytest.mark.parametrize(("share", "caught"), [(0.97, True), (1.03, False)])
+def test_a_field_at_rest_catches_a_falling_rotor_that_is_slow_enough_for_it(way: str, share: float, caught: bool) -> None:
+    world = started(HANGING.replace('drop_out = "5 ms"', ""))
+    world.run(until=2.0)
+    key = "OUT1" if way == "power" else "M1_EN"
+    world.mic488["c"].write(key, 0)
+    world.run(for_=share * HIGHEST * INERTIA / (LOAD - FRICTION))
+    world.mic488["c"].write(key, 1)
+    world.run(for_=0.05)
+    falls = [what for _, what in events(world, "fall")]
+    lost = round(world.axis["x"].lost)
+    assert falls[-2 if caught else -1 :] == ["x moves without current", f"x stands, {lost} pulses behind"][: 2 if caught else 1]
+    assert (lost % 64 == 0) is caught
+    assert (world.axis["x"].position > 79.0) is caught
+
+
+@pytest.mark.parametrize(("share", "at_once"), [(0.97, True), (1.03, False)])
+def test_a_moving_field_catches_a_rotor_that_is_not_much_slower_than_it(share: float, at_once: bool) -> None:
+    friction, load = 0.25, 0.05
+    world = started(
+        HANGING.replace(f"load = {LOAD}", f"load = {load}")
+        .replace(f"friction = {FRICTION}", f"friction = {friction}")
+        .replace('drop_out = "5 ms"', "")
+    )
+    limit = (2 * 0.8 / 50 * (1 - ((load + friction) / 0.8) ** 2) ** 0.5 / INERTIA) ** 0.5
+    world.run(until=0.4)
+    world.mic488["c"].write("OUT1", 0)
+    away = share * limit * INERTIA / (load + friction)
+    world.run(for_=away)
+    world.mic488["c"].write("OUT1", 1)
+    world.run(until=2.0)
+    lost = round(world.axis["x"].lost)
+    if at_once:
+        moment, text = events(world, "fall")[-1]
+        assert (moment, text) == (pytest.approx(0.4 + away, abs=1e-6), f"x follows its field, {lost} pulses behind")
+        assert events(world, "stall") == []
+    else:
+        (_, _), (caught, text) = events(world, "stall")
+        assert text == f"x is caught, {lost} pulses behind"
+        # The rotor has come to rest, and the field is as slow on its ramp down.
+        assert turns(900 * (0.2 + (80 - 9) / 90 + 0.1 - caught), 5.0) == pytest.approx(limit, rel=1e-3)
+
+
 def test_both_have_to_give_it_current() -> None:
     world = started(HANGING.replace("when_off", "start_speed = 3000\nwhen_off"))
     device = world.mic488["c"]

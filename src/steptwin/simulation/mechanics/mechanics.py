@@ -366,7 +366,7 @@ class Mechanism(Stateful):
         if self.build.low is not None or self.build.high is not None:
             self._watch_stops(now)
         if self._hold is not None:
-            self._watch_fall(now, coasting, is_caught=is_caught)
+            self._watch_fall(now, coasting)
 
     # ------------------------------------------------------------------ load
 
@@ -391,14 +391,14 @@ class Mechanism(Stateful):
             return None
         return motor.need_at(profile.segments[part], (now - profile.start) / SECOND, self.build.sign)
 
-    def _watch_fall(self, now: Nanos, coasting: Profile | None, *, is_caught: bool = False) -> None:
+    def _watch_fall(self, now: Nanos, coasting: Profile | None) -> None:
         """Report that a rotor that its field does not hold begins to move, and that it rests again or is caught."""
         falls = coasting is not None and coasting.moving(now)
         if falls is not self._falls and self._hold is not None:
             self._falls = falls
             lost = self.lost(now)
-            stands = FOLLOWS if is_caught and self._trajectory.moves(now) else STANDS
-            text = self._hold.why(axis=self._name) if falls else stands(axis=self._name, pulses=lost)
+            follows = coasting is None and self._trajectory.moves(now) and self._trajectory.leads(now)
+            text = self._hold.why(axis=self._name) if falls else (FOLLOWS if follows else STANDS)(axis=self._name, pulses=lost)
             facts = ("axis", self.number), ("element", self._name), ("falls", falls), ("lost", lost)
             self._scheduler.record(self.controller, "event", "fall", text, *facts)
         self._rest_due = coasting.end if coasting is not None and falls else None

@@ -108,7 +108,7 @@ class RotorHold(Stateful):
         is_weak = self._is_weak(plan, motion, now)
         against = speed - plan.velocity(now) if self._build.coasts_unpowered else speed
         if self._build.coasts_unpowered and not is_weak and not stands:
-            if self.is_coasting and plan.moving(now) and not motor.follows(against):
+            if self.is_coasting and plan.moving(now) and not self._catches(motion, speed, against):
                 state = state._replace(stalled=True)
             if state.stalled:
                 base = (state.rotor - self._build.zero) * self._build.sign
@@ -118,7 +118,7 @@ class RotorHold(Stateful):
                     self.is_coasting = self._is_lost = True
                     return found, state
                 state, self.is_coasting = state._replace(stalled=False), False
-        if not is_weak and (not self.is_coasting or motor.follows(against)):
+        if not is_weak and (not self.is_coasting or self._catches(motion, speed, against)):
             self.is_coasting = False
             found = None
             if motor.overruns and before.leads(now - 1) and not stands and not state.stalled:
@@ -134,7 +134,7 @@ class RotorHold(Stateful):
             return at_rest(now, base), state
         found = motion.profile(now, base, led.phase(now) if moves else 0.0, speed)
         if not is_weak:
-            self.due = slow_from(found, now, motor.catch_p)
+            self.due = slow_from(found, now, self._limit(motion))
         return found, state
 
     def _loses(self, plan: Profile, rotor: Profile, motion: CoastingRotor, now: Nanos, *, may_be: bool) -> bool:
@@ -142,12 +142,22 @@ class RotorHold(Stateful):
         `catch_of`."""
         motor, sign = self._motor, self._build.sign
         loaded = replace(motor, inertia=motion.inertia, friction=motion.friction, load=motion.load * sign)
-        limit = motor.start_p
-        if limit is None:
-            field = PeriodicPotential(motor.holding, float(self._build.period_p))
-            limit = field.catches_below(motion.inertia, abs(motion.load) + motion.friction)
+        limit = self._limit(motion)
         self._may_be_caught, self.due = catch_of(loaded, plan, rotor, now, sign, limit, may_be=may_be)
         return self.due is None or self.due > now
+
+    def _catches(self, motion: CoastingRotor, speed: float, against: float) -> bool:
+        """Whether a field that has become strong enough holds a rotor with ``speed``, ``against`` it, in pulses/s."""
+        if speed == 0.0 or not self._build.coasts_unpowered:
+            return self._motor.follows(against)
+        return abs(against) <= self._limit(motion) * (1.0 + 1e-9)
+
+    def _limit(self, motion: CoastingRotor) -> float:
+        """The highest speed against its field at which that catches a rotor, pulses/s: see `catching`."""
+        if self._motor.start_p is not None:
+            return self._motor.start_p
+        field = PeriodicPotential(self._motor.holding, float(self._build.period_p))
+        return field.catches_below(motion.inertia, abs(motion.load) + motion.friction)
 
     def settles(self, trajectory: Trajectory, before: Burden, after: Burden, now: Nanos) -> bool:
         """Whether a coasting rotor, whose load changes from ``before`` to ``after``, swings by less than a full step about this
