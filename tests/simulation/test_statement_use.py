@@ -61,7 +61,7 @@ RETURN
 WBC_USES = [
     StatementUse((pin("AIN2"), value("$D4")), (value("x"),)),
     StatementUse((pin("IN5"),), (pin("OUT3"),)),
-    StatementUse((value("x"),), (pin("OUT2"),)),
+    StatementUse((value("x"),), (pin("OUT2"),), lasts=True),
     StatementUse((value("x"),), (axis(2),)),
     StatementUse((), (axis(4),)),
     StatementUse((), (ANY_AXIS,)),
@@ -86,7 +86,7 @@ WBC_USES = [
     StatementUse((), waits=True, governs=range(25, 27)),
     StatementUse((), (value("x"),)),
     StatementUse(),
-    StatementUse(),  # the end
+    StatementUse((), (ANY_AXIS, ANY_PIN)),  # the end
 ]
 
 

@@ -101,6 +101,9 @@ class Subscriptions:
         self._by_kind: dict[str, list[Subscription]] = {}
         """Who selects them."""
 
+    def __bool__(self) -> bool:
+        return bool(self.all)
+
     def subscribe(self, what: Filter, bound: int) -> Subscription:
         subscription = Subscription(what, bound, self.remove)
         self.add(subscription)
