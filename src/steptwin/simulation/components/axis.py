@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
 from typing import Any
@@ -186,7 +186,7 @@ def _checked(spec: AxisSpec, context: ElementContext) -> tuple[int, Scale, Build
     )
     if build.coasts_unpowered and build.motor is not None:
         build.motor.check_coasting()
-    return number, scale, build
+    return number, scale, replace(build, zero=build.zero - (build.lies or 0))
 
 
 def _put_switch(axis: BuiltAxis, spec: SwitchSpec, channel: str, context: ElementContext) -> None:

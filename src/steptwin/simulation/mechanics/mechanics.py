@@ -184,14 +184,15 @@ class Mechanism(Stateful):
         """Whether the load always was, and always will be, at the commanded position."""
         drive = scheduler.drive_of(controller, number)
         here = 0 if scheduler.is_blank else build.sign * drive.plan.count(scheduler.now) + build.zero
+        place = here + (build.lies or 0)
         if scheduler.is_blank:
             pass  # it is restored, where another one has been
-        elif (build.low is not None and here < build.low) or (build.high is not None and here > build.high):
+        elif (build.low is not None and place < build.low) or (build.high is not None and place > build.high):
             raise Misuse(
-                f"{controller} axis {number} stands at {here} imp, outside its hard stops {build.low} to {build.high} imp"
+                f"{controller} axis {number} stands at {place} imp, outside its hard stops {build.low} to {build.high} imp"
             )
         self._revision = drive.revision
-        self._trajectory = Trajectory(build, drive.plan, scheduler.now, MechanicalState(here, build.load_at(here, here)))
+        self._trajectory = Trajectory(build, drive.plan, scheduler.now, MechanicalState(here, place))
         if self._hold is not None and not scheduler.is_blank:
             self._renew(drive, scheduler.now)
 
