@@ -170,7 +170,7 @@ def test_its_supply_drops() -> None:
         ("wear", "fault wear: 'toy' is a toy"),
         ("stall axis=2", r"fault stall: axis = 2: permitted are 1 to 1"),
         ("stuck pin=IN1", r"fault stuck: pin = 'IN1': 'toy' has STOP, BUSY"),
-        ("bounce pin=BUSY", "BUSY = 0: the input is STOP, 0 or 1"),
+        ("bounce pin=BUSY", "pin = 'BUSY': 'toy' has STOP"),
     ],
 )
 def test_what_cannot_fail_is_refused(fault: str, why: str) -> None:
