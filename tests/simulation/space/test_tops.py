@@ -58,5 +58,3 @@ def test_the_highest_face_below_carries_and_the_first_name_of_equals() -> None:
     assert top_below([high, same], FLOOR, (0, 0, 20), 0) == Above(0, same)
     face = Body("nest", FLOOR, Box((50, 50, 0)), (0, 0, 20))
     assert top_below([high, face, same], FLOOR, (0, 0, 20), 0) == Above(0, face)
-    assert top_below([low, high], FLOOR, (0, 0, 40), 0, reach=19) is None
-    assert top_below([low, high], FLOOR, (0, 0, 40), 0, radius=11) == Above(30, low)

@@ -32,17 +32,12 @@ def height_over(body: Body, frame: Frame, point: Vector, now: Nanos, radius: int
     return z - shape.half if room >= 0 and x * x + y * y <= room * room else None
 
 
-def top_below(
-    bodies: Iterable[Body], frame: Frame, point: Vector, now: Nanos, *, radius: int = 0, reach: int | None = None
-) -> Above | None:
-    """The highest top face that a point of a frame is on or above, by at most ``reach``. Of those that are equally high, a mere
-    face, such as a nest on a plate, is before a body; then the name that is first.
-
-    ``radius`` 0 and the centre of a lower face: what carries a workpiece. The radius and the middle of a cup: what it holds.
-    """
+def top_below(bodies: Iterable[Body], frame: Frame, point: Vector, now: Nanos) -> Above | None:
+    """The highest top face that a point of a frame is on or above. Of those that are equally high, a mere face, such as a nest on
+    a plate, is before a body; then the name that is first."""
     found: Above | None = None
     for body in sorted(bodies, key=lambda one: (half_height(one.shape) > 0, one.name)):
-        gap = height_over(body, frame, point, now, radius)
-        if gap is not None and gap >= 0 and (reach is None or gap <= reach) and (found is None or gap < found.gap):
+        gap = height_over(body, frame, point, now)
+        if gap is not None and gap >= 0 and (found is None or gap < found.gap):
             found = Above(gap, body)
     return found
