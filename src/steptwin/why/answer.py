@@ -25,7 +25,7 @@ class ChainRule(enum.Enum):
 
 
 class Cover(enum.Enum):
-    """What lasts from a cause until its effect, if that comes later."""
+    """Cover from a cause until its effect, if that comes later."""
 
     LEVEL = "a signal, variable or register keeps its value"
     DELAY = "a delay of an element or wire"

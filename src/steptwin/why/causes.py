@@ -185,7 +185,7 @@ class Causes:
         return self._fault(name, change) or self._of_element(name, change)
 
     def _of_workpiece(self, name: str, change: Change) -> FoundCause:
-        """What happened to a workpiece at an element at the moment of a change, before it, or to the only one anywhere."""
+        """Event of a workpiece at an element at the moment of a change, before it, or to the only one anywhere."""
         found = [
             (order, str(dict(record.facts).get("element")), record)
             for order, record in self._log.at(change.group, change.time)
@@ -515,8 +515,8 @@ class Causes:
         return Cause(link, place, partial(self._of_executed, controller, index))
 
     def _of_executed(self, controller: str, index: int) -> FoundCause:
-        """What a statement reads, if that has changed since it was executed last, so that it wrote another value; otherwise what
-        let it be executed."""
+        """Value that a statement reads, if it has changed since the last execution, so that another one was written; otherwise
+        what let it be executed."""
         use = self.use(controller, index)
         reads = [one for one in use.reads if one not in use.writes]
         before = self._executed_before(controller, index) if reads and use.writes and not use.waits else None
@@ -581,13 +581,13 @@ class Causes:
                 yield cause
 
     def _of_decision(self, controller: str, index: int, place: Place) -> FoundCause:
-        """What a condition reads has its value since then."""
+        """Change by which what a condition reads has had its value since."""
         last = max(self._read(controller, index, place), key=lambda cause: cause.place, default=None)
         return self._of_statement(controller, index) if last is None else covered(last, Cover.LEVEL)
 
     def _of_wait(self, controller: str, index: int, place: Place) -> FoundCause:
-        """What a statement waits for came while it did, at most `LONGEST_REACTION_NS` before its end. A wait for a time depends
-        on what led to it."""
+        """Change that a statement waited for, which came while it did, at most `LONGEST_REACTION_NS` before its end. A wait for a
+        time depends on what led to it."""
         reads = self.use(controller, index).reads
         if all(resource.kind is ResourceKind.VALUE for resource in reads):
             began = self._log.executed[controller][index]

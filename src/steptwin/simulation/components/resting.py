@@ -57,11 +57,11 @@ class Fall(NamedTuple):
 
 
 class Piles(NamedTuple):
-    """What follows from the workpieces that rest, found once for each change of them."""
+    """Facts that follow from the workpieces that rest, found once for each change of them."""
 
     rests: tuple[Rest, ...]
     lowest: Mapping[str, str]
-    """What each of them lies on, through others."""
+    """Element that each of them lies on, through others."""
     count: Mapping[str, int]
     """By what they lie on, through others."""
     crooked: Mapping[str, int]

@@ -406,7 +406,7 @@ class FaultyController(Stateful):
             self.report(active, now, ANOTHER_LASTS(other=others[-1].fault) if others else PIN_IS_FREE(pin=pin))
 
     def _others(self, pin: str, active: ActiveFault) -> tuple[HeldLevel, ...]:
-        """What the other faults hold a pin at."""
+        """Level at which the other faults hold a pin."""
         return tuple(held for held in self._stuck.get(pin, ()) if held.fault != active.name)
 
     def _let_act(self, pin: str, faults: tuple[HeldLevel, ...], now: Nanos) -> None:
