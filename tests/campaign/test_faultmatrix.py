@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import csv
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 from steptwin.campaign.case import EXPECTATIONS, CaseResult, Verdict
 from steptwin.campaign.effects import FaultEffect, RunFacts, judge
 from steptwin.campaign.faultmatrix import FaultMatrix, fault_matrix
 from steptwin.campaign.reading import load_campaign
 from steptwin.campaign.report.matrixpage import write_matrix
+from steptwin.cli.campaign import command
 from steptwin.errors import Misuse
 from steptwin.files import recording as recordings
 
@@ -71,11 +74,6 @@ def test_effects(facts: RunFacts, effect: FaultEffect, why: str, detection: str,
     assert bool(why) is bool(found.why)
     assert found.detection == detection
     assert (None if found.after_ns is None else found.after_ns / SECOND) == after
-
-
-def test_what_fails_without_a_fault_does_not_count() -> None:
-    nominal = replace(NOMINAL, result=failing())
-    assert judge(nominal, nominal, 0).effect is FaultEffect.UNAFFECTED
 
 
 def matrix_of(example: str, folder: Path, text: str, jobs: int = 1) -> FaultMatrix:
@@ -210,9 +208,32 @@ def test_a_program_that_waits_for_ever_hangs(tmp_path: Path) -> None:
     assert effects(matrix, "stuck machine=cell pin=IN1 value=1")[-1] == "unaffected"
     (row,) = (row for row in matrix.rows if row.possible.text == "stuck machine=cell pin=IN1 value=0")
     assert row.cells[0].judgement.why == "not done; everything stands, and nothing noticed"
-    (tmp_path / "campaign.toml").write_text(text.replace('"5 s"', '"100 ms"'))
-    with pytest.raises(Misuse, match=r"done = 'cell.OUT1': it is false at the end of the run without a fault"):
-        fault_matrix(load_campaign(tmp_path / "campaign.toml"), tmp_path / "out")
+
+
+@pytest.mark.parametrize(
+    ("end", "rules", "wrong"),
+    [
+        (
+            "100 ms",
+            'done = "cell.OUT1"\nalarm = "x.position < 1"',
+            "alarm = 'x.position < 1' is true at its end; done = .* is false at its end",
+        ),
+        ("5 s", '[[property]]\nname = "short"\nalways = "not cell.OUT2"', "short: .*"),
+    ],
+)
+def test_what_is_wrong_without_a_fault_is_the_result(tmp_path: Path, end: str, rules: str, wrong: str) -> None:
+    """No cell could tell what its fault did: the exit code is 1, the page says why, and the run can be replayed."""
+    (tmp_path / "presses.prg").write_text(PRESSES)
+    (tmp_path / "world.toml").write_text(WAITS_FOR_EVER)
+    (tmp_path / "campaign.toml").write_text(f'[campaign]\nworld = "world.toml"\nend = "{end}"\n[matrix]\n{rules}\n')
+    ran = CliRunner().invoke(command, ["faults", str(tmp_path / "campaign.toml"), "--jobs", "1"])
+    assert ran.exit_code == 1, ran.output
+    assert re.search(rf"the run without a fault does not hold, so no fault was tried: {wrong}\n", ran.output), ran.output
+    page = (tmp_path / "campaign.faults" / "faults.html").read_text(encoding="utf-8")
+    assert "does not hold" in page
+    assert 'href="cells/without.json"' in page
+    recording = recordings.load(tmp_path / "campaign.faults" / "cells" / "without.json")
+    assert recording.replay().trace.digest() == recording.digest
 
 
 def test_a_run_without_a_fault_that_is_refused_is_an_error(tmp_path: Path) -> None:

@@ -97,11 +97,30 @@ def _is_moving(world: World) -> bool:
     return any(plan.moving(world.now) for plan in plans if isinstance(plan, Profile))
 
 
+def wrong_without_a_fault(nominal: RunFacts, rules: MatrixRules) -> str:
+    """The reason for which the run without a fault does not hold; empty if it does. What is wrong in it is wrong in every cell,
+    so that none could tell what its fault did."""
+    result = nominal.result
+    found = [] if result.error is None else [f"it ends with an error: {_first_line(result.error)}"]
+    found += [_said(verdict) for verdict in _failed(result).values()]
+    if nominal.collisions:
+        found.append(f"{nominal.collisions} collisions" if nominal.collisions > 1 else "a collision")
+    if nominal.has_alarm:
+        found.append(f"alarm = {rules.alarm!r} is true at its end")
+    if nominal.is_done is False:
+        found.append(f"done = {rules.done!r} is false at its end")
+    return "; ".join(found)
+
+
+def _first_line(text: str) -> str:
+    return text.strip().partition("\n")[0]
+
+
 def judge(
     facts: RunFacts, nominal: RunFacts, set_ns: Nanos, product: Collection[str] = (), made: Collection[str] = ()
 ) -> Judgement:
-    """The effect of a fault that was set at a moment. ``product``: as in `MatrixRules`; ``made``: the measures that tell what was
-    made, while those of moments and cycle times tell only how late."""
+    """The effect of a fault that was set at a moment; the run without it holds. ``product``: as in `MatrixRules`; ``made``: the
+    measures that tell what was made, while those of moments and cycle times tell only how late."""
     detection, noticed = _detection(facts, nominal)
     after = None if noticed is None else max(noticed - set_ns, 0)
     effect, why = _effect(facts, nominal, frozenset(product), made)
@@ -111,18 +130,16 @@ def judge(
 def _effect(facts: RunFacts, nominal: RunFacts, product: frozenset[str], made: Collection[str]) -> tuple[FaultEffect, str]:
     result = facts.result
     if result.error is not None:
-        return FaultEffect.UNSAFE, f"the run ended with an error: {result.error.strip().partition(chr(10))[0]}"
+        return FaultEffect.UNSAFE, f"the run ended with an error: {_first_line(result.error)}"
     wrong = _failed(result)
-    for name in _failed(nominal.result):
-        wrong.pop(name, None)
     expected = wrong.pop(EXPECTATIONS, None)
     wrong.pop(WAITS, None)  # that something was missing is judged by what became of it, below
     unsafe = [verdict for name, verdict in wrong.items() if name not in product]
     if unsafe:
         return FaultEffect.UNSAFE, "; ".join(_said(verdict) for verdict in unsafe)
-    if facts.collisions > nominal.collisions:
+    if facts.collisions:
         return FaultEffect.UNSAFE, "a collision"
-    if facts.has_alarm and not nominal.has_alarm:
+    if facts.has_alarm:
         return (
             (FaultEffect.HANGS, "an alarm, but an axis moves at the end")
             if facts.is_moving
@@ -173,9 +190,8 @@ def _detection(facts: RunFacts, nominal: RunFacts) -> tuple[str, Nanos | None]:
         found.append((facts.alarm_ns, "alarm"))
     if facts.overdue is not None and facts.overdues > nominal.overdues:
         found.append((facts.overdue[0], "time-out of a script"))
-    earlier = _failed(nominal.result)
     expected = _failed(facts.result).get(EXPECTATIONS)
-    if expected is not None and expected.at_ns is not None and EXPECTATIONS not in earlier:
+    if expected is not None and expected.at_ns is not None:
         found.append((expected.at_ns, "expectation of a script"))
     if not found:
         return "", None

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from steptwin.campaign.case import Case, FaultAt
 from steptwin.campaign.description import CampaignDescription, MatrixRules
-from steptwin.campaign.effects import FactsWatch, FaultEffect, Judgement, RunFacts, judge
+from steptwin.campaign.effects import FactsWatch, FaultEffect, Judgement, RunFacts, judge, wrong_without_a_fault
 from steptwin.campaign.inventory import PossibleFault, occasions, possible_faults
 from steptwin.campaign.phases import MOST_PHASES, CyclePhase, cycle_phases
 from steptwin.campaign.runner import CaseRunner
@@ -22,13 +22,15 @@ from steptwin.campaign.shrink import ADDED
 from steptwin.campaign.workers import workers
 from steptwin.controller import SECOND
 from steptwin.coverage.counts import Coverage
-from steptwin.errors import Misuse, SteptwinError
+from steptwin.errors import SteptwinError
 from steptwin.files import recording as recordings
 from steptwin.files.world import World
 
 LASTING = frozenset({"no-answer"})
 """Kinds that would happen now and then, but are tried from a phase on without end: a line that is broken."""
 CELLS = "cells"
+NOMINAL = f"{CELLS}/without.json"
+"""Recording of the run without a fault."""
 COLUMNS = (
     "function", "part", "failure mode", "fault", "phase", "phase begins with", "at s", "effect", "why", "detection",
     "detected after s", "session",
@@ -55,7 +57,8 @@ class MatrixRow:
 
 @dataclass(frozen=True, slots=True)
 class FaultMatrix:
-    """``left_out``: faults to which it never comes in the run without a fault."""
+    """``left_out``: faults to which it never comes in the run without a fault; ``wrong``: the reason why that run is the result
+    and no fault was tried; empty if it holds."""
 
     name: str
     phases: tuple[CyclePhase, ...]
@@ -63,6 +66,7 @@ class FaultMatrix:
     left_out: tuple[PossibleFault, ...]
     nominal: RunFacts
     coverage: Coverage
+    wrong: str = ""
 
     @property
     def counts(self) -> dict[FaultEffect, int]:
@@ -75,6 +79,7 @@ class FaultMatrix:
             "name": self.name,
             "end_s": self.nominal.result.end_ns / SECOND,
             "ended": self.nominal.ended,
+            "wrong": self.wrong,
             "phases": [phase.to_json() for phase in self.phases],
             "counts": {effect.value: count for effect, count in self.counts.items()},
             "coverage": list(self.coverage.summary),
@@ -121,15 +126,16 @@ def fault_matrix(
     jobs: int | None = 1,
     progress: Callable[[int, int], object] = lambda done, total: None,
 ) -> FaultMatrix:
-    """Run every fault at every phase, and write the recording of each run into ``folder``. Raises `Misuse`."""
+    """Run every fault at every phase, and write the recording of each run into ``folder``. The run without a fault comes first;
+    if it does not hold, its recording is all that there is. Raises `Misuse`."""
     runner, rules = CaseRunner(description), description.matrix
     nominal_case = without_faults(description)
     coverage = Coverage()
     world, nominal = _run(runner, nominal_case, rules, coverage)
-    if nominal.result.error is not None:
-        raise Misuse(f"the run without a fault fails: {nominal.result.error}")
-    if nominal.is_done is False:
-        raise Misuse(f"done = {rules.done!r}: it is false at the end of the run without a fault, so that no cell could tell more")
+    (folder / CELLS).mkdir(parents=True, exist_ok=True)
+    recordings.save(recordings.recording_of(world), folder / NOMINAL)
+    if wrong := wrong_without_a_fault(nominal, rules):
+        return FaultMatrix(description.name, (), (), (), nominal, coverage, wrong)
     made = [one.name for one in description.measures if one.value is not None]
     begin = description.start_ns or 0
     phases = cycle_phases(world, begin, MOST_PHASES if rules.phases is None else rules.phases)
@@ -140,7 +146,6 @@ def fault_matrix(
         [_CellTask(n, _case(nominal_case, one, phase), f"{row + 1:03}-{phase.number:02}") for n, phase in enumerate(phases)]
         for row, one in enumerate(tried)
     ]
-    (folder / CELLS).mkdir(parents=True, exist_ok=True)
     rows: list[MatrixRow] = []
     for results, covered in _results(description, rules, tasks, folder, jobs):
         possible_fault, row = tried[len(rows)], tasks[len(rows)]

@@ -108,7 +108,8 @@ def faults(
 ) -> None:
     """Try every fault of sensors, actuators, logic, lines and power in every phase of the cycle: how does the machine react?
 
-    Writes faults.html, faults.csv and a recording of each run. Exit code 1 when one was unsafe.
+    Writes faults.html, faults.csv and a recording of each run. Exit code 1 when one was unsafe, or when the run without a fault,
+    which comes first, does not hold.
     """
     if not _faults(file, out, typer.echo, jobs=jobs, phases=phases, as_json=json):
         raise typer.Exit(1)
@@ -313,7 +314,7 @@ MOST_CELLS = 20
 
 
 def _faults(file: Path, out: Path | None, write: Print, *, jobs: int | None, phases: int | None, as_json: bool) -> bool:
-    """Make the matrix. Returns whether nothing was unsafe. Raises `Misuse`."""
+    """Make the matrix. Returns whether the run without a fault holds and nothing was unsafe. Raises `Misuse`."""
     from steptwin.campaign.description import MOST_PHASES
     from steptwin.campaign.effects import FaultEffect
     from steptwin.campaign.faultmatrix import fault_matrix
@@ -339,7 +340,7 @@ def _faults(file: Path, out: Path | None, write: Print, *, jobs: int | None, pha
     else:
         _print_matrix(matrix, write)
         write(f"{time.monotonic() - began:.1f} s; {', '.join(str(path) for path in written)}")
-    return not matrix.counts[FaultEffect.UNSAFE]
+    return not matrix.wrong and not matrix.counts[FaultEffect.UNSAFE]
 
 
 def _print_progress(done: int, total: int) -> None:
@@ -352,6 +353,9 @@ def _print_progress(done: int, total: int) -> None:
 def _print_matrix(matrix: FaultMatrix, write: Print) -> None:
     from steptwin.campaign.effects import FaultEffect
 
+    if matrix.wrong:
+        write(f"{matrix.name}: the run without a fault does not hold, so no fault was tried: {matrix.wrong}")
+        return
     counts = ", ".join(f"{effect} {count}" for effect, count in matrix.counts.items())
     write(f"{matrix.name}: {len(matrix.rows)} faults at {len(matrix.phases)} phases: {counts}")
     unsafe = [(row, cell) for row in matrix.rows for cell in row.cells if cell.judgement.effect is FaultEffect.UNSAFE]

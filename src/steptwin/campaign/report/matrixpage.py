@@ -7,7 +7,7 @@ from html import escape
 from pathlib import Path
 
 from steptwin.campaign.effects import FaultEffect
-from steptwin.campaign.faultmatrix import FaultMatrix, MatrixCell
+from steptwin.campaign.faultmatrix import NOMINAL, FaultMatrix, MatrixCell
 from steptwin.campaign.report.html import link, page, table
 from steptwin.controller import SECOND
 from steptwin.coverage.table import percent_text
@@ -44,6 +44,8 @@ def write_matrix(matrix: FaultMatrix, folder: Path) -> list[Path]:
 
 def matrix_page(matrix: FaultMatrix) -> str:
     title = f"{matrix.name}: faults by phase"
+    if matrix.wrong:
+        return page(title, _without_a_fault(matrix), _STYLE)
     counts = matrix.counts
     legend = table(
         ("effect", "cells", "meaning"),
@@ -64,6 +66,13 @@ def matrix_page(matrix: FaultMatrix) -> str:
         left = ", ".join(f"<code>{escape(one.text)}</code>" for one in matrix.left_out)
         body += f"<h2>Not tried</h2>\n<p>In the run without a fault it never comes to: {left}</p>\n"
     return page(title, body, _STYLE)
+
+
+def _without_a_fault(matrix: FaultMatrix) -> str:
+    return (
+        f'<p class="bad">The run without a fault does not hold: {escape(matrix.wrong)}</p>\n<p>No fault was tried: what is wrong '
+        f"without any is wrong in every cell. Mend it first. {link(NOMINAL, 'Recording of the run')}.</p>\n"
+    )
 
 
 def _mark(effect: FaultEffect) -> str:
