@@ -19,6 +19,7 @@ import { EarlierEvents, type PastEvents } from "./earlierevents";
 import { TimeTravel, plansOf, type Past } from "./timetravel.svelte";
 import { modelOf, type AxisModel, type ControllerModel, type Model } from "./model";
 import { levelsOf, Pins } from "./pins.svelte";
+import { Question } from "./question.svelte";
 import { severityOf, type Severity } from "./severity";
 import { Watches, type Watch } from "./watch.svelte";
 
@@ -103,6 +104,10 @@ export class Studio {
     present: () => this.present(),
     report: (error) => this.report(error),
   });
+  readonly question = new Question(
+    (name, fields, within_ms) => this.ask(name, fields, within_ms),
+    () => this.timeTravel.moment,
+  );
   readonly earlier = new EarlierEvents(
     (name, fields, within_ms) => this.ask(name, fields, within_ms),
     (part) => this.takeEarlier(part),

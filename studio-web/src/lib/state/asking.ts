@@ -1,0 +1,22 @@
+import type { SubjectEvent } from "../protocol/types";
+import type { Element, Model } from "./model";
+import { ownerOf } from "./owner";
+
+/** What to ask about an element: what it reports, else a number of it. */
+export function pointOf({ name, outputs, signals }: Element): string | null {
+  const own = outputs[0] ?? signals[0]?.name;
+  return own === undefined ? null : `${name}.${own}`;
+}
+
+/** What to ask about an event, at its moment; null for what comes from outside, is a fault, or is about time. */
+export function questionOf(event: SubjectEvent, model: Model): string | null {
+  if (event.kind === "edge") return `${event.controller}.${event.pin}`;
+  if (event.kind !== "status") return null;
+  const owner = ownerOf(event);
+  const element = model.elements.find(({ name }) => name === owner);
+  if (element !== undefined) return pointOf(element);
+  const controller = model.controllers.find(({ name }) => name === event.controller);
+  if (controller === undefined) return null;
+  const axis = controller.axes.find(({ number }) => String(number) === event.axis);
+  return axis?.status ?? controller.status ?? controller.name;
+}
