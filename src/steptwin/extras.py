@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 
 from steptwin.errors import Misuse
+
+
+def extras() -> list[str]:
+    """Names of all extras, from the metadata of the installed package."""
+    from importlib.metadata import metadata
+
+    return metadata("steptwin").get_all("Provides-Extra") or []
 
 
 def libraries_of(extra: str) -> list[str]:
@@ -16,13 +22,35 @@ def libraries_of(extra: str) -> list[str]:
     return [line.partition(";")[0].strip() for line in requires("steptwin") or () if wanted.search(line)]
 
 
-def missing(what: str, libraries: Sequence[str]) -> Misuse:
-    """The error for a feature some of whose libraries are not installed; its message has the command that installs them."""
-    one = len(libraries) == 1
-    *others, last = (re.split(r"[^\w.-]", library)[0] for library in libraries)
-    names = " and ".join([", ".join(others), last] if others else [last])
-    install = " ".join(f'"{library}"' if re.search(r"[<>\[]", library) else library for library in libraries)
+def lacking(extra: str) -> list[str]:
+    """Names of the libraries of an extra that are not installed."""
+    from importlib.metadata import PackageNotFoundError, distribution
+
+    names = []
+    for library in libraries_of(extra):
+        name = _name(library)
+        try:
+            distribution(name)
+        except PackageNotFoundError:
+            names.append(name)
+    return names
+
+
+def missing(what: str, extra: str) -> Misuse:
+    """The error for a feature whose libraries cannot be imported; its message has the command that installs them.
+
+    pip takes the steptwin that is installed, and adds what its extra names.
+    """
+    names = lacking(extra)
+    state = f"which {'is' if len(names) == 1 else 'are'} not installed"
+    if not names:  # installed, and broken
+        names, state = [_name(library) for library in libraries_of(extra)], "which could not be imported"
+    *others, last = names
     return Misuse(
-        f"{what} needs {names}, which {'is' if one else 'are'} not installed: "
-        f"in a clone 'make extras' installs {'it' if one else 'them'}, elsewhere 'pip install {install}'"
+        f"{what} needs {' and '.join([', '.join(others), last] if others else [last])}, {state}: "
+        f"in a clone 'make extras' installs what is missing, elsewhere pip install 'steptwin[{extra}]'"
     )
+
+
+def _name(library: str) -> str:
+    return re.split(r"[^\w.-]", library)[0]

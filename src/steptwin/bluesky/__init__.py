@@ -7,7 +7,7 @@ RE(scan([table.readings], table.m1, 0.0, 20.0, 5))
 
 from __future__ import annotations
 
-from steptwin.extras import libraries_of, missing
+from steptwin.extras import missing
 
 try:
     from steptwin.bluesky.analoginputs import AnalogInput, AnalogReadings
@@ -19,7 +19,7 @@ try:
 except ModuleNotFoundError as error:
     if (error.name or "").startswith("steptwin"):
         raise
-    raise missing("steptwin.bluesky", libraries_of("bluesky")) from error
+    raise missing("steptwin.bluesky", "bluesky") from error
 
 __all__ = [
     "AnalogInput",

@@ -30,7 +30,7 @@ from steptwin.controller import SECOND
 from steptwin.coverage.counts import Coverage
 from steptwin.durations import duration
 from steptwin.errors import Misuse
-from steptwin.extras import libraries_of, missing
+from steptwin.extras import missing
 from steptwin.files.textfiles import write_bytes
 from steptwin.files.world import World
 
@@ -176,7 +176,7 @@ class Campaign:
             from steptwin.campaign.store import CampaignStore
             from steptwin.history.database import SQLITE, read_url
         except ImportError:
-            raise missing("a campaign", libraries_of("campaign")) from None
+            raise missing("a campaign", "campaign") from None
         folder = None if out is None else Path(out)
         if folder is not None:
             _make_folder(folder)

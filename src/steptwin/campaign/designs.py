@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 
 from steptwin.campaign.description import SALTELLI
 from steptwin.errors import Misuse
-from steptwin.extras import libraries_of, missing
+from steptwin.extras import missing
 from steptwin.simulation.scheduler.chance import Chance
 
 Design: TypeAlias = Callable[[int], Sequence[float]]
@@ -67,7 +67,7 @@ def _qmc() -> Any:
     try:
         from scipy.stats import qmc
     except ImportError:
-        raise missing("this design", libraries_of("campaign")) from None
+        raise missing("this design", "campaign") from None
     return qmc
 
 

@@ -18,7 +18,7 @@ from steptwin.campaign.description import CampaignDescription
 from steptwin.campaign.runner import CaseRunner
 from steptwin.coverage.counts import Coverage
 from steptwin.errors import LineFailure, Misuse
-from steptwin.extras import libraries_of, missing
+from steptwin.extras import missing
 from steptwin.system import processors
 
 LOCAL = "local"
@@ -153,7 +153,7 @@ def _cluster(address: str, jobs: int, opened: ExitStack) -> Workers:
         from distributed import Client, LocalCluster
         from distributed.scheduler import KilledWorker
     except ImportError:
-        raise missing("--dask", libraries_of("campaign-dask")) from None
+        raise missing("--dask", "campaign-dask") from None
     where: Any = address
     if address == LOCAL:
         cluster = LocalCluster(n_workers=jobs, threads_per_worker=1, host="127.0.0.1", dashboard_address=None)

@@ -287,13 +287,13 @@ def _progress(campaign: Campaign) -> Generator[Callable[[CampaignProgress], obje
 def _check_export(path: Path) -> None:
     from importlib.util import find_spec
 
-    from steptwin.extras import libraries_of, missing
+    from steptwin.extras import missing
     from steptwin.files.textfiles import check_writable
 
     if path.suffix.lower() != EXPORT:
         raise Misuse(f"--export {path}: the name must end with {EXPORT}")
     if find_spec("pyarrow") is None:
-        raise missing("--export", libraries_of("campaign"))
+        raise missing("--export", "campaign")
     check_writable(path)
 
 

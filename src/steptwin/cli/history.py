@@ -10,7 +10,6 @@ import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -67,7 +66,8 @@ def command(
         raise typer.Exit(1)
 
 
-FORMATS = {".csv": "numpy", ".parquet": "pyarrow", ".png": "matplotlib", ".svg": "matplotlib"}
+FORMATS = {".csv": "numbers", ".parquet": "parquet", ".png": "plots", ".svg": "plots"}
+"""The extra that each needs."""
 MOST_LINES = 1000
 HEAD = ("run", "time", "seconds", "point", "value", "unit")
 
@@ -89,12 +89,12 @@ class HistoryOptions:
 
 def _show(database: str, options: HistoryOptions, out: Callable[[str], object]) -> bool:
     """Print or export; whether a comparison found no difference. Raises `Misuse`, `LineFailure`."""
-    from steptwin.extras import libraries_of, missing
+    from steptwin.extras import missing
 
     try:
         from steptwin.history.reading import HistoryDatabase
     except ImportError:
-        raise missing("steptwin history", libraries_of("history")) from None
+        raise missing("steptwin history", "history") from None
     if options.output is not None:
         _check_output(options.output, options.points)
     with HistoryDatabase(database if "://" in database else f"sqlite:///{database}") as past:
@@ -102,7 +102,7 @@ def _show(database: str, options: HistoryOptions, out: Callable[[str], object]) 
 
 
 def _check_output(path: Path, points: Sequence[str]) -> None:
-    from steptwin.extras import missing
+    from steptwin.extras import lacking, missing
     from steptwin.files.textfiles import check_writable
 
     need = FORMATS.get(path.suffix)
@@ -110,8 +110,8 @@ def _check_output(path: Path, points: Sequence[str]) -> None:
         raise Misuse(f"--output {path}: permitted are {', '.join(f'NAME{suffix}' for suffix in FORMATS)}")
     if not points:
         raise Misuse(f"--output {path}: name the points to write")
-    if find_spec(need) is None:
-        raise missing(path.suffix, [need])
+    if lacking(need):
+        raise missing(path.suffix, need)
     check_writable(path)
 
 

@@ -42,9 +42,9 @@ def command(
     except ModuleNotFoundError as error:
         if error.name is None or error.name.partition(".")[0] not in ("fastapi", "uvicorn", "websockets", "starlette"):
             raise
-        from steptwin.extras import libraries_of, missing
+        from steptwin.extras import missing
 
-        raise missing("the studio", libraries_of("studio")) from None
+        raise missing("the studio", "studio") from None
     if page.device and world is None:
         for group in (live, options):
             group.refuse("devices without a world: give a MACHINE.toml too")

@@ -64,7 +64,7 @@ def _make(hosts: Iterable[str], days: int, common_name: str, role: str | None) -
         from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
         from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
     except ImportError:
-        raise missing("a certificate", ["cryptography"]) from None
+        raise missing("a certificate", "tls") from None
 
     def names() -> Iterator[x509.GeneralName]:
         yield x509.UniformResourceIdentifier(APPLICATION_URI)

@@ -7,7 +7,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from steptwin.extras import libraries_of, missing
+from steptwin.extras import missing
 from steptwin.gateways.epics.options import EpicsSpec
 from steptwin.gateways.modbus.options import ModbusSpec
 from steptwin.gateways.mqtt.options import MqttSpec
@@ -62,5 +62,5 @@ def make_gateway(spec: GatewaySpec, subject: GatewaySubject, folder: Path) -> Ga
     try:
         module = import_module(f"steptwin.gateways.{spec.kind}.gateway")
     except ImportError:
-        raise missing(spec.rows.written, libraries_of(spec.extra)) from None
+        raise missing(spec.rows.written, spec.extra) from None
     return cast("Callable[[GatewaySpec, GatewaySubject, Path], Gateway]", module.make)(spec, subject, folder)

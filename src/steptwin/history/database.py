@@ -55,7 +55,7 @@ def engine_of(url: URL) -> Engine:
             return create_engine(url, connect_args={"connect_timeout": CONNECT_S}, pool_pre_ping=True)
         engine = create_engine(url, connect_args={"timeout": BUSY_S})
     except (ImportError, NoSuchModuleError):
-        raise missing(format_url(url), ["psycopg[binary]"]) from None
+        raise missing(format_url(url), "history") from None
     event.listen(engine, "connect", _set_up)
     return engine
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from steptwin.access.audit import Audit, CommandLog
 from steptwin.controller import Nanos
-from steptwin.extras import libraries_of, missing
+from steptwin.extras import missing
 from steptwin.gateways.contract import GatewaySubject, HistoryValues, OpenGateway
 from steptwin.gateways.kinds import make_gateway
 from steptwin.gateways.sampling import SharedSamples
@@ -88,7 +88,7 @@ def _make_keeper(spec: HistorySpec, subject: GatewaySubject, folder: Path) -> Hi
     try:
         from steptwin.history.keeper import HistoryKeeper
     except ImportError:
-        raise missing(f"[{HISTORY}]", libraries_of(HISTORY)) from None
+        raise missing(f"[{HISTORY}]", HISTORY) from None
     return HistoryKeeper(spec, subject, folder)
 
 

@@ -75,7 +75,7 @@ class LogOptions(OptionGroup):
 
     def output(self) -> Output:
         """Raises `Misuse` for an unknown format, or where structlog is missing."""
-        from steptwin.extras import libraries_of, missing
+        from steptwin.extras import missing
         from steptwin.live.output import Output
 
         if self.log_format == TEXT:
@@ -85,7 +85,7 @@ class LogOptions(OptionGroup):
         try:
             from steptwin.live.jsonoutput import JsonOutput
         except ImportError:
-            raise missing(f"--log-format {JSON}", libraries_of("logs")) from None
+            raise missing(f"--log-format {JSON}", "logs") from None
         return JsonOutput(sys.stdout)
 
     def tracing(self, subject: str, notice: Callable[[str], object]) -> AbstractContextManager[object]:
@@ -95,12 +95,12 @@ class LogOptions(OptionGroup):
         """
         if self.traces is None:
             return nullcontext()
-        from steptwin.extras import libraries_of, missing
+        from steptwin.extras import missing
 
         try:
             from steptwin.live.telemetry import exporting
         except ImportError:
-            raise missing("--traces", libraries_of("traces")) from None
+            raise missing("--traces", "traces") from None
         return exporting(self.traces, subject, notice)
 
 

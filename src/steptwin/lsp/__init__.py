@@ -15,7 +15,7 @@ def serve_stdio() -> int:
     try:
         import pygls  # noqa: F401
     except ImportError as error:
-        raise missing("the editor server", ["pygls"]) from error
+        raise missing("the editor server", "lsp") from error
     from steptwin.lsp.stdio import serve_stdio as serve
 
     return serve()

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 from steptwin.campaign.case import Case, CaseResult
 from steptwin.campaign.cases import Cases
 from steptwin.errors import Misuse
-from steptwin.extras import libraries_of, missing
+from steptwin.extras import missing
 
 WAVE = 8
 """Cases that are chosen before the results of any of them are given back."""
@@ -70,7 +70,7 @@ class _Evolution:
             import cmaes
             import numpy as np
         except ImportError:
-            raise missing("a guided search", libraries_of("campaign")) from None
+            raise missing("a guided search", "campaign") from None
         self._cma: Any = cmaes.CMA
         self._size = size
         self._bounds: Any = np.array([(0.0, 1.0)] * size)
@@ -124,7 +124,7 @@ class _Estimators:
         try:
             import optuna
         except ImportError:
-            raise missing("a guided search", libraries_of("campaign")) from None
+            raise missing("a guided search", "campaign") from None
         optuna.logging.set_verbosity(optuna.logging.WARNING)
         sampler = optuna.samplers.TPESampler(
             n_startup_trials=FIRST,

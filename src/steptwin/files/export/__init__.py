@@ -15,14 +15,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
-from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, NamedTuple
 
 from steptwin.calc import Calculation
 from steptwin.controller import MILLISECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.extras import missing
+from steptwin.extras import lacking, missing
 from steptwin.files.export.axes import axis_views, controller_views
 from steptwin.files.export.progress import ShowExport, TimeProgress, bar, unwatched
 from steptwin.files.export.records import SavedTrace, read_records, write_records
@@ -67,14 +66,13 @@ class Exporter(NamedTuple):
     """``needs`` are modules; ``extra`` is what installs them."""
 
     meaning: str
-    needs: tuple[str, ...]
     extra: str
     write: Callable[[TraceTracks, IO[bytes], _Options], None] | None
     """None: written from the records themselves."""
 
     @property
-    def missing(self) -> list[str]:
-        return [module for module in self.needs if find_spec(module) is None]
+    def is_available(self) -> bool:
+        return not self.extra or not lacking(self.extra)
 
 
 def _html(tracks: TraceTracks, file: IO[bytes], options: _Options) -> None:
@@ -125,14 +123,14 @@ def _svg(tracks: TraceTracks, file: IO[bytes], options: _Options) -> None:
 
 
 FORMATS: Mapping[str, Exporter] = {
-    "jsonl": Exporter("every record, exactly", (), "", None),
-    "html": Exporter("a timeline for the browser", (), "", _html),
-    "png": Exporter("a picture", ("matplotlib",), "plots", _png),
-    "svg": Exporter("a picture", ("matplotlib",), "plots", _svg),
-    "vcd": Exporter("signals for GTKWave", ("numpy",), "numbers", _vcd),
-    "pcapng": Exporter("frames for Wireshark", (), "", _pcapng),
-    "csv": Exporter("samples", ("numpy",), "numbers", _csv),
-    "parquet": Exporter("samples", ("numpy", "pyarrow"), "parquet", _parquet),
+    "jsonl": Exporter("every record, exactly", "", None),
+    "html": Exporter("a timeline for the browser", "", _html),
+    "png": Exporter("a picture", "plots", _png),
+    "svg": Exporter("a picture", "plots", _svg),
+    "vcd": Exporter("signals for GTKWave", "numbers", _vcd),
+    "pcapng": Exporter("frames for Wireshark", "", _pcapng),
+    "csv": Exporter("samples", "numbers", _csv),
+    "parquet": Exporter("samples", "parquet", _parquet),
 }
 USUAL = ("jsonl", "html", "png")
 """The formats written into a directory: small for any length of run. Those with missing libraries are left out."""
@@ -225,7 +223,7 @@ def _targets(where: Path, formats: Sequence[str] | None) -> list[tuple[str, Path
         is_file = not where.is_dir() and (suffix in FORMATS or (suffix != "" and formats is not None and len(formats) == 1))
     if suffix and not is_file and not where.is_dir() and formats is None:
         raise Misuse(f"{where}: formats are {', '.join(FORMATS)}")
-    chosen = formats or ([suffix] if is_file else [name for name in USUAL if not FORMATS[name].missing])
+    chosen = formats or ([suffix] if is_file else [name for name in USUAL if FORMATS[name].is_available])
     for name in chosen:
         _check(name)
     if is_file:
@@ -240,8 +238,8 @@ def _check(name: str) -> None:
     found = FORMATS.get(name)
     if found is None:
         raise Misuse(f"no format {name!r}: formats are {', '.join(FORMATS)}")
-    if found.missing:
-        raise missing(name, found.missing)
+    if not found.is_available:
+        raise missing(name, found.extra)
 
 
 def read_trace(where: Path | str) -> SavedTrace:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from steptwin.access.roles import ROLES, Role
 from steptwin.controller import SECOND
 from steptwin.eventloop import endless
-from steptwin.extras import libraries_of, missing
+from steptwin.extras import missing
 from steptwin.gateways.contract import GatewayState, GatewaySubject
 from steptwin.gateways.epics.channels import PvDatabase
 from steptwin.gateways.epics.controller import EpicsController
@@ -88,7 +88,7 @@ class EpicsGateway:
         try:
             from steptwin.gateways.epics.pvserver import PvAccessServer
         except ImportError:
-            raise missing("[gateway.epics] pva", libraries_of("epics")) from None
+            raise missing("[gateway.epics] pva", "epics") from None
         self._pv_server = PvAccessServer(records, address, beacons, self._leave)
         ports = await self._pv_server.open()
         self._pv_place = f", PV Access at {Address(address.host, ports['port'])}"

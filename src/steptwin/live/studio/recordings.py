@@ -60,7 +60,7 @@ class WorldRecordings:
     async def list(self) -> RecordingsOfWorld:
         saved = await later(asyncio.to_thread(saved_recordings, self._folder))
         files = tuple([RecordingFile(*one) for one in saved])
-        formats = tuple([name for name, form in FORMATS.items() if not form.missing])
+        formats = tuple([name for name, form in FORMATS.items() if form.is_available])
         return RecordingsOfWorld(self._recorded(), self._past(), self._trace(), str(self._folder), files, formats)
 
     async def save(self, name: str | None) -> RecordingFile:

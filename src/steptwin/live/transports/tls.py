@@ -301,7 +301,7 @@ async def _open(opening: LinkArguments) -> OpenLink:
     try:
         import cryptography  # noqa: F401  reads the role of a client
     except ImportError:
-        raise missing("tls_tcp of [[line]]", ["cryptography"]) from None
+        raise missing("tls_tcp of [[line]]", "tls") from None
     link = TlsLink(opening, server_context(opening.tls, opening.folder))
     listening = await link.open(address)
     return OpenLink(link, str(listening), {"host": listening.host, "port": listening.port})
