@@ -175,3 +175,11 @@ def test_json_of_every_command_is_documented() -> None:
     first = " ".join(row.split("|")[1] for row in page.splitlines() if row.startswith("|"))
     documented = set(re.findall(r"`([a-z-]+)`", first))
     assert named <= documented
+
+
+def test_without_a_command_it_names_what_to_try() -> None:
+    shown = steptwin()
+    assert shown.returncode == 0, shown.stderr
+    named = re.findall(r"^  steptwin (\w+)", shown.stdout, re.MULTILINE)
+    assert len(named) == 3
+    assert set(named) <= set(every_command())

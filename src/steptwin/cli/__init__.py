@@ -65,6 +65,7 @@ COMMANDS: Mapping[str, Mapping[str, str]] = {
         "campaign": "Run campaigns: many runs of a world, each a little different.",
     },
     "Devices and twins": {
+        "doctor": "Examine this computer: libraries, ports that are taken, serial ports, the page of the studio, a browser.",
         "ports": "List serial ports, and the pseudo terminals of running twins.",
         "scan": "Find controllers on serial ports and network addresses.",
         "info": "Show what a controller is and what it is doing.",
@@ -136,7 +137,6 @@ def _imported(name: str) -> Any:
 app = typer.Typer(
     name="steptwin",
     cls=_Steptwin,
-    no_args_is_help=True,
     add_completion=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -150,11 +150,23 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
+GREETING = f"""steptwin {__version__}: the WObit MIC488 and Microcon M1486 motion controllers as software. Three things to try:
+
+  steptwin studio                a machine that moves, in the browser
+  steptwin serve mic488 --demo   a controller for your own master, on Modbus TCP 127.0.0.1:5020 and on a pty
+  steptwin run FILE              a program or a machine of yours, in virtual time
+
+'steptwin --help' lists all commands, 'steptwin doctor' what this computer lacks."""
+
+
+@app.callback(invoke_without_command=True)
 def _steptwin(
+    ctx: typer.Context,
     version: Annotated[bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")] = False,
 ) -> None:
     """The WObit MIC488 and Microcon M1486 motion controllers as software."""
+    if ctx.invoked_subcommand is None:
+        typer.echo(GREETING)
 
 
 def main() -> None:

@@ -72,6 +72,15 @@ def listening(address: Address) -> socket.socket:
     return listener
 
 
+def is_taken(address: Address) -> bool:
+    """Whether others listen there, or nobody may."""
+    try:
+        listening(address).close()
+    except OSError:
+        return True
+    return False
+
+
 def set_up(connection: socket.socket) -> None:
     """Set options of a socket: send small answers at once, detect lost clients."""
     connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from steptwin.files.world import World
 from steptwin.inputfiles import read_bytes
-from steptwin.live.clients import listening
+from steptwin.live.clients import is_taken
 from steptwin.live.directory import runtime_directory
 from steptwin.live.options import UpOptions
 from steptwin.simulation.describe.description import read_world
@@ -40,21 +40,13 @@ def demo_world(options: UpOptions, *, free_ports: bool = False) -> World:
 def describe_demo(*, free_ports: bool = False) -> str:
     """The description with its ports and pseudo terminals; where others have these, a free port and none."""
     text = decode(read_bytes(FOLDER / "demo.toml"), "demo.toml").text
-    tcp, rtu_tcp, chips = (f"{HOST}:{0 if free_ports or _is_taken(port) else port}" for port in PORTS)
+    tcp, rtu_tcp, chips = (f"{HOST}:{0 if free_ports or is_taken(Address(HOST, port)) else port}" for port in PORTS)
     ptys = HAS_PTYS and not free_ports
     bus = {"pty": _pty("mic488") if ptys else None, "tcp": tcp, "rtu_tcp": rtu_tcp}
     line = {"pty": _pty("m1486") if ptys else None, "tcp": chips}
     for mark, keys in (("# ports of bus", bus), ("# ports of chips", line)):
         text = text.replace(mark, "\n".join(f"{key} = {json.dumps(value)}" for key, value in keys.items() if value is not None))
     return text
-
-
-def _is_taken(port: int) -> bool:
-    try:
-        listening(Address(HOST, port)).close()
-    except OSError:
-        return True
-    return False
 
 
 def _pty(name: str) -> str | None:

@@ -12,7 +12,11 @@ from pathlib import Path
 from steptwin.errors import Misuse
 from steptwin.live.directory import private_directory, runtime_directory
 from steptwin.live.studio.owntokens import write_private
+from steptwin.simulation.toml.addresses import Address
 from steptwin.system import reason
+
+DEFAULT = Address("127.0.0.1", 8488)
+"""Address of the page."""
 
 LEADING = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>steptwin studio</title>

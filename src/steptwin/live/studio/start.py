@@ -42,7 +42,7 @@ from steptwin.live.studio.branches import BranchStart, WorldBranches
 from steptwin.live.studio.campaigns import FolderCampaigns
 from steptwin.live.studio.demo import demo_world
 from steptwin.live.studio.drawing import WorldArrangement
-from steptwin.live.studio.openpage import OpenedPage, has_desktop
+from steptwin.live.studio.openpage import DEFAULT, OpenedPage, has_desktop
 from steptwin.live.studio.options import StudioOptions
 from steptwin.live.studio.owntokens import new_tokens, own_tokens
 from steptwin.live.studio.recorded import recorded
@@ -68,7 +68,6 @@ from steptwin.studio.work import DeviceWork
 from steptwin.subject.events import Numbering
 from steptwin.subject.jogs import WorldJogs
 
-DEFAULT = Address("127.0.0.1", 8488)
 ANY = ("0.0.0.0", "::")
 
 
