@@ -40,7 +40,7 @@ PEER_PACKAGES := chromium curl mbpoll libmodbus-dev gcc libc6-dev pkg-config mak
   prometheus ser2net tshark
 
 .DEFAULT_GOAL := help
-.PHONY: help run test golden soak extras page vsix lint format types imports bench docs peers lock clean
+.PHONY: help run test golden soak extras page vsix release lint format types imports bench docs peers lock clean
 
 help:  ## Show the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -88,6 +88,21 @@ imports: $(DEV_STAMP)  ## Check that imports go down only and that pure packages
 bench: $(DEV_STAMP)  ## Measure requests per second and latencies against other servers
 	$(BIN)/python -m bench $(ARGS)
 
+# Versions that agree, nothing that is not committed; the wheel is tried before its checksum is written.
+RELEASE := build/release
+BOM := $(RELEASE)/steptwin-$$v
+release: $(DEV_STAMP) $(PAGE) docs vsix  ## Build wheel, source archive, extension, pages, lists of components, checksums: build/release
+	@$(BIN)/python .ci/release.py check
+	@rm -rf $(RELEASE) && mkdir -p $(RELEASE)
+	@$(BIN)/python -m hatchling build -t sdist -t wheel -d $(RELEASE) >/dev/null
+	@.tools/bin/pip install -qq --disable-pip-version-check --require-hashes -r requirements/release.txt
+	@v=$$($(BIN)/python -c 'import steptwin; print(steptwin.__version__)') \
+	&& cp build/steptwin.vsix $(RELEASE)/steptwin-$$v.vsix \
+	&& tar -czf $(RELEASE)/steptwin-$$v-docs.tar.gz -C build docs \
+	&& .tools/bin/cyclonedx-py requirements requirements/run.txt --pyproject pyproject.toml --output-reproducible -o $(BOM)-python.cdx.json \
+	&& $(WEB) sbom > $(BOM)-page.cdx.json
+	@$(BIN)/python .ci/release.py finish $(RELEASE)
+
 docs: $(DEV_STAMP)  ## Build the documentation into build/docs
 	$(BIN)/sphinx-build -W --keep-going --quiet -b html -d build/doctrees docs build/docs
 	@echo "build/docs/index.html"
@@ -107,6 +122,7 @@ peers:  ## Install the system packages the tests talk to (Debian)
 lock: $(UV)  ## Pin the dependencies anew (ARGS="--upgrade" takes newer ones)
 	$(COMPILE) requirements/tools.in -o requirements/tools.txt
 	$(COMPILE) requirements/node.in -o requirements/node.txt
+	$(COMPILE) requirements/release.in -o requirements/release.txt
 	$(COMPILE) pyproject.toml --extra lsp --extra studio --group build -o requirements/run.txt
 	$(COMPILE) pyproject.toml --all-extras --group build --group dev -c requirements/run.txt -o requirements/dev.txt
 
@@ -147,7 +163,9 @@ $(NODE_STAMP): $(PYTHON_STAMP) requirements/node.txt
 	@$(WEB) node || { echo "installing node"; $(INSTALL) --require-hashes -r requirements/node.txt; }
 	@touch $@
 
-$(PAGE): $(NODE_STAMP) $(PAGE_SOURCES)
+# In an unpacked source archive the page is there already, and node is not needed.
+$(PAGE): $(PAGE_SOURCES)
+	@$(MAKE) --no-print-directory $(NODE_STAMP)
 	@echo "building the page of the studio"
 	@$(WEB) build
 	@touch $@
