@@ -22,6 +22,7 @@ from steptwin.studio.requests import ALL
 from steptwin.studio.viewersession import ViewerSession
 from steptwin.subject.commands import VERSION, StopAxes
 from steptwin.subject.dispatch import command_of
+from steptwin.subject.subscriptions import filter_of
 
 
 def kinds(messages: list[dict[str, Any]]) -> list[str]:
@@ -299,6 +300,34 @@ def test_events_come_once_however_many_follows_want_them() -> None:
     studio.run(100)
     assert "events" not in kinds(tab.read())
     assert tab.error("unsubscribe", subscription="a")[0] == "misuse"
+
+
+def test_between_the_whole_state_and_the_events_after_it_nothing_is_lost() -> None:
+    studio = Studio()
+    control = studio.open()
+    control.ok("enable", controller="table", axis=1)
+    everything = studio.subject.subscribe(filter_of(["plan", "edge"]), 1000)
+    tabs = []
+    for phase in range(60):
+        if phase % 7 == 0:
+            control.ok("set", levels={"table.IN3": phase % 2})
+        if phase % 10 == 0:
+            control.ok("move", controller="table", axis=1, to=phase % 20)
+        tab = Tab(studio)
+        tab.ok("hello", kinds=["plan", "edge"])
+        tabs.append(tab)
+        studio.run(15)
+        if phase % 3:  # it reads only later
+            tab.read()
+    control.ok("set", levels={"table.IN3": 1})
+    studio.run(1000)
+    events = [event.to_json() for event in everything.take()[1]]
+    assert len({event["time_ns"] for event in events}) > 10
+    for tab in tabs:
+        tab.read()
+        begin = tab.newest("hello")["number"]
+        came = [event for one in tab.messages for event in one.get("events", ())]
+        assert came == [event for event in events if event["number"] > begin]
 
 
 def test_what_waits_is_not_lost_when_another_follow_begins() -> None:

@@ -142,6 +142,14 @@ class Hello:
     token: Annotated[str | None, Meaning("Where the studio asks for one.")] = None
     name: Annotated[str | None, Meaning("What others see.")] = None
     lang: Annotated[str | None, Meaning("Language of the page, such as en or pl.")] = None
+    kinds: Annotated[
+        tuple[str, ...] | None,
+        Meaning(
+            "Kinds of events that are sent until the connection ends: all that the whole state does not have yet. Before a later "
+            "subscribe some would be lost.",
+            choices(KINDS, "kind of event"),
+        ),
+    ] = None
 
 
 @request("resync", LOOK, "The whole state once more, with seq 0.", is_of_connection=True)

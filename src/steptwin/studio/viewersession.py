@@ -34,7 +34,7 @@ from steptwin.studio.calculations import gear
 from steptwin.studio.hub import Hub
 from steptwin.studio.programs import ProgramTexts
 from steptwin.studio.requests import IN_THE_PAST, OF_CONNECTION, REQUESTS, WITH_TOKEN, permit_of, request_called
-from steptwin.studio.streams import Batch, StreamPosition
+from steptwin.studio.streams import MOST_WAITING, Batch, StreamPosition
 from steptwin.studio.timetravel import OF_A_MOMENT, ShownMoment
 from steptwin.studio.watches import Watched
 from steptwin.subject import commands as command
@@ -119,6 +119,7 @@ class ViewerSession:
         self._watches: dict[int, Watched] = {}
         self._watch_numbers = count(1)
         self._follows: dict[object, tuple[Filter, int]] = {}
+        """By the id of the request; that of hello by the session, as it has no end."""
         self._place: StreamPosition | None = None
         self._left_over: list[Batch] = []
         """Pending events from before the last change of the followed kinds."""
@@ -264,6 +265,9 @@ class ViewerSession:
         viewer = Viewer(self.viewer.number, name, role)
         self._hub.join(viewer)
         self.viewer, self.has_entered, self._needs_hello = viewer, True, True
+        if wanted.kinds is not None:
+            self._follows[self] = filter_of(wanted.kinds), MOST_WAITING
+            self._move()
         return ask.EnteredViewer(viewer.number, name, role.title)
 
     def _resync(self, _: ask.Resync) -> None:

@@ -51,6 +51,7 @@ export const en = {
   noEvents: "Nothing has happened yet.",
   alarms: "{count} alarms",
   missed: "{count} events lost",
+  unknownTime: "not connected: no events from {from} to {to} s",
   panels: "Panels",
   splitRight: "Open beside",
   splitDown: "Open below",

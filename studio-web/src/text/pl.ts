@@ -54,6 +54,7 @@ export const pl: Record<keyof typeof en, string> = {
   noEvents: "Jeszcze nic się nie wydarzyło.",
   alarms: "alarmy: {count}",
   missed: "utracone zdarzenia: {count}",
+  unknownTime: "brak połączenia: bez zdarzeń od {from} do {to} s",
   panels: "Panele",
   splitRight: "Otwórz obok",
   splitDown: "Otwórz poniżej",

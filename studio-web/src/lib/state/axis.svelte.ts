@@ -17,6 +17,8 @@ export interface Sample {
   velocity: number;
 }
 
+/** Of an axis of which nothing is known: it may move. */
+const UNKNOWN = new Trajectory({ start_ns: "0", base: NaN, final: NaN, segments: [] });
 /** Intervals and samples kept of each axis. */
 const KEPT = 5000;
 
@@ -46,13 +48,23 @@ export class AxisState {
     this.revision++;
   }
 
-  /** What was before: plans and coordinates in their order, the first of them from the begin. */
-  takeEarlier(events: readonly (OfKind<"plan"> | OfKind<"coordinate">)[]): void {
+  /** All plans and coordinates between two moments in their order, instead of what is known of that time. */
+  takeEarlier(events: readonly (OfKind<"plan"> | OfKind<"coordinate">)[], from_ns: bigint, to_ns: bigint): void {
     const earlier = new AxisState(this.model);
+    earlier.intervals.push({ from_ns, trajectory: UNKNOWN, origin: NaN });
     for (const event of events) earlier.take(event);
-    const first = this.intervals[0]?.from_ns;
-    const found = earlier.intervals.filter(({ from_ns }) => first === undefined || from_ns < first);
-    this.intervals.unshift(...found.slice(Math.max(0, found.length + this.intervals.length - KEPT)));
+    if (earlier.intervals.length === 1) return;
+    const before = this.intervals.filter((one) => one.from_ns < from_ns);
+    const found = earlier.intervals.filter((one) => one.from_ns < to_ns);
+    const after = this.intervals.filter((one) => one.from_ns >= to_ns);
+    this.intervals.splice(0, Infinity, ...[...before, ...found, ...after].slice(-KEPT));
+    this.revision++;
+  }
+
+  /** What happens from a moment on is not known, until something is taken again. */
+  lose(time_ns: bigint): void {
+    if (this.intervals.length) this.add({ from_ns: time_ns, trajectory: UNKNOWN, origin: NaN });
+    if (this.samples.length) this.sample(time_ns, NaN, NaN);
     this.revision++;
   }
 
@@ -90,7 +102,7 @@ export class AxisState {
   /** Null where that is not known: it may move. */
   isMoving(now_ns: bigint): boolean | null {
     const interval = this.intervalAt(now_ns);
-    if (interval !== null) return interval.trajectory.isMoving(now_ns);
+    if (interval !== null) return interval.trajectory === UNKNOWN ? null : interval.trajectory.isMoving(now_ns);
     const { velocity } = this.at(now_ns);
     return Number.isNaN(velocity) ? null : velocity !== 0;
   }

@@ -45,3 +45,18 @@ test("at a moment that is looked at its plan holds, and only there", () => {
   axis.show(null);
   expect(axis.shown(100n)).toBe(9);
 });
+
+test("what happened while nothing came is unknown, until the past is asked for it", () => {
+  const axis = new AxisState(MODEL);
+  axis.take(stands(0n, 0));
+  axis.lose(100n);
+  expect(axis.at(150n).position).toBeNaN();
+  expect(axis.isMoving(150n)).toBeNull();
+  axis.take(stands(200n, 900));
+  axis.take(stands(300n, 1000));
+  expect([99n, 100n, 199n, 200n, 300n].map((at) => axis.shown(at))).toEqual([0, NaN, NaN, 9, 10]);
+  axis.takeEarlier([stands(50n, 0), stands(120n, 500)], 50n, 200n);
+  expect([99n, 119n, 120n, 199n, 200n, 300n].map((at) => axis.shown(at))).toEqual([0, 0, 5, 5, 9, 10]);
+  axis.takeEarlier([stands(150n, 700)], 110n, 200n); // events were dropped before it
+  expect([109n, 110n, 149n, 150n, 200n].map((at) => axis.shown(at))).toEqual([0, NaN, NaN, 7, 9]);
+});

@@ -14,7 +14,7 @@ export class EarlierEvents {
   private isAsking = false;
   private waiting: (() => void)[] = [];
 
-  /** `put` is given each part, the later ones first. */
+  /** `put` is given each part, the later ones first: it replaces what is known of its time. */
   constructor(
     private readonly ask: Ask,
     private readonly put: (part: PastEvents) => void,
@@ -38,11 +38,13 @@ export class EarlierEvents {
     try {
       const moments = { from_ns: String(from_ns), to_ns: String(until_ns) };
       const part = await this.ask("past_events", { ...moments, kinds: ["plan", "coordinate", "edge"] }, ANSWER_MS);
-      const known = BigInt(part.from_ns);
-      this.put(part);
-      if (this.known_ns === until_ns) this.known_ns = known < until_ns ? known : null;
+      if (this.known_ns === until_ns) {
+        this.put(part);
+        const known = BigInt(part.from_ns);
+        this.known_ns = known < until_ns ? known : null;
+      }
     } catch {
-      this.known_ns = null; // until there is a connection again
+      if (this.known_ns === until_ns) this.known_ns = null; // until the whole state has come again
     }
     this.isAsking = false;
     for (const came of this.waiting.splice(0)) came();

@@ -41,3 +41,13 @@ test("where time has gone back, what was later is forgotten", () => {
   edges.forgetAfter(99n);
   expect(edges.at("a", 900n)).toBeNaN();
 });
+
+test("what happened while nothing came is unknown, until the past is asked for it", () => {
+  const edges = three();
+  edges.lose(500n);
+  edges.take("a", 700n, 0);
+  expect([499n, 500n, 699n, 700n].map((at) => edges.at("a", at))).toEqual([0, NaN, NaN, 0]);
+  edges.takeEarlier([["a", 350n, 1], ["a", 600n, 0], ["b", 350n, 1]], 350n, 700n); // prettier-ignore
+  expect([200n, 350n, 599n, 600n, 700n].map((at) => edges.at("a", at))).toEqual([1, 1, 1, 0, 0]);
+  expect(edges.at("b", 400n)).toBe(1);
+});

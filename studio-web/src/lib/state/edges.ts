@@ -25,20 +25,27 @@ export class Edges {
     }
   }
 
-  /** What was before, in its order. */
-  takeEarlier(edges: Iterable<readonly [pin: string, time_ns: bigint, level: number | null]>): void {
+  /** All edges between two moments in their order, and the levels at the first, instead of what is known of that time. */
+  takeEarlier(
+    edges: Iterable<readonly [pin: string, time_ns: bigint, level: number | null]>,
+    from_ns: bigint,
+    to_ns: bigint,
+  ): void {
     const earlier = new Edges();
     for (const [pin, time_ns, level] of edges) earlier.take(pin, time_ns, level);
-    for (const [pin, { times, levels }] of earlier.pins) {
-      const kept = this.pins.get(pin);
-      const first = kept?.times[0];
-      const count = first === undefined ? times.length : times.filter((time_ns) => time_ns < first).length;
-      const from = Math.max(0, count + (kept?.times.length ?? 0) - KEPT);
-      this.pins.set(pin, {
-        times: [...times.slice(from, count), ...(kept?.times ?? [])],
-        levels: [...levels.slice(from, count), ...(kept?.levels ?? [])],
-      });
+    for (const [pin, found] of earlier.pins) {
+      const kept = this.pins.get(pin) ?? { times: [], levels: [] };
+      const [first, last] = [this.before(kept, from_ns - 1n) + 1, this.before(kept, to_ns - 1n) + 1];
+      const count = this.before(found, to_ns - 1n) + 1;
+      const joined = <T>(old: T[], between: T[]): T[] =>
+        [...old.slice(0, first), ...between.slice(0, count), ...old.slice(last)].slice(-KEPT);
+      this.pins.set(pin, { times: joined(kept.times, found.times), levels: joined(kept.levels, found.levels) });
     }
+  }
+
+  /** What happens from a moment on is not known, until something is taken again. */
+  lose(time_ns: bigint): void {
+    for (const pin of this.pins.keys()) this.take(pin, time_ns, null);
   }
 
   /** Time has gone back to `time_ns`: what was later has not happened. */

@@ -25,6 +25,8 @@ export class EventLog {
   alarms = $state(0);
   /** Events that were dropped on the way. */
   missed = $state(0);
+  /** While there was no connection: from when and until when. */
+  unknown = $state.raw<readonly [bigint, bigint] | null>(null);
 
   constructor(private readonly severity: (event: SubjectEvent) => Severity) {}
 

@@ -19,3 +19,11 @@ test("the oldest are forgotten", () => {
   for (let index = 0; index < 50_000; index++) passed.take("bus", BigInt(index), index);
   expect([passed.at("bus", 49_999n), passed.at("bus", 1_000n)]).toEqual([49_999, NaN]);
 });
+
+test("what passed while nothing came is unknown", () => {
+  const passed = new Passed();
+  for (const [time_ns, line] of [[100n, 3], [300n, 4]] as const) passed.take("table", time_ns, line); // prettier-ignore
+  passed.lose(200n);
+  expect([199n, 200n, 300n].map((at) => passed.at("table", at))).toEqual([3, NaN, 4]);
+  expect([...passed.between("table", 150n, 400n)].map(({ number }) => number)).toEqual([3, 4]);
+});

@@ -22,6 +22,15 @@ export class Passed {
     }
   }
 
+  /** What passed between a moment and the next one that was taken is not known. */
+  lose(time_ns: bigint): void {
+    for (const kept of this.sources.values()) {
+      const index = this.before(kept, time_ns) + 1;
+      kept.times.splice(index, 0, time_ns);
+      kept.numbers.splice(index, 0, NaN);
+    }
+  }
+
   /** Time has gone back to `time_ns`: what was later has not happened. */
   forgetAfter(time_ns: bigint): void {
     for (const kept of this.sources.values()) kept.times.length = kept.numbers.length = this.before(kept, time_ns) + 1;
@@ -44,7 +53,8 @@ export class Passed {
     for (let index = Math.max(0, this.before(kept, from_ns)); index < kept.times.length; index++) {
       const begin = kept.times[index] as bigint;
       if (begin >= to_ns) return;
-      yield { from_ns: begin, to_ns: kept.times[index + 1] ?? to_ns, number: kept.numbers[index] as number };
+      const number = kept.numbers[index] as number;
+      if (!Number.isNaN(number)) yield { from_ns: begin, to_ns: kept.times[index + 1] ?? to_ns, number };
     }
   }
 

@@ -91,6 +91,9 @@ export class Studio {
   /** Counts stops from this page, for who shows them. */
   stops = $state(0);
 
+  /** What happened last from when on was not known, for who keeps events of a kind of his own. */
+  lost_ns = $state.raw(0n);
+
   readonly clock = new WorldClock();
   readonly log = new EventLog((event) => this.severity(event));
   readonly pins = new Pins();
@@ -126,11 +129,11 @@ export class Studio {
         this.refusal = why;
       },
     };
-    this.connection = new Connection(url, greeting, events, openInWorker, browserTimers);
+    const first = () => ({ ...greeting(), kinds: [...SUBSCRIBED] });
+    this.connection = new Connection(url, first, events, openInWorker, browserTimers);
   }
 
   open(): void {
-    this.subscribe(SUBSCRIBED);
     this.connection.open();
   }
 
@@ -259,16 +262,20 @@ export class Studio {
     this.viewers = hello.viewers;
     this.leases = hello.leases;
     this.present_workpieces = hello.workpieces;
-    this.tellClock(BigInt(hello.time_ns), hello.pace, true);
-    this.forgetAfter(BigInt(hello.time_ns));
+    const now_ns = BigInt(hello.time_ns);
+    this.tellClock(now_ns, hello.pace, true);
+    this.forgetAfter(now_ns);
+    if (isNewConnection && !isNew) this.log.unknown = [this.heard_ns, now_ns];
+    this.lose();
+    this.heard_ns = now_ns;
+    this.earlier.begin(now_ns);
     if (isNew || JSON.stringify(hello.description) !== this.description) this.describe(hello);
     for (const event of hello.plans) this.toAxis(event);
     this.pins.reset(hello.state);
-    for (const [pin, level] of levelsOf(hello.state)) this.edges.take(pin, BigInt(hello.time_ns), level);
+    for (const [pin, level] of levelsOf(hello.state)) this.edges.take(pin, now_ns, level);
     if (!hello.virtual) this.askPins();
     if (!isNewConnection) return;
     this.timeTravel.forget();
-    this.earlier.begin(BigInt(hello.time_ns));
     for (const subscription of this.subscriptions) this.beginSubscription(subscription);
     this.watches.renew();
   }
@@ -277,8 +284,18 @@ export class Studio {
   private forgetAfter(time_ns: bigint): void {
     for (const axis of this.axes.values()) axis.forgetAfter(time_ns);
     this.edges.forgetAfter(time_ns);
+    if (this.heard_ns > time_ns) this.heard_ns = time_ns;
   }
 
+  /** What was between the last events that came and the whole state is not known, until somebody asks for it. */
+  private lose(): void {
+    for (const axis of this.axes.values()) axis.lose(this.heard_ns);
+    this.edges.lose(this.heard_ns);
+    this.lost_ns = this.heard_ns;
+  }
+
+  /** Up to here all events have come. */
+  private heard_ns = 0n;
   private description = "";
 
   private describe(hello: Hello): void {
@@ -333,7 +350,12 @@ export class Studio {
   }
 
   private happened(events: readonly SubjectEvent[], missed: number, time_ns: bigint): void {
-    this.log.missed += missed;
+    if (missed) {
+      this.log.missed += missed;
+      this.lose();
+      this.connection.resync();
+    }
+    this.heard_ns = time_ns;
     this.clock.atLeast(time_ns, performance.now());
     for (const event of events) {
       this.toAxis(event);
@@ -351,19 +373,21 @@ export class Studio {
     for (const listener of this.listeners) listener(events);
   }
 
-  private takeEarlier({ from_ns, state, plans, events }: PastEvents): void {
+  private takeEarlier({ from_ns, to_ns, state, plans, events }: PastEvents): void {
+    const [begin, end] = [BigInt(from_ns), BigInt(to_ns)];
     const all = [...plans, ...events];
     for (const axis of this.axes.values()) {
       const { controller, number } = axis.model;
       const own = all.filter((event) => event.kind === "plan" || event.kind === "coordinate");
-      axis.takeEarlier(own.filter((event) => event.controller === controller && event.axis === String(number)));
+      const found = own.filter((event) => event.controller === controller && event.axis === String(number));
+      axis.takeEarlier(found, begin, end);
     }
-    const first = levelsOf(state).map(([pin, level]) => [pin, BigInt(from_ns), level] as const);
+    const first = levelsOf(state).map(([pin, level]) => [pin, begin, level] as const);
     const edges = events.filter((event) => event.kind === "edge");
     const later = edges.map(
       (event) => [`${event.controller}.${event.pin}`, BigInt(event.time_ns), event.level] as const,
     );
-    this.edges.takeEarlier([...first, ...later]);
+    this.edges.takeEarlier([...first, ...later], begin, end);
   }
 
   private showPast(past: Past | null): void {

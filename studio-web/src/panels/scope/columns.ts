@@ -20,9 +20,9 @@ export class Columns {
     for (const values of [this.first, this.last, this.low, this.high]) values.fill(NaN);
   }
 
-  /** Values of one column come in the order of time. */
+  /** Values of one column come in the order of time; what is not known is left out. */
   add(column: number, value: number): void {
-    if (!(column >= 0 && column < this.width)) return;
+    if (!(column >= 0 && column < this.width) || Number.isNaN(value)) return;
     if (Number.isNaN(this.first[column])) {
       this.first[column] = this.low[column] = this.high[column] = value;
     } else {
