@@ -65,7 +65,7 @@ def test_faults_of_a_line_of_chips(serve_m1486: Serve) -> None:
             heard += host.recv(3)
     assert heard == b"A@A"
     assert json.loads(twin.command("fault", "--json").stdout) == [
-        {"name": "flip", "fault": "flip nth=2 bit=0 link=tcp-1", "seen": 3, "happened": 1}
+        {"name": "flip", "fault": "flip nth=2 bit=0 link=tcp-1", "seen": 3, "acted": 1}
     ]
 
 

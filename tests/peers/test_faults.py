@@ -59,7 +59,7 @@ def test_faults_are_set_and_removed_while_a_client_is_connected(serve: Callable[
         assert read(client) == "answer"
         assert twin.command("fault").stdout == "no faults\n"
         assert twin.command("fault", "exception", "code=4", "name=sick").stdout == (
-            "sick  exception name=sick code=4  (occurred 0 times)\n"
+            "sick  exception name=sick code=4  (acted 0 times)\n"
         )
         assert [read(client), read(client)] == ["exception 4", "exception 4"]
         assert twin.command("fault", "--clear", "sick").stdout == "no faults\n"

@@ -60,7 +60,7 @@ def command(
     elif there:
         width = max(len(active["name"]) for active in there)
         for active in there:
-            typer.echo(f"{active['name']:<{width}}  {active['fault']}  (occurred {_times(active['happened'])})")
+            typer.echo(f"{active['name']:<{width}}  {active['fault']}  (acted {_times(active['acted'])})")
     else:
         typer.echo("no faults")
 

@@ -70,7 +70,12 @@ class Encoders:
     controller: ControllerName
 
 
-@command("faults", "The faults that are set.", "a list of name, fault, seen (occasions), happened (how often)", is_list=True)
+@command(
+    "faults",
+    "The faults that are set.",
+    "a list of name, fault, seen (occasions), acted (how often it made a difference)",
+    is_list=True,
+)
 @dataclass(frozen=True, slots=True)
 class ListFaults:
     pass

@@ -280,9 +280,15 @@ class WorldSubject:
             self.publish(plan.time, plan.controller, plan.payload)
 
     def _faults(self) -> object:
+        faults = self.world.objects.faults
         return [
-            {"name": a.name, "fault": str(a.fault), "seen": a.seen, "happened": a.struck}
-            for a in self.world.objects.faults.active
+            {
+                "name": a.name,
+                "fault": str(a.fault),
+                "seen": a.seen,
+                "acted": faults.acts[a.name].count if a.name in faults.acts else 0,
+            }
+            for a in faults.active
         ]
 
     def time(self) -> dict[str, object]:

@@ -266,6 +266,7 @@ def test_a_worn_memory_may_lose_its_supply(faults: tuple[str, str]) -> None:
     fill(rig, 0x1111)
     assert rig.ask(SAVE) == b""
     assert stored(rig) == before
+    assert rig.faults.acts["power-cut"].count == 1
 
 
 def test_supply_drop_silences_everything_and_comes_back_as_after_power_on() -> None:
@@ -360,6 +361,7 @@ def test_worn_bytes_keep_what_they_have() -> None:
         [place for place, byte in enumerate(image) if byte != word & 0xFF] for image, word in zip(images, words, strict=True)
     ]
     assert [len(places) for places in wrong] == [0, 0, 1, 2]
+    assert rig.faults.acts["wear"].count == 2, "the first two saves go well"
     assert set(wrong[2]) < set(wrong[3])
     first = wrong[2][0]
     assert (images[2][first], images[3][first]) == (0x22, 0x22)

@@ -52,7 +52,12 @@ class Lamp(Stateful):
             self._due = now + self._spec.warms if is_on else None
         if self._due is not None and self._due <= now:
             self._due = None
-        self._show(is_on and self._due is None and not self.burnt)
+        self._show(self.would_be_lit and not self.burnt)
+
+    @property
+    def would_be_lit(self) -> bool:
+        """Without faults."""
+        return self._is_on and self._due is None
 
     @property
     def name(self) -> str:
@@ -87,12 +92,24 @@ def _burn(active: ActiveFault, lamp: Lamp, begins: bool, now: Nanos) -> str:
     return "it is burnt out" if begins else "it has been replaced"
 
 
+def _is_dark(active: ActiveFault, lamp: Lamp, now: Nanos) -> bool:
+    return lamp.burnt and lamp.would_be_lit
+
+
 LAMP: Element[LampSpec, Lamp] = Element(
     spec=LampSpec,
     refers=_refers,
     build=_build,
     signals=_signals,
-    faults=(FaultKind("burnt-out", Layer.ELEMENT, Occasion.ALWAYS, "A lamp stays dark.", effect=ElementEffect(_burn)),),
+    faults=(
+        FaultKind(
+            "burnt-out",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "A lamp stays dark.",
+            effect=ElementEffect(_burn, _is_dark),
+        ),
+    ),
 )
 
 

@@ -264,6 +264,11 @@ def turning_points_of_axis(fitted: BuiltAxis, now: Nanos) -> Iterator[Nanos]:
     return iter(fitted.mechanism.trajectory(now).turning_points(now))
 
 
+def moves(fitted: BuiltAxis, now: Nanos) -> bool:
+    """Whether its load moves."""
+    return next(turning_points_of_axis(fitted, now), None) is not None
+
+
 def _signals(fitted: BuiltAxis) -> Mapping[str, SignalOf]:
     mechanism, turning = fitted.mechanism, partial(turning_points_of_axis, fitted)
     up, down = fitted.scale.pulses_per_unit.as_integer_ratio()

@@ -81,9 +81,17 @@ class Brake(TerminalComponent):
             wait = self._spec.release_time if is_on else self._spec.apply_time
             self._due = None if is_on is self._is_released else now + wait
             self._move(now)
-        is_open = self._is_released and not self.is_stuck
-        self._mechanism.brake(0.0 if is_open else self._spec.torque * self.share, now)
-        self.block.put(RELEASED, float(is_open))
+        self._mechanism.brake(0.0 if self.is_open else self._spec.torque * self.share, now)
+        self.block.put(RELEASED, float(self.is_open))
+
+    @property
+    def is_open(self) -> bool:
+        return self._is_released and not self.is_stuck
+
+    @property
+    def does_not_let_go(self) -> bool:
+        """Whether only the fault keeps it closed."""
+        return self._is_released and self.is_stuck
 
     def _move(self, now: Nanos) -> None:
         """Let go or act, if that is due."""
@@ -104,6 +112,10 @@ def _wear(active: ActiveFault, brake: Brake, begins: bool, now: Nanos) -> str:
     return IS_WORN(name=brake.block.name, share=brake.share) if begins else IS_AS_NEW(name=brake.block.name)
 
 
+def _brakes(active: ActiveFault, brake: Brake, now: Nanos) -> bool:
+    return brake.share < 1.0 and not brake.is_open
+
+
 DOES_NOT_LET_GO = Message("simulation.does-not-let-go", "{name} does not let go")
 LETS_GO_AGAIN = Message("simulation.lets-go-again", "{name} lets go again")
 
@@ -111,6 +123,10 @@ LETS_GO_AGAIN = Message("simulation.lets-go-again", "{name} lets go again")
 def _stick(active: ActiveFault, brake: Brake, begins: bool, now: Nanos) -> str:
     brake.is_stuck = begins
     return (DOES_NOT_LET_GO if begins else LETS_GO_AGAIN)(name=brake.block.name)
+
+
+def _is_kept_closed(active: ActiveFault, brake: Brake, now: Nanos) -> bool:
+    return brake.does_not_let_go
 
 
 def _make(spec: BrakeSpec, context: ElementContext) -> Brake:
@@ -136,8 +152,14 @@ BRAKE = with_terminals(
             Occasion.ALWAYS,
             "A brake has only a share of its torque.",
             own=(number("share", "Of its torque.", 0.0, 1.0, default=0.2),),
-            effect=ElementEffect(_wear),
+            effect=ElementEffect(_wear, _brakes),
         ),
-        FaultKind("stuck-brake", Layer.ELEMENT, Occasion.ALWAYS, "A brake does not let go.", effect=ElementEffect(_stick)),
+        FaultKind(
+            "stuck-brake",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "A brake does not let go.",
+            effect=ElementEffect(_stick, _is_kept_closed),
+        ),
     ),
 )

@@ -11,7 +11,7 @@ from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.motion.elastic import Response, Spring
-from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, mm_per_unit, moved_by, nm_per_pulse
+from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, mm_per_unit, moved_by, moves, nm_per_pulse
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
@@ -158,6 +158,10 @@ def _slacken(active: ActiveFault, carriage: Carriage, begins: bool, now: Nanos) 
     return BELT_HAS_SHARE(name=carriage.spec.name, share=share)
 
 
+def _swings(active: ActiveFault, carriage: Carriage, now: Nanos) -> bool:
+    return moves(carriage.axis, now)
+
+
 def _refers(spec: CarriageSpec, described: ElementSpecs) -> Iterator[Reference]:
     drives = {axis.name: axis.drive[0] for axis in described.of(AXIS)}
     controller = drives.get(spec.axis, spec.axis)
@@ -221,7 +225,7 @@ CARRIAGE: Element[CarriageSpec, Carriage] = Element(
             Occasion.ALWAYS,
             "The belt of a carriage is slack: it swings at a lower frequency.",
             own=(parameter("share", "Of its frequency.", 0.01, 1.0, default=0.5),),
-            effect=ElementEffect(_slacken),
+            effect=ElementEffect(_slacken, _swings),
         ),
     ),
 )

@@ -83,6 +83,7 @@ class Conveyor(TerminalComponent):
         "belt",
         "delivered",
         "fed",
+        "fed_in_vain",
         "feeder_stands",
         "is_stopped",
         "missed",
@@ -122,6 +123,8 @@ class Conveyor(TerminalComponent):
         """Fault: its own drive does not move it."""
         self.feeder_stands = False
         """Fault: no workpieces come onto it, but those of a conveyor before it."""
+        self.fed_in_vain = 0
+        """How many did not come because of that."""
         self._is_fed = False
         self._next_feed = spec.feed_every
         self._due: Nanos | None = None
@@ -184,6 +187,7 @@ class Conveyor(TerminalComponent):
         spec, length = self.spec, nanometres(self.spec.workpiece[0])
         if self.feeder_stands or self.belt.occupant(-self.belt.from_nm(length), 0, now) is not None:
             self.missed += 1
+            self.fed_in_vain += self.feeder_stands
             self.block.scheduler.notify(self.block.name)
             return
         self.fed += 1
@@ -376,6 +380,10 @@ def _stop(active: ActiveFault, conveyor: Conveyor, begins: bool, now: Nanos) -> 
     return (DRIVE_FAILS if begins else DRIVE_IS_REPAIRED)(name=conveyor.spec.name)
 
 
+def _should_run(active: ActiveFault, belt: Conveyor, now: Nanos) -> bool:
+    return belt.is_stopped and belt.block.is_on(RUN)
+
+
 FEEDER_FAILS = Message("simulation.feeder-stands", "the feeder of {name} stands")
 FEEDER_WORKS_AGAIN = Message("simulation.feeder-works-again", "the feeder of {name} works again")
 
@@ -385,6 +393,10 @@ def _stop_feeder(active: ActiveFault, conveyor: Conveyor, begins: bool, now: Nan
     scheduler, name = conveyor.block.scheduler, conveyor.spec.name
     scheduler.record(scheduler.owner(name), "edge", f"{name}.{FEEDER_STANDS}", float(begins))
     return (FEEDER_FAILS if begins else FEEDER_WORKS_AGAIN)(name=name)
+
+
+def _fed_in_vain(active: ActiveFault, conveyor: Conveyor, now: Nanos) -> int:
+    return conveyor.fed_in_vain
 
 
 def _own_drive(spec: ConveyorSpec, speed: Fraction, now: Nanos) -> ConstantDrive | RampedDrive:
@@ -495,7 +507,7 @@ CONVEYOR = with_terminals(
             Layer.ELEMENT,
             Occasion.ALWAYS,
             "A conveyor with a speed stands, although it is switched on.",
-            effect=ElementEffect(_stop),
+            effect=ElementEffect(_stop, _should_run),
             check=_check_stop,
         ),
         FaultKind(
@@ -503,7 +515,7 @@ CONVEYOR = with_terminals(
             Layer.ELEMENT,
             Occasion.ALWAYS,
             "The feeder of a conveyor is empty or blocked: no workpieces come onto it.",
-            effect=ElementEffect(_stop_feeder),
+            effect=ElementEffect(_stop_feeder, _fed_in_vain),
         ),
     ),
     refers=_refers_of_sensors,

@@ -120,11 +120,27 @@ class Cylinder(TerminalComponent):
 
     def _force(self) -> int:
         """Where the piston is driven: without air a spring returns it, where there is one."""
-        if self.is_jammed or self._blockers:
-            return 0
-        if not self.has_air:
+        return 0 if self.is_jammed or self._blockers else self._driven(self.has_air)
+
+    def _driven(self, has_air: bool) -> int:
+        """As `_force`, of a piston that nothing holds."""
+        if not has_air:
             return -1 if self._spec.valve == SINGLE else 0
         return self._spool
+
+    def is_held_back(self, now: Nanos) -> bool:
+        """Whether it is jammed where it would move otherwise."""
+        return self.is_jammed and not self._blockers and self._can_move(self._driven(self.has_air), now)
+
+    def lacks_air(self, now: Nanos) -> bool:
+        """Whether it has no air where it would move otherwise, or stand."""
+        wanted, driven = self._driven(has_air=True), self._driven(self.has_air)
+        is_free = not self.is_jammed and not self._blockers
+        return wanted != driven and is_free and (self._can_move(wanted, now) or self._can_move(driven, now))
+
+    def _can_move(self, direction: int, now: Nanos) -> bool:
+        """Whether it is not at the end in a direction."""
+        return direction != 0 and self.travel.grid_position(now) != (self.travel.full if direction > 0 else 0)
 
     def obstruct(self, blocked: bool, now: Nanos, by: str) -> None:
         """Let it stand until nothing blocks it any more."""
@@ -168,6 +184,10 @@ def _take_air(active: ActiveFault, cylinder: Cylinder, begins: bool, now: Nanos)
     return (HAS_NO_AIR if begins else HAS_AIR_AGAIN)(name=cylinder.block.name)
 
 
+def _lacks_air(active: ActiveFault, cylinder: Cylinder, now: Nanos) -> bool:
+    return cylinder.lacks_air(now)
+
+
 IS_JAMMED = Message("simulation.is-jammed", "{name} is jammed")
 IS_FREE_AGAIN = Message("simulation.cylinder-is-free-again", "{name} is free again")
 
@@ -175,6 +195,10 @@ IS_FREE_AGAIN = Message("simulation.cylinder-is-free-again", "{name} is free aga
 def _jam(active: ActiveFault, cylinder: Cylinder, begins: bool, now: Nanos) -> str:
     cylinder.is_jammed = begins
     return (IS_JAMMED if begins else IS_FREE_AGAIN)(name=cylinder.block.name)
+
+
+def _is_held_back(active: ActiveFault, cylinder: Cylinder, now: Nanos) -> bool:
+    return cylinder.is_held_back(now)
 
 
 # ---------------------------------------------------------------------- the element
@@ -221,9 +245,15 @@ CYLINDER = with_terminals(
             Layer.ELEMENT,
             Occasion.ALWAYS,
             "A cylinder has no compressed air: a spring retracts it, without one it stands.",
-            effect=ElementEffect(_take_air),
+            effect=ElementEffect(_take_air, _lacks_air),
         ),
-        FaultKind("jam", Layer.ELEMENT, Occasion.ALWAYS, "A cylinder stands where it is.", effect=ElementEffect(_jam)),
+        FaultKind(
+            "jam",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "A cylinder stands where it is.",
+            effect=ElementEffect(_jam, _is_held_back),
+        ),
     ),
     refers=_refers_of_switches,
     fit=_put_switches,

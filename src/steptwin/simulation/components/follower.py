@@ -11,7 +11,7 @@ from typing import ClassVar
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.simulation.components.axis import AXIS, moved_by, turning_points_of_axis
+from steptwin.simulation.components.axis import AXIS, moved_by, moves, turning_points_of_axis
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
@@ -149,6 +149,10 @@ class Follower(Stateful):
                 yield due
                 now = due
 
+    def is_elsewhere(self, now: Nanos) -> bool:
+        """Whether it is not where an unworn cam has it, or will be so by the motion of its axis."""
+        return moves(self.shaft.axis, now) or self.lift(now) != self._cam.lift(self.shaft.grid_position(now))
+
     def hold(self, holds: bool, now: Nanos) -> None:
         self._held = self.lift(now) if holds else None
         self._report(STUCK, float(holds))
@@ -179,6 +183,10 @@ FOLLOWS_AGAIN = Message("simulation.follows-its-cam-again", "{name} follows its 
 def _stick(active: ActiveFault, follower: Follower, begins: bool, now: Nanos) -> str:
     follower.hold(begins, now)
     return (IS_STUCK if begins else FOLLOWS_AGAIN)(name=follower.spec.name)
+
+
+def _is_elsewhere(active: ActiveFault, follower: Follower, now: Nanos) -> bool:
+    return follower.is_elsewhere(now)
 
 
 CAM_HAS_SHARE = Message("simulation.cam-has-share", "the cam of {name} has {share:g} of its lift")
@@ -271,7 +279,7 @@ FOLLOWER: Element[FollowerSpec, Follower] = Element(
             Layer.ELEMENT,
             Occasion.ALWAYS,
             "A follower stays where it is; afterwards it is on its cam again at once.",
-            effect=ElementEffect(_stick),
+            effect=ElementEffect(_stick, _is_elsewhere),
         ),
         FaultKind(
             "worn-cam",
@@ -279,7 +287,7 @@ FOLLOWER: Element[FollowerSpec, Follower] = Element(
             Occasion.ALWAYS,
             "A cam lifts its follower by a share only.",
             own=(number("share", "Of its lift.", 0.0, 1.0, default=0.9),),
-            effect=ElementEffect(_wear),
+            effect=ElementEffect(_wear, _is_elsewhere),
         ),
     ),
 )

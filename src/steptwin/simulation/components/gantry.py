@@ -8,7 +8,7 @@ from typing import ClassVar
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.simulation.components.axis import BuiltAxis, find_axis, mm_per_unit, moved_by, summed_travel
+from steptwin.simulation.components.axis import BuiltAxis, find_axis, mm_per_unit, moved_by, moves, summed_travel
 from steptwin.simulation.components.coordinate import Coordinate, Pulled
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs
@@ -161,6 +161,10 @@ def _stiffen(active: ActiveFault, gantry: Gantry, begins: bool, now: Nanos) -> s
     return GUIDES_ARE_STIFF(name=gantry.block.name, factor=gantry.is_stiff)
 
 
+def _rubs(active: ActiveFault, gantry: Gantry, now: Nanos) -> bool:
+    return any(moves(end, now) for end in gantry.ends)
+
+
 def _make(spec: GantrySpec, context: ElementContext) -> Gantry:
     block = context.terminal_block(spec.name)
     one, other = find_axis(spec.axis, context), find_axis(spec.other, context)
@@ -203,7 +207,7 @@ GANTRY = with_terminals(
             Occasion.ALWAYS,
             "The guides of a gantry have a multiple of their friction.",
             own=(number("factor", "Of its friction.", 1.0, 1000.0, default=3.0),),
-            effect=ElementEffect(_stiffen),
+            effect=ElementEffect(_stiffen, _rubs),
         ),
     ),
 )

@@ -161,6 +161,10 @@ class Gripper(Carrier):
         self.block.put(CLOSED, float(position == self.travel.full))
         self.block.put(HELD, float(self.is_held))
 
+    def lets_slip(self, now: Nanos) -> bool:
+        """Whether the jaws hold nothing although they close on a workpiece."""
+        return self.slips and self.block.is_on(CLOSE) and self.is_occupied(now)
+
     def deadline(self) -> Nanos | None:
         now = self.block.scheduler.now
         place = self._at if self._grasp is None else None if self._between is None else self._between.at
@@ -190,6 +194,10 @@ def _slip(active: ActiveFault, gripper: Gripper, begins: bool, now: Nanos) -> st
     return (LETS_WORKPIECES_SLIP if begins else HOLDS_AGAIN)(name=gripper.block.name)
 
 
+def _lets_slip(active: ActiveFault, gripper: Gripper, now: Nanos) -> bool:
+    return gripper.lets_slip(now)
+
+
 def _signals(gripper: Gripper) -> Mapping[str, SignalOf]:
     source, travel = gripper.block.source, gripper.travel
     bounds = (0.0, gripper.stroke)
@@ -212,7 +220,7 @@ GRIPPER = with_terminals(
             Layer.ELEMENT,
             Occasion.ALWAYS,
             "The jaws of a gripper let workpieces slip.",
-            effect=ElementEffect(_slip),
+            effect=ElementEffect(_slip, _lets_slip),
         ),
     ),
 )

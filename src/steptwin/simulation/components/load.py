@@ -131,14 +131,21 @@ class FurtherLoad(TerminalComponent):
         return self._share
 
     def update(self, now: Nanos) -> None:
-        share = self.factor
         if self._curve is not None:
             self._curve.update(now)
-            share *= self._curve.value
-        self._share = share if self._condition is None or self._condition.holds(now) else 0.0
+        self._share = self.factor * self._own_share(now)
         self._axis.mechanism.burden(self.block.name, self._whole.times(self._share), now)
         self.block.put(ACTS, float(self._share > 0.0))
         self._due = None if self._condition is None else self._condition.change(now)
+
+    def _own_share(self, now: Nanos) -> float:
+        """How much of it there is without faults."""
+        whole = 1.0 if self._curve is None else self._curve.value
+        return whole if self._condition is None or self._condition.holds(now) else 0.0
+
+    def is_other(self, now: Nanos) -> bool:
+        """Whether a fault makes it more or less than it should be."""
+        return self._share != self._own_share(now)
 
     def deadline(self) -> Nanos | None:
         deadlines = (self._due, None if self._curve is None else self._curve.due)
@@ -156,6 +163,10 @@ LOAD_IS_CHANGED = Message("simulation.load-is-changed", "{name} is {factor:g} ti
 def _change(active: ActiveFault, load: FurtherLoad, begins: bool, now: Nanos) -> str:
     load.factor = active.fault.number("factor") if begins else 1.0
     return LOAD_IS_CHANGED(name=load.block.name, factor=load.factor)
+
+
+def _is_other(active: ActiveFault, load: FurtherLoad, now: Nanos) -> bool:
+    return load.is_other(now)
 
 
 def _make(spec: LoadSpec, context: ElementContext) -> FurtherLoad:
@@ -184,7 +195,7 @@ LOAD = with_terminals(
             Occasion.ALWAYS,
             "A load is a multiple of what it should be.",
             own=(number("factor", "Of its mass, forces and torques; 0: it is missing.", 0.0, MOST_SHARE, default=2.0),),
-            effect=ElementEffect(_change),
+            effect=ElementEffect(_change, _is_other),
         ),
     ),
 )

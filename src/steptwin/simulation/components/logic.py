@@ -125,6 +125,10 @@ def _stick(active: ActiveFault, component: TerminalComponent, begins: bool, now:
     return IS_STUCK_AT(name=name, level=level) if begins else TERMINAL_IS_FREE(name=name)
 
 
+def _is_stuck(active: ActiveFault, component: TerminalComponent, now: Nanos) -> bool:
+    return component.block.is_altered(str(active.fault.get("output") or active.fault.get("input")).upper())
+
+
 STUCK_OUTPUT = FaultKind(
     "stuck-output",
     Layer.ELEMENT,
@@ -134,7 +138,7 @@ STUCK_OUTPUT = FaultKind(
         Parameter("output", ParameterForm.TEXT, "Which output.", default="out"),
         whole("level", "The level it keeps.", 0, 1, default=0),
     ),
-    effect=ElementEffect(_stick, holds="output"),
+    effect=ElementEffect(_stick, _is_stuck, holds="output"),
     check=_check_output,
     tried=({"level": 0}, {"level": 1}),
 )
@@ -148,7 +152,7 @@ STUCK_INPUT = FaultKind(
         Parameter("input", ParameterForm.TEXT, "Which input.", is_required=True),
         whole("level", "The level it keeps.", 0, 1, default=0),
     ),
-    effect=ElementEffect(_stick, holds="input"),
+    effect=ElementEffect(_stick, _is_stuck, holds="input"),
     check=_check_input,
     faulty=FaultCategory.SENSOR,
     tried=({"level": 0}, {"level": 1}),

@@ -72,6 +72,11 @@ class Relay(TerminalComponent):
         self.block.put(NO, float(closed))
         self.block.put(NC, float(not closed))
 
+    @property
+    def is_kept_closed(self) -> bool:
+        """Whether only the weld keeps the contact closed."""
+        return self.is_welded and not self.is_on and self.block.is_on(NO)
+
     def _move(self, now: Nanos) -> None:
         """Move the contact if that is due."""
         if self._due is not None and self._due <= now:
@@ -91,6 +96,10 @@ def _weld(active: ActiveFault, relay: Relay, begins: bool, now: Nanos) -> str:
     return (CONTACT_WELDS if begins else CONTACT_IS_FREE)(name=relay.block.name)
 
 
+def _is_kept_closed(active: ActiveFault, relay: Relay, now: Nanos) -> bool:
+    return relay.is_kept_closed
+
+
 COIL_IS_INTERRUPTED = Message("simulation.coil-is-interrupted", "the coil of {name} is interrupted")
 COIL_IS_CONNECTED = Message("simulation.coil-is-connected", "the coil of {name} is connected")
 
@@ -98,6 +107,10 @@ COIL_IS_CONNECTED = Message("simulation.coil-is-connected", "the coil of {name} 
 def _interrupt(active: ActiveFault, relay: Relay, begins: bool, now: Nanos) -> str:
     relay.is_open = begins
     return (COIL_IS_INTERRUPTED if begins else COIL_IS_CONNECTED)(name=relay.block.name)
+
+
+def _is_wanted(active: ActiveFault, relay: Relay, now: Nanos) -> bool:
+    return relay.is_open and relay.block.is_on(COIL)
 
 
 RELAY = with_terminals(
@@ -110,7 +123,7 @@ RELAY = with_terminals(
             Layer.ELEMENT,
             Occasion.ALWAYS,
             "The contact NO of a relay stays closed once it is.",
-            effect=ElementEffect(_weld),
+            effect=ElementEffect(_weld, _is_kept_closed),
             faulty=FaultCategory.LOGIC,
         ),
         FaultKind(
@@ -118,7 +131,7 @@ RELAY = with_terminals(
             Layer.ELEMENT,
             Occasion.ALWAYS,
             "The coil of a relay is interrupted.",
-            effect=ElementEffect(_interrupt),
+            effect=ElementEffect(_interrupt, _is_wanted),
             faulty=FaultCategory.LOGIC,
         ),
     ),

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, moved_by, turning_points_of_axis
+from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, moved_by, moves, turning_points_of_axis
 from steptwin.simulation.components.contact import ContactSpec
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementcontext import ElementContext
@@ -115,6 +115,12 @@ class GearedShaft(Stateful):
             self._held = None
         scheduler.notify(self.spec.name)
 
+    def is_left_behind(self, now: Nanos) -> bool:
+        """Whether it slips, and its axis moves or is elsewhere by now."""
+        if self._held is None:
+            return False
+        return moves(self.axis, now) or self.axis.mechanism.grid_position(now) - self._behind != self._held
+
     @property
     def moved(self) -> tuple[str, MovedChannel]:
         sign, name = self.axis.mechanism.build.sign, self.spec.name
@@ -202,6 +208,10 @@ def _slip(active: ActiveFault, shaft: GearedShaft, begins: bool, now: Nanos) -> 
     return COUPLING_SLIPS(name=name) if begins else COUPLING_GRIPS(name=name, behind=shaft.behind)
 
 
+def _is_left_behind(active: ActiveFault, shaft: GearedShaft, now: Nanos) -> bool:
+    return shaft.is_left_behind(now)
+
+
 def _moves(spec: ShaftSpec, shaft: GearedShaft) -> Sequence[Movement]:
     axis = shaft.axis
     sources = (*moved_by(axis), spec.name)
@@ -222,7 +232,7 @@ SHAFT: Element[ShaftSpec, GearedShaft] = Element(
             Layer.ELEMENT,
             Occasion.ALWAYS,
             "A shaft stands while its axis turns; afterwards it goes on from where it stands.",
-            effect=ElementEffect(_slip),
+            effect=ElementEffect(_slip, _is_left_behind),
         ),
     ),
 )

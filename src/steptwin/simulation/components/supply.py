@@ -184,6 +184,11 @@ class Supply(TerminalComponent):
         takes = spec.rise if target > volts else spec.fall
         self._ramp = Ramp(now, volts, target, spec.volts / takes if takes else 0.0)
 
+    @property
+    def lacks_voltage(self) -> bool:
+        """Whether only a fault keeps its voltage low."""
+        return self._is_on and self.sag is not None and self.sag < self._spec.volts
+
     def _feed(self, now: Nanos) -> None:
         for controller in self._fed:
             controller.supply(self.is_good, now)
@@ -206,6 +211,10 @@ SAGS = Message("simulation.supply-sags", "{name} has {volts:g} V at most")
 def _sag(active: ActiveFault, supply: Supply, begins: bool, now: Nanos) -> str:
     supply.sag = active.fault.number("volts") if begins else None
     return FULL_VOLTAGE(name=supply.block.name) if supply.sag is None else SAGS(name=supply.block.name, volts=supply.sag)
+
+
+def _lacks_voltage(active: ActiveFault, supply: Supply, now: Nanos) -> bool:
+    return supply.lacks_voltage
 
 
 def _check_order(spec: SupplySpec, context: ElementContext) -> None:
@@ -250,7 +259,7 @@ SUPPLY = with_terminals(
             Occasion.ALWAYS,
             "A power supply has less voltage; its controllers are off while that is not enough.",
             own=(parameter("volts", "V that it has at most.", 0.0, 1000.0, default=12.0),),
-            effect=ElementEffect(_sag),
+            effect=ElementEffect(_sag, _lacks_voltage),
             faulty=FaultCategory.POWER,
         ),
     ),

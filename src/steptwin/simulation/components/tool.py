@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, mm_per_unit, moved_by, summed_travel
+from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, mm_per_unit, moved_by, moves, summed_travel
 from steptwin.simulation.components.coordinate import GRID_PER_UNIT, Coordinate, Pulled, pulled_to
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementcontext import ElementContext
@@ -128,6 +128,12 @@ class Tool(Stateful):
         scheduler.notify(self.spec.name)
         return self._pulled[n].behind
 
+    def is_left_behind(self, belt: str, now: Nanos) -> bool:
+        """Whether a belt slips, and its axis moves or is elsewhere by now."""
+        n = BELTS.index(belt)
+        axis, its = self.axes[n], self._pulled[n]
+        return its.held is not None and (moves(axis, now) or pulled_to(axis, Pulled(behind=its.behind), now) != its.held)
+
     def copy_state(self) -> Plain:
         return tuple(self._pulled)
 
@@ -228,6 +234,10 @@ def _slip(active: ActiveFault, tool: Tool, begins: bool, now: Nanos) -> str:
     return TOOL_BELT_GRIPS(belt=belt, name=name, behind=behind, unit=tool.unit)
 
 
+def _is_left_behind(active: ActiveFault, tool: Tool, now: Nanos) -> bool:
+    return tool.is_left_behind(str(active.fault.get("belt")), now)
+
+
 def _moves(spec: ToolSpec, tool: Tool) -> Sequence[Movement]:
     mm = float(mm_per_unit(tool.axes[0]))
     blocks = tuple(axis.mechanism.block for axis in tool.axes)
@@ -253,7 +263,7 @@ TOOL: Element[ToolSpec, Tool] = Element(
             Occasion.ALWAYS,
             "A belt of a tool stands while its axis turns; afterwards it goes on from where it stands.",
             own=(Parameter("belt", ParameterForm.WORD, "Whose belt.", words=BELTS, default=BELTS[0]),),
-            effect=ElementEffect(_slip),
+            effect=ElementEffect(_slip, _is_left_behind),
         ),
     ),
 )

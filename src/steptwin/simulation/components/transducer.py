@@ -72,6 +72,10 @@ class Transducer(Stateful):
             return LOWEST_V
         return min(max(self._level.value + self.offset, LOWEST_V), HIGHEST_V)
 
+    def own_volts(self) -> float:
+        """The voltage that it would give without faults."""
+        return min(max(self._level.value, LOWEST_V), HIGHEST_V)
+
     def update(self, now: Nanos) -> None:
         self._level.update(now)
         self._scheduler.drive(PinName(*self._spec.target), self.volts(now))

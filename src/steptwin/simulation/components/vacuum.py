@@ -138,6 +138,10 @@ class Vacuum(Carrier):
             self.take(now)  # what closes it after it lost another one that it did not carry
         self.block.put(HELD, float(self._is_held))
 
+    def leaks_out(self, now: Nanos) -> bool:
+        """Whether only a leak keeps it from a vacuum."""
+        return self.leaks and self.block.is_on(EJECTOR) and self.is_occupied(now)
+
     def deadline(self) -> Nanos | None:
         passing = self.passing(self.block.scheduler.now) if self.block.is_on(EJECTOR) else None
         moments = (moment for moment in (self._due, passing) if moment is not None)
@@ -154,6 +158,10 @@ IS_TIGHT_AGAIN = Message("simulation.is-tight-again", "{name} is tight again")
 def _leak(active: ActiveFault, vacuum: Vacuum, begins: bool, now: Nanos) -> str:
     vacuum.leaks = begins
     return (LEAKS if begins else IS_TIGHT_AGAIN)(name=vacuum.block.name)
+
+
+def _loses(active: ActiveFault, vacuum: Vacuum, now: Nanos) -> bool:
+    return vacuum.leaks_out(now)
 
 
 def _signals(vacuum: Vacuum) -> Mapping[str, SignalOf]:
@@ -176,6 +184,12 @@ VACUUM = with_terminals(
     signals=_signals,
     faults=(
         *STUCK,
-        FaultKind("leak", Layer.ELEMENT, Occasion.ALWAYS, "A suction cup does not hold a vacuum.", effect=ElementEffect(_leak)),
+        FaultKind(
+            "leak",
+            Layer.ELEMENT,
+            Occasion.ALWAYS,
+            "A suction cup does not hold a vacuum.",
+            effect=ElementEffect(_leak, _loses),
+        ),
     ),
 )

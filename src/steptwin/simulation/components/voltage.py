@@ -20,6 +20,14 @@ class VoltageOutput(Protocol):
     @property
     def name(self) -> str: ...
 
+    def volts(self, now: Nanos) -> float:
+        """The voltage that it gives."""
+        ...
+
+    def own_volts(self) -> float:
+        """The voltage that it would give without faults."""
+        ...
+
 
 WIRE_IS_BROKEN = Message("simulation.wire-is-broken", "the wire of {name} is broken")
 WIRE_IS_WHOLE = Message("simulation.wire-is-whole", "the wire of {name} is whole again")
@@ -39,12 +47,16 @@ def _drift(active: ActiveFault, output: VoltageOutput, begins: bool, now: Nanos)
     return READS_WRONG(name=output.name, offset=output.offset) if begins else READS_RIGHT(name=output.name)
 
 
+def _is_wrong(active: ActiveFault, output: VoltageOutput, now: Nanos) -> bool:
+    return output.volts(now) != output.own_volts()
+
+
 BROKEN_WIRE = FaultKind(
     "broken-wire",
     Layer.ELEMENT,
     Occasion.ALWAYS,
     "The wire of an analog sensor is broken: 0 V.",
-    effect=ElementEffect(_break),
+    effect=ElementEffect(_break, _is_wrong),
     faulty=FaultCategory.SENSOR,
 )
 DRIFT = FaultKind(
@@ -53,7 +65,7 @@ DRIFT = FaultKind(
     Occasion.ALWAYS,
     "An analog sensor reads too high or too low.",
     own=(number("volts", "Too high; negative: too low.", -10.0, 10.0, default=0.5),),
-    effect=ElementEffect(_drift),
+    effect=ElementEffect(_drift, _is_wrong),
     faulty=FaultCategory.SENSOR,
     tried=({"volts": 0.5}, {"volts": -0.5}),
 )

@@ -189,7 +189,8 @@ class _Builder:
                 self.objects.frames.add(named.name, partial(element.moves, named, found))
             if element.faults:
                 scheduler = self._scheduler_of(element, named)
-                failing = FaultyElement(scheduler, named.name, self.objects.faults, element.faults, found)
+                faults, signals = self.objects.faults, partial(element.signals or dict, found)
+                failing = FaultyElement(scheduler, named.name, faults, element.faults, found, signals)
                 self.objects.faults.elements[named.name] = failing
                 scheduler.add_part(failing, ())
         return found

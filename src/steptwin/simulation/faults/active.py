@@ -23,7 +23,7 @@ class ActiveFault(Stateful):
     """An active fault, its counters and its random stream. Times count from ``since``."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("_count", "_every", "_from", "_nth", "_probability", "_until", "fault", "name", "since")
-    __slots__ = (*FIXED, "chance", "due", "left", "seen", "struck", "worn")
+    __slots__ = (*FIXED, "chance", "doing", "due", "left", "seen", "struck", "worn")
 
     def __init__(self, fault: Fault, name: str, seed: int, since: Nanos) -> None:
         self.fault = fault
@@ -42,6 +42,8 @@ class ActiveFault(Stateful):
         """Number of occurrences."""
         self.left = 0
         """Bytes still to be lost."""
+        self.doing: object = None
+        """What it does at present, while it lasts; nothing if that is false."""
         self.due: Nanos | None = self._moment("at_s")
         """The next moment of a timed fault."""
         self.worn: list[int] = []
@@ -129,6 +131,20 @@ class HeldLevel(NamedTuple):
         return HELD_AT(level=self.level, fault=self.fault)
 
 
+class FaultActs(NamedTuple):
+    """How often a fault has made a difference, with the first and the last moment."""
+
+    count: int
+    first: Nanos
+    last: Nanos
+
+
+class ActSubscriber(Protocol):
+    """It is called when a fault acts; with ``begins`` False, when a lasting one no longer makes a difference."""
+
+    def __call__(self, active: ActiveFault, now: Nanos, *, begins: bool) -> object: ...
+
+
 FaultReporter: TypeAlias = Callable[[ActiveFault, str], None]
 """Reports that a fault has happened, and what it did."""
 
@@ -150,6 +166,14 @@ class Failing(Protocol):
 
     def held(self) -> Iterator[tuple[str, HeldLevel]]:
         """The pins or terminals that faults hold."""
+        ...
+
+
+class FailingElement(Failing, Protocol):
+    """An element with faults."""
+
+    def watch(self) -> None:
+        """The set of faults has changed: watch the element while it has one."""
         ...
 
 
@@ -175,12 +199,23 @@ UNKNOWN_ELEMENT_OF_A_FAULT = Message(
 class Faults(Stateful):
     """The faults of a world. The random stream of a fault depends only on ``seed`` and its name.
 
-    ``sinks`` are called with every occurrence, as a record of kind ``fault``, and with the edges that faults cause. The set of
-    faults is not part of its state: a state is restored into the same set.
+    ``sinks`` are called with every occurrence, as a record of kind ``fault``, and with the edges that faults cause. ``acts`` has,
+    by name, how often each fault has made a difference, also of those that were removed. The set of faults is not part of its
+    state: a state is restored into the same set.
     """
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_found", "elements", "has_supplies", "link", "controllers", "ports", "seed", "sinks")
-    __slots__ = (*FIXED, "_active")
+    FIXED: ClassVar[tuple[str, ...]] = (
+        "_found",
+        "act_subscribers",
+        "controllers",
+        "elements",
+        "has_supplies",
+        "link",
+        "ports",
+        "seed",
+        "sinks",
+    )
+    __slots__ = (*FIXED, "_active", "acts")
 
     def __init__(self, seed: int = 0) -> None:
         self.seed = seed
@@ -188,9 +223,11 @@ class Faults(Stateful):
         self._found: dict[tuple[str, object], tuple[ActiveFault, ...]] = {}
         """Those of a layer, controller or element, as far as they have been asked for."""
         self.sinks: list[RecordSink] = []
+        self.acts: dict[str, FaultActs] = {}
+        self.act_subscribers: list[ActSubscriber] = []
         self.controllers: dict[str, Failing] = {}
         """Controllers prepared for faults of physics."""
-        self.elements: dict[str, Failing] = {}
+        self.elements: dict[str, FailingElement] = {}
         """Elements with faults."""
         self.link = ""
         """The link whose request is being served."""
@@ -208,6 +245,8 @@ class Faults(Stateful):
     def active(self, active: tuple[ActiveFault, ...]) -> None:
         self._active = active
         self._found.clear()
+        for element in self.elements.values():
+            element.watch()
 
     @property
     def interfere(self) -> bool:
@@ -221,7 +260,7 @@ class Faults(Stateful):
 
     def add(self, fault: Fault, now: Nanos = 0) -> ActiveFault:
         """Set a fault at ``now``. Raises `Misuse` for a name in use, or an unknown controller, pin or axis."""
-        if fault.name and self._named(fault.name) is not None:
+        if fault.name and self.find(fault.name) is not None:
             raise Misuse(FAULT_IS_SET_ALREADY(name=fault.name))
         active = ActiveFault(fault, fault.name or self._free_name(fault.kind.name), self.seed, now)
         failing = self.check(fault)
@@ -250,11 +289,12 @@ class Faults(Stateful):
         failing = self._failing(active.fault)
         if failing is not None:
             failing.end(active, now)
+        self.does(active, None, now)
         self._changed()
 
     def called(self, name: str) -> ActiveFault:
         """The active fault called ``name``. Raises `Misuse` with the existing names."""
-        active = self._named(name)
+        active = self.find(name)
         if active is None:
             raise Misuse(UNKNOWN_FAULT(name=name, names=[a.name for a in self.active] or NONE()))
         return active
@@ -263,12 +303,13 @@ class Faults(Stateful):
         for active in self.active:
             self.remove(active.name, now)
 
-    def _named(self, name: str) -> ActiveFault | None:
+    def find(self, name: str) -> ActiveFault | None:
+        """The active fault called ``name``; None if there is none."""
         return next((active for active in self.active if active.name == name), None)
 
     def _free_name(self, kind: str) -> str:
         name, number = kind, 1
-        while self._named(name) is not None:
+        while self.find(name) is not None:
             number += 1
             name = f"{kind}-{number}"
         return name
@@ -330,6 +371,24 @@ class Faults(Stateful):
     def _changed(self) -> None:
         for port in list(self.ports):
             port.choose()
+
+    def act(self, active: ActiveFault, now: Nanos) -> None:
+        """Count that a fault makes a difference."""
+        before = self.acts.get(active.name)
+        self.acts[active.name] = FaultActs(1, now, now) if before is None else FaultActs(before.count + 1, before.first, now)
+        for subscriber in self.act_subscribers:
+            subscriber(active, now, begins=True)
+
+    def does(self, active: ActiveFault, doing: object, now: Nanos) -> None:
+        """Note what a lasting fault does; false: nothing. It acts when that becomes something else."""
+        if doing == active.doing:
+            return
+        was, active.doing = active.doing, doing
+        if doing:
+            self.act(active, now)
+        elif was:
+            for subscriber in self.act_subscribers:
+                subscriber(active, now, begins=False)
 
     def report(self, active: ActiveFault, place: str, now: Nanos, text: str) -> None:
         """Report an occurrence at a controller or link."""

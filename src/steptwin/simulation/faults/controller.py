@@ -8,6 +8,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 from steptwin.controller import Nanos, PinEdge
 from steptwin.errors import Misuse
 from steptwin.messages import Message, text_of
+from steptwin.motion.divisions import profile_of
 from steptwin.motioncontroller import Drive, MotionController
 from steptwin.simulation.faults.active import ANOTHER_LASTS, ActiveFault, Faults, HeldLevel
 from steptwin.simulation.faults.answers import NEVER_SENT
@@ -170,7 +171,11 @@ class FaultyController(Stateful):
 
     def _collect_edges(self) -> None:
         """Take the controller's edges, but for those of outputs that faults hold."""
-        self._edges += [edge for edge in self.inner.take_edges() if edge.pin not in self.held_outputs]
+        for edge in self.inner.take_edges():
+            if edge.pin in self.held_outputs:
+                self._note_held(edge.pin, edge.value, edge.time)
+            else:
+                self._edges.append(edge)
 
     def pins(self) -> Mapping[str, float]:
         """Levels at the controller, with the faults."""
@@ -206,14 +211,15 @@ class FaultyController(Stateful):
             self.inner.advance(due)
             self._run(due)
         self.inner.advance(now)
+        self._note_blocked()
 
     def advance_to_change(self, until: Nanos) -> Nanos:
         """See `steptwin.motioncontroller.MotionController.advance_to_change`."""
         own, due = self._own(), self.inner.deadline()
-        if own is None or own > until:
-            return self.inner.advance_to_change(until)
-        if due is not None and due < own:
-            return self.inner.advance_to_change(own - 1)
+        if own is None or own > until or (due is not None and due < own):
+            moment = self.inner.advance_to_change(until if own is None else min(until, own - 1))
+            self._note_blocked()
+            return moment
         self.advance(own)
         return own
 
@@ -251,6 +257,8 @@ class FaultyController(Stateful):
             kind.effect.act(active, self, now)
             return
         if active.strikes(now):
+            if not kind.effect.lasts:
+                self._faults.act(active, now)
             kind.effect.act(active, self, now)
         active.step()
 
@@ -258,6 +266,17 @@ class FaultyController(Stateful):
         """Block the shaft of an axis (from 1)."""
         self.body.shafts[axis - 1].block(True, now)
         self._released.append((until, active.name, axis))
+        self._note_blocked()
+
+    def _note_blocked(self) -> None:
+        """Note the motions that blocked shafts do not follow."""
+        for until, name, axis in self._released:
+            active, drive = self._faults.find(name), self.inner.axes[axis - 1]
+            if active is None:
+                continue  # it is being removed
+            since, profile = until - active.ns("for_s"), profile_of(drive.plan)
+            is_moving = profile.end is None or (profile.end > since and profile.end > profile.start)
+            self._faults.does(active, (drive.revision,) if is_moving else None, max(since, profile.start))
 
     def drop_supply(self, now: Nanos, until: Nanos) -> None:
         """Switch the supply off until a moment, or longer if it is off already."""
@@ -278,8 +297,11 @@ class FaultyController(Stateful):
         self.changed()
 
     def _let_go(self, released: tuple[Nanos, str, int], now: Nanos) -> None:
+        self._note_blocked()
         self._released.remove(released)
-        axis = released[2]
+        active, axis = self._faults.find(released[1]), released[2]
+        if active is not None:
+            self._faults.does(active, None, now)
         if not any(other == axis for *_, other in self._released):
             self.body.shafts[axis - 1].block(False, now)
 
@@ -375,12 +397,14 @@ class FaultyController(Stateful):
         self.body.check_pin(name, value)
         self._outer[name] = value
         if name in self._stuck:
+            self._note_held(name, value, now)
             return
         self._bounces = [b for b in self._bounces if b[1] != name]
         self.inner.set_pin(name, value, now)
         if value != before:
             for active in self._mine():
                 if active.fault.kind.occasion is Occasion.CHANGE and self.pin_of(active.fault) == name and active.strikes(now):
+                    self._faults.act(active, now)
                     active.fault.kind.effect.act(active, self, name, (before, value), now)
 
     def bounce(self, changes: list[tuple[Nanos, str, float]]) -> None:
@@ -402,6 +426,7 @@ class FaultyController(Stateful):
             active.due = active.end
         else:
             active.due = None
+            self._faults.does(active, None, now)
             self._let_act(pin, others, now)
             self.report(active, now, ANOTHER_LASTS(other=others[-1].fault) if others else PIN_IS_FREE(pin=pin))
 
@@ -419,12 +444,23 @@ class FaultyController(Stateful):
 
     def _hold(self, pin: str, level: float, now: Nanos) -> None:
         """Give a pin a level that it keeps."""
+        own = level
         if pin in self.body.outputs:
             self._collect_edges()
-            before, self.held_outputs[pin] = self.pin(pin), level
+            own, before, self.held_outputs[pin] = self.inner.pin(pin), self.pin(pin), level
             self._edge(pin, before, now)
         if pin in self._outer:
             self._put(pin, level, now)
+            own = self._outer[pin]
+        self._note_held(pin, own, now)
+
+    def _note_held(self, pin: str, own: float, now: Nanos) -> None:
+        """Note whether faults that hold a pin give it another level than its own; only the newest does."""
+        holding = self._stuck.get(pin, ())
+        for held in holding:
+            active = self._faults.find(held.fault)
+            if active is not None:
+                self._faults.does(active, held is holding[-1] and held.level != own, now)
 
     def _free(self, pin: str, now: Nanos) -> None:
         """Let a pin have its own level again."""
@@ -448,6 +484,7 @@ class FaultyController(Stateful):
             active.struck = 1
             active.due = active.end
             self.report(active, now, SLAVE_IS_MUTE())
+            self._faults.act(active, now)
         else:
             self._mute.remove(active.name)
             active.due = None
@@ -464,6 +501,7 @@ class FaultyController(Stateful):
         for active in self._faults.refusing():
             if active.matches(unit, pdu) and active.is_on(self._faults.link, line) and active.strikes(now):
                 code, text = active.fault.kind.effect.refusal(active)
+                self._faults.act(active, now)
                 self.report(active, now, REFUSED_REQUEST(what=text_of(text), bytes=pdu.hex(" ")))
                 return exception_pdu(function, code)
         return None
@@ -474,7 +512,10 @@ class FaultyController(Stateful):
         saves = [active for active in self._mine() if active.fault.kind.occasion is Occasion.SAVE]
         for active in saves:
             if active.strikes(now):
+                before = bytes(kept)
                 active.fault.kind.effect.act(active, self, old, kept, now)
+                if kept != before or self._cut is not None:
+                    self._faults.act(active, now)
         return bytes(kept)
 
     def after_request(self, now: Nanos) -> bool:

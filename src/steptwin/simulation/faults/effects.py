@@ -69,12 +69,15 @@ class RequestEffect:
 
 @dataclass(frozen=True, slots=True)
 class MomentEffect:
+    """``lasts``: it acts while it lasts, which `FaultyController` notes; others act at their moment."""
+
     act: Callable[[ActiveFault, FaultyController, Nanos], None]
+    lasts: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class WindowEffect:
-    """``act`` is called at the beginning and at the end."""
+    """``act`` is called at the beginning and at the end; what it calls notes when it makes a difference (`Faults.does`)."""
 
     act: Callable[[ActiveFault, FaultyController, Nanos], None]
 
@@ -98,6 +101,9 @@ class ElementEffect:
     """``act`` takes what was built of the element, and whether the fault begins or ends; gives what it did, in words."""
 
     act: Callable[[ActiveFault, Any, bool, Nanos], str]
+    acts: Callable[[ActiveFault, Any, Nanos], object]
+    """Takes what was built, and gives what the fault does there at the moment, while it lasts; false if the element would be the
+    same without it. It acts again when that changes."""
     holds: str = ""
     """The parameter with the terminal that it holds at its ``level``; empty: none."""
 

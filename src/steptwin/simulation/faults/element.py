@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, ClassVar
 
 from steptwin.controller import Nanos
@@ -10,6 +10,7 @@ from steptwin.errors import Misuse
 from steptwin.messages import NONE, Message
 from steptwin.simulation.faults.active import ANOTHER_LASTS, ActiveFault, Faults, HeldLevel
 from steptwin.simulation.faults.table import Fault, FaultKind
+from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.state import Stateful
 
@@ -21,11 +22,21 @@ FAULT_OF_ANOTHER_ELEMENT = Message(
 class FaultyElement(Stateful):
     """A part of the scheduler beside an element, which applies the effects of its faults to the built object."""
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_faults", "_scheduler", "_kinds", "_part", "name")
+    FIXED: ClassVar[tuple[str, ...]] = ("_faults", "_is_watching", "_scheduler", "_kinds", "_part", "_signals", "name")
     __slots__ = (*FIXED, "_lasting")
 
-    def __init__(self, scheduler: Scheduler, name: str, faults: Faults, kinds: Iterable[FaultKind], part: Any) -> None:
+    def __init__(
+        self,
+        scheduler: Scheduler,
+        name: str,
+        faults: Faults,
+        kinds: Iterable[FaultKind],
+        part: Any,
+        signals: Callable[[], Mapping[str, SignalOf]],
+    ) -> None:
         self.name = name
+        self._signals = signals
+        self._is_watching = False
         self._scheduler = scheduler
         self._faults = faults
         self._kinds = tuple(kinds)
@@ -78,6 +89,28 @@ class FaultyElement(Stateful):
             text = ANOTHER_LASTS(other=other.name)
         self._scheduler.notify()  # the part may have been updated already at this moment
         self._faults.report(active, self.name, now, text)
+
+    # ------------------------------------------------------------------ subscriber of its scheduler, while it has faults
+
+    def watch(self) -> None:
+        """As `FailingElement.watch`."""
+        watches = bool(self._faults.of_element(self.name))
+        if watches and not self._is_watching:
+            sources = {source for signal in self._signals().values() for source in signal.sources}
+            self._scheduler.subscribe(self, sorted(one.name for one in sources if one.scheduler is self._scheduler))
+        elif self._is_watching and not watches:
+            self._scheduler.unsubscribe(self)
+        self._is_watching = watches
+
+    def leave(self, moment: Nanos) -> None:
+        """It need not know."""
+
+    def look(self, now: Nanos) -> None:
+        """Note what its faults do."""
+        begun = self._begun()
+        for active in self._faults.of_element(self.name):
+            is_newest = active in begun and self._newest_like(active) is active
+            self._faults.does(active, active.fault.kind.effect.acts(active, self._part, now) if is_newest else None, now)
 
     def _begun(self) -> list[ActiveFault]:
         """Those that have begun, in this order."""

@@ -126,7 +126,7 @@ PHYSICS = (
         Occasion.MOMENT,
         "The shaft is blocked: pulses go on and turn nothing.",
         (AXIS, number("for_s", "How long.", 1e-6, LONGEST_S, default=1.0)),
-        effect=MomentEffect(_stall),
+        effect=MomentEffect(_stall, lasts=True),
     ),
     FaultKind(
         "lost-steps",

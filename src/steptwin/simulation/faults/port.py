@@ -239,6 +239,7 @@ class FaultyPort(Stateful):
         place = self.line_name or self.link
 
         def report(active: ActiveFault, text: str) -> None:
+            self._faults.act(active, self._now)
             self._faults.report(active, place, self._now, WHERE(place=words, what=text_of(text)) if words else text)
 
         return report

@@ -133,10 +133,15 @@ class AnalogSource(Stateful):
 
     def volts(self, now: Nanos) -> float:
         """The voltage that it gives."""
-        if self.is_broken:
-            return LOWEST_V
-        volts = min(max(self._plain + self.offset, LOWEST_V), HIGHEST_V)
-        return int(volts / RESOLUTION_V + 0.5) * RESOLUTION_V
+        return LOWEST_V if self.is_broken else self._shown(self._plain + self.offset)
+
+    def own_volts(self) -> float:
+        """The voltage that it would give without faults."""
+        return self._shown(self._plain)
+
+    @staticmethod
+    def _shown(volts: float) -> float:
+        return int(min(max(volts, LOWEST_V), HIGHEST_V) / RESOLUTION_V + 0.5) * RESOLUTION_V
 
     def update(self, now: Nanos) -> None:
         if self._due is not None and self._due <= now:

@@ -98,6 +98,10 @@ class TerminalBlock(Stateful):
         else:
             self.levels[terminal] = shown
 
+    def is_altered(self, terminal: str) -> bool:
+        """Whether a terminal is held at another level than it would have."""
+        return self._held.get(terminal, own := self._wanted.get(terminal, 0.0)) != own
+
     def _show(self, output: str, level: float) -> None:
         if level == self.levels[output] and output in self._recorded:
             return
