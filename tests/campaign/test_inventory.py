@@ -57,6 +57,30 @@ def test_only_axes_that_move_something() -> None:
     assert [one.text for one in of("labeller/labeller.toml") if one.fault.kind.name == "stall"] == ["stall machine=cell axis=1"]
 
 
+def test_steps_are_lost_by_the_period_of_each_motor() -> None:
+    """Four full steps, of which a motor loses multiples, and much."""
+    world = """
+[[mic488]]
+name = "a"
+M1 = { mot_resol = 6400 }
+[[m1486]]
+name = "b"
+[[axis]]
+name = "x"
+drive = "a.M1"
+motor = { torque = [[0, 1.0]], start_speed = 100, full_steps = 400 }
+[[axis]]
+name = "y"
+drive = "b.M1"
+pitch = 5.0
+"""
+    found = [one.text for one in possible_faults(World.from_toml(world)) if one.fault.kind.name == "lost-steps"]
+    assert found == [
+        *("lost-steps machine=a axis=1 pulses=64", "lost-steps machine=a axis=1 pulses=3200"),
+        *("lost-steps machine=b axis=1 pulses=256", "lost-steps machine=b axis=1 pulses=12800"),
+    ]
+
+
 @pytest.mark.parametrize(
     "file", ["press/press.toml", "labeller/labeller.toml", "winder/winder.toml", "pick_and_place/pick_and_place.toml"]
 )

@@ -51,7 +51,7 @@ def possible_faults(world: Simulation) -> list[PossibleFault]:
 
 def _of_kind(world: Simulation, kind: FaultKind) -> Iterator[PossibleFault]:
     for where, place in _places(world, kind):
-        for more in kind.tried:
+        for more in _tried(world, kind, where):
             given: dict[str, object] = {**where, **more}
             try:
                 fault = parse({"kind": kind.name, **given})
@@ -59,6 +59,12 @@ def _of_kind(world: Simulation, kind: FaultKind) -> Iterator[PossibleFault]:
             except Misuse:
                 continue  # impossible at this place
             yield PossibleFault(_part(world, kind, where), place, _mode(kind, more, where), fault)
+
+
+def _tried(world: Simulation, kind: FaultKind, where: Mapping[str, FaultValue]) -> Iterable[Mapping[str, FaultValue]]:
+    if not callable(kind.tried):
+        return kind.tried
+    return kind.tried(world.fault_setup.prepare_for_faults(str(where["machine"])), int(where["axis"]))
 
 
 def _mode(kind: FaultKind, more: Mapping[str, FaultValue], where: dict[str, FaultValue]) -> str:

@@ -116,6 +116,19 @@ def test_lost_steps_are_made_good_by_the_encoder() -> None:
     assert [record.subject for record in world.trace.faults("m")] == ["lost-steps"]
 
 
+@pytest.mark.parametrize("is_inverted", [False, True])
+@pytest.mark.parametrize("to", [40.0, -40.0])
+def test_a_rotor_that_loses_steps_is_behind_in_the_direction_of_its_motion(to: float, is_inverted: bool) -> None:
+    """By four full steps, 64 pulses of 3200, 0.1 mm: it stays below where it goes up, and above where it goes down."""
+    text = dedent(AXIS).format(config="").replace("start = 20.0", f"start = 50.0\ninverted = {str(is_inverted).lower()}")
+    world = World.from_toml(text + '[[fault]]\nkind = "lost-steps"\nmachine = "m"\nat_s = 1.0\n')
+    world.mic488["m"].axis[1].enable()
+    world.mic488["m"].axis[1].move_to(to)
+    world.run(until="m.M1.status == 4", for_=20)
+    up = 1.0 if (to > 0.0) is not is_inverted else -1.0
+    assert world.axis["x"].position == pytest.approx(50.0 + up * 39.9, abs=0.001)
+
+
 def test_faults_of_the_line_are_in_a_snapshot_and_in_the_digest() -> None:
     request = bytes.fromhex("01 03 27 24 00 02 8e b4")
     fault = '[[fault]]\nkind = "crc"\nunit = 1\nprobability = 0.5\n[[fault]]\nkind = "delay"\nfor_ms = 300.0\nnth = 2\n'

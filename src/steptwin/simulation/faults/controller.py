@@ -23,12 +23,17 @@ from steptwin.wire.pdu import exception_pdu
 class AxisLoad(Protocol):
     """The load of an axis, for faults. All methods take the moment."""
 
+    @property
+    def period_p(self) -> int:
+        """Pulses of an electrical period of the motor, four full steps: a rotor that loses steps loses multiples of it."""
+        ...
+
     def block(self, blocked: bool, now: Nanos) -> None:
         """Block the shaft, so that pulses are lost, or release it."""
         ...
 
     def lose(self, pulses: int, now: Nanos) -> None:
-        """Move the shaft ``pulses`` behind the drive (negative: ahead)."""
+        """Move the shaft ``pulses`` behind a drive with positive pulses (negative: ahead)."""
         ...
 
     def slip(self, counts: int, now: Nanos) -> None:
@@ -307,6 +312,11 @@ class FaultyController(Stateful):
 
     def _mine(self) -> tuple[ActiveFault, ...]:
         return self._faults.of(self.name)
+
+    def lose(self, axis: int, pulses: int, now: Nanos) -> None:
+        """Let the shaft of an axis (from 1) fall ``pulses`` behind in the direction of its pulses, at rest the positive one."""
+        velocity = profile_of(self.axes[axis - 1].plan).velocity(now)
+        self.body.shafts[axis - 1].lose(-pulses if velocity < 0.0 else pulses, now)
 
     def report(self, active: ActiveFault, now: Nanos, text: str) -> None:
         self._faults.report(active, self.name, now, text)

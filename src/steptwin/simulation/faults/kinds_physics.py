@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
@@ -17,6 +19,7 @@ from steptwin.simulation.faults.table import (
     Fault,
     FaultCategory,
     FaultKind,
+    FaultValue,
     Layer,
     Need,
     Occasion,
@@ -42,9 +45,20 @@ LOSES_PULSES = Message("simulation.axis-loses-pulses", "M{axis} loses {pulses} p
 
 
 def _lose_steps(active: ActiveFault, controller: FaultyController, now: Nanos) -> None:
-    axis, pulses = _axis(active), int(active.fault.number("pulses"))
+    axis, given = _axis(active), active.fault.whole("pulses")
+    pulses = controller.body.shafts[axis - 1].period_p if given is None else given
     controller.report(active, now, LOSES_PULSES(axis=axis, pulses=pulses))
-    controller.body.shafts[axis - 1].lose(pulses, now)
+    controller.lose(axis, pulses, now)
+
+
+MANY_PERIODS = 50
+"""A turn of a motor of 200 full steps: what a stall that nobody notices costs at least."""
+
+
+def _losses(controller: FaultyController, axis: int) -> tuple[Mapping[str, FaultValue], ...]:
+    """The least that a rotor loses, and much."""
+    period = controller.body.shafts[axis - 1].period_p
+    return {"pulses": period}, {"pulses": MANY_PERIODS * period}
 
 
 ENCODER_SLIPS = Message("simulation.encoder-slips", "the encoder of M{axis} slips by {counts} counts")
@@ -132,9 +146,10 @@ PHYSICS = (
         "lost-steps",
         Layer.PHYSICS,
         Occasion.MOMENT,
-        "The shaft falls behind the pulses and stays there.",
-        (AXIS, whole("pulses", "By how many pulses; negative: ahead.", -(10**9), 10**9, default=4)),
+        "The shaft falls behind the pulses, in their direction, and stays there.",
+        (AXIS, whole("pulses", "By how many pulses; negative: ahead.", -(10**9), 10**9, otherwise="four full steps")),
         effect=MomentEffect(_lose_steps),
+        tried=_losses,
     ),
     FaultKind(
         "slip",

@@ -150,8 +150,10 @@ class FaultKind:
     check: Callable[[Any, Fault], None] | None = None
     faulty: FaultCategory | None = None
     """Category of what is faulty; without it the line, or an actuator for faults of physics and elements."""
-    tried: tuple[Mapping[str, FaultValue], ...] = field(default=({},), hash=False)
-    """Parameters with which campaigns try it."""
+    tried: tuple[Mapping[str, FaultValue], ...] | Callable[[Any, int], tuple[Mapping[str, FaultValue], ...]] = field(
+        default=({},), hash=False
+    )
+    """Parameters with which campaigns try it; a function takes the `FaultyController` and the axis."""
 
     @property
     def part(self) -> FaultCategory:

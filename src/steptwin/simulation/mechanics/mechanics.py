@@ -520,10 +520,16 @@ class Mechanism(Stateful):
         self._renew(self._drive, now, state._replace(stalled=stalled))
         self._scheduler.notify(self.controller)
 
+    @property
+    def period_p(self) -> int:
+        """Pulses of an electrical period of the motor."""
+        return self.build.period_p
+
     def lose(self, pulses: int, now: Nanos) -> None:
-        """Move the rotor ``pulses`` behind the field (negative: ahead), within the hard stops."""
+        """Move the rotor ``pulses`` of the drive behind the field, where that goes with positive pulses (negative: ahead), within
+        the hard stops."""
         build, (rotor, load, stalled, _) = self._loaded(), self.at(now)
-        rotor -= pulses
+        rotor -= build.sign * pulses
         if build.low is not None:
             rotor = max(rotor, build.low - build.play)
         if build.high is not None:

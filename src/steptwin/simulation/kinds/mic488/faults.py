@@ -11,6 +11,7 @@ from steptwin.mic488.encoder import Coupling
 from steptwin.simulation.faults.answers import NEVER_SENT
 from steptwin.simulation.faults.controller import AxisLoad, FaultyController
 from steptwin.simulation.faults.table import FaultKind, Need
+from steptwin.simulation.mechanics.scale import FULL_STEPS
 from steptwin.wire.pdu import exception_pdu
 
 
@@ -20,6 +21,10 @@ class EncoderShaft:
     def __init__(self, device: Mic488Device, axis: int) -> None:
         self._device = device
         self._axis = axis
+
+    @property
+    def period_p(self) -> int:
+        return max(1, round(4 * self._device.axes[self._axis - 1].config.mot_resol / FULL_STEPS))
 
     def block(self, blocked: bool, now: Nanos) -> None:
         self._device.couple_encoder(self._axis, Coupling.BLOCKED if blocked else Coupling.DRIVE, now)
