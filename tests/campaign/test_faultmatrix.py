@@ -158,7 +158,7 @@ def test_the_labeller_by_hand(tmp_path: Path) -> None:
     # The belt stands: no tenth product within the minute of the script.
     assert set(effects(matrix, "belt-stop element=belt")) == {"safe stop"}
     # The web slips a little in one label; the next mark makes it good.
-    assert set(effects(matrix, "lost-steps machine=cell axis=1")) == {"unaffected"}
+    assert set(effects(matrix, "lost-steps machine=cell axis=1 pulses=64")) == {"unaffected"}
     assert {one.fault.kind.name for one in matrix.left_out} >= {"power-cut", "wear", "busy"}
 
 

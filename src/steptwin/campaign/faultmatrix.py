@@ -15,7 +15,7 @@ from steptwin.campaign.case import Case, FaultAt
 from steptwin.campaign.description import CampaignDescription, MatrixRules
 from steptwin.campaign.effects import FactsWatch, FaultEffect, Judgement, RunFacts, judge, wrong_without_a_fault
 from steptwin.campaign.inventory import PossibleFault, occasions, possible_faults
-from steptwin.campaign.phases import MOST_PHASES, CyclePhase, cycle_phases
+from steptwin.campaign.phases import MOST_PHASES, CyclePhase, PhaseWatch
 from steptwin.campaign.runner import CaseRunner
 from steptwin.campaign.search.exhaustive import without_faults
 from steptwin.campaign.shrink import ADDED
@@ -131,14 +131,15 @@ def fault_matrix(
     runner, rules = CaseRunner(description), description.matrix
     nominal_case = without_faults(description)
     coverage = Coverage()
-    world, nominal = _run(runner, nominal_case, rules, coverage)
+    world = runner.begin(nominal_case, keep=True)
+    watch = PhaseWatch(world)
+    nominal = _run(runner, world, nominal_case, rules, coverage)
     (folder / CELLS).mkdir(parents=True, exist_ok=True)
     recordings.save(recordings.recording_of(world), folder / NOMINAL)
     if wrong := wrong_without_a_fault(nominal, rules):
         return FaultMatrix(description.name, (), (), (), nominal, coverage, wrong)
     made = [one.name for one in description.measures if one.value is not None]
-    begin = description.start_ns or 0
-    phases = cycle_phases(world, begin, MOST_PHASES if rules.phases is None else rules.phases)
+    phases = watch.phases(MOST_PHASES if rules.phases is None else rules.phases)
     possible = possible_faults(runner.begin(nominal_case))
     counts = occasions(runner.begin(nominal_case), possible, nominal_case.end_ns, description.until)
     tried = [one for one in possible if counts.get(one.text, 1)]
@@ -174,14 +175,13 @@ def _case(nominal: Case, possible: PossibleFault, phase: CyclePhase) -> Case:
     return replace(nominal, faults=(FaultAt(phase.middle, str(fault), ADDED),))
 
 
-def _run(runner: CaseRunner, case: Case, rules: MatrixRules, coverage: Coverage | None) -> tuple[World, RunFacts]:
-    world = runner.begin(case, keep=True)
+def _run(runner: CaseRunner, world: World, case: Case, rules: MatrixRules, coverage: Coverage | None) -> RunFacts:
     watch = FactsWatch(world, rules)
     try:
         result = runner.finish(case, world, coverage)
     except SteptwinError as error:
         result = runner.refused(case, world, error)
-    return world, watch.facts(result)
+    return watch.facts(result)
 
 
 def _run_row(
@@ -191,7 +191,8 @@ def _run_row(
     runner, coverage = CaseRunner(description), Coverage()
     found: list[_CellResult] = []
     for task in tasks:
-        world, facts = _run(runner, task.case, rules, coverage)
+        world = runner.begin(task.case, keep=True)
+        facts = _run(runner, world, task.case, rules, coverage)
         name = ""
         if facts.result.error is None:
             name = f"{CELLS}/{task.name}.json"

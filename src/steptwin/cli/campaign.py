@@ -99,7 +99,7 @@ def run(
 def faults(
     file: File,
     jobs: Annotated[int | None, typer.Option(help="Number of processes. Default: one for each processor.")] = None,
-    phases: Annotated[int | None, typer.Option(help="Largest number of phases. Default: that of the file, or 12.")] = None,
+    phases: Annotated[int | None, typer.Option(help="Largest number of phases. Default: that of the file, or 16.")] = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", metavar="DIR", help="Folder for the table and the recordings. Default: FILE with .faults."),
