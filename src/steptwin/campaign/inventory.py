@@ -64,7 +64,7 @@ def _of_kind(world: Simulation, kind: FaultKind) -> Iterator[PossibleFault]:
 def _tried(world: Simulation, kind: FaultKind, where: Mapping[str, FaultValue]) -> Iterable[Mapping[str, FaultValue]]:
     if not callable(kind.tried):
         return kind.tried
-    return kind.tried(world.fault_setup.prepare_for_faults(str(where["machine"])), int(where["axis"]))
+    return kind.tried(world.fault_setup.prepare_for_faults(str(where["machine"])), int(str(where["axis"])))
 
 
 def _mode(kind: FaultKind, more: Mapping[str, FaultValue], where: dict[str, FaultValue]) -> str:
