@@ -150,7 +150,13 @@ def test_a_thing_is_selected_in_the_picture_or_in_the_list(studio: Studio) -> No
     card = page.get_by_role("region", name="lift, cylinder")
     expect(card).to_be_visible()
     expect(page.get_by_role("list", name="Wiring of lift")).to_contain_text("table.OUT1 → lift.extend")
-    page.get_by_label("Selected").select_option("x")
+    page.get_by_text("Set a fault", exact=True).click()
+    page.get_by_label("Kind of fault").select_option("jam")
+    button(page, "Set fault").click()
+    expect(page.get_by_label("Faults of lift")).to_contain_text("jam element=lift")
+    page.get_by_label("Faults of lift").get_by_role("button").click()
+    expect(page.get_by_label("Faults of lift")).to_have_count(0)
+    button(page, "x").click()  # which carries it
     expect(page.get_by_label("x place")).to_have_text("0.00")
     expect(card).to_have_count(0)
     assert serious(page) == []

@@ -103,7 +103,7 @@ def _element(world: Simulation, kind: str, name: str) -> ElementDescription:
 def _scene(world: Simulation) -> SceneDescription:
     frames, elements = world.objects.frames, world.spec.elements
     return SceneDescription(
-        tuple(_frame(name, one) for name, one in frames.items()),
+        tuple(_frame(world, name, one) for name, one in frames.items()),
         tuple(BodyDescription(one.name, one.size, one.diameter, one.height, one.color, one.when) for one in elements.of(BODY)),
         tuple(CupDescription(one.name, one.diameter) for one in elements.of(VACUUM) if one.name in frames),
         tuple(NestDescription(one.name, one.cells, one.pitch, one.cell or one.pitch) for one in elements.of(NEST)),
@@ -115,11 +115,12 @@ def _scene(world: Simulation) -> SceneDescription:
     )
 
 
-def _frame(name: str, mounted: Mounted) -> FrameDescription:
+def _frame(world: Simulation, name: str, mounted: Mounted) -> FrameDescription:
     spec, place = mounted.spec, mounted.place
     joints = tuple(JointDescription(f"{name}.{one.signal}", str(one.along), one.turns, one.per_unit) for one in mounted.movements)
     along = str(spec.towards()) if isinstance(spec, MoverSpec) and not joints else None
-    return FrameDescription(name, str(spec.path[0]), place.on, _mm(place.origin), along, joints)
+    written = world.spec.text.place(spec.path)
+    return FrameDescription(name, str(spec.path[0]), place.on, _mm(place.origin), along, joints, *written)
 
 
 def _mm(vector: Vector) -> Point:

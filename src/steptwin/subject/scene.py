@@ -28,6 +28,8 @@ class FrameDescription:
     at: Annotated[Point, "Its origin there, while its joints are at 0 [mm]"]
     along: Annotated[str | None, "Direction of an element that moves workpieces, not what is on it"]
     joints: tuple[JointDescription, ...]
+    line: Annotated[int, "Where its table begins in the description"]
+    file: Annotated[str | None, "Of that line; none: the description itself"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -261,11 +261,16 @@ class TomlText:
 
     def where(self, path: Path) -> str:
         """The line of a value, or of what holds it: ``line 12``, of another text with its name."""
+        line, name = self.place(path)
+        return f"line {line}" if name is None else f"line {line} of {name}"
+
+    def place(self, path: Path) -> tuple[int, str | None]:
+        """The line (from 1) of a value, or of what holds it, and the name of the text where that is another one."""
         adopted = self._adopted.get(path[:2])
         if adopted is None:
-            return f"line {self.line(path)}"
-        found = adopted.text.where((*adopted.path, *path[2:]))
-        return found if " of " in found else f"{found} of {adopted.text.source.name}"
+            return self.line(path), None
+        line, name = adopted.text.place((*adopted.path, *path[2:]))
+        return line, name or adopted.text.source.name
 
     def line(self, path: Path) -> int:
         """The line (from 1) of a value, or of what holds it."""

@@ -48,7 +48,7 @@ test("what turns is drawn turned, and stands where its carrier has it", () => {
   const turns = [{ signal: "table.position", along: "+z", turns: true, per_unit: 1 }];
   const stage = stageOf(
     [["box", [100, 0, 0], [20, 10, 30], "table"]],
-    [{ name: "table", kind: "axis", on: null, at: [10, 0, 5], along: null, joints: turns }],
+    [{ name: "table", kind: "axis", on: null, at: [10, 0, 5], along: null, joints: turns, line: 1, file: null }],
   );
   stage.poses.values[0] = 90;
   stage.update();

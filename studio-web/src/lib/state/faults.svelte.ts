@@ -1,4 +1,27 @@
+import type { Sentence } from "../protocol/types";
 import type { Studio } from "./studio.svelte";
+
+/** Of a kind of faults. */
+export interface FaultParameter {
+  name: string;
+  meaning: string;
+  permitted: string;
+  messages?: { permitted?: Sentence };
+  default: string;
+  words: string[];
+  required: boolean;
+}
+/** A kind of faults that can be set. */
+export interface FaultKind {
+  name: string;
+  layer: "bytes" | "frames" | "protocol" | "physics" | "element";
+  occasion: string;
+  meaning: string;
+  lines: string[];
+  /** Kinds of elements that it can happen to. */
+  elements: string[];
+  parameters: FaultParameter[];
+}
 
 /** A fault that is set: its name, and its text such as `stuck pin=IN3 value=1`. */
 export interface ActiveFault {
