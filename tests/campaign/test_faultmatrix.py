@@ -19,10 +19,22 @@ from steptwin.campaign.report.matrixpage import write_matrix
 from steptwin.cli.campaign import command
 from steptwin.errors import Misuse
 from steptwin.files import recording as recordings
+from steptwin.simulation.faults.active import FaultActs
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "worlds"
 SECOND = 1_000_000_000
-NOMINAL = RunFacts(CaseResult(0, (), "", 10 * SECOND, {"made": 5.0}), "done", None, False, 0, None, False, None, 0, None)
+NOMINAL = RunFacts(
+    CaseResult(0, (), "", 10 * SECOND, {"made": 5.0}),
+    "done",
+    None,
+    False,
+    0,
+    None,
+    False,
+    None,
+    0,
+    FaultActs(1, 3 * SECOND, 3 * SECOND),
+)
 
 
 def failing(name: str = "guard", at: int | None = 4 * SECOND) -> CaseResult:
@@ -33,6 +45,7 @@ def failing(name: str = "guard", at: int | None = 4 * SECOND) -> CaseResult:
     ("facts", "effect", "why", "detection", "after"),
     [
         (NOMINAL, FaultEffect.UNAFFECTED, "", "", None),
+        (replace(NOMINAL, acts=None), FaultEffect.NEVER_ACTED, "", "", None),
         (replace(NOMINAL, result=replace(NOMINAL.result, end_ns=12 * SECOND)), FaultEffect.UNAFFECTED, "2 s later", "", None),
         (replace(NOMINAL, result=failing()), FaultEffect.UNSAFE, "guard: x > 3", "", None),
         (replace(NOMINAL, result=failing("size")), FaultEffect.WRONG_PART, "size: x > 3", "", None),
@@ -102,7 +115,7 @@ def test_the_press_by_hand(press: tuple[FaultMatrix, Path]) -> None:
     # The window of half a second that never ends accepts the second hand too late, in the first test of the script.
     assert effects(matrix, "stuck-output element=window output=out level=1")[0] == "wrong part"
     # The program does not look at the relay.
-    assert set(effects(matrix, "stuck machine=cell pin=IN4 value=0")) == {"unaffected"}
+    assert set(effects(matrix, "stuck machine=cell pin=IN4 value=0")) == {"unaffected", "never acted"}
 
 
 def test_each_cell_replays(press: tuple[FaultMatrix, Path]) -> None:
@@ -206,6 +219,8 @@ def test_a_program_that_waits_for_ever_hangs(tmp_path: Path) -> None:
     matrix = fault_matrix(load_campaign(tmp_path / "campaign.toml"), tmp_path / "out")
     assert effects(matrix, "stuck machine=cell pin=IN1 value=0")[0] == "hangs"
     assert effects(matrix, "stuck machine=cell pin=IN1 value=1")[-1] == "unaffected"
+    # The punch is back: its switch is off and stays so, which says nothing of what the machine would do.
+    assert effects(matrix, "stuck machine=cell pin=IN1 value=0")[-1] == "never acted"
     (row,) = (row for row in matrix.rows if row.possible.text == "stuck machine=cell pin=IN1 value=0")
     assert row.cells[0].judgement.why == "not done; everything stands, and nothing noticed"
 

@@ -12,6 +12,7 @@ from steptwin.controller import SECOND, Nanos
 from steptwin.files.world import World
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.profile import Profile
+from steptwin.simulation.faults.active import FaultActs
 from steptwin.simulation.scheduler.trace import TraceRecord
 
 LATER = 0.01
@@ -22,6 +23,7 @@ COLLISION = "collision"
 class FaultEffect(enum.StrEnum):
     """From the best to the worst. A run has the worst one that fits, but for a safe stop, which explains why nothing was made."""
 
+    NEVER_ACTED = "never acted"
     UNAFFECTED = "unaffected"
     SAFE_STOP = "safe stop"
     HANGS = "hangs"
@@ -32,7 +34,7 @@ class FaultEffect(enum.StrEnum):
 @dataclass(frozen=True, slots=True)
 class RunFacts:
     """Facts at the end of a run. ``alarm_ns``: when the alarm was there first; ``overdue``: the first wait of a script
-    that ran out of time; ``struck_ns``: when the fault happened first."""
+    that ran out of time; ``acts``: how often the fault made a difference, and when; None: never."""
 
     result: CaseResult
     ended: str | None
@@ -43,7 +45,7 @@ class RunFacts:
     has_alarm: bool
     overdue: tuple[Nanos, str] | None
     overdues: int
-    struck_ns: Nanos | None
+    acts: FaultActs | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +88,7 @@ class FactsWatch:
             rules.alarm is not None and world.holds(world.condition(rules.alarm)),
             overdue,
             len(world.overdue),
-            next((record.time for record in world.trace.faults()), None),
+            next(iter(world.objects.faults.acts.values()), None),
         )
 
 
@@ -161,7 +163,7 @@ def _effect(facts: RunFacts, nominal: RunFacts, product: frozenset[str], made: C
     ]
     if different:
         return FaultEffect.WRONG_PART, "; ".join(different)
-    return FaultEffect.UNAFFECTED, _later(facts, nominal)
+    return FaultEffect.NEVER_ACTED if facts.acts is None else FaultEffect.UNAFFECTED, _later(facts, nominal)
 
 
 def _failed(result: CaseResult) -> dict[str, Verdict]:

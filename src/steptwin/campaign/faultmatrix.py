@@ -25,6 +25,7 @@ from steptwin.coverage.counts import Coverage
 from steptwin.errors import SteptwinError
 from steptwin.files import recording as recordings
 from steptwin.files.world import World
+from steptwin.simulation.faults.active import FaultActs
 
 LASTING = frozenset({"no-answer"})
 """Kinds that would happen now and then, but are tried from a phase on without end: a line that is broken."""
@@ -32,8 +33,8 @@ CELLS = "cells"
 NOMINAL = f"{CELLS}/without.json"
 """Recording of the run without a fault."""
 COLUMNS = (
-    "function", "part", "failure mode", "fault", "phase", "phase begins with", "at s", "effect", "why", "detection",
-    "detected after s", "session",
+    "function", "part", "failure mode", "fault", "phase", "phase begins with", "at s", "acted", "acted first at s", "effect",
+    "why", "detection", "detected after s", "session",
 )  # fmt: skip
 
 
@@ -44,7 +45,7 @@ class MatrixCell:
     phase: int
     fault: str
     judgement: Judgement
-    is_struck: bool
+    acts: FaultActs | None
     session: str
 
 
@@ -93,9 +94,10 @@ class FaultMatrix:
             for cell in row.cells:
                 phase, judged = self.phases[cell.phase], cell.judgement
                 after = None if judged.after_ns is None else judged.after_ns / SECOND
+                acted, first = (0, None) if cell.acts is None else (cell.acts.count, cell.acts.first / SECOND)
                 yield (
                     row.function, row.possible.part.value, row.possible.mode, cell.fault, phase.number, phase.name,
-                    phase.middle / SECOND, judged.effect.value, judged.why, judged.detection, after, cell.session,
+                    phase.middle / SECOND, acted, first, judged.effect.value, judged.why, judged.detection, after, cell.session,
                 )  # fmt: skip
 
     def csv(self) -> str:
@@ -157,7 +159,7 @@ def fault_matrix(
                 task.phase,
                 task.case.faults[0].fault,
                 judge(found.facts, nominal, task.case.faults[0].at_ns, rules.product, made),
-                found.facts.struck_ns is not None,
+                found.facts.acts,
                 found.session,
             )
             for task, found in zip(row, results, strict=True)

@@ -12,17 +12,22 @@ from steptwin.campaign.report.html import link, page, table
 from steptwin.controller import SECOND
 from steptwin.coverage.table import percent_text
 from steptwin.files.textfiles import write_bytes
+from steptwin.simulation.faults.active import FaultActs
+
+QUIET = (FaultEffect.NEVER_ACTED, FaultEffect.UNAFFECTED)
+"""Effects that need no line of their own."""
 
 _STYLE = """
 .matrix td.e { padding: 0; } .matrix td.e a { display: block; padding: .2rem .5rem; text-decoration: none; color: inherit; }
-.unaffected { color: var(--weak); } .safe-stop { background: color-mix(in srgb, var(--good) 22%, transparent); }
+.never-acted, .unaffected { color: var(--weak); } .safe-stop { background: color-mix(in srgb, var(--good) 22%, transparent); }
 .hangs { background: color-mix(in srgb, var(--note) 22%, transparent); }
 .wrong-part { background: color-mix(in srgb, var(--doubt) 28%, transparent); }
 .unsafe { background: color-mix(in srgb, var(--bad) 35%, transparent); font-weight: 600; }
 span.e { padding: .1rem .5rem; margin-right: .7rem; }
 """
 _MEANINGS = {
-    FaultEffect.UNAFFECTED: "the same parts were made",
+    FaultEffect.NEVER_ACTED: "it made no difference to anything, so that this says nothing of the machine",
+    FaultEffect.UNAFFECTED: "it acted, so often, and the same parts were made",
     FaultEffect.SAFE_STOP: "it stands, and an alarm or a script noticed",
     FaultEffect.HANGS: "it did not go on, and nothing noticed, or it still moves",
     FaultEffect.WRONG_PART: "it went on to its end with another result",
@@ -108,11 +113,21 @@ def _matrix(matrix: FaultMatrix) -> str:
 
 def _cell(cell: MatrixCell) -> str:
     judged = cell.judgement
-    why = judged.why or ("" if cell.is_struck else "it did not come to it")
-    title = escape(f"{cell.fault}. {why}", quote=True)
-    text = escape(judged.effect if judged.effect is not FaultEffect.UNAFFECTED else "·" if cell.is_struck else "–")
+    title = escape(". ".join(filter(None, (cell.fault, _acted(cell.acts), judged.why))), quote=True)
+    quiet = "–" if cell.acts is None else f"{cell.acts.count}×"
+    text = escape(quiet if judged.effect in QUIET else judged.effect)
     inner = f'<a href="{escape(cell.session, quote=True)}">{text}</a>' if cell.session else text
     return f'<td class="e {judged.effect.replace(" ", "-")}" title="{title}">{inner}</td>'
+
+
+def _acted(acts: FaultActs | None) -> str:
+    if acts is None:
+        return FaultEffect.NEVER_ACTED
+    return (
+        f"acted {acts.count} times, first at {acts.first / SECOND:.9g} s"
+        if acts.count > 1
+        else f"acted at {acts.first / SECOND:.9g} s"
+    )
 
 
 def _effects(matrix: FaultMatrix) -> str:
@@ -121,7 +136,7 @@ def _effects(matrix: FaultMatrix) -> str:
         (worst[cell.judgement.effect], row, cell)
         for row in matrix.rows
         for cell in row.cells
-        if cell.judgement.effect is not FaultEffect.UNAFFECTED
+        if cell.judgement.effect not in QUIET
     ]
     rows = [
         (
