@@ -33,6 +33,7 @@ NOT_RUN = {
         "needs a client of EPICS; tests/gateways/epics does it",
     ],
     "docs/getting-started.md": ["needs mbpoll; tests/peers/test_readme.py does it"],
+    "docs/index.md": ["it goes on until Ctrl-C"],
     "docs/install.md": ["a clone is what these pages are run in", "needs a package index", "needs a package index"],
     "docs/studio.md": [
         "it goes on until Ctrl-C",
@@ -42,6 +43,14 @@ NOT_RUN = {
         "needs a running studio; tests/studio/test_examples.py does it",
     ],
     "docs/testing.md": ["needs devices"],
+    "docs/tutorials/device.md": ["needs a device"],
+    "docs/tutorials/machine.md": [
+        "it goes on until Ctrl-C",
+        "it fails, as it should; tests/test_tutorials.py does it",
+        "needs the recording of the run before; tests/test_tutorials.py does it",
+        "it fails, as it should; tests/test_tutorials.py does it",
+    ],
+    "docs/tutorials/panel.md": ["needs mbpoll; tests/peers/test_readme.py does it"] * 3,
     "docs/why.md": ["it goes on until Ctrl-C"],
 }
 """Blocks that are not run here, with the reason that stands before them in the source."""

@@ -79,6 +79,31 @@ def test_the_pty_as_getting_started_polls_it(require_peer: Callable[[str], str],
     assert poll([require_peer("mbpoll"), *arguments[:-1], pty], 2) == [0.0, 0.0]
 
 
+def test_the_panel_of_the_tutorial(
+    require_peer: Callable[[str], str], serve: Callable[..., Any], connect: Callable[..., Any]
+) -> None:
+    twin = serve("--demo")
+    master = connect(twin.tcp_port)
+    master.dynamics(1, acc=2000.0, dec=2000.0, vmax=200.0)
+    mbpoll = require_peer("mbpoll")
+    real = {"5020": str(twin.tcp_port), "./mic488": str(twin.pty)}
+    read, enable, move, status, stop, serial = (
+        [mbpoll, *(real.get(word, word) for word in line[1:])] for line in commands("docs/tutorials/panel.md", "mbpoll")
+    )
+
+    def type_it(line: list[str]) -> list[float]:
+        return values(subprocess.run(line, capture_output=True, text=True, check=True).stdout)
+
+    assert type_it(read) == [0.0]
+    type_it(enable)
+    type_it(move)
+    assert type_it(status) in ([3.0], [4.0])
+    assert master.follow(1, 3)[-1][2:] == (40.0, 0.0, 4)
+    type_it(stop)
+    assert master.status(1) == 1
+    assert type_it(serial) == [40.0]
+
+
 def test_every_option_of_serve_is_in_getting_started(serve: Callable[..., Any]) -> None:
     helped = serve().command("serve", "mic488", "--help").stdout
     offered = set(re.findall(r"^  (--[a-z-]+)", helped, re.MULTILINE)) - {"--help"}

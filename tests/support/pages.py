@@ -116,7 +116,7 @@ class Reader:
             elif block.language == "python":
                 self._python(block.code)
             elif block.language == "toml":
-                self._world(block.code)
+                self._world(block.code, grows="/tutorials/" in block.page)
             else:
                 for line in block.code.splitlines():
                     json.loads(line)
@@ -170,10 +170,12 @@ class Reader:
         for promised in _PROMISE.findall(code):
             assert f"{promised}\n" in printed, f"the program printed\n{printed}without\n{promised}"
 
-    def _world(self, text: str) -> None:
-        """A description, or a part of one that is added to an example; ``controller.toml`` from then on."""
+    def _world(self, text: str, *, grows: bool) -> None:
+        """A description, or a part of one that is added to an example, or to what the page has so far (``grows``);
+        ``machine.toml`` from then on."""
         if "[[mic488]]" not in text:
-            text = (self._cwd / "examples/worlds/feeder.toml").read_text() + text
+            before = self._cwd / ("machine.toml" if grows else "examples/worlds/feeder.toml")
+            text = f"{before.read_text()}\n{text}"
         (self._cwd / "machine.toml").write_text(text)
         self._check([str(BIN / "steptwin"), "run", "machine.toml", "--for", "100ms"])
 

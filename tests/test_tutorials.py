@@ -1,0 +1,52 @@
+"""Tutorials: what their pages show besides the blocks that `test_docs_run` runs, and their length."""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import serial
+from pages import BIN, ROOT, blocks
+
+TUTORIALS = sorted((ROOT / "docs/tutorials").glob("*.md"))
+
+
+@pytest.mark.parametrize("page", TUTORIALS, ids=lambda page: page.stem)
+def test_a_tutorial_is_short(page: Path) -> None:
+    assert len(page.read_text().split()) <= 1200
+
+
+def steptwin(line: str, directory: Path) -> str:
+    words = [str(BIN / "steptwin"), *shlex.split(line)[1:]]
+    return subprocess.run(words, cwd=directory, capture_output=True, text=True, check=False).stdout
+
+
+def test_the_machine_grows_and_fails_as_its_page_says(tmp_path: Path) -> None:
+    description = tmp_path / "machine.toml"
+    command = ""
+    for block in blocks("docs/tutorials/machine.md"):
+        if block.language == "toml":
+            description.write_text((description.read_text() if description.exists() else "") + block.code)
+        elif block.language == "sh" and (block.reason is None or "test_tutorials" in block.reason):
+            (command,) = block.commands()
+            printed = steptwin(command, tmp_path)
+            if " why " in command:
+                assert "is true, since 3.375881 s" in printed, printed
+        elif block.language == "text":
+            events = [line for line in block.code.splitlines() if line and not line.startswith("20 s of world")]
+            assert [line for line in events if line not in steptwin(command, tmp_path)] == []
+
+
+def test_what_is_typed_to_the_chip_proves_itself(serve_m1486: Callable[..., Any]) -> None:
+    (typed,) = (block.code.split() for block in blocks("docs/tutorials/m1486.md") if block.language == "text")
+    twin = serve_m1486("--variant", "B", "--speed", "20")
+    answers = b""
+    with serial.Serial(str(twin.pty), 4800, timeout=20) as line:
+        for text in typed:
+            line.write(f"{text}\r".encode())
+            answers += line.read(1) if text.startswith("u") else b""
+    assert answers == b"@2"
