@@ -127,6 +127,13 @@ PARTS = (
         "[[beam]]\nname = 'bm'\nat = [10, -40, 10]\nalong = '+y'\nlength = 80\n"
         "[[event]]\nwhen = 'bm.seen'\nsteps = [{ note = 'seen' }]\n"
     ),
+    (
+        "[[conveyor]]\nname = 'pm'\nlength = 160\nspeed = 380\nfeed_every = '130 ms'\nworkpiece = [20, 16, 12]\nrun = 'c.OUT1'\n"
+        "at = [0, 200, 6]\nwidth = 30\n[[conveyor]]\nname = 'pn'\nlength = 160\nspeed = 50\nat = [0, 230, 6]\nwidth = 30\n"
+        "[[cylinder]]\nname = 'pr'\nstroke = 46\nextend_time = '70 ms'\nretract_time = '40 ms'\nat = [60, 170, 8]\nalong = '+y'\n"
+        "[[body]]\nname = 'pb'\non = 'pr'\nsize = [30, 8, 10]\npushes = true\n[[button]]\nname = 'pp'\nto = 'pr.extend'\n"
+        "[[event]]\nevery = '140 ms'\nsteps = [{ press = 'pp', for = '90 ms' }]\n"
+    ),
     "[[transducer]]\nname = 'v'\nof = 'x.position'\nto = 'c.AIN1'\npoints = [[0, 0], [80, 8]]\nresolution = 0.1\n",
     (
         "[[supply]]\nname = 'p'\nfeeds = 'c'\nrise = '20 ms'\n"
@@ -214,7 +221,7 @@ SIGNALS = {
     "z": ("position",), "w": ("count", "fed"),
     "q": ("count", "fed"),
     "u": ("pressure",), "f": ("position",), "t": ("position", "settled"), "tl": ("x", "y"), "g": ("position",), "s": ("angle",),
-    "ja": ("position",), "n": ("count",), "o": ("mass",), "m": ("share",),
+    "pb": ("pushed", "jammed"), "ja": ("position",), "n": ("count",), "o": ("mass",), "m": ("share",),
     "l": ("position", "lost", "power", "speed", "torque", "reserve", "force"),
 }  # fmt: skip
 JOINTS = {

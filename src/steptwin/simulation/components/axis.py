@@ -380,8 +380,8 @@ def _moves(spec: AxisSpec, axis: BuiltAxis) -> Sequence[Movement]:
         return (
             Movement("position", motion, spec.towards(UPRIGHT), float(degrees), blocks, sources, turns=True, travel=spec.travel),
         )
-    motion = load_motion(axis, nm_per_pulse(axis))
-    return (Movement("position", motion, spec.towards(), float(mm_per_unit(axis)), blocks, sources, travel=spec.travel),)
+    motion, per_unit, heading = load_motion(axis, nm_per_pulse(axis)), float(mm_per_unit(axis)), axis.mechanism.heading
+    return (Movement("position", motion, spec.towards(), per_unit, blocks, sources, travel=spec.travel, heading=heading),)
 
 
 AXIS: Element[AxisSpec, BuiltAxis] = Element(

@@ -7,8 +7,9 @@ from typing import Any, ClassVar
 
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
-from steptwin.simulation.components.body import BODY, body_of
+from steptwin.simulation.components.body import BODY
 from steptwin.simulation.components.bodycontact import BodyContact
+from steptwin.simulation.components.bodytable import body_of
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, Reference
 from steptwin.simulation.components.frames import bodies_on, check_upright, sources_of

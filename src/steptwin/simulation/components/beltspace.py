@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from fractions import Fraction
+from math import floor
 
 from steptwin.controller import SECOND, Nanos
+from steptwin.errors import Misuse
+from steptwin.messages import Message
 from steptwin.simulation.components.builtobjects import BuiltObjects
 from steptwin.simulation.components.conveyor import CONVEYOR, Conveyor
 from steptwin.simulation.components.frames import Frames, check_upright, sources_of
@@ -16,8 +19,36 @@ from steptwin.simulation.mechanics.mechanics import Mechanism
 from steptwin.simulation.mechanics.rampeddrive import RampedDrive
 from steptwin.simulation.mechanics.workpiece import Workpiece
 from steptwin.simulation.space.bodies import Body, Box
-from steptwin.simulation.space.frames import NM_PER_MM, Frame, Joint, Vector, X
-from steptwin.simulation.space.pieces import Motion, Piece, SteadyPiece, StillPiece, gear_of, geared, pieces_of_trajectory
+from steptwin.simulation.space.frames import (
+    NM_PER_MM,
+    Direction,
+    Frame,
+    Joint,
+    Vector,
+    X,
+    in_plane,
+    out_of_plane,
+    path,
+    placement,
+)
+from steptwin.simulation.space.pieces import (
+    Gear,
+    Motion,
+    Piece,
+    SteadyPiece,
+    StillPiece,
+    gear_of,
+    geared,
+    pieces_of_trajectory,
+    summed,
+)
+
+FAR_ASIDE_NM = 10 * 10**9
+EDGE_NM = 2
+"""Beyond the edge of a belt, which belongs to it: there a workpiece has left it, whatever is rounded."""
+TURNS_AGAINST = Message(
+    "simulation.turns-against-a-belt", "{pusher!r} pushes, but {name!r} turns it against {belt!r}: what pushes moves straight"
+)
 
 
 class BeltSpace:
@@ -35,8 +66,11 @@ class BeltSpace:
         self._along = spec.towards()
         self._belt_q = float((self._along.axis + 2 * (self._along.sign < 0)) % 4)
         """The direction of the belt, quarter turns from +x."""
-        half, length = to_nm(spec.width) // 2, to_nm(spec.length)
-        box = Box((length // 2, half, 0) if self._along.axis == X else (half, length // 2, 0))
+        length = to_nm(spec.length)
+        box = self._box(length // 2, to_nm(spec.width) // 2, 0)
+        self._left = Direction(1 - self._along.axis, self._along.sign if self._along.axis == X else -self._along.sign)
+        self._pushing: dict[str, Motion] = {}
+        conveyor.belt.across_at = self._across_at
         self._top = Body(spec.name, self._frame, box, self._at(length // 2, 0))
         self._made: dict[Placed, Body] = {}
 
@@ -69,15 +103,97 @@ class BeltSpace:
         return {placed.workpiece.name: body for placed, body in self._made.items()}
 
     def _body(self, belt: Belt, placed: Placed) -> Body:
-        frame, way = self._frame, -placed.workpiece.extent(placed.yaw_q) // 2
-        if placed.held is not None:
-            at = self._at(belt.to_nm(placed.held) + way, placed.across)
-        else:
-            per_step = NM_PER_MM / belt.per_mm
-            motion = belt_motion(belt, per_step, float(way - placed.origin * per_step))
-            frame = Frame(f"{placed.workpiece.name}.belt", frame, self._at(0, placed.across), Joint(motion, self._along))
-            at = (0, 0, 0)
+        frame, at = self._carried(belt, placed, self._pushed(placed))
         return body_in(placed.workpiece, frame, Lie(at, self._belt_q + placed.yaw_q))
+
+    def _carried(self, belt: Belt, placed: Placed, frame: Frame) -> tuple[Frame, Vector]:
+        """The frame that carries a workpiece along the belt, and where it is on that."""
+        way = -placed.workpiece.extent(placed.yaw_q) // 2
+        if placed.held is not None:
+            return frame, self._at(belt.to_nm(placed.held) + way, placed.across)
+        per_step = NM_PER_MM / belt.per_mm
+        motion = belt_motion(belt, per_step, float(way - placed.origin * per_step))
+        return Frame(f"{placed.workpiece.name}.belt", frame, self._at(0, placed.across), Joint(motion, self._along)), (0, 0, 0)
+
+    # ------------------------------------------------------------------ pushing across
+
+    @property
+    def conveyor(self) -> Conveyor:
+        return self._conveyor
+
+    @property
+    def frame(self) -> Frame:
+        return self._frame
+
+    def joints_to(self, pusher: str) -> Iterator[tuple[Frame, int]]:
+        """Frames that move a pusher across the belt, and whether to the left (+1) or to the right (-1). Raises `Misuse` for one
+        that turns against the belt."""
+        for step in path(self._frame, self._frames[pusher].frame):
+            if step.turns:
+                raise Misuse(TURNS_AGAINST(pusher=pusher, name=step.frame.name, belt=self._conveyor.spec.name))
+            if step.joint is not None and step.joint.along.axis == self._left.axis:
+                yield step.frame, self._left.sign * step.joint.along.sign * (-1 if step.is_back else 1)
+
+    def pushing(self, pusher: str) -> Motion:
+        """How a pusher moves to the left."""
+        if pusher not in self._pushing:
+            joints = ((frame.joint, sign) for frame, sign in self.joints_to(pusher))
+            parts = [(joint.motion, Gear(float(sign))) for joint, sign in joints if joint is not None]
+            self._pushing[pusher] = Motion(
+                lambda: tuple(motion.version() for motion, _ in parts),
+                lambda now: summed([geared(motion.pieces(now), gear) for motion, gear in parts]),
+            )
+        return self._pushing[pusher]
+
+    def _pushed(self, placed: Placed) -> Frame:
+        """The frame across which a workpiece is as its table says."""
+        if not placed.pusher:
+            return self._frame
+        return Frame(f"{placed.workpiece.name}.push", self._frame, (0, 0, 0), Joint(self.pushing(placed.pusher), self._left))
+
+    def _across_at(self, placed: Placed, now: Nanos) -> int:
+        return placed.across + (floor(self.pushing(placed.pusher).at(now) + 0.5) if placed.pusher else 0)
+
+    def placed(self, name: str) -> Placed | None:
+        """The workpiece called ``name``, if it is here."""
+        return next((one for one in self._conveyor.belt.workpieces if one.workpiece.name == name), None)
+
+    def rectangle(self, placed: Placed, along: int = 0, across: int = 0) -> Body:
+        """The space that a workpiece takes along and across the belt, moved by so many nm."""
+        return self._space(placed, self._pushed(placed), self._at(along, across), placed.workpiece.extent(placed.yaw_q + 1) // 2)
+
+    def lane(self, placed: Placed) -> Body:
+        """The space that it takes along the belt, whatever is beside it."""
+        return self._space(placed, self._frame, (0, 0, 0), FAR_ASIDE_NM)
+
+    def _space(self, placed: Placed, frame: Frame, shift: Vector, across: int) -> Body:
+        frame, at = self._carried(self._conveyor.belt, placed, frame)
+        workpiece = placed.workpiece
+        x, y, z = (one + other for one, other in zip(at, shift, strict=True))
+        half = workpiece.height // 2
+        return Body(workpiece.name, frame, self._box(workpiece.extent(placed.yaw_q) // 2, across, half), (x, y, z + half))
+
+    @property
+    def surface(self) -> Body:
+        """The belt and all before and behind it, above which a workpiece has its middle until it is pushed off."""
+        return Body(self._top.name, self._frame, self._box(FAR_ASIDE_NM, to_nm(self._conveyor.spec.width) // 2 + EDGE_NM, 1))
+
+    def _box(self, along: int, across: int, up: int) -> Box:
+        return Box((along, across, up) if self._along.axis == X else (across, along, up))
+
+    def in_belt(self, body: Body, now: Nanos) -> tuple[float, float]:
+        """How far the middle of a body is along the belt, and to its left, nm."""
+        axis, at = placement(body.frame, self._frame, now)
+        x, y, _ = out_of_plane(at.of(in_plane(body.centre, axis)), axis)
+        sign = self._along.sign
+        return (sign * x, sign * y) if self._along.axis == X else (sign * y, -sign * x)
+
+    def halves(self, body: Body) -> tuple[int, int]:
+        """How far a box reaches along and across the belt from its middle."""
+        x, y = body.shape.half[:2] if isinstance(body.shape, Box) else (body.shape.radius, body.shape.radius)
+        return (x, y) if self._along.axis == X else (y, x)
+
+    # ------------------------------------------------------------------ taking and putting
 
     def take(self, name: str, now: Nanos) -> Workpiece:
         (found,) = (placed for placed in self._conveyor.belt.workpieces if placed.workpiece.name == name)

@@ -8,8 +8,9 @@ from itertools import combinations, product
 
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.simulation.components.body import BODY, body_of
+from steptwin.simulation.components.body import BODY
 from steptwin.simulation.components.bodycontact import BodyContact, ConditionalContact
+from steptwin.simulation.components.bodytable import body_of
 from steptwin.simulation.components.carriedcontact import CarriedContact
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.frames import bodies_on, check_upright, sources_of

@@ -154,7 +154,7 @@ class Conveyor(TerminalComponent):
 
     def _state(self) -> object:
         """Another value whenever workpieces may move or stand otherwise."""
-        return [(belt.version(), belt.raised) for belt in self._belts_ahead()]
+        return [(belt.version(), belt.raised, belt.bars) for belt in self._belts_ahead()]
 
     def _belts_ahead(self) -> Iterator[Belt]:
         """This one and those on which workpieces may be in the way."""
@@ -286,6 +286,7 @@ class Conveyor(TerminalComponent):
         before it. ``is_first``: nothing is before it on this belt."""
         belt = self.belt
         limits = [place for place in belt.raised if place >= least]
+        limits += [bar.place for bar in belt.bars if bar.workpiece == placed.workpiece.name]
         if ahead is not None:
             limits.append(ahead)
         if is_first:
@@ -309,7 +310,7 @@ class Conveyor(TerminalComponent):
                 self._report(LEAVES, placed, "leaves")
                 if self.following is not None:
                     goes_on = True
-                    self.following.take_over(placed, belt, front - belt.length, now)
+                    self.following.take_over(self._left_alone(placed, now), belt, front - belt.length, now)
             elif front < 0:
                 self.remove(belt, placed)
                 before = self.preceding.get(placed.came_from)
@@ -318,8 +319,12 @@ class Conveyor(TerminalComponent):
                     continue
                 goes_on = True
                 self._report(LEAVES, placed, "leaves")
-                before.take_back(placed, belt, front, now)
+                before.take_back(self._left_alone(placed, now), belt, front, now)
         return goes_on
+
+    def _left_alone(self, placed: Placed, now: Nanos) -> Placed:
+        """A workpiece that nothing pushes any more."""
+        return placed._replace(across=self.belt.across_at(placed, now), pusher="")
 
     def take_over(self, placed: Placed, other: Belt, beyond: int, now: Nanos) -> None:
         """Move a workpiece that the belt before it has moved. ``beyond``: how far it is beyond its end, on its grid."""

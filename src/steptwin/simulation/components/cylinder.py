@@ -154,6 +154,10 @@ class Cylinder(TerminalComponent):
         moments = (*self.travel.turning_points(self.block.scheduler.now), *(() if self._due is None else (self._due,)))
         return min(moments, default=None)
 
+    def heading(self, now: Nanos) -> int:
+        """The way in which its valve moves it, whether it can or not."""
+        return self._spool
+
     @property
     def stroke(self) -> float:
         return self._spec.stroke
@@ -229,7 +233,12 @@ def _moves(spec: CylinderSpec, cylinder: Cylinder) -> Sequence[Movement]:
     travel = cylinder.travel
     gear = Gear(float(to_nm(spec.stroke)), float(travel.full))
     motion = Motion(travel.version, lambda now: geared(pieces_of_travel(travel, now), gear))
-    return (Movement("position", motion, spec.towards(), 1.0, (cylinder.obstruct,), (spec.name,), travel=(0.0, spec.stroke)),)
+    ends = (0.0, spec.stroke)
+    return (
+        Movement(
+            "position", motion, spec.towards(), 1.0, (cylinder.obstruct,), (spec.name,), travel=ends, heading=cylinder.heading
+        ),
+    )
 
 
 CYLINDER = with_terminals(

@@ -123,6 +123,8 @@ class Movement(NamedTuple):
     turns: bool = False
     travel: tuple[float, float] | None = None
     """Where the signal may be, if that is known."""
+    heading: Callable[[Nanos], int] = lambda now: 0
+    """The way in which its drive is to move, +1 or -1, also while something blocks it; 0: not known, or none."""
 
 
 def places(mounts: Mapping[str, MountSpec]) -> dict[str, MountSpec]:

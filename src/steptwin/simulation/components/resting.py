@@ -10,7 +10,7 @@ from typing import ClassVar, NamedTuple
 from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.beltspace import add_belts
-from steptwin.simulation.components.body import BODY, body_of
+from steptwin.simulation.components.bodytable import BodySpec, body_of
 from steptwin.simulation.components.conveyor import COLLIDES
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.frames import Frames, check_upright, sources_of, tilting_axis
@@ -285,7 +285,8 @@ def resting_of(context: ElementContext, scheduler: Scheduler) -> Resting:
         return there
     described = context.objects.described
     nests = {spec.name: spec for spec in described.mounts.values() if isinstance(spec, NestSpec)}
-    bodies = (body_of(one, frames) for one in described.of(BODY) if one.holds_workpieces)
+    specs = (spec for spec in described.mounts.values() if isinstance(spec, BodySpec) and spec.holds_workpieces)
+    bodies = (body_of(spec, frames) for spec in specs)
     supports = {body.name: body for body in bodies if tilting_axis(body.frame) is None}
     for name, nest in nests.items():
         check_upright(name, frames.base(name))

@@ -9,7 +9,8 @@ from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.motion.trig import length
-from steptwin.simulation.components.body import BODY, BodySpec, body_of
+from steptwin.simulation.components.body import BODY
+from steptwin.simulation.components.bodytable import BodySpec, body_of
 from steptwin.simulation.components.builtobjects import BuiltObjects
 from steptwin.simulation.components.collision import COLLISION
 from steptwin.simulation.components.frames import Frames, bodies_on

@@ -13,7 +13,8 @@ from typing import NamedTuple
 from steptwin.messages import Message
 from steptwin.simulation.components.beam import BEAM
 from steptwin.simulation.components.beltspace import BeltSpace
-from steptwin.simulation.components.body import BODY, body_of
+from steptwin.simulation.components.body import BODY
+from steptwin.simulation.components.bodytable import body_of
 from steptwin.simulation.components.builtobjects import BuiltObjects
 from steptwin.simulation.components.conveyor import CONVEYOR
 from steptwin.simulation.components.frames import bodies_on

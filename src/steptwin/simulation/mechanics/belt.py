@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from fractions import Fraction
 from math import ceil, floor
 from typing import ClassVar, NamedTuple, Protocol
@@ -98,6 +98,8 @@ class Placed(NamedTuple):
     """How far its middle is left of the middle of the belt, nm."""
     yaw_q: float = 0.0
     """Quarter turns by which it is turned on the belt."""
+    pusher: str = ""
+    """Name of what pushes it across the belt; it is ``across`` while that is at 0."""
 
     def front(self, position: int) -> int:
         """The place of its front while the belt is at ``position``."""
@@ -106,6 +108,14 @@ class Placed(NamedTuple):
     def zones(self, *, of_marks: bool) -> tuple[tuple[int, int], ...]:
         """Begin and end, from the front, of what a sensor sees: of it, or of its marks."""
         return self.marks if of_marks else ((0, self.length),)
+
+
+class Bar(NamedTuple):
+    """Something on the way of a workpiece, whose front stands at ``place``."""
+
+    workpiece: str
+    place: int
+    by: str
 
 
 class Near(NamedTuple):
@@ -142,6 +152,7 @@ class Belt(Stateful):
         "_down",
         "_itself",
         "_up",
+        "across_at",
         "drive",
         "following",
         "length",
@@ -151,7 +162,7 @@ class Belt(Stateful):
         "per_mm",
         "stride",
     )
-    __slots__ = (*FIXED, "raised", "workpieces")
+    __slots__ = (*FIXED, "bars", "raised", "workpieces")
 
     def __init__(self, name: str, length: float, drive: BeltDrive, per_mm: Fraction) -> None:
         """``length`` in mm; ``per_mm``: steps of the grid of its drive."""
@@ -169,6 +180,9 @@ class Belt(Stateful):
         self.near: tuple[Near, ...] = ()
         self._itself = Near(self, 0, 0, 0)
         self.workpieces: tuple[Placed, ...] = ()
+        self.across_at: Callable[[Placed, Nanos], int] = lambda placed, now: placed.across
+        """How far the middle of a workpiece is left of the middle of the belt, nm."""
+        self.bars: tuple[Bar, ...] = ()
         self.raised: tuple[int, ...] = ()
         """The places of the stops that are on."""
 
@@ -225,6 +239,10 @@ class Belt(Stateful):
     def release(self, placed: Placed, position: int) -> None:
         """Let a workpiece that stood go on with the belt, which is at ``position``."""
         self._replace(placed, placed._replace(origin=position - placed.front(position), held=None))
+
+    def push(self, placed: Placed, across: int, pusher: str) -> None:
+        """Let something push a workpiece, or (an empty name) no longer. ``across`` as in `Placed`."""
+        self._replace(placed, placed._replace(across=across, pusher=pusher))
 
     def _replace(self, placed: Placed, other: Placed) -> None:
         self.workpieces = tuple(other if one == placed else one for one in self.workpieces)

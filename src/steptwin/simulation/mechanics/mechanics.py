@@ -525,6 +525,12 @@ class Mechanism(Stateful):
         """Pulses of an electrical period of the motor."""
         return self.build.period_p
 
+    def heading(self, now: Nanos) -> int:
+        """The way in which the field moves within the next millisecond, +1 or -1; 0: it stands."""
+        profile = profile_of(self._drive.plan)
+        ahead = self.build.sign * (profile.position(now + MILLISECOND) - profile.position(now))
+        return (ahead > 0) - (ahead < 0)
+
     def lose(self, pulses: int, now: Nanos) -> None:
         """Move the rotor ``pulses`` of the drive behind the field, where that goes with positive pulses (negative: ahead), within
         the hard stops."""

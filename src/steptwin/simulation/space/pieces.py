@@ -355,3 +355,28 @@ def sag(least: float, most: float, width: Nanos) -> float:
     """How far a function with a second derivative between these can be from its chord over ``width``."""
     s = width / SECOND
     return max(abs(least), abs(most)) * s * s / 8.0
+
+
+DROP_NM = 1e-6
+"""What a motion goes back at least before that is found: more than the rounding errors of positions up to 10 m."""
+
+
+def first_back(motion: Motion, now: Nanos, way: int, most: int = 256) -> Nanos | None:
+    """A moment, ns, at which a motion has gone back from the way +1 or -1 by hardly more than `DROP_NM`, for the first time; None
+    if never. After ``most`` pieces: one at which to look again."""
+    for n, piece in enumerate(motion.pieces(now)):
+        if n >= most:
+            return piece.begin
+        last = (piece.begin + FARTHEST_NS if piece.end is None else piece.end) - 1
+        stretches = [(piece.begin, last)] if last > piece.begin and piece.speed(piece.begin, last) else []
+        while stretches:
+            begin, end = stretches.pop()
+            gain, bend = way * (piece.at(end) - piece.at(begin)), 8.0 * sag(*piece.bend(begin, end), end - begin)
+            if gain >= bend:  # it never goes back
+                continue
+            if gain + bend < -DROP_NM:  # it always does
+                return begin
+            if bend >= DROP_NM and end - begin > 1:
+                middle = (begin + end) // 2
+                stretches += [(middle, end), (begin, middle)]
+    return None

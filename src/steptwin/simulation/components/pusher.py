@@ -1,0 +1,299 @@
+"""Bodies that push workpieces across belts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
+from math import ceil, floor
+from typing import ClassVar, NamedTuple
+
+from steptwin.controller import Nanos
+from steptwin.errors import Misuse
+from steptwin.messages import Message
+from steptwin.simulation.components.beltspace import BeltSpace
+from steptwin.simulation.components.bodycontact import BodyContact
+from steptwin.simulation.components.bodytable import BodySpec, body_of
+from steptwin.simulation.components.conveyor import CONVEYOR
+from steptwin.simulation.components.elementcontext import ElementContext
+from steptwin.simulation.components.frames import check_upright, sources_of
+from steptwin.simulation.components.mount import Block, Movement
+from steptwin.simulation.components.probe import Probe
+from steptwin.simulation.components.resting import resting_of
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.mechanics.belt import Bar, Placed
+from steptwin.simulation.scheduler.scheduler import Scheduler
+from steptwin.simulation.space.bodies import Body, Box
+from steptwin.simulation.space.frames import NM_PER_MM, Frame
+from steptwin.simulation.space.pieces import first_back
+from steptwin.simulation.space.sweeps import SweptBody
+from steptwin.state import Plain, Stateful
+
+TOUCH_NM = 1000
+"""Less than a workpiece and a body overlap when they have come to touch."""
+
+NO_BELTS = Message("simulation.no-belts-to-push-across", "{pusher!r} pushes, but no [[conveyor]] has a place in space")
+PUSHES = Message("simulation.pushes-workpiece", "{pusher} pushes {workpiece} on {belt}")
+RUNS_INTO = Message("simulation.runs-into-workpiece", "{pusher} and {workpiece} collide")
+JAMS = Message("simulation.pusher-jams", "{pusher} stands: {workpiece} is pushed against {other}")
+JAMS_NO_MORE = Message("simulation.pusher-is-free-again", "{pusher} is free again")
+
+
+class _Pushed(NamedTuple):
+    """A workpiece that is pushed, and what may happen to it."""
+
+    placed: Placed
+    body: Body
+    beside: BodyContact
+    """Whether the pusher is still beside it."""
+    above: BodyContact
+    """Whether its middle is above the belt."""
+    against: Probe
+    """Other workpieces that it is pushed against."""
+    close: Probe
+    """Those within a millimetre before it."""
+
+    def forget(self) -> None:
+        for one in (self.beside, self.above, self.against, self.close):
+            one.forget()
+
+
+class Pusher(Stateful):
+    """A body that pushes workpieces on belts, a part of a scheduler.
+
+    Across the belt a workpiece goes where the face of the pusher goes, until that goes back or is no longer beside it; along it
+    goes with the belt. It leaves the belt when its middle does. A workpiece that comes along the belt stands before a pusher.
+    """
+
+    FIXED: ClassVar[tuple[str, ...]] = (
+        "_belts",
+        "_body",
+        "_frames",
+        "_probe",
+        "_pushed",
+        "_resting",
+        "_scheduler",
+        "_workpieces",
+        "name",
+    )
+    __slots__ = (*FIXED, "_due", "_jammed", "_over", "count")
+
+    def __init__(self, scheduler: Scheduler, context: ElementContext, belts: Iterable[BeltSpace], body: Body) -> None:
+        self._scheduler = scheduler
+        self._frames = context.frames
+        self._workpieces = context.objects.workpieces
+        self._resting = resting_of(context, scheduler)
+        self._belts = tuple(belts)
+        self.name = body.name
+        self._body = body
+        self._probe = Probe(body, {}, self._workpieces, self._to_meet)
+        self._pushed: dict[str, _Pushed] = {}
+        self._over: tuple[str, ...] = ()
+        """Workpieces that it is in, and cannot push."""
+        self._jammed: tuple[str, str] | None = None
+        """A belt, and the workpiece on it that is pushed against another one."""
+        self._due: Nanos | None = None
+        self.count = 0
+        """How often it began to push one."""
+
+    @property
+    def is_jammed(self) -> bool:
+        return self._jammed is not None
+
+    # ------------------------------------------------------------------ what it meets
+
+    def _to_meet(self, body: Body) -> Body | None:
+        """The part of a workpiece that it may touch: not one that it pushes, and none on it."""
+        belt, placed = self._on_belt(body.name)
+        if belt is not None and placed is not None:
+            return None if placed.pusher == self.name else belt.rectangle(placed)
+        return None if any(one is self._body.frame for one in body.frame.line()) else body
+
+    def _on_belt(self, name: str) -> tuple[BeltSpace | None, Placed | None]:
+        found = ((belt, belt.placed(name)) for belt in self._belts)
+        return next(((belt, placed) for belt, placed in found if placed is not None), (None, None))
+
+    def _meet(self, name: str, now: Nanos) -> bool:
+        """It has come to touch a workpiece, or that it. Whether it cannot push it, and is no bar for it."""
+        belt, placed = self._on_belt(name)
+        if belt is None or placed is None or placed.pusher:
+            return True
+        other = belt.rectangle(placed)
+        (along, across), (far, aside) = belt.in_belt(self._body, now), belt.halves(self._body)
+        (its_along, its_across), (its_far, its_aside) = belt.in_belt(other, now), belt.halves(other)
+        to_left, to_right = across + aside - its_across + its_aside, its_across + its_aside - across + aside
+        before, behind = its_along + its_far - along + far, along + far - its_along + its_far
+        conveyor = belt.conveyor
+        least = min(to_left, to_right, before, behind)
+        if least in (to_left, to_right):
+            # It is moved to where it only touches.
+            moved, room = belt.pushing(self.name).at(now), aside + its_aside
+            place = ceil(across + room - moved) if least == to_left else floor(across - room - moved)
+            conveyor.belt.push(placed, place, self.name)
+            self.count += 1
+            self._report(PUSHES(pusher=self.name, workpiece=name, belt=conveyor.spec.name), name, "pushed")
+        elif least == before and before < TOUCH_NM:
+            conveyor.belt.bars += (Bar(name, conveyor.belt.from_nm(floor(along - far)), self.name),)
+        else:
+            return True
+        self._scheduler.notify(conveyor.spec.name)
+        return False
+
+    # ------------------------------------------------------------------ what it pushes
+
+    def _those(self) -> Iterator[tuple[BeltSpace, Placed]]:
+        for belt in self._belts:
+            yield from ((belt, placed) for placed in belt.conveyor.belt.workpieces if placed.pusher == self.name)
+
+    def _facts(self, belt: BeltSpace, placed: Placed, way: int) -> _Pushed:
+        name = placed.workpiece.name
+        body = self._workpieces.bodies()[name]
+        known = self._pushed.get(name)
+        if known is None or known.placed is not placed or known.body is not body:
+            others = partial(_unless_on, body.frame)
+            middle = Body(name, body.frame, Box((0, 0, 1)))
+            known = self._pushed[name] = _Pushed(
+                placed,
+                body,
+                BodyContact(SweptBody(self._body), SweptBody(belt.lane(placed))),
+                BodyContact(SweptBody(middle), SweptBody(belt.surface)),
+                Probe(body, {}, self._workpieces, others),
+                Probe(belt.rectangle(placed, across=way * NM_PER_MM), {}, self._workpieces, others),
+            )
+        return known
+
+    def _way(self, belt: BeltSpace, placed: Placed, now: Nanos) -> int:
+        """To which side of the belt a workpiece is pushed: left (+1) or right (-1)."""
+        return 1 if belt.in_belt(belt.rectangle(placed), now)[1] > belt.in_belt(self._body, now)[1] else -1
+
+    def _push_on(self, belt: BeltSpace, placed: Placed, now: Nanos) -> Iterator[Nanos | None]:
+        """Let a workpiece go on, or no longer. When something may happen to it."""
+        conveyor, name = belt.conveyor, placed.workpiece.name
+        way = self._way(belt, placed, now)
+        facts = self._facts(belt, placed, way)
+        back = first_back(belt.pushing(self.name), now, way)
+        if not facts.above.holds(now):
+            workpiece = belt.take(name, now)
+            self._resting.release(workpiece, facts.body.frame, now)
+            return
+        if not facts.beside.holds(now) or (back is not None and back <= now):
+            conveyor.belt.push(placed, belt.conveyor.belt.across_at(placed, now), "")
+            self._scheduler.notify(conveyor.spec.name)
+            return
+        goes_back, before = any(way * sign * one.heading(now) < 0 for one, sign in self._moving(belt)), facts.close.met(now)
+        if self._jammed == (conveyor.spec.name, name) and (goes_back or not before):
+            self._free(now)
+        others = [other for other in facts.against.met(now) if other in before]
+        if self._jammed is None and others and not goes_back:
+            self._jam(belt, name, others[0], now)
+        yield from (back, facts.beside.change(now), facts.above.change(now), facts.against.change(now), facts.close.change(now))
+
+    def _moving(self, belt: BeltSpace) -> Iterator[tuple[Movement, int]]:
+        """What moves it across a belt, and to which side."""
+        for frame, sign in belt.joints_to(self.name):
+            movement = self._frames.movement(frame)
+            if movement is not None:
+                yield movement, sign
+
+    def _blocks(self, belt: BeltSpace) -> Iterable[Block]:
+        return dict.fromkeys(block for movement, _ in self._moving(belt) for block in movement.blocks)
+
+    def _jam(self, belt: BeltSpace, name: str, other: str, now: Nanos) -> None:
+        self._jammed = belt.conveyor.spec.name, name
+        self._report(JAMS(pusher=self.name, workpiece=name, other=other), name, "jams")
+        for block in self._blocks(belt):
+            block(True, now, self.name)
+
+    def _free(self, now: Nanos) -> None:
+        """Let it move on after a jam: nothing is in its way, or it moves back."""
+        if self._jammed is None:
+            return
+        (belt,) = (one for one in self._belts if one.conveyor.spec.name == self._jammed[0])
+        name, self._jammed = self._jammed[1], None
+        for block in self._blocks(belt):
+            block(False, now, self.name)
+        self._report(JAMS_NO_MORE(pusher=self.name), name, "free again")
+
+    def _bar(self, belt: BeltSpace, now: Nanos) -> Iterator[Nanos | None]:
+        """Let workpieces stand that it is before, or no longer. When that changes."""
+        own = belt.conveyor.belt
+        kept: list[Bar] = []
+        for bar in own.bars:
+            placed = belt.placed(bar.workpiece)
+            if bar.by == self.name and placed is not None:
+                contact = BodyContact(SweptBody(self._body), SweptBody(belt.rectangle(placed, along=TOUCH_NM)))
+                if not contact.holds(now):
+                    continue
+                yield contact.change(now)
+            if placed is not None:
+                kept.append(bar)
+        if len(kept) < len(own.bars):
+            own.bars = tuple(kept)
+            self._scheduler.notify(belt.conveyor.spec.name)
+
+    # ------------------------------------------------------------------ part of a scheduler
+
+    def update(self, now: Nanos) -> None:
+        moments = [due for belt in self._belts for due in self._bar(belt, now)]
+        falling = self._workpieces.falling()
+        barred = {bar.workpiece for belt in self._belts for bar in belt.conveyor.belt.bars if bar.by == self.name}
+        met = [name for name in self._probe.met(now) if name not in falling and name not in barred]
+        over = [name for name in met if name in self._over or self._meet(name, now)]
+        for name in over:
+            if name not in self._over:
+                self._report(RUNS_INTO(pusher=self.name, workpiece=name), name, "collides")
+        self._over = tuple(over)
+        those = [*self._those()]
+        pushed = {placed.workpiece.name: belt.conveyor.spec.name for belt, placed in those}
+        self._pushed = {name: known for name, known in self._pushed.items() if name in pushed}
+        if self._jammed is not None and pushed.get(self._jammed[1]) != self._jammed[0]:
+            self._free(now)
+        for belt, placed in those:
+            moments += self._push_on(belt, placed, now)
+        moments.append(self._probe.change(now))
+        self._due = min((due for due in moments if due is not None and due > now), default=None)
+
+    def deadline(self) -> Nanos | None:
+        return self._due
+
+    def set_state(self, plain: Plain) -> None:
+        super().set_state(plain)
+        self._probe.forget()
+        self._pushed.clear()
+
+    def _report(self, text: str, name: str, what: str) -> None:
+        scheduler = self._scheduler
+        facts = ("workpiece", name), ("element", self.name), ("what", what)
+        scheduler.record(next(iter(scheduler.controllers)), "event", "workpiece", text, *facts)
+        scheduler.notify(self.name)
+
+    def signals(self) -> Mapping[str, SignalOf]:
+        source = (self._scheduler.source(self.name),)
+        return {
+            "pushed": SignalOf(source, lambda now: float(self.count)),
+            "jammed": SignalOf(source, lambda now: float(self.is_jammed)),
+        }
+
+
+def _unless_on(frame: Frame, body: Body) -> Body | None:
+    """A workpiece that is on another frame."""
+    return None if any(one is frame for one in body.frame.line()) else body
+
+
+def pusher_of(spec: BodySpec, context: ElementContext) -> Pusher:
+    """The part that a body is that pushes. Raises `Misuse` for one that turns against a belt, and where there is none."""
+    frames, workpieces = context.frames, context.objects.workpieces
+    conveyors = [one for name, one in context.objects.built(CONVEYOR).items() if name in frames]
+    if not conveyors:
+        raise Misuse(NO_BELTS(pusher=spec.name))
+    scheduler = conveyors[0].block.scheduler
+    resting_of(context, scheduler)
+    body = body_of(spec, frames)
+    check_upright(spec.name, body.frame)
+    around = body.shape if isinstance(body.shape, Box) else Box((body.shape.radius, body.shape.radius, body.shape.half))
+    belts = [holder for holder in workpieces.holders if isinstance(holder, BeltSpace)]
+    for belt in belts:
+        belt.pushing(spec.name)
+    made = Pusher(scheduler, context, belts, Body(spec.name, body.frame, around, body.centre))
+    sources = (*workpieces.sources, *sources_of(frames.carrying(body.frame)))
+    scheduler.add_part(made, sources, spec.name)
+    return made

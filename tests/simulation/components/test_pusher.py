@@ -1,0 +1,242 @@
+"""Bodies that push workpieces across belts, against times and places that follow from the lengths and speeds."""
+
+from __future__ import annotations
+
+from math import sqrt
+from pathlib import Path
+
+import pytest
+from world_rig import check_it_can_be_restored
+
+from steptwin.controller import SECOND
+from steptwin.files.world import World
+from steptwin.simulation.space.frames import FLOOR, pose
+from steptwin.simulation.toml.reader import WorldError
+
+BELT = """
+[[mic488]]
+name = "c"
+[mic488.M1]
+unit = "mm"
+gear = 160.0
+acc = 2000.0
+dec = 2000.0
+vel = 400.0
+mot_resol = 3200
+[[conveyor]]
+name = "main"
+length = 600
+speed = 100
+run = "c.OUT1"
+feed_every = "2 s"
+workpiece = [40, 30, 20]
+at = [0, 0, 100]
+"""
+ROD = """
+[[cylinder]]
+name = "rod"
+extend = "c.OUT2"
+stroke = 120
+at = [300, -80, 110]
+along = "+y"
+"""
+"""400 mm/s."""
+AXIS = """
+[[axis]]
+name = "rod"
+drive = "c.M1"
+pitch = 20.0
+at = [300, -80, 110]
+along = "+y"
+"""
+BLADE = """
+[[body]]
+name = "blade"
+on = "rod"
+size = [60, 10, 30]
+pushes = true
+"""
+SIDE = """
+[[conveyor]]
+name = "side"
+length = 400
+speed = 80
+run = "c.OUT1"
+at = [100, 100, 100]
+"""
+TRAY = """
+[[nest]]
+name = "tray"
+at = [330, 75, 100]
+workpiece = [50, 40, 30]
+filled = 1
+"""
+"""Its workpiece begins 55 mm beside the middle of the belt."""
+
+
+def pushing(text: str, until: float = 5.2, **levels: float) -> World:
+    """The middle of the first workpiece comes to that of the blade at 5.2 s: there the rod is extended."""
+    world = World.from_toml(text)
+    for name, level in {"OUT1": 1, **levels}.items():
+        world.mic488["c"].write(name, level)
+    world.run(until=5.2)
+    world.mic488["c"].write("OUT2", 1)
+    world.run(until=until)
+    return world
+
+
+def told(world: World, name: str = "main.1") -> list[tuple[float, str]]:
+    """What happened to a workpiece since it was fed, with its time in s."""
+    records = [one for one in world.trace.of("event") if one.subject == "workpiece" and name in str(one.value)]
+    return [(record.time / SECOND, str(record.value)) for record in records[1:]]
+
+
+def place_of(world: World, name: str) -> list[float]:
+    body = world.objects.workpieces.bodies()[name]
+    return [one / 1e6 for one in pose(body.frame, FLOOR, world.now).at]
+
+
+def seconds(*found: float) -> object:
+    return pytest.approx(list(found), abs=2e-8)
+
+
+def test_it_pushes_a_workpiece_onto_another_belt_and_on_there() -> None:
+    """60 mm to its side, 50 mm until its middle is at the edge; the blade comes to 45 mm. The other belt goes at 80 mm/s."""
+    world = pushing(BELT + ROD + BLADE + SIDE, 6.0)
+    times, texts = zip(*told(world), strict=True)
+    assert texts == ("blade pushes main.1 on main", "main.1 is on side", "blade pushes main.1 on side")
+    assert list(times) == seconds(5.35, 5.475, 5.475)
+    at_side = 300.0 + 27.5
+    assert place_of(world, "main.1") == pytest.approx([at_side + 80.0 * (6.0 - 5.475), 60.0, 100.0], abs=5e-6)
+    assert world.read("blade.pushed") == 2
+
+
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize(("along", "unit"), [("+x", (1, 0)), ("-x", (-1, 0)), ("+y", (0, 1)), ("-y", (0, -1))])
+def test_its_face_sets_how_far_across_a_workpiece_is(along: str, unit: tuple[int, int], side: int) -> None:
+    """The belt goes on, and the blade covers 60 mm of it: 0.35 s of that with half of the workpiece."""
+    (x, y), way = unit, "y" if unit[0] else "x"
+    left = side * (unit[0] or -unit[1])
+    at = [300 * x - 80 * left * abs(y), 300 * y - 80 * left * abs(x), 110]
+    rod = ROD.replace("[300, -80, 110]", str(at)).replace("+y", f"{'+' if left > 0 else '-'}{way}")
+    rod = rod.replace("stroke = 120", 'stroke = 70\nextend_time = "175 ms"')
+    size = "[60, 10, 30]" if x else "[10, 60, 30]"
+    belt = BELT.replace('run = "c.OUT1"', f'run = "c.OUT1"\nalong = "{along}"')
+    world = pushing(belt + rod + BLADE.replace("[60, 10, 30]", size), 5.36)
+    across = 0.0
+    for _ in range(20):
+        travel = world.read("main.place1") - 20.0
+        across = max(min(400.0 * (world.now / SECOND - 5.2), 70.0) - 80.0 + 5.0 + 15.0, 0.0) * left
+        assert place_of(world, "main.1") == pytest.approx(
+            [travel * x + across * abs(y), travel * y + across * abs(x), 100.0], abs=5e-6
+        )
+        world.run(for_=0.01)
+    assert across == 10.0 * left
+
+
+def test_what_is_pushed_off_a_belt_falls() -> None:
+    world = pushing(BELT + ROD + BLADE, 6.0)
+    times, texts = zip(*told(world), strict=True)
+    assert texts == ("blade pushes main.1 on main", "main.1 falls 100 mm", "main.1 lies on the floor")
+    assert list(times) == seconds(5.35, 5.475, 5.475 + sqrt(2.0 * 0.1 / 9.80665))
+    assert world.read("main.delivered") == 0
+
+
+def test_a_workpiece_stays_where_it_was_pushed_when_the_blade_goes_back() -> None:
+    """An axis with ramps comes to 80 mm, so that the workpiece is 20 mm from the middle, and pushes the next one by 5 mm."""
+    world = pushing(BELT + AXIS + BLADE, M1_EN=1, M1_POS_ABS=0)
+    for place in (80.0, 0.0):
+        world.mic488["c"].write("M1_POS_ABS", place)
+        world.run(for_=0.5)
+    world.run(until=7.2)
+    world.mic488["c"].write("M1_POS_ABS", 65.0)
+    world.run(for_=0.6)
+    assert place_of(world, "main.1") == pytest.approx([560.0, 20.0, 100.0], abs=5e-6)
+    assert place_of(world, "main.2")[1] == pytest.approx(5.0, abs=5e-6)
+    assert world.read("blade.pushed") == 2
+
+
+def test_a_workpiece_that_comes_stands_before_a_blade_until_that_is_gone() -> None:
+    """It has its front at 270 mm. The blade, 50 mm to each side of the rod, is beside it after 105 mm of the way back."""
+    world = World.from_toml(BELT + ROD + BLADE.replace("[60, 10, 30]", "[60, 100, 30]"))
+    world.mic488["c"].write("OUT1", 1)
+    world.mic488["c"].write("OUT2", 1)
+    world.run(until=6.0)
+    world.mic488["c"].write("OUT2", 0)
+    world.run(until=7.0)
+    times, texts = zip(*told(world), strict=True)
+    assert texts == ("main.1 stands at 270 mm of main", "main.1 goes on on main")
+    assert list(times) == seconds(4.7, 6.0 + 105.0 / 400.0)
+    assert world.read("blade.pushed") == 0
+
+
+def test_it_jams_where_a_workpiece_comes_against_another_one_and_is_free_when_it_goes_back() -> None:
+    world = pushing(BELT + ROD + BLADE + TRAY, 5.5)
+    assert world.read("blade.jammed") == 1
+    at = 40.0 + 60.0
+    assert world.read("rod.position") == pytest.approx(at, abs=1e-5)
+    assert place_of(world, "main.1") == pytest.approx([330.0, 40.0, 100.0], abs=5e-6)
+    world.mic488["c"].write("OUT2", 0)
+    world.run(until=5.6)
+    assert world.read("blade.jammed") == 0
+    assert world.read("rod.position") == pytest.approx(at - 40.0, abs=1e-5)
+    assert [text for _, text in told(world)] == [
+        "blade pushes main.1 on main",
+        "blade stands: main.1 is pushed against tray.1",
+    ]
+
+
+def test_it_goes_on_when_nothing_is_in_the_way_any_more() -> None:
+    """The belt carries the workpiece past the other one, 25 mm behind the middle of that and its own 20 mm."""
+    world = pushing(BELT + ROD + BLADE.replace("[60", "[200") + TRAY, 6.0)
+    (free,) = (one.time for one in world.trace.of("event") if str(one.value) == "blade is free again")
+    assert free / SECOND == pytest.approx(5.2 + (330.0 + 25.0 + 20.0 - 300.0) / 100.0, abs=1e-8)
+    assert world.read("rod.position") == 120.0
+
+
+def test_an_axis_that_is_jammed_is_free_when_it_is_moved_back() -> None:
+    world = pushing(BELT + AXIS + BLADE + TRAY, M1_EN=1)
+    world.mic488["c"].write("M1_POS_ABS", 120.0)
+    world.run(for_=0.4)
+    assert world.read("blade.jammed") == 1
+    assert world.read("rod.position") == pytest.approx(100.0, abs=0.01)
+    world.mic488["c"].write("M1_POS_ABS", 90.0)
+    world.run(for_=0.4)
+    assert world.read("blade.jammed") == 0
+    assert world.read("rod.position") < 90.0
+
+
+def test_what_it_cannot_push_is_an_event() -> None:
+    text = BELT + ROD + BLADE + TRAY.replace("75", "40").replace("330", "300")
+    world = pushing(text.replace('feed_every = "2 s"\n', ""), 6.0)
+    assert [str(one.value) for one in world.trace.of("event")] == ["blade and tray.1 collide"]
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        (BELT + ROD + BLADE.replace('on = "rod"', ""), "pushes means nothing without on"),
+        (BELT + ROD + BLADE + 'when = "c.OUT4"', "exclude each other"),
+        (BELT.split("[[conveyor]]", maxsplit=1)[0] + ROD + BLADE, "'blade' pushes, but no [[conveyor]] has a place in space"),
+        (
+            BELT + ROD + 'on = "t"\n[[axis]]\nname = "t"\ndrive = "c.M2"\nkind = "rotary"\nat = [0, 0, 0]\n' + BLADE,
+            "'blade' pushes, but 't' turns it against 'main': what pushes moves straight",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_refused(text: str, problem: str) -> None:
+    with pytest.raises(WorldError) as error:
+        World.from_toml(text)
+    assert problem in str(error.value)
+
+
+@pytest.mark.parametrize("moment", [5.0, 5.4, 5.5, 6.0])
+def test_it_can_be_restored_at_any_moment(moment: float, tmp_path: Path) -> None:
+    script = """
+    [[script]]
+    name = "s"
+    steps = [{ write = { "c.OUT1" = 1 } }, { wait = "5.2 s" }, { write = { "c.OUT2" = 1 } }, { wait = "1.1 s" },
+      { write = { "c.OUT2" = 0 } }]
+    """
+    text = BELT + ROD + BLADE.replace("[60", "[200") + TRAY + script
+    check_it_can_be_restored(World.from_toml(text), World.from_toml(text), moment, 7.5, tmp_path)
