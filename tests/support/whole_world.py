@@ -240,6 +240,13 @@ length = 100
 run = "power.no"
 speed = 100.0
 ramp_up = "80 ms"
+at = [0, 200, 40]
+[[body]]
+name = "blade"
+on = "clamp"
+at = [0, 180, 45]
+size = [20, 10, 30]
+pushes = true
 [[gripper]]
 name = "jaws"
 close = "clamp.extended"
