@@ -13,7 +13,6 @@ NOT_RUN = {
     "README.md": [
         "it goes on until Ctrl-C",
         "it is the demo that the other blocks are run with",
-        "needs mbpoll; tests/peers/test_readme.py does it",
         "runs this test",
     ],
     "docs/architecture.md": ["an excerpt"],
@@ -32,7 +31,7 @@ NOT_RUN = {
         "needs a client of EPICS; tests/gateways/epics does it",
         "needs a client of EPICS; tests/gateways/epics does it",
     ],
-    "docs/getting-started.md": ["needs mbpoll; tests/peers/test_readme.py does it"],
+    "docs/getting-started.md": ["needs mbpoll; tests/peers/test_mbpoll_of_the_docs.py does it"],
     "docs/index.md": ["it goes on until Ctrl-C"],
     "docs/install.md": ["a clone is what these pages are run in", "needs a package index", "needs a package index"],
     "docs/studio.md": [
@@ -50,7 +49,7 @@ NOT_RUN = {
         "needs the recording of the run before; tests/test_tutorials.py does it",
         "it fails, as it should; tests/test_tutorials.py does it",
     ],
-    "docs/tutorials/panel.md": ["needs mbpoll; tests/peers/test_readme.py does it"] * 3,
+    "docs/tutorials/panel.md": ["needs mbpoll; tests/peers/test_mbpoll_of_the_docs.py does it"] * 3,
     "docs/why.md": ["it goes on until Ctrl-C"],
 }
 """Blocks that are not run here, with the reason that stands before them in the source."""

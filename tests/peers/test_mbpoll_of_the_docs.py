@@ -1,4 +1,4 @@
-"""What README and getting-started tell a newcomer to type into mbpoll, typed against the demo."""
+"""What the pages for newcomers have them type into mbpoll, typed against the demo."""
 
 from __future__ import annotations
 
@@ -35,42 +35,6 @@ def poll(command: list[str], enough: int) -> list[float]:
             assert lines[-1], "it ended by itself"
         process.send_signal(signal.SIGINT)
         return values("".join(lines))
-
-
-def test_the_readmes_session(require_peer: Callable[[str], str], serve: Callable[..., Any], connect: Callable[..., Any]) -> None:
-    twin = serve("--demo")
-    master = connect(twin.tcp_port)
-    mbpoll = require_peer("mbpoll")
-    typed = commands("README.md", "mbpoll")
-    assert [line[line.index("-p") + 1] for line in typed] == ["5020"] * len(typed)
-    run = iter([mbpoll, *line[1 : line.index("-p") + 1], str(twin.tcp_port), *line[line.index("-p") + 2 :]] for line in typed)
-
-    def type_next() -> str:
-        return subprocess.run(next(run), capture_output=True, text=True, check=True).stdout
-
-    type_next()
-    assert master.status(1) == 1
-    # The demo takes 4.5 s for its 100 mm.
-    master.dynamics(1, acc=2000.0, dec=2000.0, vmax=200.0)
-    type_next()
-    seen = poll(next(run), 3)
-    assert seen == sorted(set(seen))
-    assert seen[-1] <= 100.0
-    assert values(type_next()) in ([3.0], [4.0])
-    assert master.follow(1, 3)[-1][2:] == (100.0, 0.0, 4)
-
-    master.move(1, -9.0)
-    assert master.follow(1, 3)[-1][2:] == (-9.0, 0.0, 4)
-    type_next()
-    homed = master.follow(1, 6)[-1]
-    assert (homed.position, homed.status) == (0.0, 4)
-
-    type_next()
-    assert master.status(1) == 2
-    type_next()
-    assert master.status(1) == 1
-    assert master.sample(1).velocity == 0.0
-    assert next(run, None) is None
 
 
 def test_the_pty_as_getting_started_polls_it(require_peer: Callable[[str], str], serve: Callable[..., Any]) -> None:
