@@ -39,6 +39,20 @@ def test_the_chain_of_a_condition(session: str) -> None:
     assert VALVE in (PRESS.parents[3] / "docs" / "why.md").read_text(encoding="utf-8")
 
 
+def test_the_run_again_without_a_root(session: str) -> None:
+    tried = invoke("why", session, "valve.out == 0", "--try-without").removeprefix(VALVE)
+    assert tried in (PRESS.parents[3] / "docs" / "why.md").read_text(encoding="utf-8")
+    assert tried.splitlines()[1:] == ["    3.198000 s  check      script check: presses curtain -> valve.out == 0 is false"]
+
+
+def test_more_than_eight_causes(session: str) -> None:
+    asked = "why", session, "cell.OUT1 == 0", "--at", "2.7s"
+    first, everything = (invoke(*asked, *more).splitlines() for more in ((), ("--all",)))
+    assert first[-1].strip() == "(earlier causes are not shown)"
+    assert first[:-1] == everything[: len(first) - 1]
+    assert everything[-1].endswith("script check: presses right")
+
+
 def test_the_chain_at_a_moment_as_json(session: str) -> None:
     told = json.loads(invoke("why", session, "cell.OUT1 = 0", "--at", "2.7s", "--json"))
     assert told["at_ns"] == "2700000000"

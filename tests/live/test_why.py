@@ -75,6 +75,8 @@ def test_the_answer_is_that_of_the_session(run: Run) -> None:
             told = await rig.why(question)
             assert told["text"] == rig.world.why(question).text()
         assert links(await rig.why("OUT1"))[-1] == "from outside: presses go"
+        tried = (await rig.why("OUT1", try_without=True))["trials"]
+        assert [(one["effect"], one["without"]) for one in tried] == [("otherwise", "cell.OUT1 is 0")]
         rig.close()
 
     run(scene())

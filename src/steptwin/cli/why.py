@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
@@ -36,36 +36,57 @@ def command(
         ),
     ] = "",
     at: Annotated[str | None, typer.Option(metavar="TIME", help="The moment, such as 2.5s. Default: now, or the end.")] = None,
+    everything: Annotated[bool, typer.Option("--all", help="All that is found, not only the first eight causes.")] = False,
+    try_without: Annotated[
+        bool,
+        typer.Option(
+            help="Repeat the run without each root (an input, an action of a script, a request, a fault) and show what would be. "
+            "Includes --all.",
+        ),
+    ] = False,
     json: Json = False,
 ) -> None:
     """Show the chain of causes of a value, of a condition or of a wait.
 
     A running twin answers if its past is kept: in the studio, or with 'steptwin up --past'.
     """
-    _answer(where, question, at, typer.echo, as_json=json)
+    asked = WhyQuestion(question, at, everything=everything, try_without=try_without)
+    _answer(where, asked, typer.echo, as_json=json)
 
 
-def _answer(where: str, question: str, at: str | None, out: Callable[[str], object], *, as_json: bool = False) -> None:
+class WhyQuestion(NamedTuple):
+    """A question as it was typed."""
+
+    text: str
+    at: str | None
+    everything: bool = False
+    try_without: bool = False
+
+
+def _answer(where: str, asked: WhyQuestion, out: Callable[[str], object], *, as_json: bool = False) -> None:
     """Print the answer. Raises `Misuse` for a file that is no recording, and for what is no question there; `Refusal` for a twin
     whose past is not kept."""
-    found = _of_recording(Path(where), question, at) if Path(where).suffix == ".json" else _of_twin(where, question, at)
+    found = _of_recording(Path(where), asked) if Path(where).suffix == ".json" else _of_twin(where, asked)
     out(json.dumps(found, ensure_ascii=False, indent=2) if as_json else found["text"])
 
 
-def _of_recording(path: Path, question: str, at: str | None) -> Mapping[str, Any]:
+def _of_recording(path: Path, asked: WhyQuestion) -> Mapping[str, Any]:
     from steptwin.durations import duration
     from steptwin.files import recording as recordings
     from steptwin.files.why import why_of_recording
 
-    return why_of_recording(recordings.load(path)).ask(question, None if at is None else duration(at)).to_json()
+    at = None if asked.at is None else duration(asked.at)
+    past = why_of_recording(recordings.load(path))
+    return past.ask(asked.text, at, try_without=asked.try_without, everything=asked.everything).to_json()
 
 
-def _of_twin(text: str, question: str, at: str | None) -> Mapping[str, Any]:
+def _of_twin(text: str, asked: WhyQuestion) -> Mapping[str, Any]:
     from steptwin.durations import duration
     from steptwin.live.remote import ask
     from steptwin.live.twins import find_controller
     from steptwin.subject.debugcommands import AskWhy
 
     twin, controller = find_controller(text)
-    moment = None if at is None else duration(at)
-    return ask(twin, AskWhy(question or controller or "", moment), timeout_s=LONGEST_S)
+    moment = None if asked.at is None else duration(asked.at)
+    wanted = AskWhy(asked.text or controller or "", moment, asked.everything, asked.try_without)
+    return ask(twin, wanted, timeout_s=LONGEST_S)

@@ -51,7 +51,9 @@ class LiveWhy:
         until = perf_counter() + PART_S
         try:
             if self._asking is None:
-                self._asking = self._kept_past().asking(wanted.question, wanted.at)
+                self._asking = self._kept_past().asking(
+                    wanted.question, wanted.at, try_without=wanted.try_without, everything=wanted.everything
+                )
             next(self._asking)
             while perf_counter() < until:
                 next(self._asking)

@@ -187,12 +187,17 @@ class ProgramSource:
     "The chain of causes of a value, of a condition or of a wait, from the past that is kept.",
     "question, at_ns, state (what is true), since_ns (null: it has not changed), links: a list of time_ns, subject and text,"
     " from the effect to its causes; complete, known_from_ns, cut (whether the"
-    " chain ends there), text (all of it in lines)",
+    " chain ends there), trials (with try_without: the links that the run was repeated without, each with effect: otherwise,"
+    " other time, same or unknown, and without: what would be), text (all of it in lines)",
 )
 @dataclass(frozen=True, slots=True)
 class AskWhy:
     question: Annotated[str, Meaning("A signal, a condition, or the name of a controller: what its program waits for.")] = ""
     at: Annotated[Nanos | None, Meaning("At which moment; now without.", TIME, unit="ns", name="at_ns")] = None
+    everything: Annotated[bool, Meaning("All that is found, not only the first eight links.", name="all")] = False
+    try_without: Annotated[
+        bool, Meaning("Repeat the run without each root: input, script act, request or fault. Implies all.")
+    ] = False
 
 
 DebugCommand: TypeAlias = (

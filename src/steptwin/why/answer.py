@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message, MessageText, read_message_text, with_messages
+from steptwin.why.roots import Root
 
 SINCE_BEFORE = Message("why.since-before", "since before {time:.6f} s")
 FROM_THE_BEGINNING = Message("why.from-the-beginning", "from the beginning")
 
+WITHOUT = Message("why.without", "the run again without each of its roots:")
+
 MOST_LINKS = 8
+"""Limit of the links of an answer, unless all are asked for."""
+ALL_LINKS = 1000
+"""Limit where all are asked for."""
 
 
 class ChainRule(enum.Enum):
@@ -38,15 +45,41 @@ class Cover(enum.Enum):
     FAULT = "a fault holds a level"
 
 
-class ChainLink(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class ChainLink:
     """One cause. ``subject``: the controller, element, line or script it happened to."""
 
     time: Nanos
     subject: str
     text: MessageText
+    root: Root | None = field(default=None, compare=False)
+    """What the run can be repeated without, if it is that."""
 
     def to_json(self) -> dict[str, Any]:
         return with_messages({"time_ns": str(self.time), "subject": self.subject, "text": self.text})
+
+
+class Effect(enum.StrEnum):
+    """Effect of the run without a root on what was asked for."""
+
+    OTHERWISE = "otherwise"
+    OTHER_TIME = "other time"
+    """It would be the same, but since another moment."""
+    SAME = "same"
+    """Something else is enough for it: the root alone does not decide."""
+    UNKNOWN = "unknown"
+    """The run could not be repeated without it."""
+
+
+class Trial(NamedTuple):
+    """The run repeated without the root of ``link``. ``text``: what would be then."""
+
+    link: ChainLink
+    effect: Effect
+    text: MessageText
+
+    def to_json(self) -> dict[str, Any]:
+        return with_messages({**self.link.to_json(), "effect": self.effect.value, "without": self.text})
 
 
 class Answer(NamedTuple):
@@ -63,6 +96,8 @@ class Answer(NamedTuple):
     """The moment from which on the past was searched."""
     is_cut: bool = False
     """Whether the chain ends there, because of something before that moment."""
+    trials: tuple[Trial, ...] = ()
+    """The runs without each of the roots, if that was asked for."""
     broken: ChainRule | None = None
     """The rule that what was found next would have broken: the chain was ended there, and its last link says so."""
 
@@ -70,11 +105,12 @@ class Answer(NamedTuple):
         """The answer in lines."""
         begin = since_before(self.known_from) if self.since is None else f"since {self.since / SECOND:.6f} s"
         lines = [f"{self.state}, {begin} (at {self.at / SECOND:g} s)"]
-        lines += [f"{link.time / SECOND:12.6f} s  {link.subject:<10} {link.text}" for link in self.links]
+        lines += map(_line, self.links)
         if self.is_cut:
             lines.append(f"{'':12}    (what was before {self.known_from / SECOND:.6f} s is not known)")
         elif not self.is_complete:
             lines.append(f"{'':12}    (earlier causes are not shown)")
+        lines += [WITHOUT(), *(f"{_line(trial.link)} -> {trial.text}" for trial in self.trials)] if self.trials else []
         return "\n".join(lines)
 
     def to_json(self) -> dict[str, Any]:
@@ -88,6 +124,7 @@ class Answer(NamedTuple):
             "complete": self.is_complete,
             "known_from_ns": str(self.known_from),
             "cut": self.is_cut,
+            "trials": [trial.to_json() for trial in self.trials],
             "text": self.text(),
         }
         return with_messages(data)
@@ -95,7 +132,7 @@ class Answer(NamedTuple):
 
 def read_answer(data: Mapping[str, Any]) -> Answer:
     """An answer from its plain data."""
-    links = tuple(ChainLink(int(link["time_ns"]), link["subject"], read_message_text(link, "text")) for link in data["links"])
+    links = tuple(map(_read_link, data["links"]))
     since = None if data["since_ns"] is None else int(data["since_ns"])
     known_from = int(data["known_from_ns"])
     return Answer(
@@ -107,7 +144,20 @@ def read_answer(data: Mapping[str, Any]) -> Answer:
         data["complete"],
         known_from,
         data["cut"],
+        tuple(_read_trial(one) for one in data["trials"]),
     )
+
+
+def _line(link: ChainLink) -> str:
+    return f"{link.time / SECOND:12.6f} s  {link.subject:<10} {link.text}"
+
+
+def _read_link(data: Mapping[str, Any]) -> ChainLink:
+    return ChainLink(int(data["time_ns"]), data["subject"], read_message_text(data, "text"))
+
+
+def _read_trial(data: Mapping[str, Any]) -> Trial:
+    return Trial(_read_link(data), Effect(data["effect"]), read_message_text(data, "without"))
 
 
 def since_before(begin: Nanos) -> MessageText:

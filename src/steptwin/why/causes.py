@@ -22,7 +22,8 @@ from steptwin.simulation.world.inputs import Download, See, SetVariable
 from steptwin.why import points
 from steptwin.why.answer import ChainLink, Cover, since_before
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing, unknown
-from steptwin.why.log import LAST, MOST_LOOKED_BACK, Act, CauseLog, Change, sets
+from steptwin.why.log import LAST, MOST_LOOKED_BACK, CauseLog, Change, sets
+from steptwin.why.roots import Act, Sent
 from steptwin.why.sentences import Frames, describe_input, statement
 
 BECAME = Message("why.became", "{signal} became {value:g}{how}")
@@ -130,19 +131,19 @@ class Causes:
                     and record.controller == owner
                     and (named is None or named in str(record.value).split())
                 ):
-                    link = ChainLink(record.time, record.controller, FAULT(name=record.subject, what=record.value))
+                    link = self.fault_link(record)
                     return Cause(link, Place(record.time, change.order, -1), self._of_fault(record, order))
         return None
 
+    def fault_link(self, record: TraceRecord) -> ChainLink:
+        """Link of a record of a fault."""
+        text = FAULT(name=record.subject, what=record.value)
+        return ChainLink(record.time, record.controller, text, self._log.fault_root(record.subject, record.time))
+
     def _of_fault(self, record: TraceRecord, order: int) -> Callable[[], FoundCause]:
-        """Search for the action that set or cleared a fault, unless its description begins or ends it."""
-        for act in self._log.acts_at(record.time, order):
-            match act.what:
-                case do.SetFault(fault) if record.subject.startswith(fault.name or fault.kind.name):
-                    return partial(_acted, act)
-                case do.ClearFault(name) if name == record.subject:
-                    return partial(_acted, act)
-        return nothing
+        """Search for the action that set or cleared a fault, unless it belongs to the description."""
+        act = self._log.fault_act(record.subject, record.time, order)
+        return nothing if act is None else lambda: covered(_acted(act), Cover.FAULT)
 
     def lasting(self, signals: Sequence[str], at: Nanos, first: FoundCause, before: int = LAST) -> FoundCause:
         """The fault that holds one of these signals at a moment, or the output to which a pin is wired, if it began to after the
@@ -156,14 +157,13 @@ class Causes:
             return first
         held, place = hold.held, Place(time, hold.order)
 
-        link = ChainLink(time, signal.partition(".")[0], IS(signal=signal, value=held.description()))
+        text = IS(signal=signal, value=held.description())
+        link = ChainLink(time, signal.partition(".")[0], text, self._log.fault_root(held.fault, time))
 
         older = self._at_begin if first is None else lambda: covered(first, Cover.LEVEL)
-        for act in self._log.acts_before(time, hold.order):
-            match act.what:
-                case do.SetFault(fault) if held.fault.startswith(fault.name or fault.kind.name):
-                    return Cause(link, place, partial(Cause, *_acted(act)[:2], older, Cover.FAULT), Cover.FAULT)
-        return Cause(link, place, older, Cover.FAULT)
+        act = self._log.fault_act(held.fault, time, hold.order)
+        before_it = older if act is None else partial(Cause, *_acted(act)[:2], older, Cover.FAULT)
+        return Cause(link, place, before_it, Cover.FAULT)
 
     def of_element(self, name: str, signal: str, time: Nanos) -> FoundCause:
         """Cause of a change of an element that no record shows: what drives a terminal, an output at the same moment, or an
@@ -229,7 +229,7 @@ class Causes:
         fault = self._log.last_fault(name, change.time, change.order)
         if fault is not None and (latest is None or (fault.time, fault.order) > (latest.time, latest.order)):
             record = self._log.record(fault)
-            link = ChainLink(record.time, record.controller, FAULT(name=record.subject, what=record.value))
+            link = self.fault_link(record)
             return Cause(link, Place(fault.time, fault.order), self._of_fault(record, fault.order), acts)
         if latest is None and len(sources) == 1 and self._log.level(sources[0], change.time):
             text = IS_SINCE(
@@ -436,7 +436,8 @@ class Causes:
         if client == SCRIPTS:
             link = ChainLink(record.time, record.controller, REQUEST(meaning=meaning))
             return Cause(link, place, partial(self._requested, record, order))
-        return Cause(ChainLink(record.time, record.controller, CLIENT(client=client, meaning=meaning)), place, nothing)
+        sent = Sent(record.time, record.controller, client)
+        return Cause(ChainLink(record.time, record.controller, CLIENT(client=client, meaning=meaning), sent), place, nothing)
 
     def _requested(self, record: TraceRecord, order: int) -> FoundCause:
         """The step that made a request, which a line with timing carries later."""
@@ -656,7 +657,7 @@ def _matches(writes: Sequence[Resource], wanted: Resource | None) -> bool:
 def _acted(act: Act) -> Cause:
     what = describe_input(act.what)
     text = SCRIPT(name=act.script, what=what) if act.script else FROM_OUTSIDE(what=what)
-    return Cause(ChainLink(act.time, act.script or "outside", text), Place(act.time, act.order), nothing)
+    return Cause(ChainLink(act.time, act.script or "outside", text, act), Place(act.time, act.order), nothing)
 
 
 def _names(act: Act, meaning: str) -> bool:

@@ -18,7 +18,7 @@ from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.simulation.components.registry import ELEMENTS
-from steptwin.simulation.faults.active import HeldLevel
+from steptwin.simulation.faults.active import ActiveFault, HeldLevel
 from steptwin.simulation.kinds.programs import Programs, StatementLocation
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
@@ -29,6 +29,7 @@ from steptwin.simulation.world.snapshot import RecordedInput
 from steptwin.simulation.world.snapshotlog import SLICE_NS, replay
 from steptwin.statements import StatementHook
 from steptwin.why import points
+from steptwin.why.roots import Act, SetFault
 
 MOST_NOTED = 20_000_000
 """Limit of what is noted, because it is kept in memory."""
@@ -66,15 +67,6 @@ class ExecutedStatements:
     def last(self, until: Nanos) -> int:
         """The number of the last one by a moment; -1 if there is none."""
         return bisect_right(self.times, until) - 1
-
-
-class Act(NamedTuple):
-    """An action of a script; from outside if ``script`` is empty. ``order``: as that of a `Change`."""
-
-    time: Nanos
-    script: str
-    what: ExternalInput
-    order: int
 
 
 class Change(NamedTuple):
@@ -128,6 +120,10 @@ class CauseLog:
         self.faults: dict[str, list[Change]] = defaultdict(list)
         """Moments at which faults began or ended, by controller or element."""
         self.acts: list[Act] = []
+        self._fault_acts: dict[str, list[Act]] = defaultdict(list)
+        """Those that set or clear a fault, by its name."""
+        self._fault_times: dict[str, list[Nanos]] = defaultdict(list)
+        """Moments at which faults acted, by name."""
         self._holds: dict[str, list[Hold]] = defaultdict(list)
         self._replaced: dict[str, Nanos] = {}
         """When the program of a controller was last replaced by a download."""
@@ -147,6 +143,7 @@ class CauseLog:
         self.points = points.NotedPoints(world)
         world.trace.subscribers.append(self._take)
         world.act_subscribers.append(self._act)
+        parts.faults.act_subscribers.append(self._fault_acted)
         for name, programs in world.programs.items():
             if not self.is_whole:
                 for frame in programs.stack(self.begin)[:1]:
@@ -230,15 +227,23 @@ class CauseLog:
             if (holds[-1].held if holds else None) != held.get(signal):
                 holds.append(Hold(now, held.get(signal), self._order))
 
+    def _fault_acted(self, active: ActiveFault, now: Nanos, *, begins: bool) -> None:
+        if begins:
+            self._fault_times[active.name].append(now)
+
     def _act(self, script: str, what: ExternalInput) -> None:
         self.world.sync_all()
         self._count()
-        self.acts.append(Act(self.world.now, script, what, self._order))
+        act = Act(self.world.now, script, what, self._order)
+        self.acts.append(act)
         match what:
+            case do.SetFault(fault):
+                self._fault_acts[self.world.objects.faults.name_of(fault)].append(act)
             case Download(controller=controller):
                 self._replaced[controller] = self.world.now
                 self._keeping[controller].clear()
             case do.ClearFault(name):
+                self._fault_acts[name].append(act)
                 for holds in self._holds.values():
                     if (held := holds[-1].held) is not None and held.fault == name:
                         holds.append(Hold(self.world.now, None, self._order))
@@ -369,6 +374,29 @@ class CauseLog:
         """Acts of scripts and from outside by a moment, before an order, the last ones first."""
         last = bisect_left(self.acts, (until, before), key=lambda act: (act.time, act.order)) - 1
         return (self.acts[index] for index in range(last, max(-1, last - MOST_LOOKED_BACK), -1))
+
+    def fault_root(self, name: str, until: Nanos) -> SetFault:
+        """A fault that acts at a moment."""
+        acts = (act for act in reversed(self._fault_acts.get(name, ())) if act.time <= until)
+        acted = self.world.objects.faults.acts.get(name)
+        first = until if acted is None else min(until, acted.first)
+        return SetFault(first, name, next((act for act in acts if isinstance(act.what, do.SetFault)), None))
+
+    def fault_time(self, name: str, until: Nanos) -> Nanos:
+        """When a fault that has acted by a moment did so last, as far as that is known."""
+        times = self._fault_times.get(name, ())
+        acts = self.world.objects.faults.acts[name]
+        return next((time for time in reversed(times) if time <= until), min(acts.last, until))
+
+    def fault_record(self, name: str, until: Nanos) -> TraceRecord | None:
+        """The last record of a fault by a moment."""
+        records = (self.record(one) for changes in self.faults.values() for one in changes if one.time <= until)
+        return max((one for one in records if one.subject == name), key=lambda one: one.time, default=None)
+
+    def fault_act(self, name: str, until: Nanos, before: int) -> Act | None:
+        """The last act by a moment, before an order, that set or cleared a fault."""
+        acts = (act for act in reversed(self._fault_acts.get(name, ())) if (act.time, act.order) < (until, before))
+        return next(acts, None)
 
     def position(self, group: int, time: Nanos) -> int:
         """The number of the records of a group until the end of a moment."""

@@ -6,24 +6,34 @@ older ones where the causes are older. It stays for further questions, which onl
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Protocol
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
+from steptwin.messages import Message
+from steptwin.simulation.faults.active import Faults
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
 from steptwin.simulation.world.snapshotlog import outside_past
-from steptwin.why.answer import MOST_LINKS, Answer
+from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Effect, Trial
 from steptwin.why.question import Asking, Why
+from steptwin.why.roots import SetFault
 from steptwin.why.search import Asked, LastChanges, Snapshots
+from steptwin.why.without import trying_without
 
 FIRST_SPAN_NS: Nanos = 5 * SECOND
 """So much of the past is searched first, and `FURTHER` times as much where the causes are older."""
 FIRST_STATEMENTS = 5500
 """Most statements of a program at first: some more than the last ones, among which the one that decided is looked for."""
 FURTHER = 8
+STANDS_NS: Nanos = SECOND
+"""What has lasted for so long may be because of any fault that has acted before."""
+MOST_SUSPECTS = 4
+"""Limit of the faults that are tried for one question, the last ones first."""
+WITHOUT_IT = Message("why.without-it", "{what}; without it: {state}")
 MOST_NOTED = 500_000
 """Limit of the records and statements that are noted: some 100 MB."""
 
@@ -42,10 +52,55 @@ class PastQuestions:
         self._snapshots = snapshots
         self._most = MOST_NOTED if most is None else most
         self._known: _Known | None = None
+        self._most_links = MOST_LINKS
         self._changes = LastChanges(snapshots, _second_world)
 
-    def asking(self, question: str, at: Nanos | None = None) -> Asking:
-        """The answer for a moment, by default the present. Raises `Misuse` for what is no question here."""
+    def asking(self, question: str, at: Nanos | None = None, *, try_without: bool = False, everything: bool = False) -> Asking:
+        """The answer for a moment, by default the present, with ``everything`` that is found. ``try_without``: the same, and what
+        would be without each of its roots. Raises `Misuse` for what is no question here."""
+        self._most_links = ALL_LINKS if everything or try_without else MOST_LINKS
+        answer = yield from self._asking(question, at)
+        tried: dict[str, Trial] = {}
+        for name in self._suspects(answer):
+            trial = yield from self._without_fault(name, answer)
+            if trial is not None:
+                tried[name] = trial
+        answer = answer._replace(links=_with(answer.links, tried.values()))
+        if not try_without:
+            return answer
+        trials: list[Trial] = []
+        for link in answer.links:
+            if link.root is not None:
+                known = tried.get(link.root.name) if isinstance(link.root, SetFault) else None
+                trials.append(known or (yield from trying_without(self._snapshots, link, answer, self._most)))
+        return answer._replace(trials=tuple(trials))
+
+    def _suspects(self, answer: Answer) -> Sequence[str]:
+        """The faults that may be why something lasts, as far as the chain does not have them: those that do something at the
+        moment, or did it since it is so, and where that is for `STANDS_NS` all that have acted."""
+        if self._known is None:
+            return ()
+        faults, at = self._known.faults, answer.at
+        since = answer.known_from if answer.since is None else answer.since
+        there = {link.root.name for link in answer.links if isinstance(link.root, SetFault)}
+        acted = [
+            (acts.last, name)
+            for name, acts in faults.acts.items()
+            if name not in there
+            and acts.first <= at
+            and (at - since >= STANDS_NS or acts.last >= since or ((one := faults.find(name)) is not None and one.doing))
+        ]
+        return [name for _, name in sorted(acted, reverse=True)][:MOST_SUSPECTS]
+
+    def _without_fault(self, name: str, answer: Answer) -> Generator[None, None, Trial | None]:
+        """The run without a fault, if what was asked for is otherwise then."""
+        if self._known is None:
+            return None
+        link = self._known.fault_link(name, answer.at)
+        trial = yield from trying_without(self._snapshots, link, answer, self._most)
+        return trial if trial.effect is Effect.OTHERWISE else None
+
+    def _asking(self, question: str, at: Nanos | None) -> Asking:
         snapshots = self._snapshots
         now = snapshots.world.now
         at = now if at is None else at
@@ -54,7 +109,7 @@ class PastQuestions:
         known, span = self._known, first_span(snapshots.world)
         if known is None or not known.fits(at, now - span):
             known = self._known = _Known(snapshots, max(snapshots.begin, at - span), self._most)
-        answer = yield from known.asking(question, at)
+        answer = yield from known.asking(question, at, self._most_links)
         if answer.is_cut and answer.since is None and (asked := known.asked(question)) is not None:
             found = yield from self._changes.before(asked, known.begin)
             if answer.links and snapshots.begin <= answer.links[0].time < known.begin:  # a fault has held it since then
@@ -64,24 +119,24 @@ class PastQuestions:
                 return answer._replace(known_from=begin, is_cut=begin > 0, is_complete=begin == 0)
             before = yield from self._then(question, found.since, further=True)
             if before.since == found.since:
-                return _joined(answer, before)
+                return _joined(answer, before, self._most_links)
         return (yield from self._further(known, question, at, answer))
 
     def _then(self, question: str, at: Nanos, *, further: bool = False) -> Asking:
         """The answer for a moment from what is noted near it; ``further``: and from older states, as `_further`."""
         snapshots = self._snapshots
         known = _Known(snapshots, max(snapshots.begin, at - first_span(snapshots.world)), self._most)
-        return (yield from self._further(known, question, at) if further else known.asking(question, at))
+        return (yield from self._further(known, question, at) if further else known.asking(question, at, self._most_links))
 
     def _further(self, known: _Known, question: str, at: Nanos, answer: Answer | None = None) -> Asking:
         """The answer from what is known, and from older states as long as causes are older."""
         is_near = known is self._known
-        answer = (yield from known.asking(question, at)) if answer is None else answer
+        answer = (yield from known.asking(question, at, self._most_links)) if answer is None else answer
         while answer.is_cut and (older := known.older(at)) is not None:
             yield
             try:
                 known = _Known(self._snapshots, older, self._most)
-                answer = yield from known.asking(question, at)
+                answer = yield from known.asking(question, at, self._most_links)
             except Misuse:
                 break
             if is_near:
@@ -108,6 +163,15 @@ class _Known:
         return is_same and log.begin <= at and not_before <= self._why.end and has_room
 
     @property
+    def faults(self) -> Faults:
+        """Those of the world at the end of what is known."""
+        return self._why.log.world.objects.faults
+
+    def fault_link(self, name: str, until: Nanos) -> ChainLink:
+        """A fault as a cause, by a moment."""
+        return self._why.fault_link(name, until)
+
+    @property
     def begin(self) -> Nanos:
         """From when on it is known."""
         return self._why.log.begin
@@ -116,11 +180,11 @@ class _Known:
         """See `Why.asked`."""
         return self._why.asked(question)
 
-    def asking(self, question: str, at: Nanos) -> Asking:
+    def asking(self, question: str, at: Nanos, most_links: int) -> Asking:
         inputs = self._snapshots.inputs_from(self._taken)
         self._taken += len(inputs)
         self._why.go_on(inputs, max(at, self._why.end))
-        return (yield from self._why.asking(question, at))
+        return (yield from self._why.asking(question, at, most_links))
 
     def older(self, at: Nanos) -> Nanos | None:
         """Where a longer search would begin; None if nothing older is kept, or too much has happened since."""
@@ -132,14 +196,23 @@ class _Known:
         return moment if moment < log.begin and snapshots.state_at(moment)[0].now < log.begin else None
 
 
-def _joined(answer: Answer, before: Answer) -> Answer:
+def _with(links: Sequence[ChainLink], trials: Iterable[Trial]) -> tuple[ChainLink, ...]:
+    """Links with those of trials, each before the first one that was earlier."""
+    found = list(links)
+    for trial in trials:
+        place = next((number for number, link in enumerate(found) if link.time < trial.link.time), len(found))
+        found.insert(place, replace(trial.link, text=WITHOUT_IT(what=trial.link.text, state=trial.text)))
+    return tuple(found)
+
+
+def _joined(answer: Answer, before: Answer, most_links: int) -> Answer:
     """``before``: the answer for the moment of the last change, before all that is known of the later one; what has held it
     since comes first."""
     held = [link for link in answer.links if link not in before.links]
     links = (*(held if held and held[0].time > (before.since or 0) else ()), *before.links)
-    is_all = len(links) <= MOST_LINKS
+    is_all = len(links) <= most_links
     return before._replace(
-        at=answer.at, links=links[:MOST_LINKS], is_complete=before.is_complete and is_all, is_cut=before.is_cut and is_all
+        at=answer.at, links=links[:most_links], is_complete=before.is_complete and is_all, is_cut=before.is_cut and is_all
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial, reduce
 from typing import TypeAlias
 
@@ -20,8 +20,8 @@ from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput
 from steptwin.simulation.world.snapshotlog import outside_past
 from steptwin.why import points
-from steptwin.why.answer import MOST_LINKS, Answer, ChainLink, Cover, since_before
-from steptwin.why.causes import IS, IS_SINCE, Causes
+from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Cover, since_before
+from steptwin.why.causes import FAULT, IS, IS_SINCE, Causes
 from steptwin.why.chain import NOT_KNOWN, Cause, Place, broken, covered, nothing
 from steptwin.why.log import LAST, MOST_NOTED, CauseLog, in_parts
 from steptwin.why.replayed import ReplayedSignals, TimeSeries, watch_truth, watch_value
@@ -127,18 +127,28 @@ class Why:
         self._causes = Causes(self.log)
         self._on_the_way = StatesOnTheWay(self.log.world)
         self._replayed = ReplayedSignals(make, self._inputs)
+        self._most_links = MOST_LINKS
 
     def go_on(self, inputs: Iterable[RecordedInput], end: Nanos) -> None:
         """The present is a later one: what came from outside since."""
         self._inputs += inputs
         self.end = end
 
+    def fault_link(self, name: str, until: Nanos) -> ChainLink:
+        """A fault that has acted by a moment, as a cause."""
+        log = self.log
+        record, active = log.fault_record(name, until), log.world.objects.faults.find(name)
+        what = record.value if record is not None else "" if active is None else str(active.fault)
+        subject = "" if record is None else record.controller
+        return ChainLink(log.fault_time(name, until), subject, FAULT(name=name, what=what), log.fault_root(name, until))
+
     def ask(self, question: str, at: Nanos | None = None) -> Answer:
         """The answer for a moment (ns), the end by default. Raises `Misuse` for what is no question here."""
         return finish(self.asking(question, at))
 
-    def asking(self, question: str, at: Nanos | None = None) -> Asking:
-        """As `ask`, in parts."""
+    def asking(self, question: str, at: Nanos | None = None, most_links: int = MOST_LINKS) -> Asking:
+        """As `ask`, in parts; the answer has at most so many links."""
+        self._most_links = most_links
         moment, begin = self.end if at is None else at, self.log.begin
         if not begin <= moment <= self.end:
             raise Misuse(outside_past(moment, begin, self.end))
@@ -413,6 +423,7 @@ class Why:
                 yield from self._answer(controller, at, state, since, covered(causes.statement(controller, index), Cover.PROGRAM))
             )
         links = [link for resource in use.reads for link in self._awaited(controller, resource, at)]
+        is_all = self._most_links != MOST_LINKS or len(links) < MOST_SNAPSHOTS
         if not use.reads:
             links.append(ChainLink(here.time, controller, WAITS_FOR_A_TIME()))
         found = [cause for resource in use.reads if (cause := causes.resource(controller, resource, index, at))]
@@ -420,7 +431,9 @@ class Why:
         last = max(changed, key=lambda cause: cause.link.time, default=None)
         first = covered(causes.statement(controller, index), Cover.WAIT) if last is None else covered(last, Cover.LEVEL)
         answer = yield from self._answer(controller, at, WAITS(controller=controller, statement=text), since, first)
-        return answer._replace(links=tuple(dict.fromkeys((*links, *answer.links)))[:MOST_LINKS])
+        links = list(dict.fromkeys((*links, *answer.links)))
+        is_all = is_all and len(links) <= self._most_links
+        return answer._replace(links=tuple(links[: self._most_links]), is_complete=answer.is_complete and is_all)
 
     def _awaited(self, controller: str, resource: Resource, at: Nanos) -> Iterator[ChainLink]:
         """The present state of what a statement waits for, and of what that depends on."""
@@ -435,7 +448,7 @@ class Why:
     def _states(self, signal: str, at: Nanos) -> Iterator[ChainLink]:
         """The level of a signal and, one after the other, of the signals that drive it."""
         waiting, seen = [signal], set[str]()
-        while waiting and len(seen) < MOST_SNAPSHOTS:
+        while waiting and len(seen) < (MOST_SNAPSHOTS if self._most_links == MOST_LINKS else ALL_LINKS):
             name = waiting.pop(0)
             if name in seen:
                 continue
@@ -458,7 +471,7 @@ class Why:
         chain: list[Cause] = []
         # What it is lasts since then.
         cause, effect = covered(first, Cover.LEVEL if first is not None and first.link.time == since else None), Place(at, LAST)
-        while cause is not None and len(chain) < MOST_LINKS:
+        while cause is not None and len(chain) < self._most_links:
             chain.append(cause)
             if broken(chain, effect, is_followed=False):
                 break
@@ -471,5 +484,5 @@ class Why:
         if found is None:
             return Answer(question, at, state, since, tuple(links), is_followed and not is_cut, self.log.begin, is_cut)
         first_link = ChainLink(at if since is None else since, question.partition(".")[0], state)
-        links[found.number :] = [(links[found.number - 1] if found.number else first_link)._replace(text=NOT_KNOWN())]
-        return Answer(question, at, state, since, tuple(links), True, self.log.begin, False, found.rule)
+        links[found.number :] = [replace(links[found.number - 1] if found.number else first_link, text=NOT_KNOWN(), root=None)]
+        return Answer(question, at, state, since, tuple(links), True, self.log.begin, broken=found.rule)

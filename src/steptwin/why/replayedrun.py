@@ -35,13 +35,13 @@ class ReplayedRun:
         self._end = end
         self._questions: PastQuestions | None = None
 
-    def ask(self, question: str, at: Nanos | None = None) -> Answer:
-        """The answer for a moment (ns), the end by default. Raises `Misuse` for what is no question here."""
+    def ask(self, question: str, at: Nanos | None = None, *, try_without: bool = False, everything: bool = False) -> Answer:
+        """The answer for a moment (ns), the end by default. Options and errors as in `PastQuestions.asking`."""
         if self._questions is None:
             states = SnapshotsOfRun(self._make(), self._inputs, self._end)
             states.run()
             self._questions = PastQuestions(states, MOST_NOTED)
-        return finish(self._questions.asking(question, at))
+        return finish(self._questions.asking(question, at, try_without=try_without, everything=everything))
 
 
 class SnapshotsOfRun:

@@ -262,7 +262,7 @@ class Faults(Stateful):
         """Set a fault at ``now``. Raises `Misuse` for a name in use, or an unknown controller, pin or axis."""
         if fault.name and self.find(fault.name) is not None:
             raise Misuse(FAULT_IS_SET_ALREADY(name=fault.name))
-        active = ActiveFault(fault, fault.name or self._free_name(fault.kind.name), self.seed, now)
+        active = ActiveFault(fault, self.name_of(fault), self.seed, now)
         failing = self.check(fault)
         self.active = (*self.active, active)
         if failing is not None:
@@ -307,9 +307,11 @@ class Faults(Stateful):
         """The active fault called ``name``; None if there is none."""
         return next((active for active in self.active if active.name == name), None)
 
-    def _free_name(self, kind: str) -> str:
-        name, number = kind, 1
-        while self.find(name) is not None:
+    def name_of(self, fault: Fault) -> str:
+        """The name that a fault has if it is set now."""
+        kind, number = fault.kind.name, 1
+        name = fault.name or kind
+        while not fault.name and self.find(name) is not None:
             number += 1
             name = f"{kind}-{number}"
         return name

@@ -92,6 +92,10 @@ class Simulation(Model):
             steps = (do.At(spec.at or 0), *spec.steps)
             self.start(spec.name, partial(do.run_through, steps, spec.repeat))
 
+    def leave_out(self, leaves_out: Callable[[str, do.Step], bool]) -> None:
+        """Leave out the steps of scripts, each with the name of its script, for which this is true."""
+        self._scripts.leaves_out = leaves_out
+
     def subscribe(self, subscriber: WorldSubscriber) -> None:
         """Call it from now on, until `unsubscribe`."""
         self._scripts.subscribe(subscriber)

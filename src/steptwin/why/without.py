@@ -1,0 +1,113 @@
+"""The past run again without one of the roots of a chain, to see whether what was asked for would be otherwise.
+
+A run is deterministic: what differs then, differs because of that root.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from functools import partial
+from typing import Protocol, TypeAlias
+
+from steptwin.controller import SECOND
+from steptwin.errors import Misuse, SteptwinError
+from steptwin.messages import Message, text_of
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.world.inputs import Bytes
+from steptwin.simulation.world.simulation import Simulation
+from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
+from steptwin.why.answer import Answer, ChainLink, Effect, Trial
+from steptwin.why.question import Why
+from steptwin.why.roots import Act, Root, Sent, SetFault
+from steptwin.why.search import Snapshots
+
+WOULD_BE_SINCE = Message("why.would-be-since", "the same, but since {time:.6f} s")
+WOULD_BE_SINCE_BEFORE = Message("why.would-be-since-before", "the same, but since before {time:.6f} s")
+WOULD_BE_THE_SAME = Message("why.would-be-the-same", "the same: something else is enough for it")
+NOT_TRIED = Message("why.not-tried", "not known: {problem}")
+PAST_BEFORE_IT_IS_NOT_KEPT = Message("why.past-before-it-is-not-kept", "the past before it is not kept")
+NOT_FOUND_AGAIN = Message("why.not-found-again", "it is not found again in the past that is kept")
+
+Trying: TypeAlias = Generator[None, None, Trial]
+
+
+class SnapshotsWithInputs(Snapshots, Protocol):
+    """The past of a world."""
+
+    def inputs_from(self, number: int) -> Sequence[RecordedInput]: ...
+
+
+def trying_without(snapshots: SnapshotsWithInputs, link: ChainLink, answer: Answer, most: int) -> Trying:
+    """Whether what was asked for would be otherwise without the root of a link, in parts. ``most``: limit of what is noted."""
+    try:
+        return (yield from _trying(snapshots, link, answer, most))
+    except SteptwinError as error:
+        return Trial(link, Effect.UNKNOWN, NOT_TRIED(problem=text_of(error)))
+
+
+def _trying(snapshots: SnapshotsWithInputs, link: ChainLink, answer: Answer, most: int) -> Trying:
+    root = link.root
+    if root is None:
+        raise Misuse(NOT_FOUND_AGAIN())
+    state = snapshots.state_at(max(snapshots.begin, root.time - 1))
+    begin = state.snapshot.now
+    if begin > root.time:
+        raise Misuse(PAST_BEFORE_IT_IS_NOT_KEPT())
+    run = _RunWithout(snapshots.world, state.snapshot, root)
+    inputs = run.inputs([one for one in snapshots.inputs_from(state.inputs) if one.time <= answer.at])
+    other = yield from Why(run.make, inputs, answer.at, most).asking(answer.question, answer.at)
+    if not run.is_without:
+        raise Misuse(NOT_FOUND_AGAIN())
+    if other.state != answer.state:
+        return Trial(link, Effect.OTHERWISE, other.state)
+    since = answer.since if answer.since is not None and answer.since > begin else None
+    if other.since == since:
+        return Trial(link, Effect.SAME, WOULD_BE_THE_SAME())
+    told = WOULD_BE_SINCE_BEFORE(time=begin / SECOND) if other.since is None else WOULD_BE_SINCE(time=other.since / SECOND)
+    return Trial(link, Effect.OTHER_TIME, told)
+
+
+class _RunWithout:
+    """Makes worlds like ``world`` at a snapshot in which ``root`` never comes."""
+
+    def __init__(self, world: Simulation, snapshot: SimulationSnapshot, root: Root) -> None:
+        self._blueprint = world.blueprint
+        self._snapshot = snapshot
+        self._root = root
+        self.is_without = False
+        """Whether the root has been left out."""
+
+    def make(self) -> Simulation:
+        """A world in which it is left out."""
+        root = self._root
+        world = Simulation(self._blueprint, keep_trace=False, keep_inputs=False, at=self._snapshot)
+        world.trace.stop()
+        if isinstance(root, SetFault) and world.objects.faults.find(root.name) is not None:
+            world.perform(do.ClearFault(root.name))
+            self.is_without = True
+        act = root if isinstance(root, Act) else root.by if isinstance(root, SetFault) else None
+        if act is not None and act.script:
+            world.leave_out(partial(self._is_left_out, world, act))
+        return world
+
+    def _is_left_out(self, world: Simulation, act: Act, script: str, step: do.Step) -> bool:
+        is_left_out = (world.now, script, step) == act[:3]
+        self.is_without |= is_left_out
+        return is_left_out
+
+    def inputs(self, inputs: Sequence[RecordedInput]) -> list[RecordedInput]:
+        """What comes from outside, without it."""
+        root = self._root
+        match root:
+            case Sent(time, line, place):
+                sent = (one for one in reversed(inputs) if isinstance(one.what, Bytes) and one.what[:2] == (line, place))
+                left_out = [one for one in sent if one.time <= time][:1]
+            case Act(time, "", what):
+                left_out = [one for one in inputs if (one.time, one.what) == (time, what)][:1]
+            case SetFault(_, name, by):
+                given = (by.time, by.what) if by is not None and not by.script else None
+                left_out = [one for one in inputs if (one.time, one.what) == given or one.what == do.ClearFault(name)]
+            case _:
+                left_out = []
+        self.is_without |= bool(left_out)
+        return [one for one in inputs if not any(one is other for other in left_out)]
