@@ -216,3 +216,24 @@ def test_a_viewer_is_sent_the_workpieces_when_one_comes_or_goes_and_not_while_th
     assert there == piece
     studio.run(3000)
     assert [[one["name"] for one in found] for found in sent()[1:]] == [["belt.3", "belt.4"]]
+
+
+def test_a_viewer_that_comes_later_has_the_events_from_before_and_is_sent_what_stands() -> None:
+    studio = Studio()
+    first = studio.open()
+    assert first.newest("hello")["events"] == []
+    first.ok("fault", fault="stuck pin=IN1 value=1 machine=table")
+    studio.run(300)
+    first.read()
+    (there,) = first.newest("standing")
+    assert (there["kind"], there["name"], there["question"]) == ("fault", "table.IN1", "table.IN1")
+    first.ok("press", button="go")
+    late = studio.open()
+    hello = late.newest("hello")
+    assert [event["kind"] for event in hello["events"]] == ["fault", "button"]
+    assert hello["events_from_ns"] == "0"
+    assert hello["standing"][0] == there
+    sent = len(first.messages)
+    studio.run(2000)
+    first.read()
+    assert [name for message in first.messages[sent:] for name in message if name == "standing"] == []

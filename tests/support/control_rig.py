@@ -63,6 +63,9 @@ class Desk:
     def workpieces(self) -> tuple[()]:
         return ()
 
+    def standing(self) -> tuple[()]:
+        return ()
+
     def happen(self, count: int = 1) -> None:
         for number in range(count):
             self.subscribers.publish(Event(number, number, "a", EdgePayload("IN1", 1.0)))

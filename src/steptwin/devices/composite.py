@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any, Protocol
 
 from steptwin.controller import Nanos
-from steptwin.devices.worldmember import WorldMember
+from steptwin.devices.worldmember import NOTHING_KNOWN, WorldMember
 from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 from steptwin.later import start
 from steptwin.messages import Message
@@ -20,6 +20,7 @@ from steptwin.subject.contract import UNKNOWN, Description, Reading, Result
 from steptwin.subject.events import Event, Numbering
 from steptwin.subject.jogs import ExtendableJog
 from steptwin.subject.scene import WorkpieceState
+from steptwin.subject.standing import StandingState
 from steptwin.subject.subscriptions import Filter, Subscription, Subscriptions
 
 TIME = "time"
@@ -251,7 +252,7 @@ class CompositeSubject:
         return Result(value, now, number)
 
     def present(self) -> dict[str, Any]:
-        return {"state": {}, "faults": [], "workpieces": []} if self._world is None else dict(self._world.present())
+        return dict(NOTHING_KNOWN) if self._world is None else dict(self._world.present())
 
     def subscribe(self, what: Filter, bound: int) -> Subscription:
         subscription = Subscription(what, bound, self._unsubscribe)
@@ -268,6 +269,10 @@ class CompositeSubject:
     def workpieces(self) -> Sequence[WorkpieceState]:
         """As `PlannedSubject.workpieces`."""
         return () if self._world is None else self._world.workpieces()
+
+    def standing(self) -> Sequence[StandingState]:
+        """As `PlannedSubject.standing`."""
+        return () if self._world is None else self._world.standing()
 
     def plans(self, what: Filter) -> list[Event]:
         return [event for member in self._members for event in member.plans(what)]

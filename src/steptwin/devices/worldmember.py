@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from steptwin.jsonvalues import to_json
@@ -12,10 +13,15 @@ from steptwin.subject.subscriptions import Subscriptions
 
 
 def present_of(world: PlannedSubject) -> dict[str, Any]:
-    """``state`` by controller, ``faults`` and ``workpieces``."""
+    """``state`` by controller, ``faults``, ``workpieces`` and ``standing``."""
     states = {controller.name: world.do(command.ReadState(controller.name)).value for controller in world.description.controllers}
     pieces = [to_json(one) for one in world.workpieces()]
-    return {"state": states, "faults": world.do(command.ListFaults()).value, "workpieces": pieces}
+    faults, standing = world.do(command.ListFaults()).value, [to_json(one) for one in world.standing()]
+    return {"state": states, "faults": faults, "workpieces": pieces, "standing": standing}
+
+
+NOTHING_KNOWN: Mapping[str, Any] = {"state": {}, "faults": [], "workpieces": [], "standing": []}
+"""As `present_of` where there is no world."""
 
 
 class WorldMember:
@@ -26,7 +32,8 @@ class WorldMember:
     def __init__(self, world: PlannedSubject, subscribers: Subscriptions, jogs: Jogs) -> None:
         self._world = world
         self.subscribers = subscribers
-        self.do, self.plans, self.workpieces = world.answer, world.plans, world.workpieces
+        self.do, self.plans = world.answer, world.plans
+        self.workpieces, self.standing = world.workpieces, world.standing
         self.begin_jog = jogs.begin_jog
 
     @property

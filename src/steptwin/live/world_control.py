@@ -15,6 +15,7 @@ from steptwin.subject import debugcommands
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.events import Event
 from steptwin.subject.scene import WorkpieceState
+from steptwin.subject.standing import StandingState
 from steptwin.subject.subscriptions import Filter, Subscription
 
 T = TypeVar("T")
@@ -65,6 +66,9 @@ class WorldControl:
 
     def workpieces(self) -> Sequence[WorkpieceState]:
         return self.at_present(self.subject.workpieces)
+
+    def standing(self) -> Sequence[StandingState]:
+        return self.at_present(self.subject.standing)
 
     def at_present(self, action: Callable[[], T]) -> T:
         """Do something at the present moment, and set the timer for its consequences."""

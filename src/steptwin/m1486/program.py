@@ -68,6 +68,7 @@ class ProgramExecution(Stateful):
         "_burst",
         "_burst_at",
         "back",
+        "began",
         "is_killed",
         "is_limited",
         "line",
@@ -91,6 +92,8 @@ class ProgramExecution(Stateful):
         self._burst_at: Nanos = 0
         self.ready: Nanos
         """The earliest moment of the next command; a reset ends a wait."""
+        self.began: Nanos
+        """When the last command began that did more than compute."""
         self.loop_starts: list[int]
         self.loop_counts: list[int]
         self.back: int | None
@@ -99,7 +102,7 @@ class ProgramExecution(Stateful):
     def reset(self, now: Nanos) -> None:
         """As after power-up, with an empty memory."""
         self.pc = 0
-        self.ready = now
+        self.ready = self.began = now
         self.is_killed = False
         self.is_limited = False
         self._forget_nesting()
@@ -216,6 +219,7 @@ class ProgramExecution(Stateful):
         if self._hooks and (hook := hook_before(self._hooks, place)) is not None:
             hook(now, place)
         self._pass(now, 1)
+        self.began = now
         self.pc = compiled.following
         try:
             self.pc = compiled.effect(now)

@@ -6,7 +6,7 @@ Pure: moments of the wall clock are arguments; sessions (`steptwin.studio.viewer
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count
 
@@ -23,6 +23,7 @@ from steptwin.studio.campaignrequests import Campaigns
 from steptwin.studio.configurations import Configurations
 from steptwin.studio.controllers import Sheets
 from steptwin.studio.drawingrequests import Arrangement
+from steptwin.studio.eventlog import EventLog
 from steptwin.studio.recordingrequests import Recordings
 from steptwin.studio.requests import (
     OF_BRANCHES,
@@ -45,10 +46,13 @@ from steptwin.subject.commands import COMMANDS
 from steptwin.subject.contract import Description, Reading, Result
 from steptwin.subject.jogs import ExtendableJog, Jogs
 from steptwin.subject.scene import WorkpieceState
+from steptwin.subject.standing import StandingKind, StandingState
 from steptwin.subject.subscriptions import filter_of
 
 MOST_VIEWERS = 64
 MOST_LEASES = 32
+STANDING_NS: Nanos = SECOND // 5
+"""Interval at which what stands is looked at."""
 CLOCK_NS: Nanos = SECOND
 """Interval at which viewers receive the present moment."""
 FASTEST_JOG = 5.0
@@ -123,6 +127,7 @@ class Hub:
         self.around = around
         self.control = Control()
         self.streams = Streams(subject)
+        self.log = EventLog(subject, around.moment().time)
         self.watches = Watches()
         self.viewers: dict[int, Viewer] = {}
         self.description = ""
@@ -145,7 +150,11 @@ class Hub:
         self._moment: tuple[Nanos, str] = (-1, "")
         self._workpieces: Sequence[WorkpieceState] = ()
         """As they were sent."""
-        self.shared = SharedState(lost=None, control=None, viewers=0, leases=[], workpieces=[], clock=None)
+        self._standing: Sequence[StandingState] = subject.standing()  # from now on it follows since when
+        self._standing_due: Nanos = 0
+        self._gateways: dict[str, Nanos | None] = {}
+        """Moments at which gateways that were up were found down, by their place; None: up."""
+        self.shared = SharedState(lost=None, control=None, viewers=0, leases=[], workpieces=[], standing=[], clock=None)
 
     def _describe(self) -> None:
         if self.subject.description is not self._described:
@@ -347,7 +356,7 @@ class Hub:
     def present(self) -> tuple[dict[str, object], int]:
         """The state of the subject for the message hello but its description, and the number of the command that has read it."""
         plans = [plan.to_json() for plan in self.subject.plans(filter_of(["plan", "sample"]))]
-        data: dict[str, object] = {**self.subject.present(), "plans": plans}
+        data: dict[str, object] = {**self.subject.present(), "plans": plans, **self.log.to_json()}
         self.streams.flush()
         return data, self.subject.result_of(None).number
 
@@ -384,6 +393,9 @@ class Hub:
         if pieces is not self._workpieces:
             self._workpieces = pieces
             self.shared.put("workpieces", [to_json(one) for one in pieces])
+        if now >= self._standing_due:
+            self._standing_due = now + STANDING_NS
+            self._look_at_standing()
         self.streams.flush()
         over = [lease for lease in self._leases.values() if lease.held.over is not None]
         for lease in over:
@@ -395,6 +407,21 @@ class Hub:
             del self._asked[holder.number]
             self.release_control(holder)
         self._look_at_clock(now)
+
+    def _look_at_standing(self) -> None:
+        standing = (*self.subject.standing(), *self._gateways_down())
+        if standing != self._standing:
+            self._standing = standing
+            self.shared.put("standing", [to_json(one) for one in standing])
+
+    def _gateways_down(self) -> Iterator[StandingState]:
+        for one in () if self.around.services is None else self.around.services.gateways():
+            if one.is_up:
+                self._gateways[one.place] = None
+                continue
+            if one.place in self._gateways and self._gateways[one.place] is None:
+                self._gateways[one.place] = self.around.moment().time
+            yield StandingState(StandingKind.GATEWAY, one.kind, one.text, self._gateways.get(one.place), None)
 
     def _look_at_clock(self, now: Nanos) -> None:
         moment = self.around.moment()

@@ -10,6 +10,7 @@ from steptwin.fields import Schema
 from steptwin.jsonvalues import FLAG, MOMENT, NUMBER, TEXT, WHOLE, list_of, members, or_null, shape
 from steptwin.subject.commands import VERSION
 from steptwin.subject.scene import WorkpieceState
+from steptwin.subject.standing import StandingState
 
 _COUNT: Schema = {"type": "integer", "minimum": 0}
 SPEED: Schema = {
@@ -42,6 +43,7 @@ _PRESENT: Mapping[str, Schema] = {
     "faults": {"type": "array", "items": {"type": "object"}, "description": "As the answer to faults."},
     "plans": {"type": "array", "items": {"$ref": "#/$defs/(event)"}, "description": "Present plans of all axes."},
     "workpieces": list_of(shape(WorkpieceState)),
+    "standing": list_of(shape(StandingState)),
 }
 CLOCK = members({"time_ns": MOMENT, "running": FLAG, "speed": SPEED})
 
@@ -98,6 +100,8 @@ _ROWS = (
                 },
                 "description": {"$ref": "#/$defs/(description)"},
                 **_PRESENT,
+                "events": {**EVENTS, "description": "The newest that people read, the oldest of them first."},
+                "events_from_ns": {**MOMENT, "description": "From when on these are all that there were. [ns]"},
             }
         ),
     ),
@@ -146,6 +150,11 @@ _ROWS = (
         "workpieces",
         "The workpieces in space, after any came, went or was carried by something else.",
         list_of(shape(WorkpieceState)),
+    ),
+    MessageRow(
+        "standing",
+        "What stands now, after any change: programs that wait, alarms, elements, faults, gateways that are not up.",
+        list_of(shape(StandingState)),
     ),
     MessageRow("lost", "The connection to the device is lost, and why; null when it is there again.", or_null(TEXT)),
 )

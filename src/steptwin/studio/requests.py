@@ -34,6 +34,7 @@ from steptwin.studio.workrequests import WorkRequest
 from steptwin.subject.commands import COMMANDS
 from steptwin.subject.payloads import KINDS
 from steptwin.subject.scene import WorkpieceState
+from steptwin.subject.standing import StandingState
 
 FASTEST_RATE = 30.0
 """Updates in a second of the wall clock."""
@@ -96,6 +97,7 @@ class PastEvents:
     ]
     faults: Annotated[Sequence[Mapping[str, object]], JsonForm(list_of({"type": "object"}))]
     workpieces: Annotated[Sequence[Mapping[str, object]], JsonForm(list_of(shape(WorkpieceState)))]
+    standing: Annotated[Sequence[Mapping[str, object]], JsonForm(list_of(shape(StandingState)))]
     plans: _EVENTS
     events: _EVENTS
 

@@ -23,6 +23,7 @@ from steptwin.studio.timetravel import TimeTravel
 from steptwin.studio.workrequests import Work
 from steptwin.subject.contract import AsyncSubject, Result
 from steptwin.subject.scene import WorkpieceState
+from steptwin.subject.standing import StandingState
 
 
 class PresentMoment(NamedTuple):
@@ -49,11 +50,15 @@ class Served(AsyncSubject, Protocol):
         ...
 
     def present(self) -> dict[str, Any]:
-        """``state`` by controller, ``faults`` and ``workpieces``, if known."""
+        """``state`` by controller, ``faults``, ``workpieces`` and ``standing``, if known."""
         ...
 
     def workpieces(self) -> Sequence[WorkpieceState]:
         """As `steptwin.subject.contract.PlannedSubject.workpieces`; none of a device."""
+        ...
+
+    def standing(self) -> Sequence[StandingState]:
+        """As `steptwin.subject.contract.PlannedSubject.standing`; nothing of a device."""
         ...
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Protocol, TypeVar
 
 from steptwin.controller import SECOND, Nanos
-from steptwin.devices.worldmember import present_of
+from steptwin.devices.worldmember import NOTHING_KNOWN, present_of
 from steptwin.errors import Misuse, Refusal, SteptwinError
 from steptwin.later import Later
 from steptwin.messages import Message
@@ -151,7 +151,7 @@ class ShownMoment:
             raise Misuse(PAST_TOO_LONG(from_s=begin / SECOND, to_s=end / SECOND, most_s=LONGEST_PAST // SECOND))
         present, batch = await time_travel.events(begin, end, filter_of(kinds), MOST_PAST_EVENTS, _present)
         if batch.missed:  # what held at the begin says nothing of the first event that is left
-            begin, present = batch.events[0].time, dict[str, Any](state={}, faults=[], workpieces=[], plans=[])
+            begin, present = batch.events[0].time, dict[str, Any](NOTHING_KNOWN, plans=[])
         events = [event.to_json() for event in batch.events]
         return PastEvents(begin, end, **present, events=events)
 

@@ -19,6 +19,7 @@ from steptwin.subject.commands import VERSION, Command
 from steptwin.subject.controls import ControlDescription
 from steptwin.subject.events import Event
 from steptwin.subject.scene import NO_SCENE, SceneDescription, WorkpieceState
+from steptwin.subject.standing import StandingState
 from steptwin.subject.subscriptions import Filter, Subscription
 
 GOOD, UNKNOWN = "good", "unknown"
@@ -264,6 +265,10 @@ class PlannedSubject(Subject, Protocol):
 
     def workpieces(self) -> Sequence[WorkpieceState]:
         """Those in space: the same object while none comes or goes, and none is carried by something else."""
+        ...
+
+    def standing(self) -> Sequence[StandingState]:
+        """What stands: programs that wait, alarms, elements, faults that are set."""
         ...
 
 

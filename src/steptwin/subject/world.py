@@ -34,6 +34,7 @@ from steptwin.subject.events import Event, Numbering, payload_of
 from steptwin.subject.payloads import FramePayload, InputPayload, PacePayload, Payload, PlanPayload, RestoredPayload, WritePayload
 from steptwin.subject.scene import WorkpieceState
 from steptwin.subject.snapshots import Snapshots
+from steptwin.subject.standing import Standing, StandingState
 from steptwin.subject.subscriptions import Filter, Subscription, Subscriptions, filter_of
 from steptwin.subject.time import advance
 from steptwin.wire.frameline import FrameLine
@@ -72,6 +73,7 @@ class WorldSubject:
         self.dispatcher = Dispatcher(self._actions(), self._begin, self._end)
         self.sources: dict[tuple[str, str], str] = {}
         """Who a client of a line is, for writes; a client that is not named here stands for itself."""
+        self._standing: Standing | None = None
         self._traffic: dict[str, TrafficLog] = {}
         self._writes: list[Callable[[], None]] = []
         """Functions that end the observation of writes; empty while nobody subscribes to them."""
@@ -275,6 +277,8 @@ class WorldSubject:
         """Restore a snapshot, with its name if it has one, and notify subscribers."""
         self.world.restore(snapshot)
         self.numbering.moved(self.world.now)
+        if self._standing is not None:
+            self._standing.went_back()
         self.publish(self.world.now, WORLD, RestoredPayload(name))
         for plan in self.plans(filter_of(["plan"])):
             self.publish(plan.time, plan.controller, plan.payload)
@@ -323,6 +327,12 @@ class WorldSubject:
         if bodies is not self._bodies:
             self._bodies, self._workpieces = bodies, tuple(workpiece_states(self.world))
         return self._workpieces
+
+    def standing(self) -> Sequence[StandingState]:
+        """What stands now. The moments since when are known from the first call on, and those of programs always."""
+        if self._standing is None:
+            self._standing = Standing(self.world)
+        return tuple(self._standing.states())
 
     def paced(self, pace: PacePayload) -> None:
         """Report that time was paused or resumed."""

@@ -35,6 +35,7 @@ class Execution(Protocol):
     handling: bool
     has_effect: bool
     waiting: bool
+    began: tuple[int, Nanos] | None
     not_before: Nanos
 
     def acting(self) -> ProgramController: ...

@@ -274,8 +274,11 @@ def _wait(holds: Callable[[Execution, Cells], bool], number: int) -> StepCode:
 
     def step(m: Execution, cells: Cells) -> int:
         if holds(m, cells):
+            m.began = None
             return following
         m.waiting = True
+        if m.began is None or m.began[0] != number:
+            m.began = number, m.now
         return again
 
     return step
@@ -290,6 +293,7 @@ def _delay(seconds: ValueCode, following: int) -> StepCode:
 
     def step(m: Execution, cells: Cells) -> int:
         m.not_before = m.now + duration(max(seconds(m, cells), s.SHORTEST_DELAY_S))
+        m.began = following - 1, m.now
         return around
 
     return step

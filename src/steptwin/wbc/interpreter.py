@@ -64,6 +64,7 @@ class Interpreter(Stateful):
         "_trail",
         "_unmarked",
         "acted",
+        "began",
         "cells",
         "due",
         "forgotten",
@@ -128,6 +129,8 @@ class Interpreter(Stateful):
         """Events that wait, one bit each."""
         self.waiting = False
         """The statement at ``pc`` is in progress: its condition was false."""
+        self.began: tuple[int, Nanos] | None = None
+        """The step that waits, and since when; of an earlier one while none waits."""
         self.not_before = 0
         self._marks = 0
         self._unmarked = 0
@@ -221,6 +224,7 @@ class Interpreter(Stateful):
         self.pc = code.entries[event].step
         self.handling = True
         self.waiting = False
+        self.began = None
         self.not_before = 0
         self.due = now
         self._trail = None
@@ -480,6 +484,15 @@ class Interpreter(Stateful):
     def cells_at(self, now: Nanos) -> Sequence[float]:
         """Variables, then constants, as the statement in execution at ``now`` finds them."""
         return self.cells if self._resting is None else self._resting.next_visit(self.after(now))[1].values()
+
+    def waits_since(self, now: Nanos) -> Nanos | None:
+        """Since when the step in execution waits, for a condition or for the end of a DELAY; None if it does not, or if that is
+        not known, as of a DELAY that an interrupt was in."""
+        is_in_loop = self._resting is not None and not self.waiting
+        if self.began is None or is_in_loop or not (self.running and (self.waiting or self.not_before > now)):
+            return None
+        step, since = self.began
+        return since if step == self.place(now) else None
 
     def place(self, now: Nanos) -> int:
         """The step in execution at ``now`` (a DELAY until it ends), or executed next."""

@@ -12,7 +12,7 @@ from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message, text_of
 from steptwin.motion.trig import PI
-from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.element import Element, Stands
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.components.encoder import EncoderSpec
@@ -311,6 +311,19 @@ def _signals(fitted: BuiltAxis) -> Mapping[str, SignalOf]:
     return found
 
 
+IS_STALLED = Message("simulation.axis-is-stalled", "its motor is stalled")
+HAS_LOST = Message("simulation.axis-has-lost", "is {distance:g} {unit} beside what its controller counts")
+
+
+def _stands(fitted: BuiltAxis, now: Nanos) -> Stands | None:
+    trajectory = fitted.mechanism.trajectory(now)
+    at = trajectory.at(now)
+    if at.stalled:
+        return Stands(IS_STALLED(), signal="stalled")
+    lost = trajectory.field(now) - at.rotor
+    return Stands(HAS_LOST(distance=fitted.units(lost), unit=fitted.scale.unit), signal="lost") if lost else None
+
+
 def _per_torque(axis: BuiltAxis) -> tuple[float, str]:
     """The force or the torque at the load for a torque at the motor, without losses, and its unit. Raises `Misuse` for an axis in
     a unit whose length is not known."""
@@ -391,4 +404,5 @@ AXIS: Element[AxisSpec, BuiltAxis] = Element(
     connect=_connect,
     signals=_signals,
     moves=_moves,
+    stands=_stands,
 )

@@ -19,6 +19,7 @@ from steptwin.messages import Message
 from steptwin.simulation.components.axis import find_axis, turning_points_of_axis
 from steptwin.simulation.components.beltsensor import Sensor, SensorSpec
 from steptwin.simulation.components.conveyortable import FEED, RUN, ConveyorSpec, NearSpec, near_ones, stop_terminal
+from steptwin.simulation.components.element import Stands
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import Reference
 from steptwin.simulation.components.logic import STUCK_INPUT, TerminalComponent, with_terminals
@@ -465,6 +466,13 @@ def _put_sensor(conveyor: Conveyor, spec: SensorSpec, channel: str, context: Ele
     scheduler.add_part(sensor, conveyor.line, drives=circuit.target.controller)
 
 
+BELT_STANDS = Message("simulation.belt-stands", "is switched on, and stands")
+
+
+def _stands(conveyor: Conveyor, now: Nanos) -> Stands | None:
+    return Stands(BELT_STANDS(), signal="travel") if conveyor.is_stopped and conveyor.block.is_on(RUN) else None
+
+
 def _place_names(spec: ConveyorSpec) -> tuple[str, ...]:
     """Signals with the places of as many workpieces as there is room for."""
     return tuple(f"place{n + 1}" for n in range(ceil(min(MOST_PLACES - 1, spec.length / spec.workpiece[0])) + 1))
@@ -502,6 +510,7 @@ CONVEYOR = with_terminals(
     ConveyorSpec,
     make=_make,
     signals=_signals,
+    stands=_stands,
     drawing=_drawing,
     moves=lambda spec, conveyor: (),
     connect=_connect,

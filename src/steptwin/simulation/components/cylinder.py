@@ -10,6 +10,7 @@ from typing import ClassVar
 
 from steptwin.controller import MILLISECOND, Nanos
 from steptwin.messages import Message
+from steptwin.simulation.components.element import Stands
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import Reference
 from steptwin.simulation.components.logic import STUCK, Joint, TerminalComponent, TerminalComponentSpec, with_terminals
@@ -159,6 +160,16 @@ class Cylinder(TerminalComponent):
         return self._spool
 
     @property
+    def wanted(self) -> int:
+        """Where its valve sends the piston: +1 to extend, -1 to retract."""
+        return self._spool
+
+    @property
+    def blockers(self) -> tuple[str, ...]:
+        """Names of what it has run against and stands at."""
+        return self._blockers
+
+    @property
     def stroke(self) -> float:
         return self._spec.stroke
 
@@ -223,6 +234,20 @@ def _put_switch(cylinder: Cylinder, spec: SwitchSpec, channel: str, context: Ele
     put_switch(cylinder.block.scheduler, cylinder.travel, cylinder.block.name, zone, spec, channel, context)
 
 
+DOES_NOT_EXTEND = Message("simulation.cylinder-does-not-extend", "is switched to extend, and stands at {place:g} mm")
+DOES_NOT_RETRACT = Message("simulation.cylinder-does-not-retract", "is switched to retract, and stands at {place:g} mm")
+STANDS_AGAINST = Message("simulation.cylinder-stands-against", "{text}, against {names}")
+
+
+def _stands(cylinder: Cylinder, now: Nanos) -> Stands | None:
+    wanted, travel = cylinder.wanted, cylinder.travel
+    end = travel.full if wanted > 0 else 0
+    if travel.grid_position(now) == end or travel.direction == wanted:
+        return None
+    text = (DOES_NOT_EXTEND if wanted > 0 else DOES_NOT_RETRACT)(place=round(cylinder.position(now), 3))
+    return Stands(STANDS_AGAINST(text=text, names=cylinder.blockers) if cylinder.blockers else text, travel.since)
+
+
 def _signals(cylinder: Cylinder) -> Mapping[str, SignalOf]:
     source, travel = cylinder.block.source, cylinder.travel
     bounds = (0.0, cylinder.stroke)
@@ -247,6 +272,7 @@ CYLINDER = with_terminals(
     signals=_signals,
     drawing=lambda cylinder: cylinder.drawing,
     moves=_moves,
+    stands=_stands,
     faults=(
         *STUCK,
         FaultKind(

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any, TypeAlias, cast
+from typing import Any, NamedTuple, TypeAlias, cast
 
+from steptwin.controller import Nanos
+from steptwin.messages import MessageText
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import B, ElementSpecs, ElementTable, NamedSpec, Reference, S
 from steptwin.simulation.components.mount import Movement
@@ -47,6 +49,8 @@ class Element(ElementTable[S, B]):
     moves: Callable[[S, B], Sequence[Movement]] | None = None
     """How it moves what is on it, in space, outermost first. An element that has a place and moves nothing: none of them. Raises
     `Misuse` where its unit is none of a place."""
+    stands: Callable[[B, Nanos], Stands | None] | None = None
+    """Why it does not do what it is switched to; None while it does."""
     faults: tuple[FaultKind, ...] = ()
     """Its faults (`Layer.ELEMENT`), which act on the built object."""
     is_named: bool = field(init=False)
@@ -88,6 +92,16 @@ class Element(ElementTable[S, B]):
         for fault in self.faults:
             if fault.layer is not Layer.ELEMENT or not self.is_named:
                 raise IncompleteTable(f"{where}: fault {fault.name} is of the layer {Layer.ELEMENT}, and its element has a name")
+
+
+class Stands(NamedTuple):
+    """Why an element does not do what it is switched to."""
+
+    text: MessageText
+    since: Nanos | None = None
+    """Its own last change, where there was one after those of its inputs and faults."""
+    signal: str = ""
+    """Signal that shows it; its first output without."""
 
 
 AnyElement: TypeAlias = Element[Any, Any]

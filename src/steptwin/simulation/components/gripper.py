@@ -11,6 +11,7 @@ from steptwin.controller import MILLISECOND, Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.beltgrip import BeltGrip
 from steptwin.simulation.components.carrier import HELD, Carrier, CarrierSpec, carrier_signals
+from steptwin.simulation.components.element import Stands
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.grasp import Grasp
 from steptwin.simulation.components.logic import STUCK, Joint, with_terminals
@@ -198,6 +199,15 @@ def _lets_slip(active: ActiveFault, gripper: Gripper, now: Nanos) -> bool:
     return gripper.lets_slip(now)
 
 
+CLOSED_ON_NOTHING = Message("simulation.closed-on-nothing", "is closed, and holds nothing")
+
+
+def _stands(gripper: Gripper, now: Nanos) -> Stands | None:
+    travel = gripper.travel
+    is_empty = gripper.block.is_on(CLOSE) and not gripper.is_held and travel.grid_position(now) == travel.full
+    return Stands(CLOSED_ON_NOTHING(), signal=HELD) if is_empty else None
+
+
 def _signals(gripper: Gripper) -> Mapping[str, SignalOf]:
     source, travel = gripper.block.source, gripper.travel
     bounds = (0.0, gripper.stroke)
@@ -212,6 +222,7 @@ GRIPPER = with_terminals(
     moves=lambda spec, gripper: (),
     make=lambda spec, context: Gripper(context.terminal_block(spec.name), spec, context),
     signals=_signals,
+    stands=_stands,
     drawing=lambda gripper: Drawing(ROD, gripper.stroke, ("position",)),
     faults=(
         *STUCK,

@@ -11,7 +11,7 @@ from typing import Generic, NamedTuple, TypedDict, TypeVar, Unpack
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.simulation.components.element import Element
+from steptwin.simulation.components.element import Element, Stands
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
 from steptwin.simulation.components.mount import Movement
@@ -172,6 +172,7 @@ class _Rest(TypedDict, Generic[S, P], total=False):
     drawing: Callable[[P], Drawing]
     moved: Callable[[P], Iterable[tuple[str, MovedChannel]]]
     moves: Callable[[S, P], Sequence[Movement]]
+    stands: Callable[[P, Nanos], Stands | None]
 
 
 def with_terminals(

@@ -11,6 +11,7 @@ from steptwin.messages import Message
 from steptwin.motion.exponential import decay, logarithm
 from steptwin.simulation.components.beltgrip import BeltGrip
 from steptwin.simulation.components.carrier import HELD, Carrier, CarrierSpec, carrier_signals
+from steptwin.simulation.components.element import Stands
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.grasp import Grasp
 from steptwin.simulation.components.logic import STUCK, Joint, with_terminals
@@ -121,6 +122,19 @@ class Vacuum(Carrier):
             ratio = (self._first - goal) / (threshold - goal)
             self._due = now if ratio <= 1.0 else now + ceil(logarithm(ratio) * self._time(goal > 0.0))
 
+    @property
+    def is_on(self) -> bool:
+        return self.block.is_on(EJECTOR)
+
+    @property
+    def is_held(self) -> bool:
+        return self._is_held
+
+    @property
+    def since(self) -> Nanos:
+        """When the pressure went another way."""
+        return self._begin
+
     # ------------------------------------------------------------------ time
 
     def update(self, now: Nanos) -> None:
@@ -164,6 +178,13 @@ def _loses(active: ActiveFault, vacuum: Vacuum, now: Nanos) -> bool:
     return vacuum.leaks_out(now)
 
 
+HOLDS_NOTHING = Message("simulation.holds-nothing", "is switched on, and holds nothing")
+
+
+def _stands(vacuum: Vacuum, now: Nanos) -> Stands | None:
+    return Stands(HOLDS_NOTHING(), vacuum.since) if vacuum.is_on and not vacuum.is_held else None
+
+
 def _signals(vacuum: Vacuum) -> Mapping[str, SignalOf]:
     source = (vacuum.block.source,)
 
@@ -182,6 +203,7 @@ VACUUM = with_terminals(
     moves=lambda spec, vacuum: (),
     make=lambda spec, context: Vacuum(context.terminal_block(spec.name), spec, context),
     signals=_signals,
+    stands=_stands,
     faults=(
         *STUCK,
         FaultKind(

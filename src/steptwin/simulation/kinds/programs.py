@@ -74,6 +74,13 @@ class StatementUse(NamedTuple):
     """Whether it may change a point of the controller without an event of that (`steptwin.points.LivePoint.is_kept`)."""
 
 
+class Wait(NamedTuple):
+    """A statement at which a program waits: for a condition, the end of a motion, or a moment."""
+
+    location: StatementLocation
+    since: Nanos
+
+
 class Programs(Protocol):
     """The programs of one controller."""
 
@@ -134,6 +141,10 @@ class Programs(Protocol):
 
     def stack(self, now: Nanos) -> Sequence[Frame]:
         """The statement that is executed, or comes next, then those to which it returns; empty where no program runs."""
+        ...
+
+    def wait(self, now: Nanos) -> Wait | None:
+        """Where it waits, and since when; None while it does not, or where that is not known."""
         ...
 
     def variables(self, now: Nanos) -> Mapping[str, float]: ...

@@ -33,6 +33,11 @@ class Travel(Stateful):
         """The direction that was commanded last: +1, −1, or 0 (stopped)."""
         return self._direction
 
+    @property
+    def since(self) -> Nanos:
+        """When that was."""
+        return self._begin
+
     def send(self, direction: int, now: Nanos) -> None:
         """Move to the upper end (+1), to the lower one (−1), or stop (0)."""
         if direction == self._direction:

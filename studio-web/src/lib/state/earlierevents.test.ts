@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import { RequestError } from "../protocol/connection";
-import { EarlierEvents, type PastEvents } from "./earlierevents";
+import { EarlierEvents, type PastEvents } from "./earlierevents.svelte";
 import type { Ask } from "./watch.svelte";
 
 const SECOND = 1_000_000_000n;
@@ -19,6 +19,17 @@ function rig(begin_ns: bigint) {
     new Promise<void>((resolve) => (earlier.want(from_ns, resolve), setTimeout(resolve)));
   return { asked, parts, earlier, want };
 }
+
+test("more is asked for until what is kept is over", async () => {
+  const { asked, earlier } = rig(5n * SECOND);
+  await earlier.more();
+  earlier.begin(30n * SECOND);
+  await Promise.all([earlier.more(), earlier.more()]);
+  await earlier.more();
+  await earlier.more();
+  await earlier.more();
+  expect([asked, earlier.isOver]).toEqual([["10 30", "0 10", "0 5"], true]);
+});
 
 test("the past is asked for in parts, as far as it is wanted and kept", async () => {
   const { asked, parts, earlier, want } = rig(5n * SECOND);

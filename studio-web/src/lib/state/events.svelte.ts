@@ -13,6 +13,8 @@ const SHOWN = new Set<SubjectEvent["kind"]>([
   "restored",
 ]);
 const KEPT = 1000;
+/** With those of the time before that were asked for. */
+const MOST = 5000;
 
 export function isShown(event: SubjectEvent): boolean {
   return SHOWN.has(event.kind) && !(event.kind === "input" && event.what === "request");
@@ -30,6 +32,29 @@ export class EventLog {
 
   constructor(private readonly severity: (event: SubjectEvent) => Severity) {}
 
+  /** From here on they are all there, but for `unknown`. */
+  private known_ns = 0n;
+
+  forget(): void {
+    this.list = [];
+    this.unknown = null;
+  }
+
+  /** The newest events, the oldest of them first, which are all from a moment on. Those that the page has heard go up to `heard_ns`. */
+  begin(events: readonly SubjectEvent[], from_ns: bigint, heard_ns: bigint): void {
+    const before = this.list.filter((event) => BigInt(event.time_ns) < from_ns);
+    if (!before.length) this.known_ns = from_ns;
+    this.unknown = before.length && heard_ns < from_ns ? [heard_ns, from_ns] : null;
+    this.list = [...events.filter(isShown).reverse(), ...before];
+  }
+
+  /** All of a time that begins there; of those that are known already nothing is taken. */
+  takeEarlier(events: readonly SubjectEvent[], from_ns: bigint): void {
+    const news = events.filter((event) => isShown(event) && BigInt(event.time_ns) < this.known_ns);
+    this.list = [...this.list, ...news.reverse()].slice(0, MOST);
+    if (from_ns < this.known_ns) this.known_ns = from_ns;
+  }
+
   *moments(): Iterable<bigint> {
     for (const event of this.list) yield BigInt(event.time_ns);
   }
@@ -38,6 +63,7 @@ export class EventLog {
     const news = events.filter(isShown);
     if (!news.length) return;
     this.alarms += news.filter((event) => this.severity(event) === "alarm").length;
-    this.list = [...news.reverse(), ...this.list].slice(0, KEPT);
+    const list = [...news.reverse(), ...this.list];
+    this.list = list.length > MOST ? list.slice(0, KEPT) : list;
   }
 }

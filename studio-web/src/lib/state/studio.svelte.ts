@@ -15,7 +15,7 @@ import { AxisState } from "./axis.svelte";
 import { WorldClock, type Pace } from "./clock";
 import { Edges } from "./edges";
 import { EventLog } from "./events.svelte";
-import { EarlierEvents, type PastEvents } from "./earlierevents";
+import { EarlierEvents, type PastEvents } from "./earlierevents.svelte";
 import { TimeTravel, plansOf, type Past } from "./timetravel.svelte";
 import { modelOf, type AxisModel, type ControllerModel, type Model } from "./model";
 import { levelsOf, Pins } from "./pins.svelte";
@@ -84,6 +84,7 @@ export class Studio {
   viewers = $state(0);
   leases = $state.raw<Hello["leases"]>([]);
   private present_workpieces = $state.raw<Hello["workpieces"]>([]);
+  private present_standing = $state.raw<Hello["standing"]>([]);
   /** Why the device does not answer. */
   lost = $state<string | null>(null);
   pace = $state.raw<Pace>({ running: false, speed: 1 });
@@ -155,6 +156,11 @@ export class Studio {
   /** Those in space, at the moment that is shown. */
   get workpieces(): Hello["workpieces"] {
     return this.timeTravel.past?.workpieces ?? this.present_workpieces;
+  }
+
+  /** What waits or is wrong, and since when, at the moment that is shown. */
+  get standing(): Hello["standing"] {
+    return this.timeTravel.past?.standing ?? this.present_standing;
   }
 
   get isVirtual(): boolean {
@@ -262,10 +268,12 @@ export class Studio {
     this.viewers = hello.viewers;
     this.leases = hello.leases;
     this.present_workpieces = hello.workpieces;
+    this.present_standing = hello.standing;
     const now_ns = BigInt(hello.time_ns);
     this.tellClock(now_ns, hello.pace, true);
     this.forgetAfter(now_ns);
-    if (isNewConnection && !isNew) this.log.unknown = [this.heard_ns, now_ns];
+    if (isNew) this.log.forget();
+    if (isNewConnection) this.log.begin(hello.events, BigInt(hello.events_from_ns), this.heard_ns);
     this.lose();
     this.heard_ns = now_ns;
     this.earlier.begin(now_ns);
@@ -276,6 +284,7 @@ export class Studio {
     if (!hello.virtual) this.askPins();
     if (!isNewConnection) return;
     this.timeTravel.forget();
+    if (!this.log.list.length && hello.may.includes("show_moment")) void this.earlier.more(); // of a recording
     for (const subscription of this.subscriptions) this.beginSubscription(subscription);
     this.watches.renew();
   }
@@ -339,6 +348,7 @@ export class Studio {
     else if ("viewers" in message) this.viewers = message.viewers;
     else if ("leases" in message) this.leases = message.leases;
     else if ("workpieces" in message) this.present_workpieces = message.workpieces;
+    else if ("standing" in message) this.present_standing = message.standing;
     else if ("lost" in message) this.lost = message.lost;
   }
 
@@ -376,6 +386,7 @@ export class Studio {
   private takeEarlier({ from_ns, to_ns, state, plans, events }: PastEvents): void {
     const [begin, end] = [BigInt(from_ns), BigInt(to_ns)];
     const all = [...plans, ...events];
+    this.log.takeEarlier(events, begin);
     for (const axis of this.axes.values()) {
       const { controller, number } = axis.model;
       const own = all.filter((event) => event.kind === "plan" || event.kind === "coordinate");

@@ -22,7 +22,7 @@ from steptwin.m1486.unit import MASK
 from steptwin.messages import Message
 from steptwin.simulation.kinds.m1486.memory import PLACE as TEXT
 from steptwin.simulation.kinds.m1486.statement_use import use_of
-from steptwin.simulation.kinds.programs import Frame, Statement, StatementLocation, StatementUse
+from steptwin.simulation.kinds.programs import Frame, Statement, StatementLocation, StatementUse, Wait
 from steptwin.statements import StatementHook
 
 BEGIN = "program"
@@ -200,6 +200,12 @@ class ChipPrograms:
         pc, text = self._chip.program.pc, self._text
         before = bisect_right(text.offsets, pc - 1) - 1
         return self.location(text.offsets[before]) if before >= 0 and pc <= text.end else None
+
+    def wait(self, now: Nanos) -> Wait | None:
+        program = self._chip.program
+        is_held = self._chip.is_shut_down or program.is_held
+        location = self._location_in_progress() if self._is_in_progress(now) and not is_held else None
+        return None if location is None else Wait(location, program.began)
 
     def variables(self, now: Nanos) -> Mapping[str, float]:
         registers = {f"register{number}": float(self._chip.memory.register(number)) for number in GENERAL}

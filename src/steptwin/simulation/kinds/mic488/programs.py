@@ -13,7 +13,7 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program_banks import LoadedProgram
 from steptwin.mic488.program_registers import ACCESS
 from steptwin.simulation.kinds.mic488.statement_use import use_of
-from steptwin.simulation.kinds.programs import Frame, Statement, StatementLocation, StatementUse
+from steptwin.simulation.kinds.programs import Frame, Statement, StatementLocation, StatementUse, Wait
 from steptwin.simulation.kinds.programtexts import bank_text
 from steptwin.statements import StatementHook
 from steptwin.wbc.dialect import Dialect
@@ -106,6 +106,15 @@ class WbcPrograms:
         # A JUMP that never comes back, such as the last one of a main loop, is no call (WBC-1 keeps its step nevertheless).
         numbers = [interpreter.place(now), *interrupted, *(step for step in calls if step == 0 or bank.comes_back(step - 1))]
         return [Frame(bank.name(number), StatementLocation(text, number)) for number in numbers]
+
+    def wait(self, now: Nanos) -> Wait | None:
+        control = self._device.program
+        since = None if control.running is None else control.interpreter.waits_since(now)
+        return (
+            None
+            if since is None
+            else Wait(StatementLocation(bank_text(control.running_bank), control.interpreter.place(now)), since)
+        )
 
     def variables(self, now: Nanos) -> Mapping[str, float]:
         return self._device.program.variables(now)

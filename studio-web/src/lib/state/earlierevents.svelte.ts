@@ -3,6 +3,7 @@ import type { Ask } from "./watch.svelte";
 
 export type PastEvents = Requests["past_events"]["answer"];
 
+const KINDS = ["plan", "coordinate", "edge", "status", "note", "report", "button", "input", "fault"] as const;
 /** Asked for at once. [ns of virtual time] */
 const PART_NS = 20_000_000_000n;
 const ANSWER_MS = 60_000;
@@ -10,7 +11,7 @@ const ANSWER_MS = 60_000;
 /** What happened before the page was opened: asked for in parts, backwards, as far as somebody wants to see it. */
 export class EarlierEvents {
   /** All from here on is known; null where nothing earlier can be had. */
-  private known_ns: bigint | null = null;
+  private known_ns = $state.raw<bigint | null>(null);
   private isAsking = false;
   private waiting: (() => void)[] = [];
 
@@ -25,10 +26,24 @@ export class EarlierEvents {
     this.known_ns = now_ns;
   }
 
+  /** Whether there is more to ask for. */
+  get isOver(): boolean {
+    return this.known_ns === null || this.known_ns === 0n;
+  }
+
+  /** The part before what is known. */
+  more(): Promise<void> {
+    return new Promise((came) => {
+      if (this.isOver) came();
+      else this.waiting.push(came);
+      if (this.known_ns !== null && !this.isOver && !this.isAsking) void this.read(this.known_ns);
+    });
+  }
+
   /** `came` is called when more is known. */
   want(from_ns: bigint, came: () => void): void {
     if (this.known_ns === null || from_ns >= this.known_ns || this.known_ns === 0n || this.isAsking) return;
-    this.waiting = [came];
+    this.waiting.push(came);
     void this.read(this.known_ns);
   }
 
@@ -37,7 +52,7 @@ export class EarlierEvents {
     const from_ns = until_ns > PART_NS ? until_ns - PART_NS : 0n;
     try {
       const moments = { from_ns: String(from_ns), to_ns: String(until_ns) };
-      const part = await this.ask("past_events", { ...moments, kinds: ["plan", "coordinate", "edge"] }, ANSWER_MS);
+      const part = await this.ask("past_events", { ...moments, kinds: [...KINDS] }, ANSWER_MS);
       if (this.known_ns === until_ns) {
         this.put(part);
         const known = BigInt(part.from_ns);

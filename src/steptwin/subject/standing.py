@@ -1,0 +1,173 @@
+"""What stands in a world, and since when: programs that wait, alarms, elements, faults."""
+
+from __future__ import annotations
+
+import enum
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated
+
+from steptwin.controller import SECOND, Nanos
+from steptwin.controllerstate import StatusLevel
+from steptwin.diagnostics import visible
+from steptwin.jsonvalues import Moment, Sentence
+from steptwin.messages import Message, MessageText
+from steptwin.simulation.components.element import Stands
+from steptwin.simulation.components.registry import ELEMENTS
+from steptwin.simulation.faults import ActiveFault, Layer
+from steptwin.simulation.kinds.programs import ResourceKind, Wait
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.world.simulation import Simulation
+from steptwin.simulation.world.wiring import connections
+
+LEAST_NS: Nanos = SECOND
+"""What has lasted for less is not reported: it may be on its way."""
+
+
+class StandingKind(enum.Enum):
+    PROGRAM = "program"
+    ALARM = "alarm"
+    """The status of a controller."""
+    AXIS = "axis"
+    ELEMENT = "element"
+    FAULT = "fault"
+    GATEWAY = "gateway"
+
+
+@dataclass(frozen=True, slots=True)
+class StandingState:
+    """Something that stands."""
+
+    kind: StandingKind
+    name: Annotated[str, "The controller, its axis (table.M1), the element, the line, the gateway."]
+    text: Sentence
+    since_ns: Annotated[Moment | None, "Null: longer than anything is known of it."]
+    question: Annotated[str | None, "What to ask `why`; null where that knows nothing of it."]
+    line: Annotated[int | None, "Of the program of a controller, from 1."] = None
+    place: Annotated[str | None, "Of the text of that program."] = None
+
+
+WAITS_AT = Message("subject.waits-at", "waits at line {line}: {statement}")
+FAULT_IS_SET = Message("subject.fault-is-set", "fault {fault}")
+WITH_LEVELS = Message("subject.waits-with-levels", "{text} ({levels})")
+LEVEL_IS = Message("subject.level-is", "{name} is {level:g}")
+
+
+class Standing:
+    """Finds what stands in ``world``, and follows when things changed that do not know it themselves: from now on."""
+
+    def __init__(self, world: Simulation) -> None:
+        self._world = world
+        self._changed: dict[str, Nanos] = {}
+        """By a pin or terminal (``table.OUT1``), a controller or its axis (``table.M1``): its last edge or event."""
+        self._around = defaultdict[str, set[str]](set)
+        """What drives the inputs of an element, and its own outputs, by its name."""
+        for one in connections(world.objects):
+            self._around[one.target[0]].add(one.source)
+        for name, terminals in world.objects.terminals.items():
+            self._around[name] |= {f"{name}.{output.lower()}" for output in terminals.outputs}
+        world.trace.subscribers.append(self._recorded)
+
+    def _recorded(self, record: TraceRecord) -> None:
+        if record.kind == "edge":
+            self._changed[record.subject if "." in record.subject else f"{record.controller}.{record.subject}"] = record.time
+        elif record.kind == "event":
+            axis = dict(record.facts).get("axis")
+            self._changed[record.controller if axis is None else f"{record.controller}.M{axis}"] = record.time
+
+    def went_back(self) -> None:
+        """Time has gone back to now: what came then and later has not happened."""
+        self._changed = {name: moment for name, moment in self._changed.items() if moment < self._world.now}
+
+    def states(self) -> Iterator[StandingState]:
+        """Those of now: first what is wrong, then what waits."""
+        now = self._world.now
+        found = [*self._faults(), *self._controllers(now), *self._elements(now), *self._waits(now)]
+        return (one for one in found if one.since_ns is None or now - one.since_ns >= LEAST_NS or one.kind is StandingKind.FAULT)
+
+    # ------------------------------------------------------------------ programs and controllers
+
+    def _waits(self, now: Nanos) -> Iterator[StandingState]:
+        for name, programs in self._world.programs.items():
+            self._world.sync(name)
+            wait = programs.wait(now)
+            if wait is not None:
+                yield self._waiting(name, wait, now)
+
+    def _waiting(self, name: str, wait: Wait, now: Nanos) -> StandingState:
+        programs, (place, number) = self._world.programs[name], wait.location
+        statement = programs.statements(place)[number]
+        words = visible(programs.texts[place].text[statement.start : statement.end].strip())
+        text: MessageText = WAITS_AT(line=statement.line, statement=words)
+        reader, controller = self._world.kind(name).state, self._world.controller(name)
+        pins = [one.name for one in programs.use(wait.location).reads if one.kind is ResourceKind.PIN and one.name]
+        if pins:
+            text = WITH_LEVELS(text=text, levels=[LEVEL_IS(name=pin, level=reader.pin(controller, pin, now)) for pin in pins])
+        return StandingState(StandingKind.PROGRAM, name, text, wait.since, name, statement.line, place)
+
+    def _controllers(self, now: Nanos) -> Iterator[StandingState]:
+        for name, controller in self._world.controllers.items():
+            self._world.sync(name)
+            reader = self._world.kind(name).state
+            status = reader.status(controller, now)
+            if status.level is not StatusLevel.OK:
+                yield StandingState(StandingKind.ALARM, name, status.text, self._since(now, name), name)
+            for axis in reader.datasheet(controller).axes:
+                found = reader.axis(controller, axis, now).status
+                if found.level is not StatusLevel.OK:
+                    full = f"{name}.{axis.name}"
+                    since = self._since(now, f"{name}.M{axis.number}")
+                    yield StandingState(StandingKind.AXIS, full, found.text, since, f"{full}.status")
+
+    # ------------------------------------------------------------------ elements and faults
+
+    def _elements(self, now: Nanos) -> Iterator[StandingState]:
+        for kind, built in self._world.objects.elements.items():
+            stands = ELEMENTS[kind].stands
+            if stands is None:
+                continue
+            for name, one in built.items():
+                found = stands(one, now)
+                if found is not None:
+                    since, question = self._since_all(name, found, now), f"{name}.{found.signal or self._output(name)}"
+                    yield StandingState(StandingKind.ELEMENT, name, found.text, since, question)
+
+    def _since_all(self, name: str, found: Stands, now: Nanos) -> Nanos | None:
+        """The last change of anything that it may depend on."""
+        faults = [fault.begin for fault in self._world.objects.faults.active if place_of(self._world, fault) == name]
+        around = [moment for one in self._around[name] if (moment := self._since(now, one)) is not None]
+        return max([*faults, *around, *(() if found.since is None else (found.since,))], default=None)
+
+    def _output(self, name: str) -> str:
+        terminals = self._world.objects.terminals.get(name)
+        return "" if terminals is None or not terminals.outputs else terminals.outputs[0].lower()
+
+    def _faults(self) -> Iterator[StandingState]:
+        for fault in self._world.objects.faults.active:
+            name = place_of(self._world, fault)
+            question: str | None = None
+            if name.partition(".")[0] in self._world.controllers:
+                question = f"{name}.status" if fault.fault.get("axis") is not None else name
+            if name in self._world.objects.element_names:
+                output = self._output(name)
+                question = f"{name}.{output}" if output else None
+            yield StandingState(StandingKind.FAULT, name, FAULT_IS_SET(fault=str(fault.fault)), fault.begin, question)
+
+    def _since(self, now: Nanos, name: str) -> Nanos | None:
+        moment = self._changed.get(name)
+        return None if moment is None or moment > now else moment  # the world has gone back before it
+
+
+def place_of(world: Simulation, fault: ActiveFault) -> str:
+    """What a fault is set on: an element, a controller, a pin or axis of it (``table.IN3``), a line. Empty: all lines."""
+    get = fault.fault.get
+    if (element := get("element")) is not None:
+        return str(element)
+    controllers = list(world.controllers)
+    machine = get("machine") or (controllers[0] if fault.fault.kind.layer is Layer.PHYSICS and len(controllers) == 1 else None)
+    if machine is None:
+        return str(get("line") or "")
+    axis = get("axis")
+    part = get("pin") or (None if axis is None else f"M{axis}")
+    return str(machine) if part is None else f"{machine}.{part}"

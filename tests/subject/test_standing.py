@@ -1,0 +1,169 @@
+"""What stands in a world, and since when; the moments are those of independent hooks, edges and numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from steptwin.controller import MILLISECOND, SECOND, Nanos
+from steptwin.files.world import World
+from steptwin.simulation.faults import read
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.script.control import Enable, Move
+from steptwin.subject.standing import StandingKind, StandingState
+from steptwin.subject.world import WorldSubject
+
+CELL = """
+[world]
+name = "cell"
+[[line]]
+name = "bus"
+kind = "modbus"
+[[mic488]]
+name = "cell"
+line = "bus"
+[mic488.M1]
+unit = "mm"
+gear = 100.0
+vel = 40.0
+acc = 400.0
+dec = 400.0
+[[axis]]
+name = "x"
+drive = "cell.M1"
+unit = "mm"
+pulses_per_unit = 100
+travel = [-5.0, 10.0]
+[[cylinder]]
+name = "lift"
+extend = "cell.OUT1"
+[[vacuum]]
+name = "cup"
+ejector = "cell.OUT2"
+[[gripper]]
+name = "jaws"
+close = "cell.OUT3"
+[[conveyor]]
+name = "belt"
+length = 100.0
+speed = 50.0
+workpiece = 20.0
+run = "cell.OUT4"
+"""
+
+
+def standing(subject: WorldSubject, kind: StandingKind) -> list[StandingState]:
+    return [one for one in subject.standing() if one.kind is kind]
+
+
+def of_a_program(tmp_path: Path, text: str, *, until_s: float) -> tuple[WorldSubject, list[tuple[Nanos, int]]]:
+    """The world at a moment, and the statements that hooks were called for by then, with their lines."""
+    (tmp_path / "p.prg").write_text(text)
+    head = '[[mic488]]\nname = "a"\nline = "bus"\nprogram = "p.prg"\nstart = true\n'
+    (tmp_path / "w.toml").write_text(f'[[line]]\nname = "bus"\nkind = "modbus"\n{head}[[button]]\nname = "go"\nto = "a.IN1"\n')
+    world = World.load(tmp_path / "w.toml")
+    executed: list[tuple[Nanos, int]] = []
+    programs = world.programs["a"]
+    programs.add_hook(lambda now, number: executed.append((now, programs.statements("program 0")[number].line)))
+    subject = WorldSubject(world)
+    world.run(until_s)
+    return subject, executed
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("A:\nDELAY 0.5\nWAIT IN1 = ON\nJUMP A", 3),
+        ("WAIT IN1 = OFF\nA:\nWAIT IN1 = OFF\nDELAY 0.2\nWAIT IN1 = ON\nJUMP A", 5),
+        ("OUT1 = ON\nDELAY 20\nOUT1 = OFF", 2),
+        ("CFGINT_IN2 = RIS\nM1 = ON\nVABS M1 5\nWAITPOS", 4),
+    ],
+)
+def test_a_program_waits_since_its_statement_was_executed(tmp_path: Path, text: str, line: int) -> None:
+    subject, executed = of_a_program(tmp_path, text, until_s=4.0)
+    (one,) = standing(subject, StandingKind.PROGRAM)
+    assert (one.name, one.question, one.line, one.place) == ("a", "a", line, "program 0")
+    assert (one.since_ns, line) == executed[-1]
+
+
+def test_a_program_that_goes_on_or_has_ended_does_not_wait(tmp_path: Path) -> None:
+    for text in ("A:\nDELAY 0.1\nN = N + 1\nJUMP A", "OUT1 = ON", "A:\nN = N + 1\nJUMP A"):
+        subject, _ = of_a_program(tmp_path, text, until_s=4.0)
+        assert standing(subject, StandingKind.PROGRAM) == []
+
+
+def test_a_wait_says_what_the_pins_are_that_it_reads(tmp_path: Path) -> None:
+    subject, _ = of_a_program(tmp_path, "WAIT IN1 = ON", until_s=2.0)
+    assert [one.text for one in subject.standing()] == ["waits at line 1: WAIT IN1 = ON (IN1 is 0)"]
+
+
+@pytest.mark.parametrize(
+    ("fault", "output", "name", "text"),
+    [
+        ("no-air element=lift", 1, "lift", "is switched to extend, and stands at 0 mm"),
+        ("", 2, "cup", "is switched on, and holds nothing"),
+        ("", 3, "jaws", "is closed, and holds nothing"),
+        ("belt-stop element=belt", 4, "belt", "is switched on, and stands"),
+    ],
+)
+def test_an_element_that_does_not_do_what_it_is_switched_to_stands_since_then(
+    fault: str, output: int, name: str, text: str
+) -> None:
+    world = World.from_toml(CELL)
+    subject = WorldSubject(world)
+    assert list(subject.standing()) == []
+    if fault:
+        subject.do(do.SetFault(read(fault)))
+    world.run(for_=2.0)
+    subject.do(do.Write((("cell", f"OUT{output}", 1),)))
+    switched = world.now
+    world.run(for_=0.5)
+    assert standing(subject, StandingKind.ELEMENT) == []
+    world.run(for_=2.0)
+    (one,) = standing(subject, StandingKind.ELEMENT)
+    assert (one.name, one.text) == (name, text)
+    assert one.since_ns is not None
+    assert 0 <= one.since_ns - switched <= 300 * MILLISECOND  # jaws have to close first
+    assert one.question is not None
+    subject.read(one.question)
+    subject.do(do.Write((("cell", f"OUT{output}", 0),)))
+    world.run(for_=1.5)
+    assert standing(subject, StandingKind.ELEMENT) == []
+
+
+def test_an_axis_says_how_far_it_is_beside_what_is_counted() -> None:
+    world = World.from_toml(CELL)
+    subject = WorldSubject(world)
+    subject.do(Enable("cell", 1, on=True))
+    subject.do(Move("cell", 1, to=12.5))
+    world.run(for_=3.0)
+    (one,) = standing(subject, StandingKind.ELEMENT)
+    beside = 12.5 - world.read("x.position")
+    assert 2.4 < beside < 2.6
+    assert (one.name, one.text, one.question) == ("x", f"is {beside:g} mm beside what its controller counts", "x.lost")
+
+
+def test_faults_stand_at_what_they_are_set_on_at_once() -> None:
+    world = World.from_toml(CELL)
+    subject = WorldSubject(world)
+    world.run(for_=1.0)
+    for fault in ("stuck pin=IN3 value=1", "leak element=cup", "crc unit=1", "lost-steps axis=1 pulses=5 at_s=9"):
+        subject.do(do.SetFault(read(fault)))
+    found = {one.name: one.question for one in standing(subject, StandingKind.FAULT) if one.since_ns == SECOND}
+    assert found == {"cell.IN3": "cell.IN3", "cup": "cup.held", "": None, "cell.M1": "cell.M1.status"}
+
+
+def test_what_was_later_than_now_has_not_happened() -> None:
+    """After a return the moment of a change that is undone is not known, and not that of what is undone."""
+    world = World.from_toml(CELL)
+    subject = WorldSubject(world)
+    subject.standing()
+    subject.do(do.Write((("cell", "OUT2", 1),)))
+    world.run(for_=2.0)
+    there = world.snapshot()
+    subject.do(do.Write((("cell", "OUT2", 0),)))
+    world.run(for_=2.0)
+    subject.go_back(there, None)
+    (one,) = standing(subject, StandingKind.ELEMENT)
+    assert one.since_ns is None or one.since_ns <= world.now
