@@ -13,7 +13,7 @@ project = "steptwin"
 copyright = "the steptwin authors"  # noqa: A001 - Sphinx wants this name
 release = __version__
 
-extensions = ["myst_parser", "command_output", "control_commands", "sphinx.ext.autodoc"]
+extensions = ["myst_parser", "sphinx_copybutton", "command_output", "control_commands", "sphinx.ext.autodoc"]
 default_role = "py:obj"  # docstrings name things in single backticks
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
@@ -25,3 +25,4 @@ myst_heading_anchors = 3
 html_theme = "furo"
 html_title = f"steptwin {release}"
 html_copy_source = False
+copybutton_prompt_text = "$ "

@@ -1,4 +1,4 @@
-"""Topics and payloads of the JSON face; docs/gateways.md lists them.
+"""Topics and payloads of the JSON face; docs/gateways/mqtt.md lists them.
 
 ``BASE/CONTROLLER`` and ``BASE/CONTROLLER/GROUP`` have the values of a controller by name. BASE is the ``topic`` of the gateway's
 table and the name of the subject.

@@ -1,4 +1,4 @@
-"""``[gateway.opcua]``: an OPC UA server, with what clients of machine tools and robots expect of an axis (docs/gateways.md).
+"""``[gateway.opcua]``: an OPC UA server, with axes as clients of machine tools and robots expect them (docs/gateways/opcua.md).
 
 `addressspace` has the nodes, `session` what they read and write, `notifications` the events,
 `security` users and certificates.

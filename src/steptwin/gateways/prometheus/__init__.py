@@ -1,1 +1,1 @@
-"""``[gateway.prometheus]``: metrics, health and readiness over HTTP (docs/gateways.md)."""
+"""``[gateway.prometheus]``: metrics, health and readiness over HTTP (docs/gateways/prometheus.md)."""

@@ -1,4 +1,4 @@
-"""The state of a subject as metrics, with names by the conventions of Prometheus; docs/gateways.md lists them.
+"""The state of a subject as metrics, with names by the conventions of Prometheus; docs/gateways/prometheus.md lists them.
 
 What is unknown has no sample.
 """
