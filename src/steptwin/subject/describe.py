@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import cast
 
+from steptwin.controller import Nanos
 from steptwin.simulation.components.axis import AXIS, MECHANICS
 from steptwin.simulation.components.beam import BEAM
 from steptwin.simulation.components.body import BODY
@@ -18,6 +19,7 @@ from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.mechanics.drawing import Drawing, SensorZone
 from steptwin.simulation.space.bodies import Box, half_height
 from steptwin.simulation.space.frames import FLOOR, NM_PER_MM, Vector, path, pose
+from steptwin.simulation.space.pieces import Motion
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.wiring import connections, terminal_name
 from steptwin.subject.commands import COMMANDS
@@ -128,18 +130,23 @@ def _mm(vector: Vector) -> Point:
     return x, y, z
 
 
-def workpiece_states(world: Simulation) -> Iterator[WorkpieceState]:
-    """All workpieces in space, at the present moment."""
+def workpiece_states(
+    world: Simulation, now: Nanos | None = None, travel_at: Callable[[str, Motion], float] | None = None
+) -> Iterator[WorkpieceState]:
+    """All workpieces in space, by default at the present moment. ``travel_at`` gives the value of a signal of a belt that is moved by
+    a motion (nm)."""
     frames = world.objects.frames
+    now = world.now if now is None else now
     owners = {mounted.frame: name for name, mounted in frames.items()}
     for name, body in world.objects.workpieces.bodies().items():
         carrier = next((one for one in body.frame.line() if one in owners), None)
-        there = pose(body.frame, FLOOR if carrier is None else carrier, world.now)
+        there = pose(body.frame, FLOOR if carrier is None else carrier, now)
         shape, height = body.shape, 2 * half_height(body.shape) / NM_PER_MM
         size = tuple(2 * one / NM_PER_MM for one in shape.half) if isinstance(shape, Box) else None
-        moves = any(one.motion is not None and not one.motion.is_still for one in path(carrier or FLOOR, body.frame))
+        motions = (one.motion for one in path(carrier or FLOOR, body.frame))
+        moved = next((one for one in motions if one is not None and not one.is_still), None)
         on = None if carrier is None else owners[carrier]
-        travel = f"{on}.travel" if moves and on is not None else None
+        travel = f"{on}.travel" if moved is not None and on is not None else None
         yield WorkpieceState(
             name,
             cast("Point | None", size),
@@ -149,7 +156,7 @@ def workpiece_states(world: Simulation) -> Iterator[WorkpieceState]:
             _mm(there.at),
             there.angle_q * 90.0,
             travel,
-            0.0 if travel is None else world.read(travel),
+            0.0 if travel is None or moved is None else world.read(travel) if travel_at is None else travel_at(travel, moved),
         )
 
 

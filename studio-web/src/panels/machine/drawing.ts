@@ -1,4 +1,5 @@
 import { isLike, type Solid } from "../../lib/scene/builder";
+import type { Levels } from "../../lib/scene/looks";
 import { POSE } from "../../lib/scene/poses";
 import type { Stage } from "../../lib/scene/stage";
 import { facesOf, frameOf, Order, spotX, spotY, type View } from "../../lib/scene/view";
@@ -12,9 +13,7 @@ const ORDER_MS = 120;
 const TURN = 1e-6;
 
 /** What is shown of elements besides where they are. */
-export interface Marks {
-  levelOf: (pin: string) => number | null;
-  isStalled: (element: string) => boolean;
+export interface Marks extends Levels {
   selected: string;
   labels: boolean;
 }

@@ -20,7 +20,8 @@ import {
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { POSE } from "../../lib/scene/poses";
-import type { Material, Solid } from "../../lib/scene/builder";
+import type { Solid } from "../../lib/scene/builder";
+import { COLOURS, lookOf, type Look } from "../../lib/scene/looks";
 import type { Stage } from "../../lib/scene/stage";
 import { frameOf, VIEWS, type ViewName } from "../../lib/scene/view";
 import type { Marks } from "./drawing";
@@ -119,18 +120,16 @@ export class Space {
     this.renderer.render(this.scene, this.camera);
   }
 
-  mark({ levelOf, isStalled, selected }: Marks): void {
+  mark(marks: Marks): void {
     this.goes = this.stage.solids
       .slice(0, this.stage.fixed)
-      .map((one) => one.element === selected && one.isCarried)
+      .map((one) => one.element === marks.selected && one.isCarried)
       .lastIndexOf(true);
     this.isStale = true;
     for (let n = 0; n < this.stage.fixed; n++) {
-      const { element, pin, material, color } = this.stage.solids[n] as Solid;
-      const isOn = pin !== null && levelOf(pin) === 1;
-      const on = material === "light" ? "interrupted" : "on";
-      const look = material === "moving" && isStalled(element) ? "stalled" : isOn ? on : material;
-      (this.meshes[n] as SolidMesh).material = this.materialOf(look, color, element === selected);
+      const solid = this.stage.solids[n] as Solid;
+      const isSelected = solid.element === marks.selected;
+      (this.meshes[n] as SolidMesh).material = this.materialOf(lookOf(solid, marks), solid.color, isSelected);
     }
   }
 
@@ -139,7 +138,7 @@ export class Space {
     const style = getComputedStyle(this.canvas);
     for (const [name, material] of this.looks) {
       const [look, own, selected] = name.split(" ");
-      const property = own?.startsWith("--") ? own : `--${COLOURS[look as Material]}`;
+      const property = own?.startsWith("--") ? own : `--${COLOURS[look as Look]}`;
       material.color.set(own && own !== property ? own : style.getPropertyValue(property));
       material.emissive.set(selected ? style.getPropertyValue("--trace-6") : "#000000");
       material.emissiveIntensity = 0.45;
@@ -246,23 +245,6 @@ export class Space {
     return found;
   }
 }
-
-/** Properties of app.css. */
-const COLOURS: Readonly<Record<Material | "on" | "stalled" | "interrupted", string>> = {
-  frame: "metal-strong",
-  rail: "metal",
-  drive: "motor",
-  moving: "accent",
-  rod: "metal",
-  belt: "rubber",
-  piece: "trace-2",
-  mark: "dim",
-  lamp: "rubber",
-  light: "danger",
-  interrupted: "danger",
-  on: "good",
-  stalled: "danger-fill",
-};
 
 function geometryOf({ size: [x, y, z], prism }: Solid): BufferGeometry {
   if (prism === null) return new BoxGeometry(x, y, z);

@@ -1,0 +1,208 @@
+"""Recording of a machine in space while its world runs: motions as they are planned, levels and workpieces as they change."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator
+from functools import partial
+from itertools import islice
+from math import isfinite
+
+from steptwin.controller import Nanos
+from steptwin.errors import Misuse
+from steptwin.files.scene.cubics import Cubic, cubics_of
+from steptwin.files.scene.recordedscene import RecordedScene, Stint, machine_of
+from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.mechanics.drawing import BELT
+from steptwin.simulation.scheduler.scheduler import Scheduler
+from steptwin.simulation.space.frames import NM_PER_MM
+from steptwin.simulation.space.pieces import Motion
+from steptwin.simulation.world.simulation import Simulation
+from steptwin.subject.describe import describe, workpiece_states
+
+SLACK_NM = 100.0
+"""Motions along a way are recorded as exactly as this."""
+SLACK_Q = 1e-6
+"""Those about an axis, quarter turns."""
+_AT_ONCE = 16
+"""Polynomials of a plan that are computed as soon as it is there: those of parts that change with the world are among the first."""
+_MOST_TURNS = 64
+DEGREES_PER_Q = 90.0
+
+
+class _Planned:
+    """A motion in units of its signal; its pieces are ``per_unit`` of theirs for one."""
+
+    def __init__(self, motion: Motion, per_unit: float, slack: float) -> None:
+        self.spans: list[Cubic] = []
+        self._motion, self._per_unit, self._slack = motion, per_unit, slack
+        self._version: object = self
+        self._more: Iterator[Cubic] = iter(())
+
+    def look(self, now: Nanos) -> None:
+        version = self._motion.version()
+        if version == self._version:
+            while self.spans and self.spans[-1].begin < now and (span := next(self._more, None)) is not None:
+                self.spans.append(span)
+            return
+        self._version = version
+        self.cut(now)
+        self._more = (one.scaled(1.0 / self._per_unit) for one in cubics_of(self._motion.pieces(now), self._slack))
+        self.spans += islice(self._more, _AT_ONCE)
+
+    def cut(self, now: Nanos) -> None:
+        """Drop what was planned from a moment on."""
+        while self.spans and self.spans[-1].begin >= now:
+            self.spans.pop()
+
+
+class _Turning:
+    """A signal that is straight between its turning points; one that does not move by itself is constant."""
+
+    def __init__(self, signal: SignalOf) -> None:
+        self.spans: list[Cubic] = []
+        self._signal = signal
+        self._version: object = self
+
+    def look(self, now: Nanos) -> None:
+        signal = self._signal
+        version = signal.version()
+        if version is not None and version == self._version:
+            return
+        self._version = version
+        ends = [now, *islice((moment for moment in signal.turning_points(now) if moment > now), _MOST_TURNS)]
+        values = [signal.value(moment) for moment in ends]
+        if version is None and self.spans and self.spans[-1].c0 == values[-1]:
+            return
+        self.cut(now)
+        for n, begin in enumerate(ends):
+            seconds = (ends[n + 1] - begin) / 1e9 if n + 1 < len(ends) else 1.0
+            self.spans.append(Cubic(begin, values[n], (values[min(n + 1, len(ends) - 1)] - values[n]) / seconds))
+
+    def cut(self, now: Nanos) -> None:
+        while self.spans and self.spans[-1].begin >= now:
+            self.spans.pop()
+
+
+class _Level:
+    """A level that changes with events only."""
+
+    def __init__(self, signal: SignalOf) -> None:
+        self.changes: list[tuple[Nanos, float]] = []
+        self._signal = signal
+
+    def look(self, now: Nanos) -> None:
+        level = self._signal.value(now)
+        if not isfinite(level) or (self.changes and self.changes[-1][1] == level):
+            return
+        if self.changes and self.changes[-1][0] == now:
+            self.changes.pop()
+        self.changes.append((now, level))
+
+
+class SceneRecorder:
+    """Records the scene of a world from its present moment on. It changes nothing there: after each event it looks at what that
+    scheduler computes."""
+
+    def __init__(self, world: Simulation) -> None:
+        self._world = world
+        self._machine = machine_of(describe(world))
+        self._motions: dict[str, _Planned | _Turning] = {}
+        self._levels: dict[str, _Level] = {}
+        self._followed: dict[Scheduler, list[_Planned | _Turning | _Level]] = {}
+        self._bodies: object = None
+        self._stints: dict[str, list[Stint]] = {}
+        world.sync_all()
+        self._follow_frames()
+        self._follow_elements()
+        schedulers = world.objects.scheduler_of
+        self._with_workpieces = {schedulers[source] for source in world.objects.workpieces.sources if source in schedulers}
+        for scheduler in world.schedulers:
+            self._changed(scheduler)
+        world.subscribe_to_schedulers(self._changed)
+
+    def recorded(self) -> RecordedScene:
+        """The scene up to the present moment."""
+        now = self._world.now
+        self._world.sync_all()
+        for motion in self._motions.values():
+            motion.look(now)
+            del motion.spans[max(1, bisect_right(motion.spans, now, key=lambda span: span.begin)) :]
+        return RecordedScene(
+            self._machine,
+            {name: motion.spans for name, motion in self._motions.items()},
+            {name: level.changes for name, level in self._levels.items() if level.changes},
+            self._stints,
+        )
+
+    def _follow_frames(self) -> None:
+        for name, mounted in self._world.objects.frames.items():
+            for one in mounted.movements:
+                per_unit, slack = (one.per_unit / DEGREES_PER_Q, SLACK_Q) if one.turns else (one.per_unit * NM_PER_MM, SLACK_NM)
+                signal = f"{name}.{one.signal}"
+                self._follow(signal, self._motions.setdefault(signal, _Planned(one.motion, per_unit, slack)))
+
+    def _follow_elements(self) -> None:
+        """What moves besides frames, what is there only sometimes, and all levels that are shown."""
+        machine, placed = self._machine, {frame.name for frame in self._machine.scene.frames}
+        moves = [f"{one.name}.present" for one in machine.scene.bodies if one.when is not None]
+        levels: list[str] = []
+        for axis in machine.axes:
+            if axis.name in placed:
+                levels += (f"{axis.name}.stalled", *(switch.pin for switch in axis.switches))
+        for element in machine.elements:
+            if element.name in placed:
+                levels += (f"{element.name}.{terminal}" for terminal in (*element.inputs, *element.outputs))
+                if element.drawing is not None and element.drawing.shape != BELT:
+                    moves += (f"{element.name}.{place}" for place in element.drawing.places)
+                    levels += (switch.pin for switch in element.drawing.switches)
+        for name in moves:
+            if name not in self._motions and (signal := self._signal(name)) is not None:
+                self._follow(name, self._motions.setdefault(name, _Turning(signal)))
+        for name in levels:
+            if name not in self._levels and (signal := self._signal(name)) is not None:
+                self._follow(name, self._levels.setdefault(name, _Level(signal)))
+
+    def _signal(self, name: str) -> SignalOf | None:
+        """None for what cannot be read."""
+        try:
+            signal = self._world.signal(name)
+        except Misuse:
+            return None
+        return signal if isinstance(signal, SignalOf) and signal.is_readable and signal.sources else None
+
+    def _follow(self, name: str, followed: _Planned | _Turning | _Level) -> None:
+        signal = self._signal(name)
+        if signal is not None:
+            self._followed.setdefault(signal.sources[0].scheduler, []).append(followed)
+
+    # ------------------------------------------------------------------ events
+
+    def _changed(self, scheduler: Scheduler) -> None:
+        if scheduler.is_dirty:  # it is called again when all has settled
+            return
+        now = scheduler.now
+        for followed in self._followed.get(scheduler, ()):
+            followed.look(now)
+        if scheduler in self._with_workpieces:
+            bodies = self._world.objects.workpieces.bodies()
+            if bodies is not self._bodies:
+                self._bodies = bodies
+                self._place(now)
+
+    def _place(self, now: Nanos) -> None:
+        there = {state.name: state for state in workpiece_states(self._world, now, partial(self._travel, now))}
+        for name in {**self._stints, **there}:
+            stints, place = self._stints.setdefault(name, []), there.get(name)
+            if stints and stints[-1].begin == now:
+                stints.pop()
+            if place != (stints[-1].place if stints else None):
+                stints.append(Stint(now, place))
+
+    def _travel(self, now: Nanos, signal: str, motion: Motion) -> float:
+        """The way of a belt, which is followed from when a workpiece is on it; only its changes count."""
+        if signal not in self._motions:
+            self._follow(signal, self._motions.setdefault(signal, _Planned(motion, NM_PER_MM, SLACK_NM)))
+        followed = self._motions[signal]
+        followed.look(now)
+        return next(span for span in reversed(followed.spans) if span.begin <= now).at(now)

@@ -1,0 +1,33 @@
+import type { Material, Solid } from "./builder";
+
+/** How a solid looks: as its material does, or as that of something that is on, interrupted or stalled. */
+export type Look = Material | "on" | "stalled" | "interrupted";
+
+/** What changes how elements look. */
+export interface Levels {
+  levelOf: (pin: string) => number | null;
+  isStalled: (element: string) => boolean;
+}
+
+/** Properties of app.css. */
+export const COLOURS: Readonly<Record<Look, string>> = {
+  frame: "metal-strong",
+  rail: "metal",
+  drive: "motor",
+  moving: "accent",
+  rod: "metal",
+  belt: "rubber",
+  piece: "trace-2",
+  mark: "dim",
+  lamp: "rubber",
+  light: "danger",
+  interrupted: "danger",
+  on: "good",
+  stalled: "danger-fill",
+};
+
+export function lookOf({ element, material, pin }: Solid, { levelOf, isStalled }: Levels): Look {
+  if (material === "moving" && isStalled(element)) return "stalled";
+  if (pin === null || levelOf(pin) !== 1) return material;
+  return material === "light" ? "interrupted" : "on";
+}
