@@ -130,7 +130,7 @@ COMPILE := env -u UV_FIND_LINKS -u PIP_FIND_LINKS UV_CUSTOM_COMPILE_COMMAND="mak
   $(UV) pip compile --quiet --universal --python-version 3.11 --fork-strategy fewest --generate-hashes --no-annotate $(ARGS)
 
 clean:  ## Remove everything that was built, downloaded or cached here
-	rm -rf .venv .tools build dist studio-web/node_modules $(EXTENSION)/node_modules $(EXTENSION)/dist $(CLIENTS)/node_modules src/steptwin/studio/page studio-web/src/lib/protocol/types.ts .pytest_cache .hypothesis .ruff_cache .import_linter_cache
+	rm -rf .venv .tools build dist studio-web/node_modules $(EXTENSION)/node_modules $(EXTENSION)/dist $(CLIENTS)/node_modules src/steptwin/studio/page src/steptwin/files/export/page/scene.js studio-web/src/lib/protocol/types.ts .pytest_cache .hypothesis .ruff_cache .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 NEED_PYTHON := [ -n "$(PYTHON_ID)" ] || { \

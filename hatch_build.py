@@ -30,5 +30,6 @@ def sources(root: Path) -> list[Path]:
 
 
 def is_current(root: Path) -> bool:
-    page = root / "src/steptwin/studio/page/index.html"
-    return page.exists() and page.stat().st_mtime >= max(path.stat().st_mtime for path in sources(root))
+    built = [root / "src/steptwin/studio/page/index.html", root / "src/steptwin/files/export/page/scene.js"]
+    newest = max(path.stat().st_mtime for path in sources(root))
+    return all(one.exists() and one.stat().st_mtime >= newest for one in built)

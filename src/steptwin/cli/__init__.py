@@ -58,6 +58,7 @@ COMMANDS: Mapping[str, Mapping[str, str]] = {
         "why": "Show the chain of causes of a value, of a condition or of a wait.",
         "export": "Write a recorded trace as timeline (html), picture (png, svg), signals (vcd), frames (pcapng) or samples "
         "(csv, parquet).",
+        "picture": "Draw the machine of a world at a moment, up to which the world runs in virtual time.",
         "lsp": "Serve an editor on standard input and output (Language Server Protocol): programs, tables, configurations, "
         "worlds.",
         "dap": "Serve an editor on standard input and output (Debug Adapter Protocol): breakpoints, steps, also backwards in "

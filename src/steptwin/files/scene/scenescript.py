@@ -1,0 +1,52 @@
+"""The script that draws machines in space: it is built with the page of the studio, from the same sources."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from importlib.resources import files
+from importlib.util import find_spec
+from typing import Any, cast
+
+from steptwin.errors import Misuse
+from steptwin.extras import missing
+from steptwin.files.scene.recordedscene import Machine
+from steptwin.jsonvalues import to_json
+from steptwin.messages import Message
+
+NO_SCRIPT = Message(
+    "files.no-scene-script",
+    "the script that draws machines in space has not been built: 'make page' in the clone builds it; a wheel contains it",
+)
+LIBRARIES = ("quickjs-ng", "resvg-py")
+
+
+def scene_script() -> str | None:
+    """Its text, for a page; None where it has not been built."""
+    script = files("steptwin.files.export") / "page" / "scene.js"
+    return script.read_text("utf-8") if script.is_file() else None
+
+
+class SceneScript:
+    """The script in an engine for JavaScript, which has neither files nor a network. Raises `Misuse` where one of both is missing."""
+
+    def __init__(self, machine: Machine) -> None:
+        if find_spec("quickjs") is None:
+            raise missing("drawing a machine", LIBRARIES)
+        text = scene_script()
+        if text is None:
+            raise Misuse(NO_SCRIPT())
+        import quickjs
+
+        self._context = quickjs.Context()
+        self._context.eval(text)
+        self._machine = to_json(machine)
+
+    def call(self, function: str, *arguments: object) -> Any:
+        """A function of the script (``studio-web/src/outside/main.ts``), with the machine before these arguments."""
+        self._context.set("given", json.dumps([self._machine, *arguments]))
+        return json.loads(cast("str", self._context.eval(f"JSON.stringify(steptwinScene.{function}(...JSON.parse(given)))")))
+
+    def wanted(self) -> Mapping[str, list[str]]:
+        """Names of the ``signals`` and ``levels`` that a picture shows."""
+        return self.call("wanted")
