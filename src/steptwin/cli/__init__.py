@@ -56,8 +56,8 @@ COMMANDS: Mapping[str, Mapping[str, str]] = {
         "run": "Run a program or a world in virtual time and print its moves, waits, outputs and uploads.",
         "replay": "Run a recording again and compare what happens.",
         "why": "Show the chain of causes of a value, of a condition or of a wait.",
-        "export": "Write a recorded trace as timeline (html), picture (png, svg), signals (vcd), frames (pcapng) or samples "
-        "(csv, parquet).",
+        "export": "Write a recorded trace as timeline (html), picture (png, svg), machine in motion (glb), signals (vcd), "
+        "frames (pcapng) or samples (csv, parquet).",
         "picture": "Draw the machine of a world at a moment, up to which the world runs in virtual time.",
         "lsp": "Serve an editor on standard input and output (Language Server Protocol): programs, tables, configurations, "
         "worlds.",

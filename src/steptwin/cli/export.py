@@ -20,6 +20,7 @@ class ExportFormat(enum.StrEnum):
     HTML = "html"
     PNG = "png"
     SVG = "svg"
+    GLB = "glb"
     VCD = "vcd"
     PCAPNG = "pcapng"
     CSV = "csv"
@@ -49,7 +50,8 @@ def command(
     period: Annotated[str, typer.Option(metavar="TIME", help="Between two samples (csv, parquet).")] = "1ms",
     json: Json = False,
 ) -> None:
-    """Write a recorded trace as timeline (html), picture (png, svg), signals (vcd), frames (pcapng) or samples (csv, parquet)."""
+    """Write a recorded trace as timeline (html), picture (png, svg), machine in motion (glb), signals (vcd), frames (pcapng) or
+    samples (csv, parquet)."""
     from steptwin.files.export import bar, read_trace, write_trace
     from steptwin.files.timedinputs import parse_duration
 
@@ -68,6 +70,7 @@ def command(
             saved.trace,
             target,
             views=saved.views,
+            scene=saved.scene,
             title=saved.title,
             ended=saved.until,
             formats=(formats or None) if output is not None else [formats[i]],

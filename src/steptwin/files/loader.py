@@ -47,10 +47,11 @@ def load_world(
     keep_inputs: bool = True,
     allow_outside: bool = False,
     state: Path | None = None,
+    begun: Callable[[World], object] = lambda world: None,
 ) -> World:
     """The world that a file describes; that of a recording at its end, or at ``moment`` (ns) with all inputs up to then.
 
-    ``warn`` is called with warnings. Raises `Misuse`.
+    ``warn`` is called with warnings, ``begun`` with the world at 0 s. Raises `Misuse`.
     """
     if not is_recording(path):
         if moment is not None:
@@ -66,6 +67,7 @@ def load_world(
         )
         for warning in world.blueprint.warnings:
             warn(warning)
+        begun(world)
         return world
     if seed is not None:
         raise Misuse(f"--seed: {path} is a recording, which continues with its own seed")
@@ -74,7 +76,7 @@ def load_world(
     if state is not None:
         raise Misuse(f"--state: {path} is a recording, which continues with its own memory")
     recording = recordings.load(path)
-    world = recording.replay(moment, keep_trace=keep_trace, keep_inputs=keep_inputs)
+    world = recording.replay(moment, keep_trace=keep_trace, keep_inputs=keep_inputs, begun=begun)
     if moment is None and world.trace.digest() != recording.digest:
         warn(
             f"{path}: the replay differs from the run recorded with steptwin {recording.version}; the world continues from the "

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from base64 import b64decode, b64encode
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -78,8 +78,16 @@ class Recording:
                 raise Misuse(f"{name} is {firmware} in the recording, but its world has {ran.get(name, 'no such controller')}")
         return world
 
-    def replay(self, until: Nanos | None = None, *, keep_trace: bool = True, keep_inputs: bool = True) -> World:
+    def replay(
+        self,
+        until: Nanos | None = None,
+        *,
+        keep_trace: bool = True,
+        keep_inputs: bool = True,
+        begun: Callable[[World], object] = lambda world: None,
+    ) -> World:
         """The world after all inputs, or after those up to the moment ``until`` (ns), from which it may continue differently.
+        ``begun`` is called with it at its beginning.
 
         Raises `Misuse` where inputs do not fit the world, and for a moment after the end of the recording.
         """
@@ -89,6 +97,7 @@ class Recording:
         world = self.world(keep_trace=keep_trace, keep_inputs=keep_inputs)
         if self.inputs and self.inputs[-1].time > self.until:
             raise Misuse(RECORDING_ENDS_BEFORE_AN_INPUT(until=self.until, time=self.inputs[-1].time))
+        begun(world)
         for _ in replay(world, self.inputs, end):
             pass
         return world

@@ -22,6 +22,8 @@ from steptwin.files.coverage import CoverageReports
 from steptwin.files.export import axis_views, bar, write_trace
 from steptwin.files.export.progress import TimeProgress
 from steptwin.files.loader import load_world, set_faults
+from steptwin.files.scene.recorder import SceneRecorder
+from steptwin.files.scene.scenescript import NO_SCRIPT, scene_script
 from steptwin.files.timedinputs import TimedInput
 from steptwin.files.world import LONGEST_RUN_NS, World
 from steptwin.files.worldoptions import ShownOptions, WorldRunOptions
@@ -78,6 +80,7 @@ def run(options: WorldRun, out: Print, warn: Print) -> bool:
     """
     reports = CoverageReports(options.coverage)
     keep_trace = options.trace is not None or not options.as_json
+    recorder = SceneRecorder()
     with load_world(
         options.world,
         warn,
@@ -87,9 +90,10 @@ def run(options: WorldRun, out: Print, warn: Print) -> bool:
         keep_trace=keep_trace,
         allow_outside=options.run.allow_outside,
         state=options.run.state,
+        begun=recorder.follow if options.trace is not None else lambda world: None,
     ) as world:
         reports.observe(world, options.world.parent)
-        return _run_and_report(world, options, reports, out)
+        return _run_and_report(world, options, reports, recorder, out, warn)
 
 
 def _check_until(text: str | None) -> None:
@@ -101,7 +105,9 @@ def _check_until(text: str | None) -> None:
     raise Misuse(f"--until {text}: this is a time, where a condition is expected; --for {text} ends the run then")
 
 
-def _run_and_report(world: World, options: WorldRun, reports: CoverageReports, out: Print) -> bool:
+def _run_and_report(
+    world: World, options: WorldRun, reports: CoverageReports, recorder: SceneRecorder, out: Print, warn: Print
+) -> bool:
     _check_until(options.until)
     began = world.now
     before = filter(is_shown, world.trace) if began else ()  # what happens at power-on is part of the run
@@ -118,7 +124,7 @@ def _run_and_report(world: World, options: WorldRun, reports: CoverageReports, o
     wall_s = time.perf_counter() - wall
     verdicts = [one.verdict() for one in properties]
     measures = {name: value for one in properties for name, value in one.measures().items()}
-    written = _write(world, options)
+    written = _write(world, options, recorder, warn)
     recording = recordings.recording_of(world)
     if options.run.session is not None:
         recordings.save(recording, options.run.session)
@@ -209,10 +215,10 @@ def _arrange(world: World, options: WorldRun) -> None:
         world.condition(options.until)
 
 
-def _write(world: World, options: WorldRun) -> list[Path]:
+def _write(world: World, options: WorldRun, recorder: SceneRecorder, warn: Print) -> list[Path]:
     if options.trace is None:
         return []
-    written = _write_trace(world, options.trace)
+    written = _write_trace(world, options.trace, recorder, warn)
     if options.trace.is_dir():
         where = options.trace / RECORDING
         recordings.save(recordings.recording_of(world), where)
@@ -220,9 +226,12 @@ def _write(world: World, options: WorldRun) -> list[Path]:
     return written
 
 
-def _write_trace(world: World, where: Path) -> list[Path]:
-    views = axis_views(world)
-    return write_trace(world.trace, where, views=views, title=world.spec.name, ended=world.now, watch=bar)
+def _write_trace(world: World, where: Path, recorder: SceneRecorder, warn: Print) -> list[Path]:
+    views, scene = axis_views(world), recorder.recorded()
+    written = write_trace(world.trace, where, views=views, scene=scene, title=world.spec.name, ended=world.now, watch=bar)
+    if scene is not None and not scene_script() and any(path.suffix == ".html" for path in written):
+        warn(str(NO_SCRIPT()))
+    return written
 
 
 # ---------------------------------------------------------------------- output
@@ -362,10 +371,11 @@ def _json(world: World, outcome: WorldRunResult, out: Print) -> None:
 def replay(path: Path, trace: Path | None, out: Print, warn: Print, *, as_json: bool = False) -> bool:
     """Run a recording again. Returns whether the result was the same. Raises `Misuse` for a file that is not a recording."""
     recording = recordings.load(path)
-    world = recording.replay()
+    recorder = SceneRecorder()
+    world = recording.replay(begun=recorder.follow if trace is not None else lambda world: None)
     digest = world.trace.digest()
     is_same = digest == recording.digest
-    written = [] if trace is None else _write_trace(world, trace)
+    written = [] if trace is None else _write_trace(world, trace, recorder, warn)
     if as_json:
         data = {
             "same": is_same,

@@ -133,8 +133,8 @@ def _mm(vector: Vector) -> Point:
 def workpiece_states(
     world: Simulation, now: Nanos | None = None, travel_at: Callable[[str, Motion], float] | None = None
 ) -> Iterator[WorkpieceState]:
-    """All workpieces in space, by default at the present moment. ``travel_at`` gives the value of a signal of a belt that is moved by
-    a motion (nm)."""
+    """All workpieces in space, by default at the present moment. ``travel_at`` gives the value of a signal of a belt and takes
+    its motion, nm, too."""
     frames = world.objects.frames
     now = world.now if now is None else now
     owners = {mounted.frame: name for name, mounted in frames.items()}

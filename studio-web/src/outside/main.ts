@@ -1,7 +1,7 @@
 import css from "../app.css?raw";
 import type { Piece } from "../lib/scene/pieces";
 import { COLOURS } from "../lib/scene/looks";
-import { palettesOf, pictureOf, type Palette } from "../lib/scene/picture";
+import { palettesOf, pictureOf } from "../lib/scene/picture";
 import { Stage } from "../lib/scene/stage";
 import { VIEWS } from "../lib/scene/view";
 import type { Model } from "../lib/state/model";
@@ -59,14 +59,13 @@ function show(stage: Stage, valueOf: (name: string) => number): void {
   stage.update();
 }
 
-/** Solids of the elements of a machine and the colours of what they are made of, for other formats. */
-function solids(machine: Machine): { solids: Stage["solids"]; colours: Record<string, string> } {
-  const light: Palette = PALETTES.light;
-  const properties = Object.entries(COLOURS).map(([look, property]) => [look, light.get(`--${property}`)]);
-  return {
-    solids: stageOf(machine).solids,
-    colours: { ...Object.fromEntries(light), ...Object.fromEntries(properties) },
-  };
+/** Solids of the elements of a machine, then of workpieces, with their colours, for other formats. */
+function solids(machine: Machine, pieces: readonly Piece[]) {
+  const { light } = PALETTES;
+  return stageOf(machine, pieces).solids.map((solid) => {
+    const own = solid.color ?? `--${COLOURS[solid.material]}`;
+    return { ...solid, color: light.get(own) ?? own };
+  });
 }
 
 /** A machine in a recorded run. */

@@ -5,6 +5,7 @@
 | ``jsonl`` | every record, exactly; can be read back (`read_trace`) | |
 | ``html`` | a timeline to look through in a browser | |
 | ``png``, ``svg`` | a picture | matplotlib (extra ``plots``) |
+| ``glb`` | the machine in space, in motion; for viewers of glTF | quickjs-ng (extra ``scene``) |
 | ``vcd`` | what a logic analyser would have seen; for GTKWave | numpy (extra ``numbers``) |
 | ``pcapng`` | the frames of lines; for Wireshark | |
 | ``csv`` | samples of positions, velocities and levels | numpy (extra ``numbers``) |
@@ -26,9 +27,11 @@ from steptwin.files.export.axes import axis_views, controller_views
 from steptwin.files.export.progress import ShowExport, TimeProgress, bar, unwatched
 from steptwin.files.export.records import SavedTrace, read_records, write_records
 from steptwin.files.export.tracetracks import TraceTracks, sort_out
+from steptwin.files.scene.recordedscene import RecordedScene
 from steptwin.files.textfiles import check_writable, new_file
 from steptwin.files.writing import as_text, is_written_directly
 from steptwin.inputfiles import open_regular
+from steptwin.messages import Message
 from steptwin.simulation.mechanics.channels import AxisChannel, AxisViews
 from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 from steptwin.wire.pcapng import CapturedFrame, capture
@@ -51,6 +54,10 @@ __all__ = [
 NAME = "trace"
 """The base name of files in a directory."""
 NO_VIEWS: AxisViews = {}
+NO_SCENE = Message(
+    "files.no-scene",
+    "this trace has no machine in space: 'run' and 'replay' record it where elements have at, on or along (docs/space.md)",
+)
 
 
 class _Options(NamedTuple):
@@ -60,6 +67,7 @@ class _Options(NamedTuple):
     """Whether everything up to the end is shown."""
     texts: bool
     """Whether signals may be texts."""
+    scene: RecordedScene | None
 
 
 class Exporter(NamedTuple):
@@ -79,7 +87,7 @@ def _html(tracks: TraceTracks, file: IO[bytes], options: _Options) -> None:
     from steptwin.files.export.timeline import write_timeline
 
     with as_text(file) as text:
-        write_timeline(tracks, text, options.progress)
+        write_timeline(tracks, text, options.progress, options.scene)
 
 
 def _vcd(tracks: TraceTracks, file: IO[bytes], options: _Options) -> None:
@@ -122,11 +130,21 @@ def _svg(tracks: TraceTracks, file: IO[bytes], options: _Options) -> None:
     write_plot(tracks if options.window else tracks.to_last_change(), file, "svg", options.progress)
 
 
+def _glb(tracks: TraceTracks, file: IO[bytes], options: _Options) -> None:
+    from steptwin.files.scene.gltf import write_glb
+
+    if options.scene is None:
+        raise Misuse(NO_SCENE())
+    write_glb(options.scene, file, tracks.begin, tracks.until)
+    options.progress(tracks.until)
+
+
 FORMATS: Mapping[str, Exporter] = {
     "jsonl": Exporter("every record, exactly", "", None),
     "html": Exporter("a timeline for the browser", "", _html),
     "png": Exporter("a picture", "plots", _png),
     "svg": Exporter("a picture", "plots", _svg),
+    "glb": Exporter("the machine in space, in motion", "scene", _glb),
     "vcd": Exporter("signals for GTKWave", "numbers", _vcd),
     "pcapng": Exporter("frames for Wireshark", "", _pcapng),
     "csv": Exporter("samples", "numbers", _csv),
@@ -141,6 +159,7 @@ def write_trace(
     where: Path | str,
     *,
     views: AxisViews = NO_VIEWS,
+    scene: RecordedScene | None = None,
     title: str = "",
     ended: Nanos | None = None,
     formats: Sequence[str] | None = None,
@@ -154,7 +173,8 @@ def write_trace(
     """Write ``trace`` to a file, whose suffix selects its format, or into a directory, as ``trace.jsonl`` and so on; what was
     written. A pipe or device without a suffix gets JSON lines.
 
-    ``views`` (`axis_views`) give units of axes, names of their terminals, and mechanics. ``title`` is the name of what ran, and
+    ``views`` (`axis_views`) give units of axes, names of their terminals, and mechanics. ``scene`` is the machine in space, where
+    it has been recorded (`steptwin.files.scene.recorder`). ``title`` is the name of what ran, and
     ``ended`` (ns) when that ended; by default when all came to rest. ``formats``: by default `USUAL` for a directory,
     otherwise that of the file's suffix. A window of time (``begin`` to ``until``, ns) and ``controllers`` limit what is
     shown; JSON lines always have everything. Without ``until`` everything goes on to the end, but pictures end shortly after
@@ -177,9 +197,9 @@ def write_trace(
         with new_file(path) as file, watch(path.name, tracks.begin, tracks.until) as progress:
             if write is None:
                 with as_text(file) as text:
-                    write_records(trace, views, text, progress, title=title, until=ended)
+                    write_records(trace, views, text, progress, title=title, until=ended, scene=scene)
             else:
-                write(tracks, file, _Options(period, progress, until is not None, texts))
+                write(tracks, file, _Options(period, progress, until is not None, texts, scene))
     return [path for _, path in targets]
 
 

@@ -3,7 +3,8 @@
 The first line is the head of the file: a title, the controllers, how their axes are shown, the end of the run, the digest.
 A file that is written while a world runs has the end of the run and the digest in its last line; one that was cut has none.
 Every other line is a record: ``time_ns``, ``machine``, ``kind``, ``subject``, ``value``, and ``facts`` where its text has some.
-The value of a plan is as `steptwin.motion.planjson` has it; bytes are ``{"hex": …}``.
+Lines with ``scene``, behind the first one, are the machine in space (`steptwin.files.scene.recordedscene`); they are not part of
+the digest. The value of a plan is as `steptwin.motion.planjson` has it; bytes are ``{"hex": …}``.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from steptwin.datatypes import fields_fit, fits, fitting, format_short
 from steptwin.durations import LONGEST_NS as LATEST_NS
 from steptwin.errors import Misuse
 from steptwin.files.export.progress import TimeProgress
+from steptwin.files.scene.recordedscene import RecordedScene, read_scene
 from steptwin.motion import Profile
 from steptwin.motion.divisions import StepTrain
 from steptwin.motion.planjson import plan_to_json, read_plan
@@ -42,10 +44,22 @@ class SavedTrace(NamedTuple):
     """When the run ended."""
     digest: str
     title: str
+    scene: RecordedScene | None = None
 
 
-def write_records(trace: Trace, views: AxisViews, file: IO[str], progress: TimeProgress, *, title: str, until: Nanos) -> None:
+def write_records(
+    trace: Trace,
+    views: AxisViews,
+    file: IO[str],
+    progress: TimeProgress,
+    *,
+    title: str,
+    until: Nanos,
+    scene: RecordedScene | None = None,
+) -> None:
     file.write(_line({**_head_of(trace, views, title), "until_ns": until, "digest": trace.digest()}))
+    for line in () if scene is None else scene.lines():
+        file.write(_line(line))
     for i, record in enumerate(trace):
         file.write(record_line(record))
         if i % _PROGRESS_EVERY == 0:
@@ -86,6 +100,11 @@ def read_records(file: IO[bytes], name: str) -> SavedTrace:
             if saved is None:
                 is_open = data.get("until_ns", 0) is None
                 saved = _head({**data, "until_ns": 0, "digest": ""} if is_open else data)
+            elif "scene" in data:
+                if saved.scene is None:
+                    saved = saved._replace(scene=read_scene(data["scene"]))
+                else:
+                    saved.scene.add_line(data)
             elif is_open and "kind" not in data:
                 saved, is_open = saved._replace(until=_until(data), digest=fitting("digest", data["digest"], str)), False
             else:

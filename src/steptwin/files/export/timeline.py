@@ -17,6 +17,8 @@ from steptwin.files.export.polyline import PolylineSection, sections_of
 from steptwin.files.export.progress import TimeProgress
 from steptwin.files.export.tracetracks import TraceTracks
 from steptwin.files.export.tracks import AxisTrack, PinTrack
+from steptwin.files.scene.recordedscene import RecordedScene
+from steptwin.files.scene.scenescript import scene_script
 from steptwin.motion.divisions import Plan, StepTrain, profile_of
 from steptwin.motion.planjson import plan_to_json
 from steptwin.simulation.scheduler.trace import TraceRecord
@@ -26,7 +28,9 @@ _MOST_BYTES = 64
 """Most bytes of a frame in the page."""
 
 
-def write_timeline(tracks: TraceTracks, file: IO[str], progress: TimeProgress) -> None:
+def write_timeline(tracks: TraceTracks, file: IO[str], progress: TimeProgress, scene: RecordedScene | None = None) -> None:
+    """``scene``: the machine in space beside it, where the script that draws it has been built."""
+    script = None if scene is None else scene_script()
     names = tracks.title or ", ".join(tracks.controllers[:4]) + (" …" if len(tracks.controllers) > 4 else "")
     data = {
         "begin": tracks.begin,
@@ -36,10 +40,12 @@ def write_timeline(tracks: TraceTracks, file: IO[str], progress: TimeProgress) -
         "moved": [_moved(track, tracks) for track in tracks.moved],
         "pins": [_pin(pin, tracks) for pin in tracks.pins],
         "marks": [_mark(record, tracks.begin) for record in tracks.marks if record.time <= tracks.until],
+        "scene": None if scene is None or script is None else scene.to_json(),
     }
     parts = {
         "title": escape(names),
         "style": _part("timeline.css"),
+        "scene": script or "",
         "script": "".join(map(_part, _SCRIPTS)),
         # A "</script>" in a text must not end the script.
         "data": json.dumps(data, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c"),

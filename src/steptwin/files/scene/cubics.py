@@ -23,11 +23,11 @@ class Cubic(NamedTuple):
     c2: float = 0.0
     c3: float = 0.0
 
-    def at(self, now: Nanos) -> float:
+    def at(self, now: float) -> float:
         s = (now - self.begin) / SECOND
         return self.c0 + s * (self.c1 + s * (self.c2 + s * self.c3))
 
-    def slope(self, now: Nanos) -> float:
+    def slope(self, now: float) -> float:
         s = (now - self.begin) / SECOND
         return self.c1 + s * (2.0 * self.c2 + s * 3.0 * self.c3)
 
@@ -49,7 +49,9 @@ def cubics_of(pieces: Iterable[Piece], slack: float) -> Iterator[Cubic]:
 def _divided(look: Callable[[Nanos], float], begin: Nanos, end: Nanos, slack: float) -> Iterator[Cubic]:
     width = end - begin
     found = _through(look, begin, width)
-    if width > SHORTEST_NS and any(abs(found.at(t) - look(t)) > slack for t in (begin + width * k // 12 for k in (1, 3, 6, 9, 11))):
+    if width > SHORTEST_NS and any(
+        abs(found.at(t) - look(t)) > slack for t in (begin + width * k // 12 for k in (1, 3, 6, 9, 11))
+    ):
         middle = begin + width // 2
         yield from _divided(look, begin, middle, slack)
         yield from _divided(look, middle, end, slack)

@@ -7,6 +7,7 @@ from math import isfinite
 from pathlib import Path
 
 from steptwin.errors import Misuse
+from steptwin.extras import missing
 from steptwin.files.scene.recordedscene import machine_of
 from steptwin.files.scene.scenescript import SceneScript
 from steptwin.files.textfiles import check_writable, new_file
@@ -30,7 +31,8 @@ class View(enum.StrEnum):
 
 
 NO_SPACE = Message(
-    "files.no-space", "{name} has no places in space, so there is nothing to draw: give its elements at, on or along (docs/space.md)"
+    "files.no-space",
+    "{name} has no places in space, so there is nothing to draw: give its elements at, on or along (docs/space.md)",
 )
 NO_SUCH_PICTURE = Message("files.no-such-picture", "cannot write {path}: pictures are {suffixes}")
 
@@ -43,14 +45,16 @@ def check_picture(where: Path) -> None:
 
 
 def write_picture(world: Simulation, where: Path | str, view: View | str = View.ISO) -> None:
-    """Write a picture of a machine at the present moment; the suffix selects svg or png. Raises `Misuse` for a world without places
-    in space, and for a file that cannot be written."""
+    """Write a picture of a machine at the present moment; the suffix selects svg or png. Raises `Misuse` for a world without
+    places in space, and for a file that cannot be written."""
     where = Path(where)
     check_picture(where)
     text = picture(world, View(view))
     if where.suffix.lower() == ".png":
-        import resvg_py
-
+        try:
+            import resvg_py
+        except ImportError:
+            raise missing("a picture as PNG", "scene") from None
         content = resvg_py.svg_to_bytes(svg_string=text, skip_system_fonts=True)
     else:
         content = text.encode()

@@ -25,7 +25,7 @@ SLACK_NM = 100.0
 SLACK_Q = 1e-6
 """Those about an axis, quarter turns."""
 _AT_ONCE = 16
-"""Polynomials of a plan that are computed as soon as it is there: those of parts that change with the world are among the first."""
+"""Polynomials of a plan that are computed as soon as it is there. Pieces that read from what changes are among these."""
 _MOST_TURNS = 64
 DEGREES_PER_Q = 90.0
 
@@ -101,50 +101,58 @@ class _Level:
 
 
 class SceneRecorder:
-    """Records the scene of a world from its present moment on. It changes nothing there: after each event it looks at what that
-    scheduler computes."""
+    """Records the scene of a world. It changes nothing there: after each event it looks at what that scheduler computes."""
 
-    def __init__(self, world: Simulation) -> None:
-        self._world = world
-        self._machine = machine_of(describe(world))
+    def __init__(self) -> None:
+        self._world: Simulation | None = None
         self._motions: dict[str, _Planned | _Turning] = {}
         self._levels: dict[str, _Level] = {}
         self._followed: dict[Scheduler, list[_Planned | _Turning | _Level]] = {}
+        self._with_workpieces: set[Scheduler] = set()
         self._bodies: object = None
         self._stints: dict[str, list[Stint]] = {}
+
+    def follow(self, world: Simulation) -> None:
+        """Record a world from its present moment on, if it has places in space."""
+        if not world.objects.frames:
+            return
+        self._world = world
         world.sync_all()
-        self._follow_frames()
-        self._follow_elements()
+        self._follow_frames(world)
+        self._follow_elements(world)
         schedulers = world.objects.scheduler_of
         self._with_workpieces = {schedulers[source] for source in world.objects.workpieces.sources if source in schedulers}
         for scheduler in world.schedulers:
             self._changed(scheduler)
         world.subscribe_to_schedulers(self._changed)
 
-    def recorded(self) -> RecordedScene:
-        """The scene up to the present moment."""
-        now = self._world.now
-        self._world.sync_all()
+    def recorded(self) -> RecordedScene | None:
+        """The scene up to the present moment; None without one."""
+        world = self._world
+        if world is None:
+            return None
+        now = world.now
+        world.sync_all()
         for motion in self._motions.values():
             motion.look(now)
             del motion.spans[max(1, bisect_right(motion.spans, now, key=lambda span: span.begin)) :]
         return RecordedScene(
-            self._machine,
+            machine_of(describe(world)),
             {name: motion.spans for name, motion in self._motions.items()},
             {name: level.changes for name, level in self._levels.items() if level.changes},
-            self._stints,
+            {name: stints for name, stints in self._stints.items() if stints},
         )
 
-    def _follow_frames(self) -> None:
-        for name, mounted in self._world.objects.frames.items():
+    def _follow_frames(self, world: Simulation) -> None:
+        for name, mounted in world.objects.frames.items():
             for one in mounted.movements:
                 per_unit, slack = (one.per_unit / DEGREES_PER_Q, SLACK_Q) if one.turns else (one.per_unit * NM_PER_MM, SLACK_NM)
                 signal = f"{name}.{one.signal}"
-                self._follow(signal, self._motions.setdefault(signal, _Planned(one.motion, per_unit, slack)))
+                self._follow(world, signal, self._motions.setdefault(signal, _Planned(one.motion, per_unit, slack)))
 
-    def _follow_elements(self) -> None:
+    def _follow_elements(self, world: Simulation) -> None:
         """What moves besides frames, what is there only sometimes, and all levels that are shown."""
-        machine, placed = self._machine, {frame.name for frame in self._machine.scene.frames}
+        machine, placed = machine_of(describe(world)), set(world.objects.frames)
         moves = [f"{one.name}.present" for one in machine.scene.bodies if one.when is not None]
         levels: list[str] = []
         for axis in machine.axes:
@@ -157,41 +165,34 @@ class SceneRecorder:
                     moves += (f"{element.name}.{place}" for place in element.drawing.places)
                     levels += (switch.pin for switch in element.drawing.switches)
         for name in moves:
-            if name not in self._motions and (signal := self._signal(name)) is not None:
-                self._follow(name, self._motions.setdefault(name, _Turning(signal)))
+            if name not in self._motions and (signal := _signal(world, name)) is not None:
+                self._follow(world, name, self._motions.setdefault(name, _Turning(signal)))
         for name in levels:
-            if name not in self._levels and (signal := self._signal(name)) is not None:
-                self._follow(name, self._levels.setdefault(name, _Level(signal)))
+            if name not in self._levels and (signal := _signal(world, name)) is not None:
+                self._follow(world, name, self._levels.setdefault(name, _Level(signal)))
 
-    def _signal(self, name: str) -> SignalOf | None:
-        """None for what cannot be read."""
-        try:
-            signal = self._world.signal(name)
-        except Misuse:
-            return None
-        return signal if isinstance(signal, SignalOf) and signal.is_readable and signal.sources else None
-
-    def _follow(self, name: str, followed: _Planned | _Turning | _Level) -> None:
-        signal = self._signal(name)
+    def _follow(self, world: Simulation, name: str, followed: _Planned | _Turning | _Level) -> None:
+        signal = _signal(world, name)
         if signal is not None:
             self._followed.setdefault(signal.sources[0].scheduler, []).append(followed)
 
     # ------------------------------------------------------------------ events
 
     def _changed(self, scheduler: Scheduler) -> None:
-        if scheduler.is_dirty:  # it is called again when all has settled
+        world = self._world
+        if world is None or scheduler.is_dirty:  # it is called again when all has settled
             return
         now = scheduler.now
         for followed in self._followed.get(scheduler, ()):
             followed.look(now)
         if scheduler in self._with_workpieces:
-            bodies = self._world.objects.workpieces.bodies()
+            bodies = world.objects.workpieces.bodies()
             if bodies is not self._bodies:
                 self._bodies = bodies
-                self._place(now)
+                self._place(world, now)
 
-    def _place(self, now: Nanos) -> None:
-        there = {state.name: state for state in workpiece_states(self._world, now, partial(self._travel, now))}
+    def _place(self, world: Simulation, now: Nanos) -> None:
+        there = {state.name: state for state in workpiece_states(world, now, partial(self._travel, world, now))}
         for name in {**self._stints, **there}:
             stints, place = self._stints.setdefault(name, []), there.get(name)
             if stints and stints[-1].begin == now:
@@ -199,10 +200,19 @@ class SceneRecorder:
             if place != (stints[-1].place if stints else None):
                 stints.append(Stint(now, place))
 
-    def _travel(self, now: Nanos, signal: str, motion: Motion) -> float:
+    def _travel(self, world: Simulation, now: Nanos, signal: str, motion: Motion) -> float:
         """The way of a belt, which is followed from when a workpiece is on it; only its changes count."""
         if signal not in self._motions:
-            self._follow(signal, self._motions.setdefault(signal, _Planned(motion, NM_PER_MM, SLACK_NM)))
+            self._follow(world, signal, self._motions.setdefault(signal, _Planned(motion, NM_PER_MM, SLACK_NM)))
         followed = self._motions[signal]
         followed.look(now)
         return next(span for span in reversed(followed.spans) if span.begin <= now).at(now)
+
+
+def _signal(world: Simulation, name: str) -> SignalOf | None:
+    """None for what cannot be read."""
+    try:
+        signal = world.signal(name)
+    except Misuse:
+        return None
+    return signal if isinstance(signal, SignalOf) and signal.is_readable and signal.sources else None

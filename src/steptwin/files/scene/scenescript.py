@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from importlib.resources import files
-from importlib.util import find_spec
 from typing import Any, cast
 
 from steptwin.errors import Misuse
@@ -18,7 +17,6 @@ NO_SCRIPT = Message(
     "files.no-scene-script",
     "the script that draws machines in space has not been built: 'make page' in the clone builds it; a wheel contains it",
 )
-LIBRARIES = ("quickjs-ng", "resvg-py")
 
 
 def scene_script() -> str | None:
@@ -28,16 +26,16 @@ def scene_script() -> str | None:
 
 
 class SceneScript:
-    """The script in an engine for JavaScript, which has neither files nor a network. Raises `Misuse` where one of both is missing."""
+    """The script in an engine for JavaScript, which has neither files nor a network. Raises `Misuse` where either is missing."""
 
     def __init__(self, machine: Machine) -> None:
-        if find_spec("quickjs") is None:
-            raise missing("drawing a machine", LIBRARIES)
+        try:
+            import quickjs
+        except ImportError:
+            raise missing("drawing a machine", "scene") from None
         text = scene_script()
         if text is None:
             raise Misuse(NO_SCRIPT())
-        import quickjs
-
         self._context = quickjs.Context()
         self._context.eval(text)
         self._machine = to_json(machine)

@@ -29,14 +29,14 @@ function mixed(first: string, share: number, second: string): string {
 const ROOM = 0.06;
 const escaped = (text: string) => text.replace(/[&<>"]/g, (one) => `&#${one.charCodeAt(0)};`);
 
-/** A scene at one moment as the text of an SVG that needs nothing besides, `width` pixels wide unless it is higher than wide. */
+/** A scene at one moment as the text of an SVG whose longer side has `width` pixels; with a title as a picture of its own, on paper. */
 export function pictureOf(
   stage: Stage,
   view: View,
   levels: Levels,
   palette: Palette,
   width: number,
-  title = "",
+  title: string | null = null,
 ): string {
   const [left, top, wide, tall] = frameOf(view, stage.extent);
   const room = ROOM * Math.max(wide, tall);
@@ -70,8 +70,9 @@ export function pictureOf(
   const size = `width="${Math.round(frame[2] / pixel)}" height="${Math.round(frame[3] / pixel)}"`;
   return (
     `<svg xmlns="http://www.w3.org/2000/svg" viewBox="${x} ${y} ${w} ${h}" ${size}>` +
-    (title ? `<title>${escaped(title)}</title>` : "") +
-    `<rect x="${x}" y="${y}" width="${w}" height="${h}" fill="${paper}"/>` +
+    (title === null
+      ? ""
+      : `<title>${escaped(title)}</title><rect x="${x}" y="${y}" width="${w}" height="${h}" fill="${paper}"/>`) +
     `<g stroke="${line}" stroke-width="${pixel.toFixed(3)}" stroke-linejoin="round">${shapes.join("")}</g></svg>\n`
   );
 }

@@ -107,7 +107,7 @@ function zoomToMark() {
 const styles = getComputedStyle(document.documentElement);
 let palette = new Map();
 const color = (name) => palette.get(name) ?? (palette.set(name, styles.getPropertyValue(name).trim()), palette.get(name));
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { palette = new Map(); overviewImage = null; channelsKey = ""; redraw(); });
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { palette = new Map(); overviewImage = null; channelsKey = ""; scenePainted = ""; redraw(); });
 
 function redraw() {
   if (dirty) return;
@@ -156,6 +156,7 @@ function paint() {
   paintScale(scroll);
   paintRuler();
   paintOverview();
+  paintScene();
   tell();
 }
 
@@ -278,6 +279,8 @@ const KEYS = {
   m: () => { mark = mark === cursor ? null : cursor; redraw(); },
   z: zoomToMark,
   y: () => $("scale").click(),
+  s: () => $("scene-toggle").click(),
+  " ": () => $("play").click(),
   l: () => $("list-toggle").click(),
   "/": () => { openList(true); $("filter").focus(); },
   ".": () => $("wanted").focus(),
@@ -302,7 +305,8 @@ addEventListener("keydown", (e) => {
     return;
   }
   if (e.target === $("rows") && rowKeys(e)) return;
-  if (e.key === "Enter" && e.target instanceof HTMLButtonElement) return;
+  if (e.target instanceof HTMLSelectElement) return;
+  if ((e.key === "Enter" || e.key === " ") && e.target instanceof HTMLButtonElement) return;
   const act = KEYS[e.key] ?? KEYS[e.key.toLowerCase()];
   if (!act) return;
   e.preventDefault();
@@ -409,6 +413,63 @@ $("wanted").addEventListener("input", () => want($("wanted").value));
 $("list-close").addEventListener("click", () => openList(false));
 
 function cursorOrMiddle() { return cursor >= view.from && cursor <= view.to ? cursor : (view.from + view.to) / 2; }
+
+// ---------------------------------------------------------------------- the machine
+
+const VIEWS = { iso: "Oblique", front: "Front", side: "Side", top: "Top" };
+const replay = DATA.scene && globalThis.steptwinScene ? new steptwinScene.Replay(DATA.scene) : null;
+let sceneView = "iso", scenePainted = "", playing = null;
+
+function paintScene() {
+  if (replay === null || $("scene").hidden) return;
+  const t = hover ?? cursor, { clientWidth: width, clientHeight: height } = $("picture"), key = [t, sceneView, width, height].join();
+  if (key === scenePainted) return;
+  scenePainted = key;
+  const theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
+  $("picture").innerHTML = replay.picture(t + DATA.begin, sceneView, theme, Math.max(width, height, 1));
+}
+
+function openScene(open) {
+  $("scene").hidden = !open;
+  $("scene-toggle").setAttribute("aria-pressed", open);
+  if (!open) play(false);
+  redraw();
+}
+
+// As long as it runs, the cursor goes on with the time of the screen.
+function play(on) {
+  playing = on && replay !== null ? { from: cursor >= SPAN ? 0 : cursor, since: performance.now() } : null;
+  $("play").setAttribute("aria-pressed", playing !== null);
+  $("play").textContent = playing === null ? "▶" : "❚❚";
+  if (playing !== null) requestAnimationFrame(goOn);
+}
+
+function goOn(now) {
+  if (playing === null) return;
+  const t = playing.from + Math.max(now - playing.since, 0) * 1e6 * Number($("speed").value);
+  moveCursor(t);
+  if (t >= SPAN) play(false);
+  else requestAnimationFrame(goOn);
+}
+
+if (replay !== null) {
+  $("views").append(...Object.entries(VIEWS).map(([name, label]) => {
+    const button = document.createElement("button");
+    button.textContent = label;
+    button.setAttribute("aria-pressed", name === sceneView);
+    button.addEventListener("click", () => {
+      sceneView = name;
+      for (const other of $("views").children) other.setAttribute("aria-pressed", other === button);
+      redraw();
+    });
+    return button;
+  }));
+  $("scene-toggle").hidden = false;
+  $("scene-toggle").addEventListener("click", () => openScene($("scene").hidden));
+  $("play").addEventListener("click", () => play(playing === null));
+  $("speed").addEventListener("change", () => playing !== null && play(true));
+  openScene(true);
+}
 
 // ---------------------------------------------------------------------- the list
 
