@@ -13,7 +13,6 @@ import typer
 
 from steptwin.cli.writtenfiles import written
 from steptwin.errors import Misuse
-from steptwin.messages import Message
 
 
 class ViewName(enum.StrEnum):
@@ -21,9 +20,6 @@ class ViewName(enum.StrEnum):
     FRONT = "front"
     SIDE = "side"
     TOP = "top"
-
-
-RUN_ENDS_BEFORE = Message("cli.run-ends-before", "{path} ends at {until:g} s ({why}), before {at:g} s")
 
 
 def command(
@@ -47,6 +43,6 @@ def command(
     with load_world(file, warn, moment=moment if is_recording(file) else None, keep_trace=False, keep_inputs=False) as world:
         reason = world.run_to(moment) if world.now < moment else None
         if world.now < moment:
-            raise Misuse(RUN_ENDS_BEFORE(path=file, until=world.now / SECOND, why=reason or "", at=moment / SECOND))
+            raise Misuse(f"{file} ends at {world.now / SECOND:g} s ({reason}), before {moment / SECOND:g} s")
         write_picture(world, output, view.value)
     typer.echo(f"{output}: {world.spec.name} at {moment / SECOND:g} s")

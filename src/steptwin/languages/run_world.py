@@ -230,7 +230,7 @@ def _write_trace(world: World, where: Path, recorder: SceneRecorder, warn: Print
     views, scene = axis_views(world), recorder.recorded()
     written = write_trace(world.trace, where, views=views, scene=scene, title=world.spec.name, ended=world.now, watch=bar)
     if scene is not None and not scene_script() and any(path.suffix == ".html" for path in written):
-        warn(str(NO_SCRIPT()))
+        warn(NO_SCRIPT)
     return written
 
 

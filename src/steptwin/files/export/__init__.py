@@ -31,7 +31,6 @@ from steptwin.files.scene.recordedscene import RecordedScene
 from steptwin.files.textfiles import check_writable, new_file
 from steptwin.files.writing import as_text, is_written_directly
 from steptwin.inputfiles import open_regular
-from steptwin.messages import Message
 from steptwin.simulation.mechanics.channels import AxisChannel, AxisViews
 from steptwin.simulation.scheduler.trace import Trace, TraceRecord
 from steptwin.wire.pcapng import CapturedFrame, capture
@@ -54,10 +53,6 @@ __all__ = [
 NAME = "trace"
 """The base name of files in a directory."""
 NO_VIEWS: AxisViews = {}
-NO_SCENE = Message(
-    "files.no-scene",
-    "this trace has no machine in space: 'run' and 'replay' record it where elements have at, on or along (docs/space.md)",
-)
 
 
 class _Options(NamedTuple):
@@ -134,7 +129,9 @@ def _glb(tracks: TraceTracks, file: IO[bytes], options: _Options) -> None:
     from steptwin.files.scene.gltf import write_glb
 
     if options.scene is None:
-        raise Misuse(NO_SCENE())
+        raise Misuse(
+            "this trace has no machine in space: 'run' and 'replay' record it where elements have at, on or along (docs/space.md)"
+        )
     write_glb(options.scene, file, tracks.begin, tracks.until)
     options.progress(tracks.until)
 

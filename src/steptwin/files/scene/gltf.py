@@ -24,13 +24,9 @@ from steptwin.files.scene.cubics import Cubic
 from steptwin.files.scene.recordedscene import RecordedScene, Stint
 from steptwin.files.scene.scenescript import SceneScript
 from steptwin.jsonvalues import to_json
-from steptwin.messages import Message
 
 LONGEST_NS: Nanos = 600 * SECOND
 SLACK_DEG = 0.01
-TOO_LONG = Message(
-    "files.gltf-too-long", "{span} of motion: a glTF file has at most {most}; choose a part with --from and --until"
-)
 
 _FLOAT, _SHORT = 5126, 5123
 _ARRAY, _INDICES = 34962, 34963
@@ -41,7 +37,10 @@ def write_glb(scene: RecordedScene, file: IO[bytes], begin: Nanos, until: Nanos)
     """Write what moves from ``begin``, which is 0 s there, to ``until``. Raises `Misuse` for more than ten minutes, and without
     the script that knows what elements look like."""
     if until - begin > LONGEST_NS:
-        raise Misuse(TOO_LONG(span=duration_text(until - begin), most=duration_text(LONGEST_NS)))
+        raise Misuse(
+            f"{duration_text(until - begin)} of motion: a glTF file has at most {duration_text(LONGEST_NS)}; "
+            "choose a part with --from and --until"
+        )
     made = _Gltf(scene, begin, until)
     content = json.dumps(made.to_json(), separators=(",", ":"), ensure_ascii=False).encode()
     content += b" " * (-len(content) % 4)

@@ -14,7 +14,6 @@ from steptwin.files.textfiles import check_writable, new_file
 from steptwin.files.writing import is_written_directly
 from steptwin.inputfiles import format_path
 from steptwin.jsonvalues import to_json
-from steptwin.messages import Message
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.subject.describe import describe, workpiece_states
 
@@ -30,17 +29,10 @@ class View(enum.StrEnum):
     TOP = "top"
 
 
-NO_SPACE = Message(
-    "files.no-space",
-    "{name} has no places in space, so there is nothing to draw: give its elements at, on or along (docs/space.md)",
-)
-NO_SUCH_PICTURE = Message("files.no-such-picture", "cannot write {path}: pictures are {suffixes}")
-
-
 def check_picture(where: Path) -> None:
     """Check in advance that a picture can be written to a file. Raises `Misuse`."""
     if where.suffix.lower() not in SUFFIXES and not is_written_directly(where):
-        raise Misuse(NO_SUCH_PICTURE(path=format_path(where), suffixes=" or ".join(SUFFIXES)))
+        raise Misuse(f"cannot write {format_path(where)}: pictures are {' or '.join(SUFFIXES)}")
     check_writable(where)
 
 
@@ -66,7 +58,9 @@ def picture(world: Simulation, view: View) -> str:
     """The text of an SVG. Raises `Misuse` as `write_picture`."""
     machine = machine_of(describe(world))
     if not machine.scene.frames:
-        raise Misuse(NO_SPACE(name=machine.name))
+        raise Misuse(
+            f"{machine.name} has no places in space, so nothing can be drawn: give its elements at, on or along (docs/space.md)"
+        )
     script = SceneScript(machine)
     workpieces = tuple(workpiece_states(world))
     wanted = script.wanted()

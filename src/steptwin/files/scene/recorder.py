@@ -7,11 +7,14 @@ from collections.abc import Iterator
 from functools import partial
 from itertools import islice
 from math import isfinite
+from typing import TypeAlias
 
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.files.scene.cubics import Cubic, cubics_of
 from steptwin.files.scene.recordedscene import RecordedScene, Stint, machine_of
+from steptwin.simulation.components.signals import Idle
+from steptwin.simulation.logic.condition import SignalCondition
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.drawing import BELT
 from steptwin.simulation.scheduler.scheduler import Scheduler
@@ -30,6 +33,12 @@ _MOST_TURNS = 64
 DEGREES_PER_Q = 90.0
 
 
+def _cut(spans: list[Cubic], now: Nanos) -> None:
+    """Drop what was expected from a moment on."""
+    while spans and spans[-1].begin >= now:
+        spans.pop()
+
+
 class _Planned:
     """A motion in units of its signal; its pieces are ``per_unit`` of theirs for one."""
 
@@ -46,18 +55,13 @@ class _Planned:
                 self.spans.append(span)
             return
         self._version = version
-        self.cut(now)
+        _cut(self.spans, now)
         self._more = (one.scaled(1.0 / self._per_unit) for one in cubics_of(self._motion.pieces(now), self._slack))
         self.spans += islice(self._more, _AT_ONCE)
 
-    def cut(self, now: Nanos) -> None:
-        """Drop what was planned from a moment on."""
-        while self.spans and self.spans[-1].begin >= now:
-            self.spans.pop()
-
 
 class _Turning:
-    """A signal that is straight between its turning points; one that does not move by itself is constant."""
+    """A signal that is straight between its turning points."""
 
     def __init__(self, signal: SignalOf) -> None:
         self.spans: list[Cubic] = []
@@ -72,16 +76,46 @@ class _Turning:
         self._version = version
         ends = [now, *islice((moment for moment in signal.turning_points(now) if moment > now), _MOST_TURNS)]
         values = [signal.value(moment) for moment in ends]
-        if version is None and self.spans and self.spans[-1].c0 == values[-1]:
-            return
-        self.cut(now)
+        _cut(self.spans, now)
         for n, begin in enumerate(ends):
             seconds = (ends[n + 1] - begin) / 1e9 if n + 1 < len(ends) else 1.0
             self.spans.append(Cubic(begin, values[n], (values[min(n + 1, len(ends) - 1)] - values[n]) / seconds))
 
-    def cut(self, now: Nanos) -> None:
-        while self.spans and self.spans[-1].begin >= now:
-            self.spans.pop()
+
+class _Condition:
+    """1 while a condition holds, which may change without an event."""
+
+    def __init__(self, world: Simulation, text: str) -> None:
+        self.spans: list[Cubic] = []
+        self._signals: list[SignalOf | Idle] = []
+
+        def signal(name: str) -> SignalOf | Idle:
+            self._signals.append(world.signal(name))
+            return self._signals[-1]
+
+        self._condition = SignalCondition(text, signal)
+        self._version: object = self
+        self._more: Iterator[Cubic] = iter(())
+        sources = [source for one in self._signals if isinstance(one, SignalOf) for source in one.sources]
+        self.scheduler = sources[0].scheduler if sources else None
+        """None: it depends on the time only."""
+
+    def look(self, now: Nanos) -> None:
+        version = tuple(one.version() if one.continuous else one.value(now) for one in self._signals)
+        if version == self._version and None not in version:
+            while self.spans[-1].begin < now and (span := next(self._more, None)) is not None:
+                self.spans.append(span)
+            return
+        self._version = version
+        _cut(self.spans, now)
+        self.spans.append(Cubic(now, float(self._condition.holds(now))))
+        self._more = self._changes(now)
+        self.spans += islice(self._more, _MOST_TURNS)
+
+    def _changes(self, now: Nanos) -> Iterator[Cubic]:
+        while (change := self._condition.change(now)) is not None:
+            now = change
+            yield Cubic(now, float(self._condition.holds(now)))
 
 
 class _Level:
@@ -100,14 +134,17 @@ class _Level:
         self.changes.append((now, level))
 
 
+_Motion: TypeAlias = _Planned | _Turning | _Condition
+
+
 class SceneRecorder:
     """Records the scene of a world. It changes nothing there: after each event it looks at what that scheduler computes."""
 
     def __init__(self) -> None:
         self._world: Simulation | None = None
-        self._motions: dict[str, _Planned | _Turning] = {}
+        self._motions: dict[str, _Motion] = {}
         self._levels: dict[str, _Level] = {}
-        self._followed: dict[Scheduler, list[_Planned | _Turning | _Level]] = {}
+        self._followed: dict[Scheduler, list[_Motion | _Level]] = {}
         self._with_workpieces: set[Scheduler] = set()
         self._bodies: object = None
         self._stints: dict[str, list[Stint]] = {}
@@ -123,6 +160,7 @@ class SceneRecorder:
         schedulers = world.objects.scheduler_of
         self._with_workpieces = {schedulers[source] for source in world.objects.workpieces.sources if source in schedulers}
         for scheduler in world.schedulers:
+            scheduler.deadline()  # which settles it
             self._changed(scheduler)
         world.subscribe_to_schedulers(self._changed)
 
@@ -153,7 +191,11 @@ class SceneRecorder:
     def _follow_elements(self, world: Simulation) -> None:
         """What moves besides frames, what is there only sometimes, and all levels that are shown."""
         machine, placed = machine_of(describe(world)), set(world.objects.frames)
-        moves = [f"{one.name}.present" for one in machine.scene.bodies if one.when is not None]
+        for body in machine.scene.bodies:
+            if body.when is not None:
+                present = self._motions[f"{body.name}.present"] = _Condition(world, body.when)
+                self._followed.setdefault(present.scheduler or world.schedulers[0], []).append(present)
+        moves: list[str] = []
         levels: list[str] = []
         for axis in machine.axes:
             if axis.name in placed:
@@ -171,7 +213,7 @@ class SceneRecorder:
             if name not in self._levels and (signal := _signal(world, name)) is not None:
                 self._follow(world, name, self._levels.setdefault(name, _Level(signal)))
 
-    def _follow(self, world: Simulation, name: str, followed: _Planned | _Turning | _Level) -> None:
+    def _follow(self, world: Simulation, name: str, followed: _Motion | _Level) -> None:
         signal = _signal(world, name)
         if signal is not None:
             self._followed.setdefault(signal.sources[0].scheduler, []).append(followed)

@@ -11,12 +11,8 @@ from steptwin.errors import Misuse
 from steptwin.extras import missing
 from steptwin.files.scene.recordedscene import Machine
 from steptwin.jsonvalues import to_json
-from steptwin.messages import Message
 
-NO_SCRIPT = Message(
-    "files.no-scene-script",
-    "the script that draws machines in space has not been built: 'make page' in the clone builds it; a wheel contains it",
-)
+NO_SCRIPT = "the script that draws machines in space has not been built: 'make page' in the clone builds it; a wheel contains it"
 
 
 def scene_script() -> str | None:
@@ -35,7 +31,7 @@ class SceneScript:
             raise missing("drawing a machine", "scene") from None
         text = scene_script()
         if text is None:
-            raise Misuse(NO_SCRIPT())
+            raise Misuse(NO_SCRIPT)
         self._context = quickjs.Context()
         self._context.eval(text)
         self._machine = to_json(machine)

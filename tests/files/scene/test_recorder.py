@@ -1,0 +1,141 @@
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from steptwin.controller import SECOND, Nanos
+from steptwin.files.scene.recordedscene import RecordedScene
+from steptwin.files.scene.recorder import SceneRecorder
+from steptwin.files.world import World
+from steptwin.simulation.space.frames import FLOOR, NM_PER_MM, pose
+from steptwin.subject.scene import WorkpieceState
+
+ROOT = Path(__file__).parents[3]
+EXAMPLES = ROOT / "examples/worlds"
+DEMO = ROOT / "src/steptwin/live/studio/demo_machine/demo.toml"
+JAWS = """
+[[mic488]]
+name = "table"
+[[axis]]
+name = "turn"
+drive = "table.M1"
+kind = "rotary"
+at = [0, 0, 200]
+along = "+z"
+[[cylinder]]
+name = "lift"
+stroke = 60
+on = "turn"
+at = [100, 0, 0]
+along = "-z"
+[[gripper]]
+name = "jaws"
+stroke = 60
+on = "lift"
+along = "+x"
+[[nest]]
+name = "tray"
+at = [100, 0, 100]
+cells = [1, 1]
+pitch = [60, 60]
+workpiece = [40, 30, 50]
+filled = 1
+[[body]]
+name = "hand"
+at = [0, -300, 0]
+size = [50, 50, 50]
+when = "time > 1 and time < 2.5"
+[[button]]
+name = "down"
+to = "lift.extend"
+[[button]]
+name = "grip"
+to = "jaws.close"
+[[script]]
+name = "way"
+steps = [
+  { press = "down" }, { wait = "1 s" }, { press = "grip" }, { wait = "700 ms" }, { release = "down" }, { wait = "300 ms" },
+  { press = "down" }, { wait = "800 ms" }, { release = "grip" },
+]
+"""
+
+
+def recorded(world: World, seconds: float) -> RecordedScene:
+    recorder = SceneRecorder()
+    recorder.follow(world)
+    world.run(for_=seconds)
+    scene = recorder.recorded()
+    assert scene is not None
+    return scene
+
+
+def place_of(scene: RecordedScene, name: str, now: Nanos) -> tuple[WorkpieceState | None, float]:
+    """Where a workpiece is in what carries it, and how far a belt has moved it since."""
+    (*_, place) = [None, *(stint.place for stint in scene.workpieces.get(name, []) if stint.begin <= now)]
+    if place is None or place.travel is None:
+        return place, 0.0
+    return place, (scene.value(place.travel, now) or 0.0) - place.travel_at
+
+
+def moments(seconds: float, count: int) -> Iterator[Nanos]:
+    yield from sorted(random.Random(7).randrange(round(seconds * SECOND)) for _ in range(count))
+
+
+@pytest.mark.parametrize("path", ["palletizer/palletizer", "pick_and_place/pick_and_place", "press/press", "hoist/hoist", None])
+def test_a_recorded_scene_is_where_the_world_is(path: str | None) -> None:
+    """Everything that moves, every level and every workpiece, at moments that nothing else knows of."""
+    file = DEMO if path is None else EXAMPLES / f"{path}.toml"
+    scene = recorded(World.load(file), 16.0)
+    world = World.load(file)
+    for now in moments(16.0, 150):
+        world.advance(now)
+        world.sync_all()
+        for name, mounted in world.objects.frames.items():
+            for one in mounted.movements:
+                factor = one.per_unit / 90.0 if one.turns else one.per_unit * NM_PER_MM
+                assert scene.value(f"{name}.{one.signal}", now) == pytest.approx(one.motion.at(now) / factor, abs=1e-3), (
+                    name,
+                    now,
+                )
+        for signal, changes in scene.levels.items():
+            assert [level for moment, level in changes if moment <= now][-1] == world.read(signal), (signal, now)
+        check_workpieces(scene, world, now)
+
+
+def check_workpieces(scene: RecordedScene, world: World, now: Nanos) -> None:
+    frames = world.objects.frames
+    bodies = world.objects.workpieces.bodies()
+    assert {name for name in scene.workpieces if place_of(scene, name, now)[0] is not None} == set(bodies)
+    for name, body in bodies.items():
+        place, moved = place_of(scene, name, now)
+        assert place is not None
+        carrier = FLOOR if place.on is None else frames[place.on].frame
+        there = pose(body.frame, carrier, now).at
+        way = sum((place.at[k] - there[k] / NM_PER_MM) ** 2 for k in range(3)) ** 0.5
+        assert way == pytest.approx(abs(moved), abs=1e-3), (name, now)
+
+
+def test_jaws_and_a_hand_that_comes_and_goes() -> None:
+    scene = recorded(World.from_toml(JAWS), 5.0)
+    world = World.from_toml(JAWS)
+    for now in moments(5.0, 200):
+        world.advance(now)
+        for signal in ("jaws.position", "hand.present"):
+            assert scene.value(signal, now) == pytest.approx(world.read(signal), abs=1e-3), (signal, now)
+    assert [place.on for _, place in scene.workpieces["tray.1"] if place is not None] == ["tray", "jaws", "tray"]
+
+
+def test_recording_changes_nothing() -> None:
+    plain, watched = (World.load(EXAMPLES / "palletizer/palletizer.toml") for _ in range(2))
+    plain.run(for_=12.0)
+    recorded(watched, 12.0)
+    assert watched.trace.digest() == plain.trace.digest()
+
+
+def test_a_world_without_space_has_no_scene() -> None:
+    recorder = SceneRecorder()
+    recorder.follow(World.load(EXAMPLES / "winder/winder.toml"))
+    assert recorder.recorded() is None
