@@ -47,6 +47,7 @@ NOT_RUN = {
         "it fails, as it should; tests/test_tutorials.py does it",
     ],
     "docs/tutorials/panel.md": ["needs mbpoll; tests/peers/test_mbpoll_of_the_docs.py does it"] * 3,
+    "docs/tutorials/panel.pl.md": ["needs mbpoll; tests/peers/test_mbpoll_of_the_docs.py does it"] * 3,
     "docs/why.md": ["it goes on until Ctrl-C"],
 }
 """Blocks that are not run here, with the reason that stands before them in the source."""

@@ -50,3 +50,10 @@ def test_what_is_typed_to_the_chip_proves_itself(serve_m1486: Callable[..., Any]
             line.write(f"{text}\r".encode())
             answers += line.read(1) if text.startswith("u") else b""
     assert answers == b"@2"
+
+
+def test_the_polish_page_has_the_blocks_and_numbers_of_the_english_one() -> None:
+    def typed(page: str) -> list[str]:
+        return [line.partition("  # ")[0].rstrip() for block in blocks(page) for line in block.code.splitlines()]
+
+    assert typed("docs/tutorials/panel.pl.md") == typed("docs/tutorials/panel.md")
