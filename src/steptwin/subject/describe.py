@@ -106,7 +106,10 @@ def _scene(world: Simulation) -> SceneDescription:
     frames, elements = world.objects.frames, world.spec.elements
     return SceneDescription(
         tuple(_frame(world, name, one) for name, one in frames.items()),
-        tuple(BodyDescription(one.name, one.size, one.diameter, one.height, one.color, one.when) for one in elements.of(BODY)),
+        tuple(
+            BodyDescription(one.name, one.size, one.diameter, one.height, one.color, one.when, one.lit)
+            for one in elements.of(BODY)
+        ),
         tuple(CupDescription(one.name, one.diameter) for one in elements.of(VACUUM) if one.name in frames),
         tuple(NestDescription(one.name, one.cells, one.pitch, one.cell or one.pitch) for one in elements.of(NEST)),
         tuple(

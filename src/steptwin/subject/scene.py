@@ -42,6 +42,7 @@ class BodyDescription:
     height: float | None
     color: Annotated[str | None, "#RRGGBB"]
     when: Annotated[str | None, "The condition under which it is there"]
+    lit: Annotated[str | None, "The condition under which it shines"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -84,7 +84,9 @@ class Replay {
     const pieces = this.workpieces.at(at);
     if (this.taken !== pieces) this.stage.take((this.taken = pieces));
     show(this.stage, (name) => valueAt(motions[name] ?? [], at));
-    const known = levelsOf(machine, (name) => levelAt(levels[name] ?? [], at));
+    const level = (name: string) =>
+      name in motions ? valueAt(motions[name] ?? [], at) : levelAt(levels[name] ?? [], at);
+    const known = levelsOf(machine, level);
     return pictureOf(this.stage, SHOWN[view], known, PALETTES[theme], width);
   }
   private taken: readonly Piece[] = [];

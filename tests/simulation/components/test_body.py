@@ -227,9 +227,28 @@ def test_a_viewer_sees_whether_a_body_is_there() -> None:
     assert world.read("hand.present") == 1.0
     c.write("OUT1", 0)
     assert world.read("hand.present") == 0.0
-    with pytest.raises(Misuse, match="conditions say themselves when it is"):
+    with pytest.raises(Misuse, match="conditions say themselves when"):
         world.run(until="hand.present == 1")
     assert "present" not in [signal.name for one in describe(world).elements if one.name == "tip" for signal in one.signals]
+
+
+def test_a_viewer_sees_whether_a_lamp_is_lit() -> None:
+    lamp = "[[body]]\nname = 'lamp'\nsize = [9, 9, 9]\nlit = 'c.OUT2 and x.position > 0.02'\n"
+    world = World.from_toml(MACHINE + lamp)
+    c = world.mic488["c"]
+    c.write("OUT2", 1)
+    c.write("M1_EN", 1)
+    c.write("M1_POS_ABS", 30.0)
+    world.run(until="x.position > 0.01")
+    assert world.read("lamp.lit") == 0.0
+    world.run(until="x.position > 0.02")
+    assert world.read("lamp.lit") == 1.0
+    c.write("OUT2", 0)
+    assert world.read("lamp.lit") == 0.0
+    (body,) = [one for one in describe(world).scene.bodies if one.name == "lamp"]
+    assert body.lit == "c.OUT2 and x.position > 0.02"
+    with pytest.raises(WorldError, match="'lamp' depends on itself"):
+        World.from_toml(MACHINE + lamp.replace("c.OUT2", "lamp.lit"))
 
 
 STEPS = """[[axis]]

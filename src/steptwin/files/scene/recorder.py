@@ -192,9 +192,10 @@ class SceneRecorder:
         """What moves besides frames, what is there only sometimes, and all levels that are shown."""
         machine, placed = machine_of(describe(world)), set(world.objects.frames)
         for body in machine.scene.bodies:
-            if body.when is not None:
-                present = self._motions[f"{body.name}.present"] = _Condition(world, body.when)
-                self._followed.setdefault(present.scheduler or world.schedulers[0], []).append(present)
+            for what, text in (("present", body.when), ("lit", body.lit)):
+                if text is not None:
+                    holds = self._motions[f"{body.name}.{what}"] = _Condition(world, text)
+                    self._followed.setdefault(holds.scheduler or world.schedulers[0], []).append(holds)
         moves: list[str] = []
         levels: list[str] = []
         for axis in machine.axes:

@@ -17,8 +17,8 @@ from steptwin.simulation.components.signals import Idle, find_signal
 from steptwin.simulation.logic.condition import SignalCondition
 from steptwin.simulation.logic.signal import SignalOf
 
-PRESENCE_CAN_ONLY_BE_WATCHED = Message(
-    "simulation.presence-can-only-be-watched", "whether a body is there can be watched; conditions say themselves when it is"
+CAN_ONLY_BE_WATCHED = Message(
+    "simulation.presence-can-only-be-watched", "whether a body is there or lit can be watched; conditions say themselves when"
 )
 
 
@@ -28,32 +28,34 @@ class BuiltBody(NamedTuple):
     pusher: Pusher | None
 
     def signals(self) -> Mapping[str, SignalOf]:
-        """Whether it is there, where that depends on anything; what it pushes."""
-        if self.pusher is not None:
-            return self.pusher.signals()
-        if self.spec.when is None:
-            return {}
+        """Whether it is there and whether it shines, where that depends on anything; what it pushes."""
+        conditions = {"present": self.spec.when, "lit": self.spec.lit}
+        watched = {name: self._signal(condition) for name, condition in conditions.items() if condition is not None}
+        return watched if self.pusher is None else {**watched, **self.pusher.signals()}
+
+    def _signal(self, text: str) -> SignalOf:
         found: list[SignalOf | Idle] = []
 
         def signal(name: str) -> SignalOf | Idle:
             found.append(find_signal(self.objects, name))
             return found[-1]
 
-        condition = SignalCondition(self.spec.when, signal)
+        condition = SignalCondition(text, signal)
         sources = tuple(dict.fromkeys(source for one in found if isinstance(one, SignalOf) for source in one.sources))
-        return {"present": SignalOf(sources, lambda now: float(condition.holds(now)), check=_refuse_presence)}
+        return SignalOf(sources, lambda now: float(condition.holds(now)), check=_refuse)
 
 
-def _refuse_presence() -> None:
-    raise Misuse(PRESENCE_CAN_ONLY_BE_WATCHED())
+def _refuse() -> None:
+    raise Misuse(CAN_ONLY_BE_WATCHED())
 
 
 def _refers(spec: BodySpec, described: ElementSpecs) -> Iterator[Reference]:
     """Nothing for one that stands on the floor, and is always there."""
     if spec.on is not None:
         yield Reference(spec.on, spec.on, (*spec.path, "on"))
-    for owner in spec.owners:
-        yield Reference(spec.on or spec.owners[0], owner, (*spec.path, "when"))
+    owners = [*((owner, "when") for owner in spec.owners), *((owner, "lit") for owner in spec.lit_by)]
+    for owner, name in owners:
+        yield Reference(spec.on or owners[0][0], owner, (*spec.path, name))
     if spec.pushes and spec.on is not None:
         for name in described.holders:
             yield Reference(spec.on, name, (*spec.path, "pushes"))

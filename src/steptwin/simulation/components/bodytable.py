@@ -53,6 +53,9 @@ class BodySpec(NamedSpec, MountSpec):
         flag, "whether it pushes workpieces across belts that it moves across", default=False, needs="on", excludes=("when",)
     )
     color: str | None = key(color_value, "of its picture: #RRGGBB", default=None)
+    lit: str | None = key(
+        text_value, "the condition under which it shines, such as the output of a lamp, 'table.OUT3'", default=None
+    )
 
     @property
     def is_mounted(self) -> bool:
@@ -70,14 +73,24 @@ class BodySpec(NamedSpec, MountSpec):
 
     @property
     def owners(self) -> tuple[str, ...]:
-        """Controllers and elements whose signals are in its condition."""
-        return () if self.when is None else tuple(owner for owner in owners_of(self.when) if owner != TIME)
+        """Controllers and elements whose signals say whether it is there."""
+        return _owners(self.when)
+
+    @property
+    def lit_by(self) -> tuple[str, ...]:
+        """Controllers and elements whose signals say whether it shines."""
+        return _owners(self.lit)
 
     def check(self, text: TomlText) -> None:
         if self.size is None and self.diameter is None:
             text.wrong(self.path, "D007", "a body needs size, or diameter and height")
-        if self.when is not None:
-            check_condition(text, self.path, self.name, self.when)
+        for name, condition in (("when", self.when), ("lit", self.lit)):
+            if condition is not None:
+                check_condition(text, self.path, self.name, condition, name)
+
+
+def _owners(condition: str | None) -> tuple[str, ...]:
+    return () if condition is None else tuple(owner for owner in owners_of(condition) if owner != TIME)
 
 
 def shape_of(size: tuple[float, float, float] | None, diameter: float | None, height: float | None) -> Shape:

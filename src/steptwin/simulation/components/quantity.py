@@ -26,13 +26,13 @@ def owners_of(condition: str) -> tuple[str, ...]:
         return ()
 
 
-def check_condition(text: TomlText, path: Path, name: str, condition: str) -> None:
+def check_condition(text: TomlText, path: Path, name: str, condition: str, key: str = "when") -> None:
     """Report a condition of the element ``name`` that cannot be read, or is over itself."""
     try:
         parse_condition(condition)
     except Misuse as error:
-        text.wrong((*path, "when"), "D003", str(error))
-    check_owners(text, (*path, "when"), name, owners_of(condition))
+        text.wrong((*path, key), "D003", str(error))
+    check_owners(text, (*path, key), name, owners_of(condition))
 
 
 def check_owners(text: TomlText, path: Path, name: str, owners: tuple[str, ...]) -> None:

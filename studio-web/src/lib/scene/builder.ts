@@ -3,7 +3,8 @@ import { directionOf, type Scene } from "./poses";
 export type Vector = readonly [x: number, y: number, z: number];
 
 /** What a solid is made of; how that looks is said by who draws it. */
-export type Material = "frame" | "rail" | "drive" | "moving" | "rod" | "belt" | "piece" | "mark" | "lamp" | "light";
+export type Material =
+  "frame" | "rail" | "drive" | "moving" | "rod" | "belt" | "piece" | "mark" | "lamp" | "light" | "glass" | "ghost";
 
 /** A box or a prism that an element is drawn with: it stands on its frame, or is carried by it. */
 export interface Solid {

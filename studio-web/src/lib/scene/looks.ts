@@ -1,7 +1,7 @@
 import type { Material, Solid } from "./builder";
 
 /** How a solid looks: as its material does, or as that of something that is on, interrupted or stalled. */
-export type Look = Material | "on" | "stalled" | "interrupted";
+export type Look = Material | "on" | "stalled" | "interrupted" | "shining";
 
 /** What changes how elements look. */
 export interface Levels {
@@ -21,13 +21,19 @@ export const COLOURS: Readonly<Record<Look, string>> = {
   mark: "dim",
   lamp: "rubber",
   light: "danger",
+  glass: "rubber",
+  shining: "good",
+  ghost: "accent",
   interrupted: "danger",
   on: "good",
   stalled: "danger-fill",
 };
 
+/** Of its own colour, that a lamp shows which does not shine. */
+export const DARK = 0.35;
+
 export function lookOf({ element, material, pin }: Solid, { levelOf, isStalled }: Levels): Look {
   if (material === "moving" && isStalled(element)) return "stalled";
   if (pin === null || levelOf(pin) !== 1) return material;
-  return material === "light" ? "interrupted" : "on";
+  return material === "light" ? "interrupted" : material === "glass" ? "shining" : "on";
 }

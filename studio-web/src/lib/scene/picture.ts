@@ -1,4 +1,4 @@
-import { COLOURS, lookOf, type Levels } from "./looks";
+import { COLOURS, DARK, lookOf, type Levels } from "./looks";
 import { POSE } from "./poses";
 import type { Stage } from "./stage";
 import { facesOf, frameOf, Order, spotX, spotY, type View } from "./view";
@@ -50,8 +50,9 @@ export function pictureOf(
     const solid = stage.solids[n];
     if (solid === undefined || !stage.isThere[n]) return "";
     const look = lookOf(solid, levels);
-    const own = look === solid.material ? solid.color : null;
-    const fill = own === null ? colour(`--${COLOURS[look]}`) : own.startsWith("--") ? colour(own) : own;
+    const own = look === solid.material || look === "shining" ? solid.color : null;
+    const whole = own === null ? colour(`--${COLOURS[look]}`) : own.startsWith("--") ? colour(own) : own;
+    const fill = look === "glass" ? mixed(whole, DARK, colour("--rubber")) : whole;
     const isLight = solid.material === "light";
     const faces = facesOf(solid, stage.places, n * POSE, view);
     const lights = [
@@ -60,7 +61,7 @@ export function pictureOf(
       [faces.top, mixed(fill, 0.8, "#ffffff")],
     ] as const;
     const paths = lights.filter(([data]) => data).map(([data, one]) => `<path d="${data}" fill="${one}"/>`);
-    const place = `translate(${spotX(view, stage.places, n).toFixed(2)} ${spotY(view, stage.places, n).toFixed(2)})`;
+    const place = `translate(${spotX(view, stage.places, n * POSE + 9).toFixed(2)} ${spotY(view, stage.places, n * POSE + 9).toFixed(2)})`;
     const thick = look === "interrupted" ? ` stroke-width="${(2.5 * pixel).toFixed(3)}"` : "";
     const faint = isLight && look !== "interrupted" ? ' opacity="0.3"' : "";
     const name = n < stage.fixed ? solid.element : (stage.pieces.names[n - stage.fixed] ?? "");

@@ -241,9 +241,10 @@ function body(build: Builder, { scene }: Known): void {
     at: [0, 0, size[2] / 2],
     size,
     prism,
-    material: "frame",
+    material: its.lit === null ? "frame" : "glass",
     color: its.color,
     shown: its.when === null ? null : `${its.name}.present`,
+    pin: its.lit === null ? null : `${its.name}.lit`,
   });
 }
 

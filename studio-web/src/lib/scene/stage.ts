@@ -4,6 +4,19 @@ import { Pieces, type Piece } from "./pieces";
 import { copyPose, POSE, Poses, shift, type Scene } from "./poses";
 import { solidsOf, travelOf } from "./solids";
 
+const GHOST = { material: "ghost", color: null, pin: null, shown: null } as const;
+/** What goes less far is not drawn at its target. */
+const GONE_MM = 1;
+const WORKS = new Set(["vacuum", "gripper", "tool"]);
+
+function tipsOf({ frames }: Scene): number[] {
+  const places = frames.map((_, place) => place);
+  const working = places.filter((place) => WORKS.has(frames[place]?.kind ?? ""));
+  if (working.length) return working;
+  const carriers = new Set(frames.map(({ joints, on }) => (joints.length ? on : null)));
+  return places.filter((place) => frames[place]?.kind === "axis" && !carriers.has(frames[place].name));
+}
+
 /** The least box about everything. [mm] */
 export interface Extent {
   low: Vector;
@@ -29,15 +42,29 @@ export class Stage {
   highs = new Float64Array();
   /** Of all, wherever they may be. */
   readonly extent: Extent;
+  /** Frames of what works on workpieces, or of the outermost axes. */
+  readonly tips: readonly number[];
+  /** Whether tips are drawn where they are going, too. */
+  showsTargets = false;
+  /** Values of the signals of `poses` where motions will end; NaN: it stands, or that is not known. */
+  readonly targets: Float64Array;
+  private readonly aims: Poses;
   private readonly slides: Int32Array;
   private readonly shown: Int32Array;
 
-  constructor(scene: Scene, model: Model, pieces: readonly Piece[] = []) {
-    this.solids = solidsOf(scene, model);
+  /** `hasTargets`: solids for what is drawn where it is going. */
+  constructor(scene: Scene, model: Model, pieces: readonly Piece[] = [], hasTargets = false) {
+    const solids = solidsOf(scene, model);
+    this.tips = tipsOf(scene);
+    const isTip = ({ frame, isCarried }: Solid) =>
+      hasTargets && this.tips.includes(frame) && (isCarried || scene.frames[frame]?.joints.length === 0);
+    this.solids = [...solids, ...solids.filter(isTip).map((one): Solid => ({ ...one, ...GHOST }))];
     this.fixed = this.solids.length;
     this.pieces = new Pieces(scene);
     const more = this.solids.flatMap(({ slide, shown }) => [slide?.signal ?? [], shown ?? []].flat());
     this.poses = new Poses(scene, more);
+    this.aims = new Poses(scene, more);
+    this.targets = new Float64Array(this.poses.signals.length).fill(NaN);
     const place = (signal: string | undefined | null) => (signal ? this.poses.signals.indexOf(signal) : -1);
     this.slides = Int32Array.from(this.solids, ({ slide }) => place(slide?.signal));
     this.shown = Int32Array.from(this.solids, ({ shown }) => place(shown));
@@ -61,17 +88,30 @@ export class Stage {
 
   /** Everything from the values of `poses` and `pieces`. */
   update(): void {
-    const { poses, places } = this;
+    const { poses, places, aims, targets } = this;
     poses.update();
+    if (this.showsTargets) {
+      for (let k = 0; k < targets.length; k++) {
+        const target = targets[k] as number;
+        aims.values[k] = Number.isNaN(target) ? (poses.values[k] as number) : target;
+      }
+      aims.update();
+    }
     for (let n = this.fixed; n < this.solids.length; n++) {
       this.pieces.place(n - this.fixed, poses, places, n * POSE);
       this.isThere[n] = 1;
       this.bound(n);
     }
     for (let n = 0; n < this.fixed; n++) {
-      const { isCarried, frame, at, slide } = this.solids[n] as Solid;
+      const { isCarried, frame, at, slide, material } = this.solids[n] as Solid;
       const from = n * POSE;
-      copyPose(places, from, isCarried ? poses.carried : poses.bases, frame * POSE);
+      const isGhost = material === "ghost";
+      if (isGhost && !(this.showsTargets && this.isGoing(frame))) {
+        this.isThere[n] = 0;
+        continue;
+      }
+      const of = isGhost ? aims : poses;
+      copyPose(places, from, isCarried ? of.carried : of.bases, frame * POSE);
       shift(places, from, at[0], at[1], at[2]);
       if (slide !== null) {
         const value = poses.values[this.slides[n] as number] || 0;
@@ -81,6 +121,14 @@ export class Stage {
       this.isThere[n] = shown < 0 || (poses.values[shown] as number) > 0 ? 1 : 0;
       this.bound(n);
     }
+  }
+
+  /** Whether a tip is not where it will be. */
+  private isGoing(frame: number): boolean {
+    let way = 0;
+    for (let k = frame * POSE; k < (frame + 1) * POSE; k++)
+      way = Math.max(way, Math.abs((this.aims.carried[k] as number) - (this.poses.carried[k] as number)));
+    return way > GONE_MM;
   }
 
   private bound(n: number): void {

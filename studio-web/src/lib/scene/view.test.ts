@@ -53,7 +53,7 @@ test("what turns is drawn turned, and stands where its carrier has it", () => {
   stage.poses.values[0] = 90;
   stage.update();
   const { places } = stage;
-  expect([spotX(VIEWS.top, places, 0), spotY(VIEWS.top, places, 0)]).toEqual([10, -100]);
+  expect([spotX(VIEWS.top, places, 9), spotY(VIEWS.top, places, 9)]).toEqual([10, -100]);
   const [solid] = stage.solids;
   if (solid === undefined) throw new Error("no solid");
   expect(facesOf(solid, places, 0, VIEWS.top)).toEqual({ front: "", side: "", top: "M-5.00 -10.00L-5.00 10.00L5.00 10.00L5.00 -10.00Z" }); // prettier-ignore

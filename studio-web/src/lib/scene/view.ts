@@ -1,4 +1,3 @@
-import { POSE } from "./poses";
 import type { Solid, Vector } from "./builder";
 import type { Extent, Stage } from "./stage";
 
@@ -223,14 +222,16 @@ export class Order {
 }
 
 /** Where a middle is in a picture. */
-export function spotX(view: View, poses: Float64Array, n: number): number {
-  return dotAt(view.right, poses, n * POSE + 9);
+export function spotX(view: View, numbers: Numbers, at: number): number {
+  return dotAt(view.right, numbers, at);
 }
 
-export function spotY(view: View, poses: Float64Array, n: number): number {
-  return -dotAt(view.up, poses, n * POSE + 9);
+export function spotY(view: View, numbers: Numbers, at: number): number {
+  return -dotAt(view.up, numbers, at);
 }
 
-function dotAt(direction: Vector, numbers: Float64Array, at: number): number {
+type Numbers = Float64Array | Float32Array;
+
+function dotAt(direction: Vector, numbers: Numbers, at: number): number {
   return direction[0] * (numbers[at] as number) + direction[1] * (numbers[at + 1] as number) + direction[2] * (numbers[at + 2] as number); // prettier-ignore
 }

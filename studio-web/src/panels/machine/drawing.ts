@@ -2,6 +2,7 @@ import { isLike, type Solid } from "../../lib/scene/builder";
 import type { Levels } from "../../lib/scene/looks";
 import { POSE } from "../../lib/scene/poses";
 import type { Stage } from "../../lib/scene/stage";
+import type { Trail } from "../../lib/scene/trail";
 import { facesOf, frameOf, Order, spotX, spotY, type View } from "../../lib/scene/view";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -45,6 +46,7 @@ export class Drawing {
   private revision = -1;
   private readonly order: Order;
   private readonly all: SVGGElement;
+  private readonly trails: SVGPathElement[] = [];
   private readonly labels = new Map<string, SVGTextElement>();
   /** The solids of each element with a label. */
   private readonly named = new Map<string, number[]>();
@@ -66,9 +68,11 @@ export class Drawing {
     this.renew();
     const fixed = stage.solids.slice(0, stage.fixed);
     fixed.forEach(({ element, material }, n) => {
+      if (material === "ghost") return;
       if (material !== "frame" || fixed.some((one) => one.element === element && one.material !== "frame"))
         this.named.set(element, [...(this.named.get(element) ?? []), n]);
     });
+    for (const _ of stage.tips) this.trails.push(create("path", svg, "trail"));
     const words = create("g", svg, "labels");
     for (const name of this.named.keys()) {
       const label = create("text", words);
@@ -99,8 +103,8 @@ export class Drawing {
       if (part.style.display !== display) part.style.display = display;
       if (!stage.isThere[n]) continue;
       if (this.hasTurned(n)) this.outline(n, part);
-      const x = spotX(this.view, stage.places, n);
-      const y = spotY(this.view, stage.places, n);
+      const x = spotX(this.view, stage.places, n * POSE + 9);
+      const y = spotY(this.view, stage.places, n * POSE + 9);
       if (this.spots[2 * n] === x && this.spots[2 * n + 1] === y) continue;
       this.spots[2 * n] = x;
       this.spots[2 * n + 1] = y;
@@ -109,6 +113,14 @@ export class Drawing {
     if (now_ms - this.ordered_ms < ORDER_MS) return;
     this.ordered_ms = now_ms;
     this.sort();
+  }
+
+  /** The path of a tip; null: none. */
+  trail(tip: number, trail: Trail | null): void {
+    let d = "";
+    for (let at = 0; trail !== null && at < 3 * trail.count; at += 3)
+      d += `${at ? "L" : "M"}${spotX(this.view, trail.places, at).toFixed(1)} ${spotY(this.view, trail.places, at).toFixed(1)}`;
+    this.trails[tip]?.setAttribute("d", d);
   }
 
   mark({ levelOf, isStalled, selected, labels }: Marks): void {

@@ -1,10 +1,13 @@
 import {
   AmbientLight,
   BoxGeometry,
+  BufferAttribute,
+  BufferGeometry,
   CylinderGeometry,
   DirectionalLight,
   EdgesGeometry,
   HemisphereLight,
+  Line,
   LineBasicMaterial,
   LineSegments,
   Mesh,
@@ -15,14 +18,14 @@ import {
   Vector2,
   Vector3,
   WebGLRenderer,
-  type BufferGeometry,
   type Matrix4,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { POSE } from "../../lib/scene/poses";
 import type { Solid } from "../../lib/scene/builder";
-import { COLOURS, lookOf, type Look } from "../../lib/scene/looks";
+import { COLOURS, DARK, lookOf, type Look } from "../../lib/scene/looks";
 import type { Stage } from "../../lib/scene/stage";
+import type { Trail } from "../../lib/scene/trail";
 import { frameOf, VIEWS, type ViewName } from "../../lib/scene/view";
 import type { Marks } from "./drawing";
 
@@ -51,6 +54,8 @@ export class Space {
   /** The solid of what is selected that moves with it; below 0: none. */
   private goes = -1;
   private view: ViewName = "oblique";
+  private readonly trails: Line[] = [];
+  private readonly trailLook = new LineBasicMaterial({ depthTest: false });
   /** Something has changed since the last picture. */
   private isStale = true;
 
@@ -120,6 +125,29 @@ export class Space {
     this.renderer.render(this.scene, this.camera);
   }
 
+  /** The path of a tip; null: none. */
+  trail(tip: number, trail: Trail | null): void {
+    let line = this.trails[tip];
+    if (line === undefined) {
+      if (trail === null) return;
+      this.trails[tip] = line = new Line(new BufferGeometry(), this.trailLook);
+      line.frustumCulled = false;
+      line.renderOrder = 1;
+      this.scene.add(line);
+    }
+    line.visible = trail !== null;
+    this.isStale = true;
+    if (trail === null) return;
+    let place = line.geometry.getAttribute("position") as BufferAttribute | undefined;
+    if (place?.array !== trail.places) {
+      line.geometry.dispose();
+      line.geometry = new BufferGeometry();
+      line.geometry.setAttribute("position", (place = new BufferAttribute(trail.places, 3)));
+    }
+    place.needsUpdate = true;
+    line.geometry.setDrawRange(0, trail.count);
+  }
+
   mark(marks: Marks): void {
     this.goes = this.stage.solids
       .slice(0, this.stage.fixed)
@@ -139,11 +167,13 @@ export class Space {
     for (const [name, material] of this.looks) {
       const [look, own, selected] = name.split(" ");
       const property = own?.startsWith("--") ? own : `--${COLOURS[look as Look]}`;
-      material.color.set(own && own !== property ? own : style.getPropertyValue(property));
-      material.emissive.set(selected ? style.getPropertyValue("--trace-6") : "#000000");
-      material.emissiveIntensity = 0.45;
+      const color = own && own !== property ? own : style.getPropertyValue(property);
+      material.color.set(color).multiplyScalar(look === "glass" ? DARK : 1);
+      material.emissive.set(selected ? style.getPropertyValue("--trace-6") : look === "shining" ? color : "#000000");
+      material.emissiveIntensity = look === "shining" ? 0.9 : 0.45;
     }
     this.lines.color.set(style.getPropertyValue("--dim"));
+    this.trailLook.color.set(style.getPropertyValue("--trace-6"));
     this.isStale = true;
   }
 
@@ -152,7 +182,7 @@ export class Space {
     const { left, top, width, height } = this.canvas.getBoundingClientRect();
     const ray = new Raycaster();
     ray.setFromCamera(new Vector2((2 * (x - left)) / width - 1, 1 - (2 * (y - top)) / height), this.camera);
-    const seen = this.meshes.filter((mesh) => mesh.visible);
+    const seen = this.meshes.filter((mesh, n) => mesh.visible && this.stage.solids[n]?.material !== "ghost");
     const [hit] = ray.intersectObjects(seen, false);
     return hit === undefined ? "" : (this.stage.solids[this.meshes.indexOf(hit.object as never)]?.element ?? "");
   }
@@ -164,6 +194,7 @@ export class Space {
       shape.dispose();
       edges.dispose();
     }
+    for (const line of this.trails) line?.geometry.dispose();
     for (const material of this.looks.values()) material.dispose();
     this.renderer.dispose();
   }
@@ -237,8 +268,8 @@ export class Space {
     if (found === undefined) {
       const isMetal = look === "rod" || look === "rail";
       found = new MeshStandardMaterial({ roughness: isMetal ? 0.35 : 0.7, metalness: isMetal ? 0.25 : 0 });
-      found.transparent = look === "light";
-      found.opacity = look === "light" ? 0.3 : 1;
+      found.transparent = look === "light" || look === "ghost";
+      found.opacity = found.transparent ? 0.3 : 1;
       this.looks.set(name, found);
       this.paint();
     }

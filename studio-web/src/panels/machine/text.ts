@@ -44,6 +44,9 @@ export const t = texts(
     noWebGl: "This browser has no WebGL 2: the drawing stays.",
     notLoaded: "The picture in three dimensions could not be loaded.",
     labels: "Labels",
+    pathWord: "Path",
+    pathHelp:
+      "The way of what works on workpieces in the last 10 s, as it was seen here, and where its motion will end.",
     selected: "Selected",
     nothingSelected: "Nothing selected",
     isStalled: "{name} is stalled",
@@ -100,6 +103,8 @@ export const t = texts(
     noWebGl: "Ta przeglądarka nie ma WebGL 2: zostaje rysunek.",
     notLoaded: "Nie udało się wczytać obrazu w trzech wymiarach.",
     labels: "Nazwy",
+    pathWord: "Tor",
+    pathHelp: "Droga narzędzia w ostatnich 10 s, tak jak ją tu widziano, i miejsce, w którym jego ruch się skończy.",
     selected: "Wybrany element",
     nothingSelected: "Nic nie wybrano",
     isStalled: "utyk: {name}",
