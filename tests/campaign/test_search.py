@@ -98,6 +98,32 @@ def test_a_guided_search_needs_fewer_cases_than_chance(campaign: Campaign) -> No
     assert median(asked_until_found(campaign, seed) for seed in range(5)) < 0.69 / area / 2  # half of the median of chance
 
 
+def test_equal_distances_lead_back_to_the_points_of_a_random_search(campaign: Campaign) -> None:
+    """A property that is true or false only shows no way: the search is never worse than chance."""
+    search = GuidedSearch(campaign.cases)
+    asked: list[Case] = []
+    for _ in range(6):
+        cases = search.ask()
+        asked += cases
+        search.tell([0.9] * len(cases))
+    assert asked == [campaign.cases[n] for n in range(len(asked))]
+
+
+@pytest.mark.parametrize("values", [1, 2])
+def test_a_mistake_at_the_edge_of_a_value_is_found_along_the_slope(campaign: Campaign, values: int) -> None:
+    if values == 1:
+        campaign = Campaign(replace(campaign.description, vary=campaign.description.vary[:1], steps=()))
+    search, asked = GuidedSearch(campaign.cases), 0
+    while asked < 100:
+        cases = search.ask()
+        asked += len(cases)
+        distances = [0.95 - float(case.values["a"]) for case in cases]
+        if min(distances) < 0:
+            break
+        search.tell(distances)
+    assert asked <= 8
+
+
 @pytest.mark.parametrize("values", [1, 2])  # that are continuous: estimators, evolution
 def test_the_same_cases_for_the_same_results(campaign: Campaign, values: int) -> None:
     if values == 1:

@@ -66,6 +66,10 @@ class Cases:
 
     def __getitem__(self, number: int) -> Case:
         """The case with this number, from 0."""
+        return self.at(number, self.unit(number))
+
+    def unit(self, number: int) -> list[float]:
+        """The point of the design with this number, as `at` takes it."""
         drawn = iter(self._design(number))
         place = number % self.grid
         unit: list[float] = []
@@ -75,7 +79,7 @@ class Cases:
                 unit.append((level + 0.5) / dimension.levels)
             else:
                 unit.append(-1.0)
-        return self.at(number, [next(drawn) if u < 0.0 else u for u in reversed(unit)])
+        return [next(drawn) if u < 0.0 else u for u in reversed(unit)]
 
     def at(self, number: int, unit: Sequence[float]) -> Case:
         """The case at a point: for each of `dimensions` a number from 0 to below 1."""

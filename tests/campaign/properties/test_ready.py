@@ -171,6 +171,27 @@ def test_lost_steps_that_nobody_notices(text: str) -> None:
     assert not said(text, "no-lost-step-unnoticed within 700 ms", fault=fault, stopped=False)[0].holds
 
 
+def test_how_near_an_axis_is_to_losing_steps_is_the_torque_that_it_has_left() -> None:
+    """Of 1 N·m at 0 and all speeds of a slow move: friction takes a part, and nothing counts while the motor has no current."""
+
+    def robustness(friction: float) -> float:
+        world = World.from_toml(
+            '[[mic488]]\nname = "c"\n[[axis]]\nname = "x"\ndrive = "c.M1"\npitch = 5.0\n'
+            f"motor = {{ torque = [[0, 1.0], [6000, 1.0]], start_speed = 100, friction = {friction} }}\n"
+        )
+        watch = read_property("no-lost-step-unnoticed").watch(world)
+        world.run(for_=0.1)
+        world.mic488["c"].axis[1].enable()
+        world.mic488["c"].axis[1].move_by(2000)
+        world.run(for_=1.0)
+        verdict = watch.verdict()
+        assert verdict.holds
+        return verdict.robustness
+
+    assert robustness(0.2) == pytest.approx(0.8, abs=0.001)
+    assert robustness(0.9) == pytest.approx(0.1, abs=0.001)
+
+
 @BOTH
 def test_the_return_to_a_safe_state(text: str) -> None:
     safe = f"returns-to-safe not {MOVING[text]} and not guard.pressed"

@@ -46,10 +46,12 @@ def _no_lost_step(rest: str, world: Simulation | None) -> str:
         return f"after any.lost != 0 within {time} ({noticed or 'any.noticed'})"
     if not world.axes:
         raise Misuse("property 'no-lost-step-unnoticed': this world has no [[axis]]")
-    return _all(
-        f"after {name}.lost != 0 within {time} ({noticed or f'not {_moving_of(world, *axis.spec.drive)}'})"
-        for name, axis in world.axes.items()
-    )
+    texts: list[str] = []
+    for name, axis in world.axes.items():
+        texts.append(f"after {name}.lost != 0 within {time} ({noticed or f'not {_moving_of(world, *axis.spec.drive)}'})")
+        if axis.spec.motor is not None:  # always true, by as much torque as it has left: how near it is to losing steps
+            texts.append(f"always ({name}.power == 0 or {name}.reserve >= 0)")
+    return _all(texts)
 
 
 def _moving_of(world: Simulation, controller: str, axis: str) -> str:

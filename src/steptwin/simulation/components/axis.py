@@ -284,13 +284,16 @@ def _signals(fitted: BuiltAxis) -> Mapping[str, SignalOf]:
             freeze=lambda now: partial(of, mechanism.trajectory(now)),
         )
 
-    def effort(of: Callable[[Effort, Nanos], float], factor: float, unit: str) -> SignalOf:
+    def effort(
+        of: Callable[[Effort, Nanos], float], factor: float, unit: str, bounds: tuple[float, float] | None = None
+    ) -> SignalOf:
         return SignalOf(
             source,
             lambda now: of(mechanism.effort(now), now) * factor,
             lambda now: mechanism.effort(now).turning_points(now),
             lambda: (version(), mechanism.has_current),
             unit,
+            bounds,
             freeze=lambda now: partial(_times, partial(of, mechanism.effort(now)), factor),
         )
 
@@ -303,7 +306,8 @@ def _signals(fitted: BuiltAxis) -> Mapping[str, SignalOf]:
     if mechanism.build.motor is None:
         return SignalsOf(found, dict.fromkeys(("torque", "reserve", "force"), HAS_NO_MOTOR(axis=fitted.spec.name)))
     found["torque"] = effort(Effort.torque, 1.0, "N·m")
-    found["reserve"] = effort(Effort.reserve, 1.0, "N·m")
+    most = max(torque for _, torque in mechanism.build.motor.curve)
+    found["reserve"] = effort(Effort.reserve, 1.0, "N·m", (0.0, most))
     try:
         found["force"] = effort(Effort.torque, *_per_torque(fitted))
     except Misuse as error:
