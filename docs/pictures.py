@@ -344,6 +344,42 @@ at = [60, -50, 165]
 along = "+y"
 length = 100
 """
+TANK = """
+[[cylinder]]
+name = "valve"
+extend = "table.OUT1"
+stroke = 10.0
+extend_time = "200 ms"
+retract_time = "100 ms"
+[[integrator]]
+name = "tank"
+unit = "l"
+start = 6.0
+low = 0.0
+high = 8.0
+rate = "2.5 * table.OUT2 - 0.4 * valve.position"
+[[integrator.switch]]
+below = 3.0
+to = "table.IN4"
+[[integrator]]
+name = "bottle"
+unit = "l"
+rate = "0.4 * valve.position * (1 - tank.at_low)"
+reset = "table.OUT3"
+"""
+REEL = """
+[[dcmotor]]
+name = "reel"
+speed = 90
+run = "table.OUT1"
+run_up = "800 ms"
+coast = "1.5 s"
+[[fault]]
+kind = "dead-motor"
+element = "reel"
+from_s = 1.4
+until_s = 1.8
+"""
 
 
 def main() -> None:
@@ -371,6 +407,10 @@ def main() -> None:
         (2.8, "OUT1=0"),
     )
     draw("beam", SPACE, cup, 3.2, ("x.position", "lift.position"), ("table.OUT2", "cup.held", "passes.seen"))
+    fills = ((0.2, "OUT1=1"), (1.1, "OUT1=0"), (1.6, "OUT3=1"), (1.7, "OUT3=0"), (1.8, "OUT2=1"), (2.4, "OUT1=1"))
+    draw("integrator", TANK, fills, 3.4, ("valve.position", "tank.value", "bottle.value"), ("table.OUT2", "table.IN4"))
+    runs = ((0.2, "OUT1=1"), (2.6, "OUT1=0"))
+    draw("dcmotor", REEL, runs, 4.5, ("reel.speed", "reel.angle"), ("table.OUT1",))
     draw("transducer", AXIS + GAP, way, 1.8, ("z.position", "gap.volts"), ())
     draw("shaft", AXIS + SHAFT, way, 1.8, ("z.position", "cams.angle"), ("table.IN11", "table.IN12"))
     apart = ((0.0, "M1_EN=1"), (0.0, "M2_EN=1"), (0.2, "M1_POS_REL=80"), (0.2, "M2_POS_REL=80"), (0.7, "M2_EN=0"))

@@ -134,7 +134,7 @@ PARTS = (
         "[[body]]\nname = 'pb'\non = 'pr'\nsize = [30, 8, 10]\npushes = true\n[[button]]\nname = 'pp'\nto = 'pr.extend'\n"
         "[[event]]\nevery = '140 ms'\nsteps = [{ press = 'pp', for = '90 ms' }]\n"
     ),
-    "[[transducer]]\nname = 'v'\nof = 'x.position'\nto = 'c.AIN1'\npoints = [[0, 0], [80, 8]]\nresolution = 0.1\n",
+    "[[transducer]]\nname = 'v'\nof = 'x.position + 3 * c.OUT1'\nto = 'c.AIN1'\npoints = [[0, 0], [80, 8]]\nresolution = 0.1\n",
     (
         "[[supply]]\nname = 'p'\nfeeds = 'c'\nrise = '20 ms'\n"
         "[[fault]]\nkind = 'brown-out'\nelement = 'p'\nfrom_s = 0.9\nuntil_s = 1.0\n"
@@ -199,12 +199,27 @@ PARTS = (
     ),
     (
         "[[axis]]\nname = 'l'\ndrive = 'c.M4'\npitch = 5.0\npulses_per_rev = 3200\npower = 'kp.no'\nbacklash = 0.3\n"
+        "[axis.encoder]\nfollows = 'lc'\ncounts_per_unit = 20\n"
         "[axis.motor]\ntorque = [[0, 0.5], [600, 0.4], [900, 0.1]]\ninertia = 0.00004\nload = 0.2\nfriction = 0.03\n"
         "when_off = 'free'\n"
+        "[[conveyor]]\nname = 'lc'\nlength = 60\nspeed = 70\nrun = 'c.OUT1'\nramp_down = '120 ms'\n"
         "[[relay]]\nname = 'kp'\ncoil = 'c.OUT1'\npull_in = '6 ms'\ndrop_out = '4 ms'\n"
         "[[event]]\nat = '20 ms'\nsteps = [{ write = { 'c.M4_EN' = 1, 'c.M4_ACC' = 90000.0, 'c.M4_VEL_ABS' = 30000.0 } }, "
         "{ write = { 'c.M4_POS_ABS' = 20000.0 } }]\n"
         "[[event]]\nat = '700 ms'\nsteps = [{ write = { \"c.M4_POS_ABS\" = -20000.0 } }]\n"
+    ),
+    (
+        "[[dcmotor]]\nname = 'dm'\nspeed = 300\nrun = 'c.OUT1'\nrun_up = '90 ms'\ncoast = '210 ms'\n"
+        "[[cylinder]]\nname = 'va'\nextend = 'c.OUT1'\nstroke = 10\nextend_time = '130 ms'\nretract_time = '60 ms'\n"
+        "[[integrator]]\nname = 'ig'\nlow = 0\nhigh = 12\nstart = 3\nreset = 'c.OUT2'\nalong = '+z'\n"
+        "rate = 'dm.speed * 0.2 - 40 * (c.OUT1 < 1) - 6 * va.position'\n"
+        "[[integrator.switch]]\nabove = 6\nhysteresis = 1\nto = 'c.IN20'\n"
+        "[[integrator]]\nname = 'ih'\nunit = 'l'\nrate = 'ig.rate - 3 * ig.at_high'\n"
+        "[[body]]\nname = 'fl'\non = 'ig'\nsize = [5, 5, 5]\n"
+        "[[body]]\nname = 'ar'\non = 'dm'\nsize = [40, 5, 5]\nat = [20, 0, 8]\n"
+        "[[collision]]\nname = 'ic'\nbetween = ['fl', 'ar']\n"
+        "[[fault]]\nkind = 'other-rate'\nelement = 'ig'\nfactor = 3\nfrom_s = 0.7\nuntil_s = 0.9\n"
+        "[[fault]]\nkind = 'dead-motor'\nelement = 'dm'\nfrom_s = 0.5\nuntil_s = 0.6\n"
     ),
 )
 """Every element of the product is in one of them, or in the base."""
@@ -221,6 +236,7 @@ SIGNALS = {
     "z": ("position",), "w": ("count", "fed"),
     "q": ("count", "fed"),
     "u": ("pressure",), "f": ("position",), "t": ("position", "settled"), "tl": ("x", "y"), "g": ("position",), "s": ("angle",),
+    "ig": ("value", "rate"), "ih": ("value",), "dm": ("speed", "angle"),
     "pb": ("pushed", "jammed"), "ja": ("position",), "n": ("count",), "o": ("mass",), "m": ("share",),
     "l": ("position", "lost", "power", "speed", "torque", "reserve", "force"),
 }  # fmt: skip

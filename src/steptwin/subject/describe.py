@@ -50,7 +50,7 @@ from steptwin.subject.scene import (
 
 def describe(world: Simulation) -> Description:
     """Description of a world."""
-    moved = set().union(*(axis.mechanism.may_turn for axis in world.axes.values()))
+    moved = world.objects.turned.union(*(axis.mechanism.may_turn for axis in world.axes.values()))
     return Description(
         world.spec.name,
         tuple(_controller(world, name, is_moved=name in moved) for name in world.controllers),

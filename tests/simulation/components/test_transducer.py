@@ -197,3 +197,32 @@ def test_a_controller_with_the_name_of_a_signal_is_not_measured() -> None:
     text = TEXT.replace('of = "x.position"', 'of = "time"')
     with pytest.raises(WorldError, match="of = 'time' is not a quantity of what 'a' is connected to"):
         World.from_toml(f'[[mic488]]\nname = "time"\n{text}')
+
+
+def test_it_follows_an_expression() -> None:
+    """A load cell: a box of 3 units on what the position presses."""
+    world = World.from_toml(TEXT.replace('of = "x.position"', 'of = "2 * x.position + 3 * (a.OUT1 > 0) - 1"'))
+    device = world.mic488["a"]
+    device.write("M1_EN", 1)
+    device.write("OUT1", 1)
+    device.write("M1_POS_ABS", 30.0)
+    for n in range(1, 12):
+        world.run(until=0.1 * n)
+        assert world.read("gap.volts") == pytest.approx(volts(2 * world.axis["x"].position + 2), abs=0.0251)
+    device.write("OUT1", 0)
+    world.run(for_="1 ms")
+    assert world.read("gap.volts") == pytest.approx(volts(2 * world.axis["x"].position - 1), abs=0.0251)
+
+
+@pytest.mark.parametrize(
+    ("of", "message"),
+    [
+        ("x.position + gap.volts", "'gap' depends on itself"),
+        ("x.position + a.M2.position", "x.position, a.M2.position change between events: of the signals"),
+        ("x.position * x.position", "x.position change between events: multiplied"),
+        ("x.position +", "ends too early"),
+    ],
+)
+def test_an_expression_that_it_does_not_follow(of: str, message: str) -> None:
+    with pytest.raises(WorldError, match=message):
+        World.from_toml(TEXT.replace("x.position", of))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
@@ -223,7 +223,8 @@ def _fit_encoder(axis: BuiltAxis, spec: EncoderSpec | None, axes: Mapping[str, B
     if spec.follows is not None:
         other = axes.get(spec.follows)
         if other is None:
-            raise Unknown(spec.follows, f"encoder: follows = {spec.follows!r}: axes are {', '.join(axes)}")
+            _check_followed(spec.follows, axes, context)
+            return  # it is fitted to it when that is built
         turned = other
     counts = _counts(spec, turned, encoders, controller, mechanism.number)
     on_load = spec.mount == "load" or spec.follows is not None
@@ -235,6 +236,14 @@ def _fit_encoder(axis: BuiltAxis, spec: EncoderSpec | None, axes: Mapping[str, B
         circuit = context.circuit(axis.scheduler, target, (*spec.path, "index"), None)
         zone = Zone(low, low + spec.index_width - 1, 0, axis.scale.pulses_per_rev)
         axis.scheduler.add_part(Switch(circuit, RotorMark(turned.mechanism), zone, now), (turned.mechanism.controller,))
+
+
+def _check_followed(name: str, axes: Iterable[str], context: ElementContext) -> None:
+    """Raise `Misuse` unless encoders may follow what is called so, which is no axis."""
+    specs = (one for specs in context.objects.described.values() for one in specs)
+    others = [one.name for one in specs if isinstance(one, NamedSpec) and one.turns_encoders]
+    if name not in others:
+        raise Unknown(name, f"encoder: follows = {name!r}: permitted are {', '.join((*axes, *others))}")
 
 
 def _counts(spec: EncoderSpec, turned: BuiltAxis, encoders: EncoderInputs[Any], controller: Any, number: int) -> Fraction | None:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from fractions import Fraction
 from math import floor
 
-from steptwin.controller import SECOND, Nanos
+from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.simulation.components.builtobjects import BuiltObjects
@@ -35,10 +35,10 @@ from steptwin.simulation.space.pieces import (
     Gear,
     Motion,
     Piece,
-    SteadyPiece,
     StillPiece,
     gear_of,
     geared,
+    pieces_of_drive,
     pieces_of_trajectory,
     summed,
 )
@@ -216,16 +216,10 @@ def belt_motion(belt: Belt, per_step: Fraction, shift: float) -> Motion:
 def _pieces_of_drive(drive: BeltDrive, now: Nanos) -> Iterator[Piece]:
     """Steps of a drive."""
     if isinstance(drive, Mechanism):
-        yield from pieces_of_trajectory(drive.trajectory(now), now)
-        return
-    if isinstance(drive, RampedDrive) and now < (straight := drive.straight_from()):
-        rate, acceleration = float(drive.whole_speed * SECOND), float(drive.acceleration * SECOND * SECOND)
-        yield SteadyPiece(now, straight, drive.grid_position, rate, acceleration)
-        now = straight
-    if isinstance(drive, ConstantDrive | RampedDrive) and drive.runs:
-        yield SteadyPiece(now, None, drive.grid_position, float(drive.whole_speed * SECOND))
-    else:
-        yield StillPiece(now, None, float(drive.grid_position(now)))
+        return pieces_of_trajectory(drive.trajectory(now), now)
+    if isinstance(drive, ConstantDrive | RampedDrive):
+        return pieces_of_drive(drive, now)
+    return iter((StillPiece(now, None, float(drive.grid_position(now))),))
 
 
 def add_belts(objects: BuiltObjects) -> None:

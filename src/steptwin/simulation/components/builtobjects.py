@@ -56,6 +56,9 @@ class BuiltObjects:
     supplied: dict[str, str] = field(default_factory=dict)
     """The power supplies of controllers that have one."""
 
+    turned: set[str] = field(default_factory=set)
+    """Controllers whose encoders belts and DC motors turn."""
+
     def __post_init__(self) -> None:
         self.frames = Frames(self.described)
 

@@ -19,6 +19,7 @@ from steptwin.messages import Message
 from steptwin.simulation.components.axis import find_axis, turning_points_of_axis
 from steptwin.simulation.components.beltsensor import Sensor, SensorSpec
 from steptwin.simulation.components.conveyortable import FEED, RUN, ConveyorSpec, NearSpec, near_ones, stop_terminal
+from steptwin.simulation.components.driveencoder import Turned, fit_encoders
 from steptwin.simulation.components.element import Stands
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import Reference
@@ -435,6 +436,8 @@ def _make(spec: ConveyorSpec, context: ElementContext) -> Conveyor:
 def _connect(spec: ConveyorSpec, conveyor: Conveyor, context: ElementContext) -> None:
     following = None if spec.next is None else find_conveyor(spec.next, context)
     conveyor.connect(following, context.objects.built(CONVEYOR))
+    drive = conveyor.belt.own or find_axis(str(spec.axis), context).mechanism
+    fit_encoders(Turned(spec.name, drive, "counts_per_unit", "mm", conveyor.belt.per_mm), context)
 
 
 def find_conveyor(name: str, context: ElementContext) -> Conveyor:

@@ -71,6 +71,10 @@ class ConveyorSpec(TerminalComponentSpec, MoverSpec):
         return True
 
     @property
+    def turns_encoders(self) -> bool:
+        return True
+
+    @property
     def moves_others(self) -> bool:
         """Only its workpieces."""
         return False

@@ -21,6 +21,7 @@ from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.drawing import ROD, Drawing
+from steptwin.simulation.mechanics.integral import Straight
 from steptwin.simulation.mechanics.scale import exact_fraction
 from steptwin.simulation.mechanics.travel import Travel
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
@@ -181,6 +182,13 @@ class Cylinder(TerminalComponent):
         """In units of the stroke, 0 retracted."""
         return self._spec.stroke * (self.travel.grid_position(now) / self.travel.full)
 
+    def line(self, now: Nanos) -> Straight:
+        """As `position`, up to where its motion changes."""
+        travel, per_step = self.travel, exact_fraction(self._spec.stroke) / self.travel.full
+        arrival = max(travel.turning_points(now), default=None)
+        slope = 0 if arrival is None else travel.direction * travel.speed(travel.direction)
+        return Straight(travel.grid_position(now) * per_step, slope * per_step, arrival)
+
     def to_grid(self, units: float) -> int:
         """The position on the grid of its travel nearest to a position in units."""
         exact = exact_fraction(units) / exact_fraction(self._spec.stroke) * self.travel.full
@@ -250,8 +258,9 @@ def _stands(cylinder: Cylinder, now: Nanos) -> Stands | None:
 
 def _signals(cylinder: Cylinder) -> Mapping[str, SignalOf]:
     source, travel = cylinder.block.source, cylinder.travel
-    bounds = (0.0, cylinder.stroke)
-    return {"position": SignalOf((source,), cylinder.position, travel.turning_points, travel.version, unit="mm", bounds=bounds)}
+    turning, bounds = travel.turning_points, (0.0, cylinder.stroke)
+    position = SignalOf((source,), cylinder.position, turning, travel.version, "mm", bounds, straight=cylinder.line)
+    return {"position": position}
 
 
 def _moves(spec: CylinderSpec, cylinder: Cylinder) -> Sequence[Movement]:

@@ -16,6 +16,11 @@ class NamedSpec(TableSpec):
 
     name: str
 
+    @property
+    def turns_encoders(self) -> bool:
+        """Whether encoders of axes may follow it, though it is no axis."""
+        return False
+
 
 S = TypeVar("S", bound=TableSpec)
 B = TypeVar("B")

@@ -10,11 +10,11 @@ from steptwin.simulation.toml.values import flag, name_value, number, whole, wor
 class EncoderSpec(TableSpec):
     counts_per_rev: int | None = key(whole(-(10**9), 10**9), "counts per motor revolution; negative: backwards", default=None)
     counts_per_unit: float | None = key(
-        number(), "counts per unit of the axis, for an encoder on the load", default=None, excludes=("counts_per_rev",)
+        number(), "counts per unit of the axis (mm of a conveyor), on the load", default=None, excludes=("counts_per_rev",)
     )
     index: bool = key(flag, "whether channel C gives an index once per revolution", default=False)
     offset: float = key(number(), "position of an index, in the unit of the axis", default=0.0, needs="index")
     index_width: int = key(whole(1, 10**6), "width of the index in pulses", default=4, needs="index")
     mount: str = key(word("motor", "load"), "on the motor, or on the load behind the play", default="motor")
-    follows: str | None = key(name_value, "another axis whose load turns it (electronic gear)", default=None)
+    follows: str | None = key(name_value, "another axis, a conveyor or a DC motor that turns it", default=None)
     slip: float = key(number(0.0, 1.0), "share of the motion that its coupling loses", default=0.0)

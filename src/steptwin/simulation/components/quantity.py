@@ -8,7 +8,7 @@ from steptwin.errors import Misuse
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.signals import Idle, find_signal
 from steptwin.simulation.logic.condition import SignalCondition
-from steptwin.simulation.logic.expression import parse_condition
+from steptwin.simulation.logic.expression import parse_condition, parse_expression
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.keypaths import Path
@@ -26,6 +26,14 @@ def owners_of(condition: str) -> tuple[str, ...]:
         return ()
 
 
+def owners_in(expression: str) -> tuple[str, ...]:
+    """As `owners_of`, of an expression."""
+    try:
+        return tuple(dict.fromkeys(owner_of(name) for name in parse_expression(expression).names()))
+    except Misuse:
+        return ()
+
+
 def check_condition(text: TomlText, path: Path, name: str, condition: str, key: str = "when") -> None:
     """Report a condition of the element ``name`` that cannot be read, or is over itself."""
     try:
@@ -33,6 +41,15 @@ def check_condition(text: TomlText, path: Path, name: str, condition: str, key: 
     except Misuse as error:
         text.wrong((*path, key), "D003", str(error))
     check_owners(text, (*path, key), name, owners_of(condition))
+
+
+def check_expression(text: TomlText, path: Path, name: str, expression: str) -> None:
+    """As `check_condition`, of an expression at the key ``path``."""
+    try:
+        parse_expression(expression)
+    except Misuse as error:
+        text.wrong(path, "D003", str(error))
+    check_owners(text, path, name, owners_in(expression))
 
 
 def check_owners(text: TomlText, path: Path, name: str, owners: tuple[str, ...]) -> None:

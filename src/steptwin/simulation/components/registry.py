@@ -16,11 +16,13 @@ from steptwin.simulation.components.collision import COLLISION
 from steptwin.simulation.components.conveyor import CONVEYOR
 from steptwin.simulation.components.counter import COUNTER
 from steptwin.simulation.components.cylinder import CYLINDER
+from steptwin.simulation.components.dcmotor import DCMOTOR
 from steptwin.simulation.components.element import AnyElement
 from steptwin.simulation.components.follower import FOLLOWER
 from steptwin.simulation.components.gantry import GANTRY
 from steptwin.simulation.components.gate import GATE
 from steptwin.simulation.components.gripper import GRIPPER
+from steptwin.simulation.components.integrator import INTEGRATOR
 from steptwin.simulation.components.latch import LATCH
 from steptwin.simulation.components.load import LOAD
 from steptwin.simulation.components.nest import NEST
@@ -78,6 +80,8 @@ for _one in (
     RELAY,
     CYLINDER,
     CONVEYOR,
+    DCMOTOR,
+    INTEGRATOR,
     BRAKE,
     SHAFT,
     FOLLOWER,

@@ -10,11 +10,14 @@ from steptwin.errors import Misuse
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
-from steptwin.simulation.components.quantity import check_owners, owner_of
+from steptwin.simulation.components.quantity import check_expression, owners_in
 from steptwin.simulation.components.signals import find_signal
 from steptwin.simulation.components.voltage import BROKEN_WIRE, DRIFT
+from steptwin.simulation.logic.calculated import CalculatedSignal
 from steptwin.simulation.logic.condition import Signal
 from steptwin.simulation.logic.curve import Stepped
+from steptwin.simulation.logic.expression import parse_expression
+from steptwin.simulation.logic.quantities import SignalName
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.logic.sources import HIGHEST_V, LOWEST_V
 from steptwin.simulation.scheduler.scheduler import Scheduler, Source
@@ -29,13 +32,13 @@ from steptwin.state import Stateful
 @table("[[transducer]]")
 class TransducerSpec(NamedSpec):
     name: str = key(name_value, "how conditions and faults name it")
-    of: str = key(text_value, "the signal that it measures, such as x.position, clamp.position, cup.pressure")
+    of: str = key(text_value, "a signal, such as x.position, or an expression, such as 0.4 * there.seen + bottle.value")
     target: Terminal = key(PinOf(ANALOG_INPUT), "the analog input: CONTROLLER.AIN1 or AIN2", name="to")
     points: tuple[tuple[float, float], ...] = key(points, "[[value, volts], ...] in the unit of the signal, linear between")
     resolution: float = key(number_value(0.0001, 10.0), "V: steps in which the voltage changes", default=0.01)
 
     def check(self, text: TomlText) -> None:
-        check_owners(text, (*self.path, "of"), self.name, (owner_of(self.of),))
+        check_expression(text, (*self.path, "of"), self.name, self.of)
         volts = [volts for _, volts in self.points]
         if not all(LOWEST_V <= one <= HIGHEST_V for one in volts):
             there = f"{min(volts):g} to {max(volts):g} V"
@@ -86,17 +89,24 @@ class Transducer(Stateful):
 
 def _refers(spec: TransducerSpec, described: ElementSpecs) -> Iterator[Reference]:
     yield Reference(spec.target[0], spec.target[0], (*spec.path, "to"))
-    yield Reference(spec.target[0], owner_of(spec.of), (*spec.path, "of"))
+    yield from (Reference(spec.target[0], owner, (*spec.path, "of")) for owner in owners_in(spec.of))
+
+
+def _measured(spec: TransducerSpec, scheduler: Scheduler, context: ElementContext) -> Signal:
+    """The signal that it follows. Raises `Misuse` for one of nothing that shares its scheduler."""
+    quantity = parse_expression(spec.of)
+    signals: dict[str, Signal] = {name: find_signal(context.objects, name) for name in dict.fromkeys(quantity.names())}
+    for name, signal in signals.items():
+        signal.watch(name)
+        if all(source.scheduler is not scheduler for source in signal.sync(scheduler.now)):
+            raise Misuse(f"of = {spec.of!r} is not a quantity of what {spec.target[0]!r} is connected to")
+    return signals[quantity.text] if isinstance(quantity, SignalName) else CalculatedSignal(quantity, signals)
 
 
 def _build(spec: TransducerSpec, context: ElementContext) -> Transducer:
     scheduler = context.scheduler(spec.target[0])
     context.input(spec.target, (*spec.path, "to"), ANALOG_INPUT)
-    found = find_signal(context.objects, spec.of)
-    found.watch(spec.of)
-    if all(source.scheduler is not scheduler for source in found.sync(scheduler.now)):
-        raise Misuse(f"of = {spec.of!r} is not a quantity of what {spec.target[0]!r} is connected to")
-    transducer = Transducer(scheduler, spec, found)
+    transducer = Transducer(scheduler, spec, _measured(spec, scheduler, context))
     scheduler.add_part(transducer, name=spec.name)
     return transducer
 

@@ -37,6 +37,10 @@ def build(blueprint: Blueprint, record: RecordSink, keep: Keep | None = None, *,
     return _Builder(blueprint, record, keep, is_blank=is_blank).objects
 
 
+OVER = ("of", "when", "rate")
+"""Keys over signals of others, which are built before."""
+
+
 class _Builder:
     def __init__(self, blueprint: Blueprint, record: RecordSink, keep: Keep | None, *, is_blank: bool) -> None:
         self.spec = spec = blueprint.spec
@@ -166,7 +170,7 @@ class _Builder:
     def _waits(self, element: AnyElement, spec: TableSpec) -> bool:
         """Whether it is over a signal of an element that is not built yet."""
         references = element.refers(spec, self.spec.elements)
-        over = (reference.other for reference in references if reference.path[-1:] in (("of",), ("when",)))
+        over = (reference.other for reference in references if reference.path[-1] in OVER)
         return any(self.objects.unbuilt(owner) is not None for owner in over)
 
     def _build_elements(self, element: AnyElement, specs: Iterable[TableSpec]) -> None:

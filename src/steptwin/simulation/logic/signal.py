@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
+from steptwin.simulation.mechanics.integral import Straight
 from steptwin.simulation.scheduler.scheduler import Source
 
 IT_CAN_ONLY_BE_WRITTEN = Message("simulation.it-can-only-be-written", "it can only be written")
@@ -41,6 +42,8 @@ class SignalOf:
     """Whether a request may change it without an event of its scheduler."""
     freeze: Callable[[Nanos], Callable[[Nanos], float]] | None = None
     """Gives the trajectory at a moment as a function that does not change when another trajectory follows; None: it cannot."""
+    straight: Callable[[Nanos], Straight] | None = None
+    """The straight line on which a value that changes between events is from a moment on; None: it has none, or not always."""
     check: Callable[[], None] = lambda: None
     """Raises `Misuse` if conditions cannot use it, because it changes between events at unknown moments."""
 

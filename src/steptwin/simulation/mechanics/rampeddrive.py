@@ -15,6 +15,7 @@ from math import ceil, isqrt, lcm
 from typing import ClassVar
 
 from steptwin.controller import Nanos
+from steptwin.simulation.mechanics.integral import Straight
 from steptwin.state import Stateful
 
 
@@ -76,6 +77,12 @@ class RampedDrive(Stateful):
             level = isqrt(needed + before * before - 1) + 1
             return self._begin - (before - level) // rate
         return self._begin - -(needed + (whole - before) ** 2) // (2 * rate * whole)
+
+    def speed(self, now: Nanos) -> Straight:
+        """Its speed in steps/ns, up to the end of its ramp."""
+        rate, end = self.whole_speed, self.straight_from()
+        ramp = Fraction(0) if now >= end else self.acceleration
+        return Straight(rate * self._reached(now - self._begin) / self._whole, ramp, None if now >= end else end)
 
     def line(self, now: Nanos) -> tuple[Fraction, Fraction] | None:
         """Its position at 0 ns and its speed in steps/ns; None on a ramp."""

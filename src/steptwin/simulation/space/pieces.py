@@ -19,7 +19,9 @@ from steptwin.motion.divisions import profile_of
 from steptwin.motion.elastic import Response, ResponseInterval
 from steptwin.motion.paths import ArcSegment
 from steptwin.motion.trig import QUARTER
+from steptwin.simulation.mechanics.belt import ConstantDrive
 from steptwin.simulation.mechanics.cam import Cam
+from steptwin.simulation.mechanics.rampeddrive import RampedDrive
 from steptwin.simulation.mechanics.trajectory import Trajectory
 from steptwin.simulation.mechanics.travel import Travel
 
@@ -275,6 +277,18 @@ def pieces_of_travel(travel: Travel, now: Nanos) -> Iterator[Piece]:
         return
     yield SteadyPiece(now, arrival, travel.grid_position, travel.speed(way) * float(SECOND))
     yield StillPiece(arrival, None, float(end))
+
+
+def pieces_of_drive(drive: ConstantDrive | RampedDrive, now: Nanos) -> Iterator[Piece]:
+    """What a drive with a speed moves, in its steps."""
+    if isinstance(drive, RampedDrive) and now < (straight := drive.straight_from()):
+        rate, acceleration = float(drive.whole_speed * SECOND), float(drive.acceleration * SECOND * SECOND)
+        yield SteadyPiece(now, straight, drive.grid_position, rate, acceleration)
+        now = straight
+    if drive.runs:
+        yield SteadyPiece(now, None, drive.grid_position, float(drive.whole_speed * SECOND))
+    else:
+        yield StillPiece(now, None, float(drive.grid_position(now)))
 
 
 def pieces_of_response(response: Response, now: Nanos) -> Iterator[Piece]:
