@@ -113,6 +113,9 @@ drive = "table.M4"
 pitch = 5.0
 [axis.motor]
 torque = [[0, 1.0], [600, 0.5]]
+[axis.encoder]
+follows = "away"
+counts_per_unit = 20
 [[gantry]]
 name = "beam"
 axis = "left"

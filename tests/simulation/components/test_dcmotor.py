@@ -73,8 +73,8 @@ J, K, R, FRICTION, MOST_A, VOLTS = 0.02, 0.5, 0.4, 0.2, 2.0, 24.0
 
 
 def test_against_the_equation_of_a_motor() -> None:
-    """A driver that limits the current gives a straight ramp; without it friction alone brakes. What the model leaves out is the end
-    of the ramp, where the voltage is the limit: 0.2 revolutions of 90."""
+    """A driver that limits the current gives a straight ramp; without current friction alone brakes. What the model leaves out is
+    the end of the ramp, where the voltage is the limit."""
 
     def rates(t: float, state: list[float]) -> list[float]:
         speed, _ = state

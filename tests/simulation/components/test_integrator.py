@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from numpy import interp
 from scipy.integrate import solve_ivp
 from world_rig import check_it_can_be_restored
 
@@ -99,7 +98,7 @@ def test_it_leaves_its_limit_when_its_rate_turns_back() -> None:
     assert here.read("tank.value") == 20.0
 
 
-ACTS = ((0.1, "OUT1", 1), (0.25, "OUT2", 1), (0.5, "OUT3", 1), (0.9, "OUT3", 0), (1.15, "OUT1", 0), (1.2, "OUT1", 1), (2.0, "OUT2", 0))
+ACTS = ((0.1, "OUT1", 1), (0.25, "OUT2", 1), (0.5, "OUT3", 1), (0.9, "OUT3", 0), (1.15, "OUT1", 0), (1.2, "OUT1", 1))
 
 
 def test_against_an_integration() -> None:
@@ -113,10 +112,10 @@ def test_against_an_integration() -> None:
         return [moved, faster, 0.01 * speed - (0.0 if levels["OUT3"] else 1.5 * opening)]
 
     before = 0.0
-    for moment, output, level in (*ACTS, (2.4, "OUT1", 1)):
+    for moment, output, level in (*ACTS, (2.0, "OUT2", 0), (2.4, "OUT1", 1)):
         found = solve_ivp(rates, (before, moment), expected, max_step=2e-4)
-        expected = [float(one[-1]) for one in found.y]
-        expected[0], expected[1] = float(interp(expected[0], [0, 10], [0, 10])), float(interp(expected[1], [0, 600], [0, 600]))
+        opening, speed, level_l = (float(one[-1]) for one in found.y)
+        expected = [min(max(opening, 0.0), 10.0), min(max(speed, 0.0), 600.0), level_l]
         here.run(until=moment)
         assert here.read("tank.value") == pytest.approx(expected[2], abs=5e-3)
         assert here.read("pump.speed") == pytest.approx(expected[1], abs=0.2)
@@ -139,9 +138,8 @@ def test_it_can_be_restored(tmp_path: Path) -> None:
 
 def test_what_is_on_it_moves_by_its_value() -> None:
     text = TEXT.replace("[[integrator.switch]]", 'mm_per_unit = 10\nalong = "+z"\n[[integrator.switch]]')
-    text += (
-        '[[body]]\nname = "float"\non = "tank"\nsize = [20, 20, 10]\n[[body]]\nname = "stop"\nat = [0, 0, 330]\nsize = [30, 30, 10]\n'
-    )
+    text += '[[body]]\nname = "float"\non = "tank"\nsize = [20, 20, 10]\n'
+    text += '[[body]]\nname = "stop"\nat = [0, 0, 330]\nsize = [30, 30, 10]\n'
     here = world(text + '[[collision]]\nname = "full"\nbetween = ["float", "stop"]\n')
     write(here, OUT2=1)
     here.run(until="full.hit", for_="10 s")
@@ -151,7 +149,7 @@ def test_what_is_on_it_moves_by_its_value() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("pump.speed -", "pump.angle -", "rate: 'pump.angle' changes between events, and is not known to go on in a straight line"),
+        ("pump.speed -", "pump.angle -", "rate: 'pump.angle' changes between events, and is not known to go on"),
         ("pump.speed -", "tank.rate -", "'tank' depends on itself"),
         ("pump.speed -", "pump.speed * valve.position -", "pump.speed, valve.position change between events: multiplied"),
         ("0.01 * pump.speed", "abs(pump.speed)", "pump.speed change between events: multiplied"),

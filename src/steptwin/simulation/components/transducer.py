@@ -95,7 +95,7 @@ def _refers(spec: TransducerSpec, described: ElementSpecs) -> Iterator[Reference
 def _measured(spec: TransducerSpec, scheduler: Scheduler, context: ElementContext) -> Signal:
     """The signal that it follows. Raises `Misuse` for one of nothing that shares its scheduler."""
     quantity = parse_expression(spec.of)
-    signals: dict[str, Signal] = {name: find_signal(context.objects, name) for name in dict.fromkeys(quantity.names())}
+    signals = {name: find_signal(context.objects, name) for name in dict.fromkeys(quantity.names())}
     for name, signal in signals.items():
         signal.watch(name)
         if all(source.scheduler is not scheduler for source in signal.sync(scheduler.now)):

@@ -43,6 +43,14 @@ class Shaft(NamedTuple):
         return ((state.load if self.on_load else state.rotor) - build.zero) * build.sign
 
 
+class EncoderShaft(Protocol):
+    """The motion of an encoder shaft. Immutable."""
+
+    def count(self, now: Nanos) -> int:
+        """Its position in whole steps."""
+        ...
+
+
 class EncoderReader(Protocol):
     """A controller that reads encoders. Axes count from 1."""
 
@@ -50,7 +58,7 @@ class EncoderReader(Protocol):
         """Set the resolution: ``counts`` of the encoder per ``pulses`` of its shaft."""
         ...
 
-    def follow_shaft(self, axis: int, shaft: Shaft, now: Nanos, /) -> None:
+    def follow_shaft(self, axis: int, shaft: EncoderShaft, now: Nanos, /) -> None:
         """Couple the encoder to ``shaft`` from now on."""
         ...
 
