@@ -103,6 +103,10 @@ def _stop(active: ActiveFault, motor: DcMotor, begins: bool, now: Nanos) -> str:
     return (GETS_NO_CURRENT if begins else GETS_CURRENT_AGAIN)(name=motor.block.name)
 
 
+def _should_run(active: ActiveFault, motor: DcMotor, now: Nanos) -> bool:
+    return motor.is_dead and motor.block.is_on(RUN)
+
+
 def _make(spec: DcMotorSpec, context: ElementContext) -> DcMotor:
     return DcMotor(context.terminal_block(spec.name), spec)
 
@@ -140,7 +144,7 @@ DCMOTOR = with_terminals(
             Layer.ELEMENT,
             Occasion.ALWAYS,
             "A DC motor gets no current although it is switched on: it coasts.",
-            effect=ElementEffect(_stop),
+            effect=ElementEffect(_stop, _should_run),
         ),
     ),
 )

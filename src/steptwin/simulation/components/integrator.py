@@ -126,7 +126,7 @@ class Integrator(TerminalComponent):
             self._renew(is_reset, now)
 
     def _renew(self, is_reset: bool, now: Nanos) -> None:
-        rate = Straight(Fraction(0)) if is_reset else self._per_ns(now)
+        rate = Straight(Fraction(0)) if is_reset else self._per_ns(exact_fraction(self.factor), now)
         value = exact_fraction(self.spec.start) if is_reset else self.plan.at(now)
         plan = Integral.of(rate, value, self._limits, now)
         if not self.plan.goes_on_as(plan):
@@ -136,14 +136,19 @@ class Integrator(TerminalComponent):
         self.block.put(AT_LOW, float(stands and value == self._limits.low))
         self.block.put(AT_HIGH, float(stands and value == self._limits.high))
 
-    def _per_ns(self, now: Nanos) -> Straight:
+    def _per_ns(self, factor: Fraction, now: Nanos) -> Straight:
         lines = {name: signal.straight(now) for name, signal in self._moving.items() if signal.straight is not None}
         value, slope, until = straight_of(self._rate, lines, lambda name: self._reads[name](now))
-        scale = exact_fraction(self.factor) / SECOND
+        scale = factor / SECOND
         return Straight(value * scale, slope * scale, until)
 
     def deadline(self) -> Nanos | None:
         return self.plan.end
+
+    def has_other_rate(self, now: Nanos) -> bool:
+        """Whether a fault gives it another rate than it should have."""
+        value, slope, _ = self._per_ns(Fraction(1), now)
+        return self.factor != 1.0 and not self.block.is_on(RESET) and bool(value or slope)
 
     def set_state(self, plain: Plain) -> None:
         super().set_state(plain)
@@ -221,6 +226,10 @@ def _change(active: ActiveFault, integrator: Integrator, begins: bool, now: Nano
     return OTHER_RATE(name=integrator.block.name, factor=integrator.factor)
 
 
+def _has_other_rate(active: ActiveFault, integrator: Integrator, now: Nanos) -> bool:
+    return integrator.has_other_rate(now)
+
+
 # ---------------------------------------------------------------------- the element
 
 
@@ -290,7 +299,7 @@ INTEGRATOR = with_terminals(
             Occasion.ALWAYS,
             "An integrator fills and empties at a multiple of its rate, as with a clogged nozzle or a wheel that slips.",
             own=(parameter("factor", "What its rate is multiplied by.", 0.0, 100.0, default=0.5),),
-            effect=ElementEffect(_change),
+            effect=ElementEffect(_change, _has_other_rate),
         ),
     ),
     refers=_refers_of_switches,
