@@ -337,7 +337,7 @@ def test_elements_in_space_are_found_and_renamed_where_others_name_them() -> Non
 
 def test_keys_of_places_are_completed() -> None:
     text = WORLD + SPACE
-    placed = ["x", "lift", "belt", "head", "post", "workpiece", "tray", "gate"]
+    placed = ["x", "lift", "belt", "tray", "head", "post", "workpiece", "gate"]
     assert items(text + '\n[[body]]\non = "') == placed
     assert items(text + '\n[[collision]]\nbetween = ["') == ["workpieces", *placed]
     assert items(text + '\n[[collision]]\nbetween = ["head", "p') == ["workpieces", *placed]

@@ -44,6 +44,8 @@ EXAMPLES: list[tuple[dict[str, Any], command.Command]] = [
     ({"do": "write", "values": {"a.M1_POS_ABS": 5.0}}, do.Write((("a", "M1_POS_ABS", 5.0),))),
     ({"do": "send", "line": "chips", "text": "f640\r\xff"}, do.Send("chips", b"f640\r\xff")),
     ({"do": "request", "line": "bus", "unit": 1, "pdu": "0327240002"}, do.Request("bus", 1, b"\x03\x27\x24\x00\x02", SECOND)),
+    ({"do": "put", "on": "belt", "front": 20.0}, do.Put("belt", 20.0)),
+    ({"do": "remove", "workpiece": "belt.1"}, do.Remove("belt.1")),
     ({"do": "power_cycle", "controller": "a"}, do.PowerCycle("a")),
     ({"do": "turn", "controller": "a", "axis": 3, "counts": -40}, do.Turn("a", 3, -40)),
     ({"do": "couple", "controller": "a", "axis": 3, "to": "free"}, do.Couple("a", 3, "free")),

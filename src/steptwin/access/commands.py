@@ -29,6 +29,8 @@ PERMITS: Mapping[str, Permit] = complete(
         "set": ACT,
         "press": ACT,
         "release": ACT,
+        "put": ACT,
+        "remove": ACT,
         "write": ACT,
         "turn": ACT,
         "couple": ACT,

@@ -306,6 +306,15 @@ class World(Simulation):
     def release(self, button: str) -> None:
         self.apply_input(do.Release(button))
 
+    def put(self, on: str, front: float | None = None) -> None:
+        """Put a new workpiece on a conveyor, its front ``front`` mm from the beginning, or into the first free cell of a nest.
+        Raises `Misuse`; `Refusal` where there is no room."""
+        self.apply_input(do.Put(on, front))
+
+    def remove(self, workpiece: str) -> None:
+        """Take a workpiece out of the world, such as ``infeed.3``. Raises `Misuse`; `Refusal` where it is not there."""
+        self.apply_input(do.Remove(workpiece))
+
     def fault(self, fault: str | Fault) -> str:
         """Set a fault from now on, such as ``"crc unit=1 nth=3"`` (`steptwin fault --kinds`); gives its name.
 

@@ -221,6 +221,8 @@ Command: TypeAlias = (
     | do.Set
     | do.Press
     | do.Release
+    | do.Put
+    | do.Remove
     | do.Write
     | do.Send
     | do.Request

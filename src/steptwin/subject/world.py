@@ -41,8 +41,8 @@ from steptwin.wire.frameline import FrameLine
 from steptwin.wire.rtu import BROADCAST
 
 STEPS = (
-    steps.Set, steps.Press, steps.Release, steps.Send, steps.PowerCycle, steps.Turn, steps.Couple, steps.ClearFault,
-    steps.Note, See, Download,
+    steps.Set, steps.Press, steps.Release, steps.Put, steps.Remove, steps.Send, steps.PowerCycle, steps.Turn, steps.Couple,
+    steps.ClearFault, steps.Note, See, Download,
 )  # fmt: skip
 """Commands that are steps themselves, without a result."""
 

@@ -198,6 +198,9 @@ class Causes:
         text = text_of(record.value if isinstance(record.value, str) else str(record.value))
 
         def before() -> FoundCause:
+            act = next((act for act in self._log.acts_at(record.time, order) if _moves(act, record)), None)
+            if act is not None:
+                return _acted(act)
             cause = self._of_element(owner, change._replace(order=order)) if owner in self._parts else None
             # What comes onto a belt does not by what moves that.
             comes = ("what", "on") in record.facts and cause is not None and cause.place.time < record.time
@@ -681,6 +684,12 @@ def _requests(act: Act, line: str, members: Collection[str]) -> bool:
         case do.Request() | do.Send() as what:
             return what.line == line
     return False
+
+
+def _moves(act: Act, record: TraceRecord) -> bool:
+    """Whether somebody has put a workpiece there."""
+    facts = dict(record.facts)
+    return isinstance(act.what, do.Put) and facts["what"] == "on" and str(facts["workpiece"]).startswith(f"{act.what.on}.")
 
 
 def _changes(act: Act, controller: str) -> bool:

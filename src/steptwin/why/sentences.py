@@ -25,6 +25,8 @@ WRITES = Message("why.writes", "writes {values}")
 SWITCHES_OFF_AND_ON = Message("why.switches-off-and-on", "switches {controller} off and on")
 STOPS = Message("why.stops", "stops {name}")
 STOPS_A_PROGRAM = Message("why.stops-a-program", "stops {controller}'s program ({program})")
+PUTS_A_WORKPIECE = Message("why.puts-a-workpiece", "puts a workpiece on {on}")
+REMOVES_A_WORKPIECE = Message("why.removes-a-workpiece", "removes {workpiece}")
 TURNS = Message("why.turns", "turns the encoder of {axis} by {counts}")
 SETS_A_FAULT = Message("why.sets-a-fault", "sets the fault {name}")
 CLEARS_A_FAULT = Message("why.clears-a-fault", "clears the fault {name}")
@@ -46,6 +48,8 @@ _WORDS: Mapping[type, Callable[[Any], MessageText]] = {
     do.Set: lambda step: SETS(levels=[f"{controller}.{pin.upper()} = {value:g}" for controller, pin, value in step.levels]),
     do.Press: lambda step: PRESSES(button=step.button),
     do.Release: lambda step: RELEASES(button=step.button),
+    do.Put: lambda step: PUTS_A_WORKPIECE(on=step.on),
+    do.Remove: lambda step: REMOVES_A_WORKPIECE(workpiece=step.workpiece),
     do.Write: lambda step: WRITES(values=[f"{controller}.{name} = {value:g}" for controller, name, value in step.values]),
     do.PowerCycle: lambda step: SWITCHES_OFF_AND_ON(controller=step.controller),
     Halt: _halted,

@@ -22,9 +22,9 @@ from steptwin.subject.contract import Result
 from steptwin.subject.dispatch import JsonObject, failure, read_message, respond
 
 COMMANDS = (
-    *("read", "pins", "state", "encoders", "faults", "time", "stop", "set", "press", "release", "write", "turn", "enable"),
-    *("move", "home", "jog", "program", "download", "note", "pause", "resume", "send", "request", "power_cycle", "fault"),
-    "clear_fault",
+    *("read", "pins", "state", "encoders", "faults", "time", "stop", "set", "press", "release", "put", "remove", "write", "turn"),
+    *("enable", "move", "home", "jog", "program", "download", "note", "pause", "resume", "send", "request", "power_cycle"),
+    *("fault", "clear_fault"),
 )
 """Those of the control endpoint that are taken here: no files, no debugger."""
 PROTOCOL = "MQTT"

@@ -38,6 +38,7 @@ _STEP_VALUE = re.compile(r"([A-Za-z_]+)[ \t]*=[ \t]*([\"'])([^\"']*)\Z")
 _STEP_NAMES = {
     "press": SymbolKind.BUTTON,
     "release": SymbolKind.BUTTON,
+    "put": SymbolKind.ELEMENT,
     "send": SymbolKind.LINE,
     "power_cycle": SymbolKind.CONTROLLER,
 }

@@ -73,6 +73,11 @@ class BeltGrip(Stateful):
         if not lies:
             self.dropped += 1
 
+    def lose(self, now: Nanos) -> None:
+        """It has its workpiece no more."""
+        self.workpiece = None
+        self._block.scheduler.notify(self._block.name)
+
     def change(self, now: Nanos) -> Nanos | None:
         source = self._source
         if source is None or not self._block.is_on(PICK):

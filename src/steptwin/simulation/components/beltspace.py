@@ -18,6 +18,7 @@ from steptwin.simulation.mechanics.belt import Belt, BeltDrive, ConstantDrive, P
 from steptwin.simulation.mechanics.mechanics import Mechanism
 from steptwin.simulation.mechanics.rampeddrive import RampedDrive
 from steptwin.simulation.mechanics.workpiece import Workpiece
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.space.bodies import Body, Box
 from steptwin.simulation.space.frames import (
     NM_PER_MM,
@@ -85,6 +86,10 @@ class BeltSpace:
         return (sign * x, sign * y) if axis == X else (sign * y, -sign * x)
 
     # ------------------------------------------------------------------ a holder
+
+    @property
+    def scheduler(self) -> Scheduler:
+        return self._conveyor.block.scheduler
 
     @property
     def sources(self) -> Iterable[str]:

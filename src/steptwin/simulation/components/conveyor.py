@@ -82,6 +82,7 @@ class Conveyor(TerminalComponent):
         "_next_feed",
         "_own",
         "_then",
+        "_waits",
         "belt",
         "delivered",
         "fed",
@@ -129,6 +130,8 @@ class Conveyor(TerminalComponent):
         """How many did not come because of that."""
         self._is_fed = False
         self._next_feed = spec.feed_every
+        self._waits = False
+        """Whether a workpiece waits for room at the beginning."""
         self._due: Nanos | None = None
         """When a workpiece comes to an end of the belt, to what holds it, or is taken back."""
         self._seen: object = None
@@ -152,11 +155,13 @@ class Conveyor(TerminalComponent):
 
     @property
     def depends_on(self) -> tuple[str, ...]:
-        return (self.block.name, *self._moved_by, *(near.name for near in self._near if near.joins is not None))
+        # What waits for room waits for workpieces of conveyors before this one, too.
+        near = (one.name for one in self._near if one.joins is not None or self.spec.feed_waits)
+        return (self.block.name, *self._moved_by, *near)
 
     def _state(self) -> object:
         """Another value whenever workpieces may move or stand otherwise."""
-        return [(belt.version(), belt.raised, belt.bars) for belt in self._belts_ahead()]
+        return self._waits, [(belt.version(), belt.raised, belt.bars) for belt in self._belts_ahead()]
 
     def _belts_ahead(self) -> Iterator[Belt]:
         """This one and those on which workpieces may be in the way."""
@@ -175,7 +180,11 @@ class Conveyor(TerminalComponent):
         self._is_fed = is_fed
         if self._next_feed is not None and self._next_feed <= now:
             self._feed(now)
-            self._next_feed += self.spec.feed_every or 0
+            self._next_feed = None if self._waits else self._next_feed + (self.spec.feed_every or 0)
+        elif self._waits and (self.feeder_stands or self.room_at(0, now)):
+            self._waits = False
+            self._feed(now)
+            self._next_feed = None if self.spec.feed_every is None else now + self.spec.feed_every
         if self._state() != self._seen or (self._due is not None and self._due <= now):
             self._hold(now)
             while self._deliver(now):
@@ -185,17 +194,34 @@ class Conveyor(TerminalComponent):
             self._due = self._next(now)
 
     def _feed(self, now: Nanos) -> None:
-        """Put a workpiece at the beginning, where there is room for it."""
-        spec, length = self.spec, nanometres(self.spec.workpiece[0])
-        if self.feeder_stands or self.belt.occupant(-self.belt.from_nm(length), 0, now) is not None:
+        """Let a workpiece come to the beginning, if there is room for it."""
+        has_room = self.room_at(0, now)
+        if has_room and not self.feeder_stands:
+            self.put_new(0, now)
+        elif self.spec.feed_waits and not self.feeder_stands:
+            self._waits = True
+        else:
             self.missed += 1
             self.fed_in_vain += self.feeder_stands
             self.block.scheduler.notify(self.block.name)
-            return
+
+    def room_at(self, front: int, now: Nanos) -> bool:
+        """Whether there is room for one of its workpieces with its front ``front`` steps from the beginning."""
+        return self.belt.occupant(front - self._length, front, now) is None
+
+    def put_new(self, front: int, now: Nanos) -> str:
+        """Put one of its workpieces where there is room for it; gives its name."""
         self.fed += 1
+        spec = self.spec
         marks = tuple((nanometres(mark), nanometres(mark + spec.mark_width)) for mark in spec.marks)
         workpiece = workpiece_of(f"{spec.name}.{self.fed}", spec.workpiece, spec.mass, marks)
-        self._lay(self.belt.place(workpiece, 0, now), now)
+        self._lay(self.belt.place(workpiece, front, now), now)
+        return workpiece.name
+
+    @property
+    def _length(self) -> int:
+        """The length of its workpieces, steps."""
+        return self.belt.from_nm(nanometres(self.spec.workpiece[0]))
 
     def lay(self, workpiece: Workpiece, front: int, now: Nanos, across: int = 0, yaw_q: float = 0.0) -> bool:
         """Put a workpiece with its front ``front`` steps from the beginning, ``across`` and ``yaw_q`` as in `Placed`. Whether it
@@ -353,6 +379,8 @@ class Conveyor(TerminalComponent):
             ends.append(first.origin + place)
         due = next_change(belt.drive, below, min(ends, default=None), now)
         moments = [due, look]
+        if self._waits:
+            moments += [belt.next_change(place, now) for place in (0, -self._length)]
         if len(moving) < len(belt.workpieces):
             moments += [next(self._turning_points(now), None), belt.drive.reaches(position - 1, now, -1)]
         return min((moment for moment in moments if moment is not None), default=None)

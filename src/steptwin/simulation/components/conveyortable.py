@@ -16,7 +16,7 @@ from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.mechanics.belt import nanometres
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import TableSpec, key, table, tables_in
-from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, number, permitting, positive_time, time_value
+from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, flag, number, permitting, positive_time, time_value
 
 RUN, FEED = "RUN", "FEED"
 
@@ -51,6 +51,9 @@ class ConveyorSpec(TerminalComponentSpec, MoverSpec):
         OUTPUT_PIN, "output connected to FEED, which puts a workpiece on when it is switched on", default=None
     )
     feed_every: Nanos | None = key(positive_time, "a workpiece comes after each such time", default=None)
+    feed_waits: bool = key(
+        flag, "whether one without room waits for it, and the time to the next one begins then; else it is missed", default=False
+    )
     workpiece: tuple[float, ...] = key(
         size_of_workpiece,
         "mm: its length; in space [length, width, height] or [diameter, height]",

@@ -19,7 +19,7 @@ from steptwin.simulation.components.probe import Probe
 from steptwin.simulation.components.resting import resting_of
 from steptwin.simulation.components.workpieces import REACH_NM, Lie, body_in, lie_in
 from steptwin.simulation.mechanics.workpiece import Workpiece
-from steptwin.simulation.scheduler.scheduler import TerminalBlock
+from steptwin.simulation.scheduler.scheduler import Scheduler, TerminalBlock
 from steptwin.simulation.space.bodies import Body, Box, Cylinder, half_height
 from steptwin.simulation.space.frames import NM_PER_MM, Direction, Frame
 from steptwin.simulation.space.tops import height_over
@@ -169,6 +169,10 @@ class Grasp(Stateful):
         block.scheduler.notify(block.name)
 
     # ------------------------------------------------------------------ a holder
+
+    @property
+    def scheduler(self) -> Scheduler:
+        return self._block.scheduler
 
     @property
     def sources(self) -> Iterable[str]:

@@ -17,12 +17,13 @@ from steptwin.simulation.scheduler.scheduler import TerminalBlock
 class Nest(TerminalComponent):
     """Counts the workpieces in it, those on others too, and which of them lie crooked."""
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_resting",)
+    FIXED: ClassVar[tuple[str, ...]] = ("resting", "spec")
     __slots__ = (*FIXED, "count", "crooked")
 
-    def __init__(self, block: TerminalBlock, resting: Resting) -> None:
+    def __init__(self, block: TerminalBlock, spec: NestSpec, resting: Resting) -> None:
         super().__init__(block)
-        self._resting = resting
+        self.spec = spec
+        self.resting = resting
         self.count = self.crooked = 0
 
     @property
@@ -30,7 +31,7 @@ class Nest(TerminalComponent):
         return (self.block.name, WORKPIECES)
 
     def update(self, now: Nanos) -> None:
-        name, piles = self.block.name, self._resting.piles()
+        name, piles = self.block.name, self.resting.piles()
         count, crooked = piles.count.get(name, 0), piles.crooked.get(name, 0)
         if (count, crooked) != (self.count, self.crooked):
             self.count, self.crooked = count, crooked
@@ -39,7 +40,7 @@ class Nest(TerminalComponent):
 
 def _make(spec: NestSpec, context: ElementContext) -> Nest:
     block = context.terminal_block(spec.name)
-    return Nest(block, resting_of(context, block.scheduler))
+    return Nest(block, spec, resting_of(context, block.scheduler))
 
 
 NEST = with_terminals(

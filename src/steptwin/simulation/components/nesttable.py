@@ -90,14 +90,19 @@ class NestSpec(TerminalComponentSpec, MountSpec):
             return None
         return Lie((*middle, z), float(straight % TURN_Q))
 
+    @property
+    def middles(self) -> list[tuple[int, int]]:
+        """Of its cells, nm."""
+        (nx, ny), (px, py) = self.cells, map(to_nm, self.pitch)
+        return [(n % nx * px, n // nx * py) for n in range(nx * ny)]
+
     def workpieces(self) -> Iterator[Rest]:
         """Those that are in it when the world begins."""
-        (nx, ny), (px, py) = self.cells, map(to_nm, self.pitch)
-        size = self.workpiece
+        middles, size = self.middles, self.workpiece
         for n in range(0 if size is None else self.filled):
-            layer, cell = divmod(n, nx * ny)
+            layer, cell = divmod(n, len(middles))
             its = workpiece_of(f"{self.name}.{n + 1}", size or (), self.mass)
             if layer:
-                yield Rest(its, f"{self.name}.{n + 1 - nx * ny}", Lie((0, 0, its.height)))
+                yield Rest(its, f"{self.name}.{n + 1 - len(middles)}", Lie((0, 0, its.height)))
             else:
-                yield Rest(its, self.name, Lie((cell % nx * px, cell // nx * py, 0)))
+                yield Rest(its, self.name, Lie((*middles[cell], 0)))

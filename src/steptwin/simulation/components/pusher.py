@@ -263,7 +263,7 @@ class Pusher(Stateful):
     def _report(self, text: str, name: str, what: str) -> None:
         scheduler = self._scheduler
         facts = ("workpiece", name), ("element", self.name), ("what", what)
-        scheduler.record(next(iter(scheduler.controllers)), "event", "workpiece", text, *facts)
+        scheduler.record(scheduler.first, "event", "workpiece", text, *facts)
         scheduler.notify(self.name)
 
     def signals(self) -> Mapping[str, SignalOf]:

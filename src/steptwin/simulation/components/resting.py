@@ -15,7 +15,17 @@ from steptwin.simulation.components.conveyor import COLLIDES
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.frames import Frames, check_upright, sources_of, tilting_axis
 from steptwin.simulation.components.nesttable import NestSpec
-from steptwin.simulation.components.workpieces import REACH_NM, WORKPIECES, Below, Lie, Rest, Workpieces, body_in, lie_in
+from steptwin.simulation.components.workpieces import (
+    REACH_NM,
+    WORKPIECES,
+    Below,
+    Lie,
+    Rest,
+    Workpieces,
+    body_in,
+    lie_in,
+    workpiece_of,
+)
 from steptwin.simulation.mechanics.workpiece import Workpiece
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.space.bodies import Body, half_height
@@ -85,7 +95,7 @@ class Resting(Stateful):
         "_supports",
         "_workpieces",
     )
-    __slots__ = (*FIXED, "_falls", "_rests")
+    __slots__ = (*FIXED, "_falls", "_put", "_rests")
 
     def __init__(
         self,
@@ -102,11 +112,17 @@ class Resting(Stateful):
         self._nests = nests
         self._rests = tuple(rest for nest in nests.values() for rest in nest.workpieces())
         self._falls: tuple[Fall, ...] = ()
+        self._put: dict[str, int] = {}
+        """Numbers of the last workpieces of nests into which others than those of the beginning were put."""
         self._bodies: dict[str, tuple[Rest | Fall, Frame | None, Body]] = {}
         """As they were made: a body stays the same while nothing below it changes."""
         self._piles: Piles | None = None
 
     # ------------------------------------------------------------------ a holder
+
+    @property
+    def scheduler(self) -> Scheduler:
+        return self._scheduler
 
     @property
     def sources(self) -> Iterable[str]:
@@ -147,8 +163,9 @@ class Resting(Stateful):
         return known[2]
 
     def take(self, name: str, now: Nanos) -> Workpiece:
-        (found,) = (rest.workpiece for rest in self._rests if rest.workpiece.name == name)
+        (found,) = (one.workpiece for one in (*self._rests, *self._falls) if one.workpiece.name == name)
         self._rests = tuple(rest for rest in self._rests if rest.workpiece.name != name)
+        self._falls = tuple(fall for fall in self._falls if fall.workpiece.name != name)
         self._scheduler.notify(WORKPIECES)
         return found
 
@@ -162,6 +179,35 @@ class Resting(Stateful):
         for name in self._overlapping(workpiece.name, now):
             self._report(COLLIDES(workpiece=workpiece.name, other=name, belt=on.name), workpiece, "collides")
         return True
+
+    def next_in(self, nest: NestSpec, now: Nanos) -> Rest | None:
+        """A further workpiece of a nest, in the first cell of the lowest layer that is not full; None where another one is in its
+        way."""
+        above = {rest.on: rest for rest in self._rests if rest.on != nest.name}
+        lowest = {rest.lie.at[:2]: rest for rest in self._rests if rest.on == nest.name}
+        piles: list[list[Rest]] = []
+        for middle in nest.middles:
+            pile = [lowest[middle]] if middle in lowest else []
+            while pile and (further := above.get(pile[-1].workpiece.name)) is not None:
+                pile.append(further)
+            piles.append(pile)
+        cell = min(range(len(piles)), key=lambda n: len(piles[n]))
+        number = self._put.get(nest.name, nest.filled) + 1
+        workpiece = workpiece_of(f"{nest.name}.{number}", nest.workpiece or (), nest.mass)
+        if piles[cell]:
+            below = piles[cell][-1].workpiece
+            rest = Rest(workpiece, below.name, Lie((0, 0, below.height)))
+            frame = self._workpieces.bodies()[below.name].frame
+        else:
+            rest, frame = Rest(workpiece, nest.name, Lie((*nest.middles[cell], 0))), self._supports[nest.name].frame
+        body = body_in(workpiece, frame, rest.lie)
+        return None if any(Pair(body, other).overlap(now) for other in self._workpieces.bodies().values()) else rest
+
+    def add(self, nest: NestSpec, rest: Rest) -> None:
+        """Put a further workpiece into a nest, as `next_in` has found it."""
+        self._put[nest.name] = self._put.get(nest.name, nest.filled) + 1
+        self._rests = (*self._rests, rest)
+        self._report(LIES_ON(workpiece=rest.workpiece.name, on=rest.on), rest.workpiece, "on")
 
     def _aligned(self, on: str, lie: Lie) -> Lie | None:
         """Where a workpiece is that is put on something; None where it lies crooked, in a nest."""
@@ -263,7 +309,7 @@ class Resting(Stateful):
     def _report(self, text: str, workpiece: Workpiece, what: str) -> None:
         scheduler = self._scheduler
         facts = ("workpiece", workpiece.name), ("element", WORKPIECES), ("what", what)
-        scheduler.record(next(iter(scheduler.controllers)), "event", "workpiece", text, *facts)
+        scheduler.record(scheduler.first, "event", "workpiece", text, *facts)
         scheduler.notify(WORKPIECES)
 
 

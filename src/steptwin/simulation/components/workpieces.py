@@ -9,6 +9,7 @@ from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.simulation.components.mount import UPRIGHT, to_nm
 from steptwin.simulation.mechanics.workpiece import Workpiece
+from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.space.bodies import Body, Box, Cylinder, Shape, half_height
 from steptwin.simulation.space.frames import Frame, Joint, Vector, Z, pose
 from steptwin.simulation.space.pieces import standing
@@ -39,6 +40,11 @@ class Rest(NamedTuple):
 
 class Holder(Protocol):
     """Something that workpieces are on, or in."""
+
+    @property
+    def scheduler(self) -> Scheduler:
+        """The scheduler that it is in."""
+        ...
 
     @property
     def sources(self) -> Iterable[str]:

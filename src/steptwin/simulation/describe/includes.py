@@ -38,6 +38,7 @@ class UseSpec(TableSpec):
 
 _REFERRING = frozenset(
     {"line", "drive", "feeds", "to", "from", "follows", "when", "until", "expect", "set", "press", "release", "write", "send"}
+    | {"put", "remove"}
     | {"power_cycle", "turn", "couple", "machine", "element", "of", "move", "home", "wait_for"}
 )
 _IDENTIFIER = re.compile(r"(?<![\w.&-])[A-Za-z_][\w-]*")

@@ -22,7 +22,9 @@ from steptwin.simulation.script.steps import (
     Order,
     PowerCycle,
     Press,
+    Put,
     Release,
+    Remove,
     Repeat,
     Send,
     Set,
@@ -153,6 +155,12 @@ ACTIONS: Mapping[str, StepKind] = dict(
             Key("for", time_value, "how long", None, "duration"),
         ),
         _action(Key("release", name_value, "a button"), Release),
+        _action(
+            Key("put", name_value, "a conveyor or a nest: one of its workpieces", attribute="on"),
+            Put,
+            Key("front", number(0.0), "of a conveyor: mm of its front from the beginning", None),
+        ),
+        _action(Key("remove", text_value, "a workpiece, such as infeed.3"), Remove),
         _action(Key("write", _levels, "{ 'CONTROLLER.REGISTER' = VALUE }"), Write),
         _action(
             Key("move", _turned, "CONTROLLER.M1 to M4: moves it, waits for the end and expects it at its target"),

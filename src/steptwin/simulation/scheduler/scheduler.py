@@ -381,6 +381,12 @@ class Scheduler:
         """The controller under which ``name`` is recorded: itself, or the first one for an element with terminals."""
         return next(iter(self.controllers), name) if name in self.terminal_blocks else name
 
+    @property
+    def first(self) -> str:
+        """The name under which is recorded what belongs to none of its elements: the first controller, or element with
+        terminals."""
+        return next(iter((*self.controllers, *self.terminal_blocks)))
+
     def put(self, element: str, output: str, level: float) -> None:
         """An output of an element has another level now, or its first one."""
         self.record(self.owner(element), "edge", f"{element}.{output.lower()}", level)

@@ -14,7 +14,7 @@ from typing import Annotated, Any, TypeAlias, cast
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.fields import CHARACTERS, HEX, TIME, AxisNumber, ControllerName, Meaning, choice, whole
+from steptwin.fields import CHARACTERS, HEX, TIME, AxisNumber, ControllerName, Meaning, choice, number, whole
 from steptwin.messages import Message
 from steptwin.simulation.faults import Fault
 from steptwin.simulation.script.command import FAULT, LEVELS, UNITS, command
@@ -85,6 +85,25 @@ class Press:
 @dataclass(frozen=True, slots=True)
 class Release:
     button: Annotated[str, Meaning("The name of a button.")]
+
+
+@command("put", "Put a workpiece on a conveyor or into a nest: one as it is fed or filled with.")
+@dataclass(frozen=True, slots=True)
+class Put:
+    """Put a new workpiece on a conveyor or into a nest. Refused where there is no room for it."""
+
+    on: Annotated[str, Meaning("The name of a conveyor, or of a nest with the size of its workpieces: into its first free cell.")]
+    front: Annotated[
+        float | None, Meaning("Of a conveyor: where its front is, from the beginning; 0 without.", number(0.0), unit="mm")
+    ] = None
+
+
+@command("remove", "Take a workpiece away.")
+@dataclass(frozen=True, slots=True)
+class Remove:
+    """Take a workpiece out of the world, from wherever it is."""
+
+    workpiece: Annotated[str, Meaning("The name of a workpiece, such as infeed.3.")]
 
 
 @command("write", "Registers take values by name, as a Modbus master writes them.")
@@ -248,6 +267,8 @@ Step: TypeAlias = (
     | Set
     | Press
     | Release
+    | Put
+    | Remove
     | Write
     | Send
     | Request

@@ -34,6 +34,7 @@ from steptwin.simulation.world.inputs import (
     SetVariable,
 )
 from steptwin.simulation.world.model import WORLD, Model
+from steptwin.simulation.world.putting import Act, put, remove
 from steptwin.simulation.world.scripts import Scripts
 from steptwin.simulation.world.worldprograms import name_of_text
 from steptwin.tables import complete
@@ -118,6 +119,25 @@ def _button(model: Model, name: str, *, pressed: bool) -> Action:
         with _now(model, button.controller):
             _record(model, button.controller, name, "pressed" if pressed else "released")
             button.press(pressed, model.now)
+
+    return action
+
+
+def _put(model: Model, step: do.Put) -> Action:
+    model.sync_all()
+    return _of_workpiece(model, put(model, step.on, step.front), step.on, "put")
+
+
+def _remove(model: Model, step: do.Remove) -> Action:
+    model.sync_all()
+    return _of_workpiece(model, remove(model, step.workpiece), step.workpiece, "removed")
+
+
+def _of_workpiece(model: Model, act: Act, name: str, what: str) -> Action:
+    def action(scripts: Scripts) -> None:
+        _record(model, act.scheduler.first, name, what)
+        act.do(model.now)
+        act.scheduler.propagate()
 
     return action
 
@@ -349,6 +369,8 @@ ACTIONS: Mapping[type, Callable[[Model, Any], Action]] = complete(
         do.Set: _set,
         do.Press: _press,
         do.Release: _release,
+        do.Put: _put,
+        do.Remove: _remove,
         do.Write: _write,
         do.Request: _request,
         do.Send: _send,

@@ -65,7 +65,7 @@ class EndScripts(NamedTuple):
 
 
 class Refused(NamedTuple):
-    """A controller could not do what a script from outside commanded; a replay has the command no more."""
+    """What a script from outside commanded could not be done; a replay has the command no more."""
 
     text: str
 

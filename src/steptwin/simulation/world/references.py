@@ -97,7 +97,8 @@ def _may_be_called(fault: Fault, name: str) -> bool:
 
 def check_step(model: Model, step: ExternalInput) -> None:
     """Raises `Misuse` for a step with unknown names or invalid values."""
-    _CHECKS.get(type(step), prepare)(model, step)
+    with suppress(Refusal):  # what cannot be done now may be possible later
+        _CHECKS.get(type(step), prepare)(model, step)
 
 
 def _condition(model: Model, step: do.Until) -> None:
@@ -107,7 +108,7 @@ def _condition(model: Model, step: do.Until) -> None:
 def _order(model: Model, step: do.Order) -> None:
     command = step.command
     motion_ends(model, command.controller, command.axis)
-    with suppress(Refusal):  # what cannot be done now may be possible later
+    with suppress(Refusal):
         check_step(model, ordered(model, command))
     if isinstance(command, Seek):
         model.condition(motion_ends(model, command.controller, command.axis, command).reached)

@@ -291,7 +291,10 @@ class Scripts:
         return _TAKING.get(type(step), Scripts._act)(self, step, script)
 
     def _act(self, step: do.Step, script: Script) -> StepResult:
-        self._do(script, step)
+        try:
+            self._do(script, step)
+        except Refusal as error:
+            self._do(script, Refused(str(error)))
         return None, None
 
     def _pause(self, step: do.Wait, script: Script) -> StepResult:
