@@ -1,4 +1,4 @@
-"""Pictures of elements for docs/elements.md, from worlds that run: ``python docs/pictures.py``."""
+"""Pictures of elements and of a machine for the docs, from worlds that run: ``python docs/pictures.py``."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 
 from steptwin.controller import SECOND
+from steptwin.files.scene.picture import write_picture
 from steptwin.files.world import World
 
 IMAGES = Path(__file__).parent / "images"
@@ -428,6 +429,10 @@ def main() -> None:
     draw(
         "gripper", GRIPPER, tries, 1.6, ("jaws.position",), ("table.OUT1", "jaws.pick", "jaws.opened", "jaws.closed", "jaws.held")
     )
+
+    with World.load(IMAGES.parents[1] / "examples/worlds/palletizer/palletizer.toml") as palletizer:
+        palletizer.run(for_=22.0)
+        write_picture(palletizer, IMAGES / "palletizer.svg")
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ from steptwin.durations import duration_text
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.files import recording as recordings
 from steptwin.files.export import axis_views, write_trace
+from steptwin.files.scene.recorder import SceneRecorder
 from steptwin.files.textfiles import write_bytes
 
 WIDTH = 120
@@ -54,6 +55,8 @@ def reproduce(
     except Misuse:
         world = None
     if world is not None:
+        recorder = SceneRecorder()
+        recorder.follow(world)
         try:
             world.run_to(case.end_ns, runner.description.until)
         except SteptwinError:
@@ -61,7 +64,8 @@ def reproduce(
         else:
             recording, timeline = folder / f"{name}.json", folder / f"{name}.html"
             recordings.save(recordings.recording_of(world), recording)
-            write_trace(world.trace, timeline, views=axis_views(world), title=name, ended=world.now)
+            views, scene = axis_views(world), recorder.recorded()
+            write_trace(world.trace, timeline, views=views, scene=scene, title=name, ended=world.now)
     if campaign is not None:
         beside = os.path.relpath(campaign, folder)
         test = folder / f"test_{identifier(name)}.py"

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from node_client import NodeClient
-from tests.files.scene.test_recorder import DEMO, EXAMPLES, JAWS, recorded
+from tests.files.scene.test_recorder import DEMO, EXAMPLES, JAWS, SWINGS, recorded
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
@@ -99,6 +99,7 @@ LOADS: dict[str, tuple[Callable[[], World], Nanos]] = {
     "demo": (lambda: World.load(DEMO), 0),
     "palletizer": (lambda: World.load(EXAMPLES / "palletizer/palletizer.toml"), 4 * SECOND),
     "jaws": (lambda: World.from_toml(JAWS), 0),
+    "swings": (lambda: World.from_toml(SWINGS), SECOND),
 }
 """Worlds, and where their files begin."""
 
@@ -126,7 +127,9 @@ def test_everything_is_where_the_world_has_it(load: Callable[[], World], begin: 
 
 def test_the_validator_finds_nothing(require_peer: Callable[[str], str], tmp_path: Path) -> None:
     with NodeClient(require_peer("node"), "gltf.js", tmp_path) as client:
-        for n, world in enumerate([World.load(DEMO), World.load(EXAMPLES / "press/press.toml"), World.from_toml(JAWS)]):
+        for n, world in enumerate(
+            [World.load(DEMO), World.load(EXAMPLES / "press/press.toml"), World.from_toml(JAWS), World.from_toml(SWINGS)]
+        ):
             file = tmp_path / f"{n}.glb"
             with file.open("wb") as out:
                 write_glb(recorded(world, 8.0), out, 0, 8 * SECOND)

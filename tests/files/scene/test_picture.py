@@ -74,6 +74,10 @@ def test_a_world_without_space_and_a_script_that_was_not_built(monkeypatch: pyte
         write_picture(World.load(WORLDS / "winder/winder.toml"), tmp_path / "p.svg")
     with pytest.raises(Misuse, match=r"p.pdf: pictures are .svg or .png$"):
         write_picture(World.load(WORLDS / "hoist/hoist.toml"), tmp_path / "p.pdf")
+    with monkeypatch.context() as without:
+        without.setattr("steptwin.files.scene.picture.lacking", lambda extra: ["quickjs-ng"])
+        with pytest.raises(Misuse, match=r"^a picture needs .*pip install 'steptwin\[scene\]'$"):
+            write_picture(World.load(WORLDS / "hoist/hoist.toml"), tmp_path / "p.svg")
     monkeypatch.setattr(scenescript, "scene_script", lambda: None)
     with pytest.raises(Misuse, match=r"^the script that draws machines in space has not been built: 'make page' in the clone"):
         write_picture(World.load(WORLDS / "hoist/hoist.toml"), tmp_path / "p.svg")

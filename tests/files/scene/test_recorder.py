@@ -9,6 +9,7 @@ import pytest
 from steptwin.controller import SECOND, Nanos
 from steptwin.files.scene.recordedscene import RecordedScene
 from steptwin.files.scene.recorder import SceneRecorder
+from steptwin.files.scene.scenescript import SceneScript
 from steptwin.files.world import World
 from steptwin.simulation.space.frames import FLOOR, NM_PER_MM, pose
 from steptwin.subject.scene import WorkpieceState
@@ -61,6 +62,55 @@ steps = [
   { press = "down" }, { wait = "800 ms" }, { release = "grip" },
 ]
 """
+SWINGS = """
+[[mic488]]
+name = "table"
+[mic488.M1]
+unit = "mm"
+gear = 640.0
+acc = 400.0
+dec = 400.0
+vel = 100.0
+[[axis]]
+name = "x"
+drive = "table.M1"
+pitch = 5.0
+at = [0, 0, 100]
+[[carriage]]
+name = "load"
+axis = "x"
+frequency = 8.0
+damping = 0.05
+at = [0, 50, 100]
+[[shaft]]
+name = "cams"
+axis = "x"
+ratio = 0.1
+at = [0, 300, 50]
+along = "+x"
+[[body]]
+name = "arm"
+on = "cams"
+at = [0, 30, 0]
+size = [10, 10, 10]
+[[follower]]
+name = "knife"
+shaft = "cams"
+points = [[0, 0], [90, 10], [180, 10], [270, 0]]
+at = [0, 350, 50]
+along = "+z"
+[[body]]
+name = "lid"
+when = "x.position % 20 < 10"
+at = [300, 0, 0]
+size = [10, 10, 10]
+[[script]]
+name = "way"
+steps = [
+  { write = { "table.M1_EN" = 1 } }, { write = { "table.M1_POS_ABS" = 120 } }, { wait = "1800 ms" },
+  { write = { "table.M1_POS_ABS" = -20 } },
+]
+"""
 
 
 def recorded(world: World, seconds: float) -> RecordedScene:
@@ -89,6 +139,9 @@ def test_a_recorded_scene_is_where_the_world_is(path: str | None) -> None:
     """Everything that moves, every level and every workpiece, at moments that nothing else knows of."""
     file = DEMO if path is None else EXAMPLES / f"{path}.toml"
     scene = recorded(World.load(file), 16.0)
+    wanted = SceneScript(scene.machine).wanted()
+    assert set(wanted["signals"]) <= scene.motions.keys()
+    assert set(wanted["levels"]) <= scene.levels.keys()
     world = World.load(file)
     for now in moments(16.0, 150):
         world.advance(now)
@@ -126,6 +179,22 @@ def test_jaws_and_a_hand_that_comes_and_goes() -> None:
         for signal in ("jaws.position", "hand.present"):
             assert scene.value(signal, now) == pytest.approx(world.read(signal), abs=1e-3), (signal, now)
     assert [place.on for _, place in scene.workpieces["tray.1"] if place is not None] == ["tray", "jaws", "tray"]
+
+
+def test_what_swings_turns_and_is_lifted_and_what_no_event_shows() -> None:
+    """Plans with more polynomials than are computed at once, the last of which are cut by another plan."""
+    scene = recorded(World.from_toml(SWINGS), 5.0)
+    world = World.from_toml(SWINGS)
+    for now in moments(5.0, 400):
+        world.advance(now)
+        world.sync_all()
+        for name in ("load", "knife", "cams"):
+            (one,) = world.objects.frames[name].movements
+            factor = one.per_unit / 90.0 if one.turns else one.per_unit * NM_PER_MM
+            assert scene.value(f"{name}.{one.signal}", now) == pytest.approx(one.motion.at(now) / factor, abs=1e-3), (name, now)
+        assert scene.value("lid.present", now) == world.read("lid.present"), now
+    assert len(scene.motions["load.position"]) > 100
+    assert len(scene.motions["cams.angle"]) < 20
 
 
 def test_recording_changes_nothing() -> None:

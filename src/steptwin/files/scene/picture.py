@@ -7,7 +7,7 @@ from math import isfinite
 from pathlib import Path
 
 from steptwin.errors import Misuse
-from steptwin.extras import missing
+from steptwin.extras import lacking, missing
 from steptwin.files.scene.recordedscene import machine_of
 from steptwin.files.scene.scenescript import SceneScript
 from steptwin.files.textfiles import check_writable, new_file
@@ -30,7 +30,9 @@ class View(enum.StrEnum):
 
 
 def check_picture(where: Path) -> None:
-    """Check in advance that a picture can be written to a file. Raises `Misuse`."""
+    """Check in advance that a picture can be drawn and written to a file. Raises `Misuse`."""
+    if lacking("scene"):
+        raise missing("a picture", "scene")
     if where.suffix.lower() not in SUFFIXES and not is_written_directly(where):
         raise Misuse(f"cannot write {format_path(where)}: pictures are {' or '.join(SUFFIXES)}")
     check_writable(where)
@@ -43,10 +45,8 @@ def write_picture(world: Simulation, where: Path | str, view: View | str = View.
     check_picture(where)
     text = picture(world, View(view))
     if where.suffix.lower() == ".png":
-        try:
-            import resvg_py
-        except ImportError:
-            raise missing("a picture as PNG", "scene") from None
+        import resvg_py
+
         content = resvg_py.svg_to_bytes(svg_string=text, skip_system_fonts=True)
     else:
         content = text.encode()

@@ -49,10 +49,10 @@ class _Planned:
         self._more: Iterator[Cubic] = iter(())
 
     def look(self, now: Nanos) -> None:
+        while self.spans and self.spans[-1].begin < now and (span := next(self._more, None)) is not None:
+            self.spans.append(span)  # as it was planned before this moment
         version = self._motion.version()
         if version == self._version:
-            while self.spans and self.spans[-1].begin < now and (span := next(self._more, None)) is not None:
-                self.spans.append(span)
             return
         self._version = version
         _cut(self.spans, now)
@@ -102,9 +102,9 @@ class _Condition:
 
     def look(self, now: Nanos) -> None:
         version = tuple(one.version() if one.continuous else one.value(now) for one in self._signals)
+        while self.spans and self.spans[-1].begin < now and (span := next(self._more, None)) is not None:
+            self.spans.append(span)
         if version == self._version and None not in version:
-            while self.spans[-1].begin < now and (span := next(self._more, None)) is not None:
-                self.spans.append(span)
             return
         self._version = version
         _cut(self.spans, now)
@@ -186,7 +186,7 @@ class SceneRecorder:
             for one in mounted.movements:
                 per_unit, slack = (one.per_unit / DEGREES_PER_Q, SLACK_Q) if one.turns else (one.per_unit * NM_PER_MM, SLACK_NM)
                 signal = f"{name}.{one.signal}"
-                self._follow(world, signal, self._motions.setdefault(signal, _Planned(one.motion, per_unit, slack)))
+                self._follow(_signal(world, signal), self._motions.setdefault(signal, _Planned(one.motion, per_unit, slack)))
 
     def _follow_elements(self, world: Simulation) -> None:
         """What moves besides frames, what is there only sometimes, and all levels that are shown."""
@@ -204,18 +204,21 @@ class SceneRecorder:
         for element in machine.elements:
             if element.name in placed:
                 levels += (f"{element.name}.{terminal}" for terminal in (*element.inputs, *element.outputs))
-                if element.drawing is not None and element.drawing.shape != BELT:
-                    moves += (f"{element.name}.{place}" for place in element.drawing.places)
+                if element.drawing is not None:
                     levels += (switch.pin for switch in element.drawing.switches)
+                    if element.drawing.shape != BELT:  # places of workpieces are those of one dimension
+                        moves += (f"{element.name}.{place}" for place in element.drawing.places)
         for name in moves:
             if name not in self._motions and (signal := _signal(world, name)) is not None:
-                self._follow(world, name, self._motions.setdefault(name, _Turning(signal)))
-        for name in levels:
+                self._follow(signal, self._motions.setdefault(name, _Turning(signal)))
+        elements = {element.name for element in machine.elements}
+        for pin in levels:
+            owner, _, terminal = pin.partition(".")
+            name = f"{owner}.{terminal.lower()}" if owner in elements else pin
             if name not in self._levels and (signal := _signal(world, name)) is not None:
-                self._follow(world, name, self._levels.setdefault(name, _Level(signal)))
+                self._follow(signal, self._levels.setdefault(name, _Level(signal)))
 
-    def _follow(self, world: Simulation, name: str, followed: _Motion | _Level) -> None:
-        signal = _signal(world, name)
+    def _follow(self, signal: SignalOf | None, followed: _Motion | _Level) -> None:
         if signal is not None:
             self._followed.setdefault(signal.sources[0].scheduler, []).append(followed)
 
@@ -246,7 +249,7 @@ class SceneRecorder:
     def _travel(self, world: Simulation, now: Nanos, signal: str, motion: Motion) -> float:
         """The way of a belt, which is followed from when a workpiece is on it; only its changes count."""
         if signal not in self._motions:
-            self._follow(world, signal, self._motions.setdefault(signal, _Planned(motion, NM_PER_MM, SLACK_NM)))
+            self._follow(_signal(world, signal), self._motions.setdefault(signal, _Planned(motion, NM_PER_MM, SLACK_NM)))
         followed = self._motions[signal]
         followed.look(now)
         return next(span for span in reversed(followed.spans) if span.begin <= now).at(now)
