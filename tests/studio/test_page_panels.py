@@ -182,6 +182,12 @@ def test_every_panel_goes_to_a_moment_of_the_past(studio: Studio) -> None:
     button(page, "To the present").click()
     expect(page.get_by_role("group", name="The past")).to_have_count(0)
     expect(button(page, "Enable M1")).to_be_enabled()
+    # The time line goes back by events, and plays on to the present.
+    page.get_by_role("slider", name="Time line").press("ArrowLeft")
+    expect(page.get_by_role("group", name="The past")).to_be_visible()
+    page.get_by_label("Speed of playing").select_option(label="10×")
+    page.get_by_role("button", name="Play").click()
+    expect(page.get_by_role("group", name="The past")).to_have_count(0)
     # What others do while one looks back is there afterwards; stop works all the time.
     button(page, "Look at this moment").click()
     expect(position).to_have_text("0.00")

@@ -33,7 +33,7 @@ export class EventLog {
   constructor(private readonly severity: (event: SubjectEvent) => Severity) {}
 
   /** From here on they are all there, but for `unknown`. */
-  private known_ns = 0n;
+  known_ns = $state.raw(0n);
 
   forget(): void {
     this.list = [];
