@@ -73,7 +73,7 @@ def test_an_output_sticks_and_only_inputs_bounce(studio: Studio) -> None:
     expect(pin.locator("option", has_text=re.compile("^IN1$"))).to_have_count(1)
     page.get_by_label("Kind of fault").select_option("stuck")
     pin.select_option("OUT1")
-    page.get_by_label("value", exact=True).fill("1")
+    page.get_by_label("value", exact=True).select_option("1")
     button(page, "Set fault").click()
     expect(page.get_by_role("row", name=re.compile("^stuck "))).to_contain_text("pin=OUT1")
     answer = httpx.get(f"{studio.process.url}/api/points?names=both.in1").json()

@@ -117,6 +117,11 @@ export const pl: Record<keyof typeof en, string> = {
   fromTheBeginning: "od początku",
   sinceBefore: "od co najmniej {time}",
   atTime: "w {time}",
+  tryWithout: "Wypróbuj bez tego",
+  tryWithoutHelp:
+    "Powtórz przebieg bez każdego źródła: wejścia, działania, zapytania lub usterki, i zobacz, co jest inaczej",
+  allCauses: "Wszystkie przyczyny",
+  trials: "Przebieg jeszcze raz, bez każdego źródła:",
   lookThere: "Wszystkie panele pokazują ten moment",
   moreCauses: "Wcześniejszych przyczyn nie pokazano.",
   notKnownBefore: "Co było przed {time}, nie jest znane.",

@@ -3,6 +3,16 @@ import type { Sentence } from "../protocol/types";
 import type { Said } from "../../text";
 import type { Ask } from "./watch.svelte";
 
+interface Link {
+  time_ns: string;
+  subject: string;
+  text: string;
+  messages?: { text?: Sentence };
+}
+
+/** What is asked beside the chain: all of it, or also the run without each of its roots. */
+type More = { all?: true; try_without?: true };
+
 /** As `why` answers (docs/why.md). */
 export interface Answer {
   question: string;
@@ -10,10 +20,16 @@ export interface Answer {
   state: string;
   messages?: { state?: Sentence };
   since_ns: string | null;
-  links: readonly { time_ns: string; subject: string; text: string; messages?: { text?: Sentence } }[];
+  links: readonly Link[];
   complete: boolean;
   known_from_ns: string;
   cut: boolean;
+  /** The run again without each root: a link with what would be then. */
+  trials: readonly (Link & {
+    effect: "otherwise" | "other time" | "same" | "unknown";
+    without: string;
+    messages?: { without?: Sentence };
+  })[];
 }
 
 const ANSWER_MS = 60_000;
@@ -34,12 +50,12 @@ export class Question {
   ) {}
 
   /** Without a moment it is asked about the one that the page shows. */
-  async ask(question: string, at = this.moment()): Promise<void> {
+  async ask(question: string, at = this.moment(), more: More = {}): Promise<void> {
     const number = ++this.number;
     this.asked = question;
     this.isAsking = true;
     try {
-      const fields = { question, ...(at === null ? {} : { at_ns: String(at) }) };
+      const fields = { question, ...(at === null ? {} : { at_ns: String(at) }), ...more };
       const answer = (await this.request("why", fields, ANSWER_MS)) as Answer;
       if (number !== this.number) return;
       this.answer = answer;
@@ -50,6 +66,11 @@ export class Question {
       this.problem = saidOf(error);
     }
     this.isAsking = false;
+  }
+
+  /** The same question, of the moment that was answered. */
+  askMore(more: More): void {
+    if (this.answer !== null) void this.ask(this.answer.question, BigInt(this.answer.at_ns), more);
   }
 
   close(): void {

@@ -40,3 +40,12 @@ test("an answer to an earlier question, and one that comes after it was closed, 
   await third;
   expect([question.asked, question.answer, question.problem]).toEqual([null, null, null]);
 });
+
+test("more is asked about the moment that was answered", async () => {
+  const { sent, question } = rig();
+  const first = question.ask("cup.held");
+  sent[0]?.answer({ question: "cup.held", at_ns: "9" });
+  await first;
+  question.askMore({ try_without: true });
+  expect(sent[1]?.fields).toEqual({ question: "cup.held", at_ns: "9", try_without: true });
+});
