@@ -19,7 +19,7 @@ from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
 from steptwin.simulation.world.snapshotlog import outside_past
 from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Effect, Trial
-from steptwin.why.question import Asking, Why
+from steptwin.why.question import Asking, Lacking, Why
 from steptwin.why.roots import SetFault
 from steptwin.why.search import Asked, LastChanges, Snapshots
 from steptwin.why.without import trying_without
@@ -65,7 +65,8 @@ class PastQuestions:
             trial = yield from self._without_fault(name, answer)
             if trial is not None:
                 tried[name] = trial
-        answer = answer._replace(links=_with(answer.links, tried.values()))
+        lacking = () if self._known is None else (yield from self._known.lacking(question, answer.at))
+        answer = answer._replace(links=(*lacking, *_with(answer.links, tried.values())))
         if not try_without:
             return answer
         trials: list[Trial] = []
@@ -166,6 +167,10 @@ class _Known:
     def faults(self) -> Faults:
         """Those of the world at the end of what is known."""
         return self._why.log.world.objects.faults
+
+    def lacking(self, question: str, at: Nanos) -> Lacking:
+        """See `Why.lacking`."""
+        return self._why.lacking(question, at)
 
     def fault_link(self, name: str, until: Nanos) -> ChainLink:
         """A fault as a cause, by a moment."""

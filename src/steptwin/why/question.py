@@ -14,8 +14,9 @@ from steptwin.messages import Message, MessageText
 from steptwin.points import LivePoint
 from steptwin.simulation.kinds.programs import Resource, ResourceKind
 from steptwin.simulation.logic.condition import Signal, SignalCondition
-from steptwin.simulation.logic.expression import parse_condition
+from steptwin.simulation.logic.expression import deciding, parse_condition
 from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput
 from steptwin.simulation.world.snapshotlog import outside_past
@@ -32,6 +33,11 @@ from steptwin.why.states import Interval, StatesOnTheWay, rest_of
 MOST_SNAPSHOTS = 5
 """Limit of the signals whose present levels are shown of what a program waits for."""
 
+WHY_NOT = "not "
+"""Beginning of a question for what a condition lacks."""
+LONGEST_AHEAD_NS: Nanos = 60 * SECOND
+"""How far ahead it is tried whether a condition becomes true by itself."""
+
 SWITCH = "switch"
 """The type of a point that is 0 or 1."""
 _AXIS = re.compile(r"(?:M|ENC)(\d+)[._]|moving$", re.IGNORECASE)
@@ -39,6 +45,7 @@ _AXIS = re.compile(r"(?:M|ENC)(\d+)[._]|moving$", re.IGNORECASE)
 
 Asking: TypeAlias = Generator[None, None, Answer]
 """In parts: after each of them something else can be done, or the question be given up by `close`."""
+Lacking: TypeAlias = Generator[None, None, tuple[ChainLink, ...]]
 FoundValue: TypeAlias = Generator[None, None, tuple[float, Nanos | None]]
 
 
@@ -76,6 +83,11 @@ def _text_of(question: str) -> str:
     return question.strip().removeprefix("why ").strip()
 
 
+def _note_when(world: Simulation, condition: str, found: list[Nanos]) -> do.Steps:
+    yield do.Until(condition)
+    found.append(world.now)
+
+
 def _last_flip(condition: SignalCondition, times: Iterable[Nanos], at: Nanos) -> Nanos | None:
     """The last of the moments at which something changed that made a condition what it is at a moment."""
     value = condition.holds(at)
@@ -96,6 +108,10 @@ WAITS_FOR_A_TIME = Message("why.waits-for-a-time", "it waits for a time only")
 DEPENDS_ON = Message("why.depends-on", "it depends on {name}")
 ANY_PIN = Message("why.any-pin", "any pin")
 NO_AXIS_HAS_MOVED = Message("why.no-axis-has-moved", "no axis has moved until {time:g} s")
+BECOMES_TRUE = Message("why.becomes-true", "it becomes true at {time:.6f} s if nothing comes from outside")
+ONLY_FROM_OUTSIDE = Message(
+    "why.only-from-outside", "it does not become true within {time:g} s if nothing comes from outside: only from outside"
+)
 FORM_OF_A_QUESTION = Message(
     "why.form-of-a-question", "a question is a signal, a condition, or a controller: table.OUT3, 'table.OUT3 == 0', table"
 )
@@ -217,6 +233,48 @@ class Why:
         signals = tuple(canonical.values())
         first = self._causes.lasting(signals, at, None if since is None else self._changed(signals, since))
         return (yield from self._answer(text, at, state, since, first))
+
+    def lacking(self, question: str, at: Nanos) -> Lacking:
+        """Of a question that begins with ``not`` and is true: the present values of what would have to be otherwise, with what
+        drives it, and when it becomes so by itself, in parts; nothing for another question. `asking` comes first."""
+        text = _text_of(question)
+        if not text.startswith(WHY_NOT):
+            return ()
+        condition = self._named(text.removeprefix(WHY_NOT).strip())
+        other = yield from self._world_at(at)
+        node = parse_condition(condition).in_unit("", self._unit)
+
+        def value(name: str) -> float:
+            return other.read(name) if self._is_signal(name) else self.log.level(name, at)
+
+        if node.value(value):
+            return ()
+        links: list[ChainLink] = []
+        for name in dict.fromkeys(name for one in deciding(node, value, wanted=True) for name in one.names()):
+            full, unit = self._canonical(name), self._unit(name)
+            if self.log.is_recorded(full):
+                links += self._states(full, at)
+            else:
+                text = IS_IN_UNIT(name=name, value=value(name), unit=unit) if unit else IS_NUMBER(name=name, value=value(name))
+                links.append(ChainLink(at, name.partition(".")[0], text))
+        if all(map(self._is_signal, node.names())):
+            found: list[Nanos] = []
+            other.start("why", partial(_note_when, other, condition, found), is_external=True)
+            for _ in in_parts(other, (), at + LONGEST_AHEAD_NS):
+                if found:
+                    break
+                yield
+            ahead = BECOMES_TRUE(time=found[0] / SECOND) if found else ONLY_FROM_OUTSIDE(time=LONGEST_AHEAD_NS / SECOND)
+            links.append(ChainLink(at, "", ahead))
+        return tuple(dict.fromkeys(links))
+
+    def _world_at(self, at: Nanos) -> Generator[None, None, Simulation]:
+        """Another world in the state of a moment of the past."""
+        other, state = self._make(), next(self._on_the_way.until(at))
+        other.restore(state.snapshot)
+        for _ in in_parts(other, self._inputs[state.inputs :], at):
+            yield
+        return other
 
     def _takes_values_between(self, name: str) -> bool:
         """Whether a quantity changes between events, but not from one level to the other as ``moving`` at the end of a motion."""
@@ -390,10 +448,7 @@ class Why:
     def _moving(self, signal: str, at: Nanos) -> Asking:
         """Cause of a quantity that changes all the time: the motion, or since when a point of a controller stands."""
         world = self.log.world
-        other, state = self._make(), next(self._on_the_way.until(at))
-        other.restore(state.snapshot)
-        for _ in in_parts(other, self._inputs[state.inputs :], at):
-            yield
+        other = yield from self._world_at(at)
         value, full = other.read(signal), self._canonical(signal)
         unit = world.signal(signal).unit
         state = IS_IN_UNIT(name=signal, value=value, unit=unit) if unit else IS(signal=signal, value=f"{value:.6g}")

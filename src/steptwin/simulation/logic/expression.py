@@ -154,6 +154,19 @@ def comparisons(node: Truth) -> Iterator[Comparison]:
             yield from comparisons(part)
 
 
+def deciding(node: Truth, values: Callable[[str], float], *, wanted: bool) -> Iterator[Comparison]:
+    """The comparisons because of which a condition is not as ``wanted``: each would have to be another one, or with ``or`` one of
+    them."""
+    if isinstance(node, Comparison):
+        yield node
+    elif isinstance(node, Not):
+        yield from deciding(node.inner, values, wanted=not wanted)
+    else:
+        for part in node.parts:
+            if bool(part.value(values)) is not wanted:
+                yield from deciding(part, values, wanted=wanted)
+
+
 def truth_of(node: Truth, reads: Mapping[str, ReadAt], check: Callable[[float], float] | None = None) -> Callable[[Nanos], bool]:
     """Whether a condition holds at a moment, as a function, because conditions are evaluated far more often than made.
 
