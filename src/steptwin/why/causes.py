@@ -6,14 +6,17 @@ import math
 import re
 from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
+from typing import Any
 
 from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.messages import Message, MessageText, text_of
 from steptwin.motion.divisions import profile_of
+from steptwin.simulation.components.elementspec import NamedSpec
 from steptwin.simulation.components.logic import TerminalComponent
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementLocation, StatementUse
+from steptwin.simulation.logic.expression import parse_condition
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
@@ -51,6 +54,8 @@ DECIDED = Message("why.decided", "{statement} decided")
 PROGRAM_STARTED = Message("why.program-started", "the program started")
 LONGEST_REACTION_NS: Nanos = 510 * MILLISECOND
 """Limit of the time after which a statement goes on when what it waits for has come: inputs may be filtered for 500 ms."""
+TIME = "time"
+"""What an element may be over that is no signal."""
 MOST_UNDECIDED = 5000
 """Limit of the statements among which the one that decided is looked for."""
 
@@ -68,6 +73,8 @@ class Causes:
         self._at_begin = nothing if log.is_whole else unknown
         self.is_far = False
         """Whether the chain that was followed last ends because nothing older was searched (`MOST_UNDECIDED`)."""
+        every = (spec for specs in log.world.spec.elements.values() for spec in specs)
+        self._specs = {spec.name: spec for spec in every if isinstance(spec, NamedSpec) and spec.name}
         self._parts: dict[str, TerminalComponent] = {
             name: part for kind, parts in built.items() if ELEMENTS[kind].terminals is not None for name, part in parts.items()
         }
@@ -97,11 +104,12 @@ class Causes:
         found = None if power is None else self.last((self._name(PinName(*power)),), until, GIVES_POWER(axis=axis))
         return covered(found, Cover.MOTION)
 
-    def moved(self, axis: str, until: Nanos) -> FoundCause:
-        """Cause that moved the load of an axis last, or left it where it is: a motion, or the power of its motor meanwhile."""
+    def moved(self, axis: str, until: Nanos, before: int = LAST) -> FoundCause:
+        """Cause before an order that moved the load of an axis last, or left it where it is: a motion, or the power of its motor
+        meanwhile."""
         built = self._world.axes[axis]
         controller, number = built.spec.drive[0], built.spec.drive[1].removeprefix("M")
-        motion, power = self.motion(controller, number, until, axis), self.power(axis, until)
+        motion, power = self.motion(controller, number, until, axis, before), self.power(axis, until)
         if power is None or (motion is not None and motion.link.time >= power.link.time):
             return motion
         plans = self._log.plans_in_force(controller, number, power.link.time)
@@ -118,8 +126,8 @@ class Causes:
         if owner in self._world.controllers:
             return self._of_pin(PinName(owner, terminal), change)
         if owner in self._world.axes:
-            return self.moved(owner, change.time)
-        return self._operated(owner, change)
+            return self.moved(owner, change.time, change.order)
+        return self._of_followed(owner, change) if self._followed(owner) else self._operated(owner, change)
 
     def _fault(self, owner: str, change: Change, named: str | None = None) -> FoundCause:
         """A fault that began or ended at a controller or element at the moment of a change, and is recorded after it; one that
@@ -176,9 +184,11 @@ class Causes:
         workpiece = self._of_workpiece(name, change)
         if workpiece is not None:
             return workpiece
+        if part is None and self._followed(name):
+            return self._of_followed(name, change)
         channels = [one for one in self._log.changes if one == name or one.startswith(f"{name}.")]
-        last = self.last(channels, time)
-        return last if part is None or (last is not None and last.place.time == time) else self._of_element(name, change)
+        found = None if part is None else self._of_element(name, change)
+        return self.last(channels, time) if found is None else found
 
     def _at_element(self, name: str, change: Change) -> FoundCause:
         """Cause of an event of an element."""
@@ -197,16 +207,21 @@ class Causes:
         order, owner, record = mine[0]
         text = text_of(record.value if isinstance(record.value, str) else str(record.value))
 
+        act = next((act for act in self._log.acts_at(record.time, order) if _moves(act, record)), None)
+        every = getattr(self._specs.get(owner), "feed_every", None)
+        is_fed = act is None and ("what", "on") in record.facts and every and record.time % every == 0
+
         def before() -> FoundCause:
-            act = next((act for act in self._log.acts_at(record.time, order) if _moves(act, record)), None)
             if act is not None:
                 return _acted(act)
-            cause = self._of_element(owner, change._replace(order=order)) if owner in self._parts else None
+            # What takes a workpiece from an element, or lets go of it there, acts.
+            actor = str(getattr(record.value, "values", {}).get("cup", owner))
+            cause = self._of_element(actor, change._replace(order=order)) if actor in self._parts else None
             # What comes onto a belt does not by what moves that.
             comes = ("what", "on") in record.facts and cause is not None and cause.place.time < record.time
             return None if comes else cause
 
-        return Cause(ChainLink(record.time, owner, text), Place(record.time, order), before)
+        return Cause(ChainLink(record.time, owner, text), Place(record.time, order), nothing if is_fed else before)
 
     def _of_element(self, name: str, change: Change) -> FoundCause:
         """Cause of a change of an element's output: an input at the same moment, or one before, as much earlier as it delays."""
@@ -227,6 +242,8 @@ class Causes:
         workpiece = self._of_workpiece(name, change)
         if workpiece is not None:
             return workpiece
+        if not sources and (followed := self._of_followed(name, change)) is not None:
+            return followed
         acts = Cover.ACTION if type(part).deadline is not TerminalComponent.deadline else None
         latest, source = max(last, key=lambda found: (found[0].time, found[0].order), default=(None, ""))
         fault = self._log.last_fault(name, change.time, change.order)
@@ -244,6 +261,36 @@ class Causes:
             link = ChainLink(self._log.begin, sources[0].partition(".")[0], text)
             return Cause(link, Place(self._log.begin), self._at_begin, acts)
         return None if latest is None else covered(self.change(source, latest, HAS_ACTED_SINCE(name=name)), acts)
+
+    def _followed(self, name: str) -> tuple[str, ...]:
+        """The signals that an element follows besides its inputs: those of its condition, what it measures, its axes."""
+        spec: Any = self._specs.get(name)
+        if spec is None:
+            return ()
+        when, of = getattr(spec, "when", None), getattr(spec, "of", None)
+        axes = [getattr(spec, one, None) for one in ("axis", "other")] if not (when or of) else []
+        turned_by = getattr(spec, "shaft", None)
+        found = [*(parse_condition(when).names() if when else ()), *([of] if of and of != TIME else ())]
+        found += [f"{axis}.position" for axis in axes if axis]
+        return (*dict.fromkeys(found), *(self._followed(turned_by) if turned_by else ()))
+
+    def _of_followed(self, name: str, change: Change) -> FoundCause:
+        """The last cause by a moment of what an element follows; that of the same moment, if there is one."""
+        found: list[Cause] = []
+        for signal in self._followed(name):
+            owner, _, rest = signal.partition(".")
+            before = self._before(signal, change, change.time)
+            if before is not None:
+                cause = covered(self.change(signal, before[0]), Cover.ACTION)
+            elif owner in self._world.axes:
+                cause = covered(self.moved(owner, change.time, change.order), Cover.MOTION)
+            elif owner in self._world.controllers:
+                cause = self.at_moment(owner, change.time, Resource(ResourceKind.AXIS, ""), rest)
+            else:
+                cause = covered(self.of_element(owner, rest, change.time), Cover.ACTION)
+            if cause is not None and cause.place < Place(change.time, change.order):
+                found.append(cause)
+        return max(found, key=lambda cause: cause.place, default=None)
 
     def _before(self, signal: str, change: Change, until: Nanos) -> tuple[Change, str] | None:
         """The last change of a signal by a moment and before ``change``."""
@@ -282,7 +329,9 @@ class Causes:
         if path is not None:
             where = self._world.spec.text.where(path)
             link = ChainLink(change.time, pin.controller, DRIVES(kind=path[0], where=where, pin=str(pin)))
-            return Cause(link, Place(change.time, change.order, -1), nothing)
+            name = next((name for name, spec in self._specs.items() if spec.path == path[: len(spec.path)]), "")
+            before = partial(self._of_followed, name, change) if self._followed(name) else nothing
+            return Cause(link, Place(change.time, change.order, -1), before)
         return self.in_controller(pin.controller, change, Resource(ResourceKind.PIN, pin.pin))
 
     def _operated(self, name: str, change: Change) -> FoundCause:
@@ -371,24 +420,32 @@ class Causes:
 
     def _inside(self, controller: str, change: Change, wanted: Resource | None) -> FoundCause:
         """Cause of an act of the controller itself: an input, or the end of what an earlier statement began."""
-        earlier = partial(self._earlier, controller, change.time, wanted)
-        after: Callable[[], FoundCause] = earlier
-        found: tuple[ChainLink, Place] | None = None
+        inputs: list[tuple[int, str]] = []
+        event: tuple[int, TraceRecord] | None = None
         for order, record in self._log.at(change.group, change.time):
             if order >= change.order or record.controller != controller:
                 continue
             if record.kind == "edge" and self._is_input(PinName(controller, record.subject)):
-                edge = next(one for one in self._log.changes[f"{controller}.{record.subject}"] if one.order == order)
-                after = partial(self.change, f"{controller}.{record.subject}", edge)
+                inputs.append((order, f"{controller}.{record.subject}"))
             elif record.kind == "event":
-                text = text_of(record.value if isinstance(record.value, str) else str(record.value))
-                found, after = (ChainLink(change.time, controller, text), Place(change.time, order)), earlier
-                element = str(dict(record.facts).get("element"))
-                if element in self._parts:  # such as a supply that is off
-                    after = partial(self._at_element, element, change._replace(order=order))
-        if found is not None:
-            return Cause(*found, after)
-        return self._fault(controller, change) or self._ended(controller, change.time, wanted) or after()
+                event = order, record
+        limit = change.order if event is None else event[0]
+        last = max((one for one in inputs if one[0] < limit), default=None)
+
+        def before() -> FoundCause:
+            if last is None:
+                return self._earlier(controller, change.time, wanted)
+            edge = next(one for one in self._log.changes[last[1]] if one.order == last[0])
+            return self.change(last[1], edge)
+
+        if event is None:
+            return self._fault(controller, change) or self._ended(controller, change.time, wanted) or before()
+        order, record = event
+        element = str(dict(record.facts).get("element"))
+        if element in self._parts:  # such as a supply that is off
+            before = partial(self._at_element, element, change._replace(order=order))
+        text = text_of(record.value if isinstance(record.value, str) else str(record.value))
+        return Cause(ChainLink(change.time, controller, text), Place(change.time, order), before)
 
     def _ended(self, controller: str, time: Nanos, wanted: Resource | None) -> FoundCause:
         """The motion of an axis that ended at a moment."""
@@ -519,19 +576,25 @@ class Causes:
         return Cause(link, place, partial(self._of_executed, controller, index))
 
     def _of_executed(self, controller: str, index: int) -> FoundCause:
-        """Value that a statement reads, if it has changed since the last execution, so that another one was written; otherwise
-        what let it be executed."""
+        """Value that a statement reads, if it has changed since the last execution, so that another one was written, or of the
+        first execution since that was decided; otherwise what let it be executed."""
         use = self.use(controller, index)
         reads = [one for one in use.reads if one not in use.writes]
-        before = self._executed_before(controller, index) if reads and use.writes and not use.waits else None
+        if not reads or not use.writes or use.waits:
+            return self._of_statement(controller, index)
+        before, decided = self._executed_before(controller, index), None
+        here, since = self._log.executed[controller][index], Place(-1)
         if before is None:
-            return self._of_statement(controller, index)
-        here, last = self._log.executed[controller][index], self._log.executed[controller][before]
+            decided = self._of_statement(controller, index)
+            since = Place(here.time) if decided is None else decided.place
+        else:
+            last = self._log.executed[controller][before]
+            since = Place(last.time, last.order, 3 * before + 2)
         found = [cause for one in reads if (cause := self.resource(controller, one, index, here.time, here.order))]
-        changed = [cause for cause in found if cause.place > Place(last.time, last.order, 3 * before + 2)]
-        if not changed:
-            return self._of_statement(controller, index)
-        return covered(max(changed, key=lambda cause: cause.place), Cover.LEVEL)
+        changed = max((cause for cause in found if cause.place > since), key=lambda cause: cause.place, default=None)
+        if changed is not None:
+            return covered(changed, Cover.LEVEL)
+        return self._of_statement(controller, index) if decided is None else decided
 
     def _executed_before(self, controller: str, index: int) -> int | None:
         """The number of the execution of a statement before this one."""

@@ -9,7 +9,7 @@ from collections.abc import Generator, Sequence
 from functools import partial
 from typing import Protocol, TypeAlias
 
-from steptwin.controller import SECOND
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.messages import Message, text_of
 from steptwin.simulation.script import steps as do
@@ -27,6 +27,9 @@ WOULD_BE_THE_SAME = Message("why.would-be-the-same", "the same: something else i
 NOT_TRIED = Message("why.not-tried", "not known: {problem}")
 PAST_BEFORE_IT_IS_NOT_KEPT = Message("why.past-before-it-is-not-kept", "the past before it is not kept")
 NOT_FOUND_AGAIN = Message("why.not-found-again", "it is not found again in the past that is kept")
+
+LONGEST_FRAME_NS: Nanos = 2 * SECOND
+"""How long before the end of a request its bytes may have come."""
 
 Trying: TypeAlias = Generator[None, None, Trial]
 
@@ -49,7 +52,7 @@ def _trying(snapshots: SnapshotsWithInputs, link: ChainLink, answer: Answer, mos
     root = link.root
     if root is None:
         raise Misuse(NOT_FOUND_AGAIN())
-    state = snapshots.state_at(max(snapshots.begin, root.time - 1))
+    state = snapshots.state_at(max(snapshots.begin, _began(snapshots, root) - 1))
     begin = state.snapshot.now
     if begin > root.time:
         raise Misuse(PAST_BEFORE_IT_IS_NOT_KEPT())
@@ -65,6 +68,19 @@ def _trying(snapshots: SnapshotsWithInputs, link: ChainLink, answer: Answer, mos
         return Trial(link, Effect.SAME, WOULD_BE_THE_SAME())
     told = WOULD_BE_SINCE_BEFORE(time=begin / SECOND) if other.since is None else WOULD_BE_SINCE(time=other.since / SECOND)
     return Trial(link, Effect.OTHER_TIME, told)
+
+
+def _began(snapshots: SnapshotsWithInputs, root: Root) -> Nanos:
+    """When a root came: a request on a line with timing came before it was whole."""
+    if not isinstance(root, Sent):
+        return root.time
+    state = snapshots.state_at(max(snapshots.begin, root.time - LONGEST_FRAME_NS))
+    sent = [one.time for one in snapshots.inputs_from(state.inputs) if one.time <= root.time and _is_of(one, root)]
+    return max(sent, default=root.time)
+
+
+def _is_of(given: RecordedInput, root: Sent) -> bool:
+    return isinstance(given.what, Bytes) and given.what[:2] == (root.line, root.place)
 
 
 class _RunWithout:
@@ -99,9 +115,8 @@ class _RunWithout:
         """What comes from outside, without it."""
         root = self._root
         match root:
-            case Sent(time, line, place):
-                sent = (one for one in reversed(inputs) if isinstance(one.what, Bytes) and one.what[:2] == (line, place))
-                left_out = [one for one in sent if one.time <= time][:1]
+            case Sent(time):
+                left_out = [one for one in reversed(inputs) if _is_of(one, root) and one.time <= time][:1]
             case Act(time, "", what):
                 left_out = [one for one in inputs if (one.time, one.what) == (time, what)][:1]
             case SetFault(_, name, by):
