@@ -109,6 +109,10 @@ def test_the_session_is_the_run_of_the_case(found: list[FoundFailure], campaign:
         assert recording.replay().trace.digest() == recording.digest
         assert one.files.timeline is not None
         assert "table" in one.files.timeline.read_text(encoding="utf-8")
+        assert one.files.page is not None
+        page = one.files.page.read_text(encoding="utf-8")
+        assert one.files.timeline.name in page
+        assert "script go" in page[page.index("<h2>Why") : page.index("<h2>Timeline")]
         assert one.to_json(campaign.parent)["files"]["session"].startswith("out")
 
 

@@ -30,7 +30,7 @@ def test_a_campaign_with_failures(shell: Shell, file: Path, tmp_path: Path) -> N
     assert first.startswith(f"doors: 40 runs, {len(early)} failed: {(40 - len(early)) / 40:.2%} pass (95 %: ")
     cases = [line for line in lines if line.startswith("case ")]
     values = campaign.cases[early[0]].values
-    assert cases[0] == f"case {early[0]}: t = {values['t']}: expectations of the scripts: table.IN1 == 0; table.IN1 is 1"
+    assert cases[0] == f"case {early[0]}: t = {values['t']} s: expectations of the scripts: table.IN1 == 0; table.IN1 is 1"
     assert len(cases) == min(len(early), 20)
     plain = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert (plain["runs"], plain["failed"], plain["pass_rate"]) == (40, len(early), (40 - len(early)) / 40)

@@ -231,7 +231,9 @@ class Campaign:
             finished += len(batch.results)
             progress(CampaignProgress(known + finished, failed, total, finished / max(time.monotonic() - began, 1e-9)))
         before = total if first is None or not description.until_failure else first + 1
-        return CampaignSummary.of(description.name, description.digest, description.seed, store.results(before))
+        summary = CampaignSummary.of(description.name, description.digest, description.seed, store.results(before))
+        summary.times = description.times
+        return summary
 
     def _guided(
         self,

@@ -10,7 +10,7 @@ from typing import Any
 
 from steptwin import __version__
 from steptwin.campaign.case import digest_of
-from steptwin.campaign.variation import MOST_LEVELS, Varied
+from steptwin.campaign.variation import MOST_LEVELS, Choice, Varied
 from steptwin.controller import SECOND, Nanos
 from steptwin.durations import duration
 from steptwin.errors import Misuse
@@ -251,6 +251,11 @@ class CampaignDescription(CampaignTable):
     measures: tuple[Measure, ...]
     matrix: MatrixRules
     """Settings of the fault matrix."""
+
+    @property
+    def times(self) -> tuple[str, ...]:
+        """Names of the values that vary as times."""
+        return tuple(one.name for one in self.vary if not isinstance(one.spread, Choice) and one.spread.is_time)
 
     @cached_property
     def digest(self) -> str:

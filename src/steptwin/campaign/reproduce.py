@@ -7,6 +7,7 @@ import os
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from operator import itemgetter
 from pathlib import Path
 from pprint import pformat
 from textwrap import fill
@@ -15,8 +16,8 @@ from typing import Any
 from steptwin.campaign.case import Case, CaseResult, VariedValue
 from steptwin.campaign.description import CampaignDescription
 from steptwin.campaign.reading import load_campaign
-from steptwin.campaign.runner import CaseRunner
-from steptwin.campaign.variation import Choice
+from steptwin.campaign.report.failurepage import failure_page
+from steptwin.campaign.runner import CaseRunner, read_step
 from steptwin.controller import SECOND
 from steptwin.durations import duration_text
 from steptwin.errors import Misuse, SteptwinError
@@ -24,6 +25,8 @@ from steptwin.files import recording as recordings
 from steptwin.files.export import axis_views, write_trace
 from steptwin.files.scene.recorder import SceneRecorder
 from steptwin.files.textfiles import write_bytes
+from steptwin.simulation.script.steps import Press
+from steptwin.why.sentences import describe_input
 
 WIDTH = 120
 LONGEST_NAME = 60
@@ -33,23 +36,24 @@ LONGEST_NAME = 60
 class Reproduction:
     """The files of a case. Without a recording the world refused the case; without a test the campaign has no file."""
 
+    page: Path | None
     session: Path | None
     timeline: Path | None
     test: Path | None
 
     def to_json(self, folder: Path) -> dict[str, str]:
         """Their paths, relative to a folder."""
-        found = {"session": self.session, "timeline": self.timeline, "test": self.test}
+        found = {"page": self.page, "session": self.session, "timeline": self.timeline, "test": self.test}
         return {name: os.path.relpath(path, folder) for name, path in found.items() if path is not None}
 
 
 def reproduce(
     runner: CaseRunner, case: Case, result: CaseResult, folder: Path, name: str, campaign: Path | None = None
 ) -> Reproduction:
-    """Write ``NAME.json`` (recording), ``NAME.html`` (timeline) and ``test_NAME.py`` into a folder. Raises `Misuse` where that is
-    impossible."""
+    """Write ``NAME.html`` (page), ``NAME.json`` (recording), ``NAME.timeline.html`` and ``test_NAME.py`` into a folder. Raises
+    `Misuse` where that is impossible."""
     folder.mkdir(parents=True, exist_ok=True)
-    recording = timeline = test = None
+    page = recording = timeline = test = None
     try:
         world = runner.begin(case, keep=True)
     except Misuse:
@@ -62,15 +66,25 @@ def reproduce(
         except SteptwinError:
             pass  # it is the failure: the recording ends there
         else:
-            recording, timeline = folder / f"{name}.json", folder / f"{name}.html"
+            page, recording, timeline = (folder / f"{name}.{suffix}" for suffix in ("html", "json", "timeline.html"))
             recordings.save(recordings.recording_of(world), recording)
             views, scene = axis_views(world), recorder.recorded()
             write_trace(world.trace, timeline, views=views, scene=scene, title=name, ended=world.now)
+            text = failure_page(
+                world,
+                runner.description,
+                result,
+                title=name,
+                what=summary(result),
+                script=parts_of(case, runner.description),
+                timeline=timeline.name,
+            )
+            write_bytes(page, text.encode())
     if campaign is not None:
         beside = os.path.relpath(campaign, folder)
         test = folder / f"test_{identifier(name)}.py"
         write_bytes(test, text_of_test(case, result, name, beside, where(case, runner.description)).encode())
-    return Reproduction(recording, timeline, test)
+    return Reproduction(page, recording, timeline, test)
 
 
 def identifier(text: str) -> str:
@@ -98,12 +112,26 @@ def summary(result: CaseResult) -> str:
 
 
 def where(case: Case, description: CampaignDescription) -> str:
-    """Text of the values of one case of a campaign: values that it varies as times have units."""
-    times = {one.name for one in description.vary if not isinstance(one.spread, Choice) and one.spread.is_time}
-    parts = [f"{name} = {_value_text(value, is_time=name in times)}" for name, value in case.values.items()]
-    parts += [f"{one.at_ns / SECOND:.9g} s: {one.fault}" for one in case.faults]
-    parts += [f"{one.at_ns / SECOND:.9g} s: {one.step}" for one in case.steps]
-    return "; ".join((*parts, f"end {case.end_ns / SECOND:.9g} s"))
+    """What is particular to one case of a campaign, in a line."""
+    return "; ".join(parts_of(case, description))
+
+
+def parts_of(case: Case, description: CampaignDescription) -> list[str]:
+    """The values of a case, those that it varies as times with units; then what is done, in the order of time, in words."""
+    parts = [f"{name} = {_value_text(value, is_time=name in description.times)}" for name, value in case.values.items()]
+    done = [(one.at_ns, f"fault {one.fault}") for one in case.faults]
+    done += [(one.at_ns, _step_text(one.step)) for one in case.steps]
+    parts += [f"{at / SECOND:.9g} s: {text}" for at, text in sorted(done, key=itemgetter(0))]
+    return [*parts, f"end {case.end_ns / SECOND:.9g} s"]
+
+
+def _step_text(text: str) -> str:
+    """A step in words; as it is written where there are none for it."""
+    step = read_step(text)
+    words = describe_input(step)
+    if words == type(step).__name__:
+        return text
+    return f"{words} for {duration_text(step.duration)}" if isinstance(step, Press) and step.duration is not None else str(words)
 
 
 def _value_text(value: VariedValue, *, is_time: bool) -> str:

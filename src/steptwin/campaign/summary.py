@@ -57,6 +57,8 @@ class CampaignSummary:
     name: str
     campaign: str
     seed: int
+    times: tuple[str, ...] = ()
+    """Names of the values that are times, in s."""
     runs: int = 0
     failed: int = 0
     errors: int = 0
@@ -111,6 +113,7 @@ class CampaignSummary:
             "campaign": self.campaign,
             "name": self.name,
             "seed": self.seed,
+            "times": list(self.times),
             "runs": self.runs,
             "failed": self.failed,
             "errors": self.errors,

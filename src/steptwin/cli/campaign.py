@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Collection, Generator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -242,7 +242,7 @@ def _print(data: Any, out: Print, causes: Sequence[str] = ()) -> None:
         held = f"violated in {one['failed']}" if one["failed"] else "holds"
         out(f"  {name}: {held}{worst}")
     for one in data["failures"][:MOST_LINES]:
-        out(f"case {one['number']}: {_given(one['case'])}: {one['why']}")
+        out(f"case {one['number']}: {_given(one['case'], data.get('times', ()))}: {one['why']}")
     if failed > MOST_LINES:
         out(f"... and {failed - MOST_LINES} more: {SUMMARY} has the first 1000, the database all")
     for cause in causes:
@@ -250,9 +250,9 @@ def _print(data: Any, out: Print, causes: Sequence[str] = ()) -> None:
     out(f"seed {data['seed']}, digest {data['digest']}")
 
 
-def _given(case: Any) -> str:
-    """Text of the values of a case."""
-    values = [f"{name} = {value}" for name, value in case["values"].items()]
+def _given(case: Any, times: Collection[str]) -> str:
+    """Text of the values of a case. ``times``: the names of those that are times."""
+    values = [f"{name} = {value:.9g} s" if name in times else f"{name} = {value}" for name, value in case["values"].items()]
     faults = [f"{one['fault']} at {one['at_ns'] / 1e9:g} s" for one in case["faults"]]
     return ", ".join([*values, *faults]) or f"seed {case['seed']}"
 

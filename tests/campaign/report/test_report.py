@@ -67,7 +67,7 @@ def test_the_page_needs_no_network_and_links_what_is_there(report: tuple[Campaig
     assert f"{found.summary.pass_rate:.2%} pass" in text
     for cause in found.found:
         files = cause.to_json(folder)["files"]
-        assert set(files) == {"session", "timeline", "test"}
+        assert set(files) == {"page", "session", "timeline", "test"}
         assert all((folder / file).is_file() and file in text for file in files.values())
 
 
