@@ -206,6 +206,25 @@ def test_an_axis_that_is_jammed_is_free_when_it_is_moved_back() -> None:
     assert world.read("rod.position") < 90.0
 
 
+def test_workpieces_pass_each_other_where_none_is_before_the_other() -> None:
+    """The first one stands at a stop and is pushed 35 mm aside, by 95 mm of the rod. The second one stands behind it, then before
+    the blade, and goes on when that is 60 mm out: to the stop, beside the first one."""
+    stop = '[[conveyor.stop]]\nat = 330\nhold = "c.OUT3"\n'
+    rod = ROD.replace("stroke = 120", 'stroke = 95\nretract_time = "500 ms"').replace("300, -80", "310, -80")
+    world = World.from_toml(BELT + stop + rod + BLADE.replace("[60", "[40"))
+    for output in ("OUT1", "OUT3"):
+        world.mic488["c"].write(output, 1)
+    world.run(until=7.0)
+    assert [world.read(f"main.place{n}") for n in (1, 2)] == pytest.approx([330.0, 290.0], abs=1e-5)
+    for level in (1, 0):
+        world.mic488["c"].write("OUT2", level)
+        world.run(for_=1.0)
+    assert [world.read(f"main.place{n}") for n in (1, 2)] == pytest.approx([330.0, 330.0], abs=1e-5)
+    assert place_of(world, "main.1")[1] == pytest.approx(35.0, abs=1e-5)
+    goes_on = next(time for time, text in told(world, "main.2") if time > 8.0 and "goes on" in text)
+    assert goes_on == pytest.approx(8.0 + (95.0 - 60.0) / 190.0, abs=1e-7)
+
+
 def test_what_it_cannot_push_is_an_event() -> None:
     text = BELT + ROD + BLADE + TRAY.replace("75", "40").replace("330", "300")
     world = pushing(text.replace('feed_every = "2 s"\n', ""), 6.0)

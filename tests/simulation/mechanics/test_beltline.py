@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from steptwin.simulation.mechanics.belt import Belt, ConstantDrive, Near, Placed, Workpiece
-from steptwin.simulation.mechanics.beltline import ahead_of, first_of, limit, next_look, pushed_against
+from steptwin.simulation.mechanics.beltline import ahead_of, limit, next_look, pushed_against
 
 FAR = 10**15
 NM = 1000
@@ -65,7 +65,7 @@ def test_two_constant_speeds_touch_where_a_walk_has_it(fast: Fraction, slow: Fra
     one.following, one.near = two, (Near(two, 100, -FAR, FAR, 100, "a"),)
     two.put(lying("a.1", long * NM // 2, long * NM, "a"))
     one.put(lying("a.2", (100 - long) * NM + long * NM // 2 - gap * NM, short * NM))
-    first = first_of(one, 0)
+    first = next(iter(one.firsts(0)), None)
     assert first is not None
     found, end = limit(one, first, 0), one.exit(first)
 
@@ -87,7 +87,7 @@ def walked(one: Belt, two: Belt, end: int) -> list[tuple[int, int]]:
     """Each ns at which the limit is not that of before, as one who looks each ns sees it: whether the first one touches."""
     found = []
     for now in range(end):
-        first = first_of(one, now)
+        first = next(iter(one.firsts(now)), None)
         assert first is not None
         place = limit(one, first, now)
         if place is not None and first.front(one.position(now)) >= place:
@@ -118,7 +118,7 @@ def test_whoever_looks_when_it_is_due_sees_what_one_sees_who_always_looks(ways: 
     expected = walked(one, two, end)
     now, found = 0, []
     while now < end:
-        first = first_of(one, now)
+        first = next(iter(one.firsts(now)), None)
         assert first is not None
         place, front = limit(one, first, now), first.front(one.position(now))
         if place is not None and front >= place:

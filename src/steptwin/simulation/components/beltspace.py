@@ -165,11 +165,16 @@ class BeltSpace:
 
     def rectangle(self, placed: Placed, along: int = 0, across: int = 0) -> Body:
         """The space that a workpiece takes along and across the belt, moved by so many nm."""
-        return self._space(placed, self._pushed(placed), self._at(along, across), placed.workpiece.extent(placed.yaw_q + 1) // 2)
+        return self._space(placed, self._pushed(placed), self._at(along, across), placed.width // 2)
 
     def lane(self, placed: Placed) -> Body:
         """The space that it takes along the belt, whatever is beside it."""
         return self._space(placed, self._frame, (0, 0, 0), FAR_ASIDE_NM)
+
+    def strip(self, placed: Placed) -> Body:
+        """The width that it takes, all along the belt."""
+        x, y, _ = self._at(0, placed.across)
+        return Body(placed.workpiece.name, self._pushed(placed), self._box(FAR_ASIDE_NM, placed.width // 2, 1), (x, y, 0))
 
     def _space(self, placed: Placed, frame: Frame, shift: Vector, across: int) -> Body:
         frame, at = self._carried(self._conveyor.belt, placed, frame)

@@ -29,7 +29,7 @@ from steptwin.simulation.faults import ActiveFault, Fault, FaultKind, Layer, Occ
 from steptwin.simulation.faults.effects import ElementEffect
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.belt import Belt, ConstantDrive, Near, Placed, nanometres, next_change
-from steptwin.simulation.mechanics.beltline import first_of, limit, next_look, pushed_against
+from steptwin.simulation.mechanics.beltline import limit, next_look, pushed_against
 from steptwin.simulation.mechanics.drawing import BELT, Drawing, SensorZone
 from steptwin.simulation.mechanics.rampeddrive import RampedDrive
 from steptwin.simulation.mechanics.scale import exact_fraction
@@ -161,7 +161,7 @@ class Conveyor(TerminalComponent):
 
     def _state(self) -> object:
         """Another value whenever workpieces may move or stand otherwise."""
-        return self._waits, [(belt.version(), belt.raised, belt.bars) for belt in self._belts_ahead()]
+        return self._waits, [(belt.version(), belt.raised, belt.bars, belt.passings) for belt in self._belts_ahead()]
 
     def _belts_ahead(self) -> Iterator[Belt]:
         """This one and those on which workpieces may be in the way."""
@@ -207,28 +207,28 @@ class Conveyor(TerminalComponent):
 
     def room_at(self, front: int, now: Nanos) -> bool:
         """Whether there is room for one of its workpieces with its front ``front`` steps from the beginning."""
-        return self.belt.occupant(front - self._length, front, now) is None
+        placed = self.belt.place(self._workpiece(), front, now)
+        return self.belt.occupant(front - placed.length, front, now, beside=placed) is None
 
     def put_new(self, front: int, now: Nanos) -> str:
         """Put one of its workpieces where there is room for it; gives its name."""
+        workpiece = self._workpiece()
         self.fed += 1
-        spec = self.spec
-        marks = tuple((nanometres(mark), nanometres(mark + spec.mark_width)) for mark in spec.marks)
-        workpiece = workpiece_of(f"{spec.name}.{self.fed}", spec.workpiece, spec.mass, marks)
         self._lay(self.belt.place(workpiece, front, now), now)
         return workpiece.name
 
-    @property
-    def _length(self) -> int:
-        """The length of its workpieces, steps."""
-        return self.belt.from_nm(nanometres(self.spec.workpiece[0]))
+    def _workpiece(self) -> Workpiece:
+        """The next one that it is fed with."""
+        spec = self.spec
+        marks = tuple((nanometres(mark), nanometres(mark + spec.mark_width)) for mark in spec.marks)
+        return workpiece_of(f"{spec.name}.{self.fed + 1}", spec.workpiece, spec.mass, marks)
 
     def lay(self, workpiece: Workpiece, front: int, now: Nanos, across: int = 0, yaw_q: float = 0.0) -> bool:
         """Put a workpiece with its front ``front`` steps from the beginning, ``across`` and ``yaw_q`` as in `Placed`. Whether it
         lies there: it does not where it collides with another one."""
         place = front
         placed = self.belt.place(workpiece, place, now, "", across, yaw_q)
-        found = self.belt.occupant(place - placed.length + 1, place - 1, now)
+        found = self.belt.occupant(place - placed.length + 1, place - 1, now, beside=placed)
         if found is not None:
             self._collides(placed, found[1])
             return False
@@ -287,14 +287,17 @@ class Conveyor(TerminalComponent):
                 if placed.held is not None:
                     belt.release(placed, position + back)
                     self._report(GOES_BACK, placed, "goes back")
-        first = first_of(belt, now) if belt.near else None
-        while first is not None and (other := pushed_against(belt, first, now)) is not None:
-            self._collides(other.placed, first)
-            self.remove(other.near.belt, other.placed)
-        ahead: int | None = None
+        firsts = belt.firsts(now) if belt.near else []
+        for first in firsts:
+            while (other := pushed_against(belt, first, now)) is not None:
+                self._collides(other.placed, first)
+                self.remove(other.near.belt, other.placed)
+        standing: list[tuple[Placed, int]] = []
+        """With where one behind it stands."""
         for placed in sorted(belt.workpieces, key=lambda one: one.front(position), reverse=True):
             front = placed.front(position)
-            most = self._limit(placed, front - stride, ahead, now, is_first=placed == first)
+            before = (place for one, place in reversed(standing) if not belt.are_beside(placed, belt, one, now))
+            most = self._limit(placed, front - stride, next(before, None), now, is_first=placed in firsts)
             if most is not None and front >= most:
                 at = most if front - most <= stride else front
                 if placed.held != at:
@@ -302,10 +305,8 @@ class Conveyor(TerminalComponent):
                     place = float(at / belt.per_mm)
                     name = placed.workpiece.name
                     self.report(STANDS_AT(workpiece=name, place=place, belt=self.spec.name), name, "stands")
-                ahead = at - placed.length - 1
-                continue
-            ahead = None
-            if placed.held is not None:
+                standing.append((placed, at - placed.length - 1))
+            elif placed.held is not None:
                 belt.release(placed, position)
                 self._report(GOES_ON, placed, "goes on")
 
@@ -371,16 +372,19 @@ class Conveyor(TerminalComponent):
         """When the next workpiece is lost at the beginning, is delivered or cannot go on; or can again."""
         belt, position = self.belt, self.belt.position(now)
         moving = [placed for placed in belt.workpieces if placed.held is None]
-        first = first_of(belt, now) if belt.near else None
-        place, look = (None, None) if first is None else next_look(belt, first, now)
+        firsts = belt.firsts(now) if belt.near else []
+        looks = [next_look(belt, first, now) for first in firsts]
         below = max((placed.origin - 1 for placed in moving), default=None)
-        ends = [placed.origin + self._way(placed, position, now, is_first=placed == first) for placed in moving]
-        if first is not None and first.held is None and place is not None:
-            ends.append(first.origin + place)
+        ends = [placed.origin + self._way(placed, position, now, is_first=placed in firsts) for placed in moving]
+        ends += [
+            first.origin + place
+            for first, (place, _) in zip(firsts, looks, strict=True)
+            if first.held is None and place is not None
+        ]
         due = next_change(belt.drive, below, min(ends, default=None), now)
-        moments = [due, look]
+        moments = [due, *(look for _, look in looks)]
         if self._waits:
-            moments += [belt.next_change(place, now) for place in (0, -self._length)]
+            moments += [belt.next_change(place, now) for place in (0, -belt.from_nm(nanometres(self.spec.workpiece[0])))]
         if len(moving) < len(belt.workpieces):
             moments += [next(self._turning_points(now), None), belt.drive.reaches(position - 1, now, -1)]
         return min((moment for moment in moments if moment is not None), default=None)
@@ -388,7 +392,9 @@ class Conveyor(TerminalComponent):
     def _way(self, placed: Placed, position: int, now: Nanos, *, is_first: bool) -> int:
         """Up to where a moving workpiece can go."""
         front, end = placed.front(position), self.belt.exit(placed)
-        before = [one for one in self.belt.workpieces if one.held is not None and one.held > front]
+        belt = self.belt
+        before = [one for one in belt.workpieces if one.held is not None and one.held > front]
+        before = [one for one in before if not belt.are_beside(placed, belt, one, now)]
         ahead = min((one.front(position) - one.length - 1 for one in before), default=None)
         found = self._limit(placed, front, ahead, now, is_first=is_first)
         return end if found is None else min(found, end)

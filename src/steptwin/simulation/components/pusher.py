@@ -75,7 +75,7 @@ class Pusher(Stateful):
         "_workpieces",
         "name",
     )
-    __slots__ = (*FIXED, "_due", "_jammed", "_over", "count")
+    __slots__ = (*FIXED, "_due", "_jammed", "_lines", "_over", "count")
 
     def __init__(self, scheduler: Scheduler, context: ElementContext, belts: Iterable[BeltSpace], body: Body) -> None:
         self._scheduler = scheduler
@@ -91,6 +91,8 @@ class Pusher(Stateful):
         """Workpieces that it is in, and cannot push."""
         self._jammed: tuple[str, str] | None = None
         """A belt, and the workpiece on it that is pushed against another one."""
+        self._lines: tuple[tuple[str, str], ...] = ()
+        """Workpieces that it pushes, and those that cannot pass them."""
         self._due: Nanos | None = None
         self.count = 0
         """How often it began to push one."""
@@ -187,6 +189,23 @@ class Pusher(Stateful):
             self._jam(belt, name, others[0], now)
         yield from (back, facts.beside.change(now), facts.above.change(now), facts.against.change(now), facts.close.change(now))
 
+    def _pass(self, now: Nanos) -> Iterator[Nanos | None]:
+        """Let workpieces on the belts go on past those that it pushes, or no longer. When that changes."""
+        lines: list[tuple[str, str]] = []
+        for belt, placed in self._those():
+            near = [one for one in self._belts if one.conveyor.spec.name in belt.conveyor.line]
+            for its, other in ((one, other) for one in near for other in one.conveyor.belt.workpieces):
+                if other is not placed:
+                    contact = BodyContact(SweptBody(belt.strip(placed)), SweptBody(its.strip(other)))
+                    if contact.holds(now):
+                        lines.append((placed.workpiece.name, other.workpiece.name))
+                    yield contact.change(now)
+        if tuple(lines) != self._lines:
+            self._lines = tuple(lines)
+            for belt in self._belts:
+                belt.conveyor.belt.passings += 1
+                self._scheduler.notify(belt.conveyor.spec.name)
+
     def _moving(self, belt: BeltSpace) -> Iterator[tuple[Movement, int]]:
         """What moves it across a belt, and to which side."""
         for frame, sign in belt.joints_to(self.name):
@@ -249,6 +268,7 @@ class Pusher(Stateful):
             self._free(now)
         for belt, placed in those:
             moments += self._push_on(belt, placed, now)
+        moments += self._pass(now)
         moments.append(self._probe.change(now))
         self._due = min((due for due in moments if due is not None and due > now), default=None)
 

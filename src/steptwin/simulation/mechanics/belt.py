@@ -17,6 +17,10 @@ NANOMETRES = 10**6
 """In a millimetre."""
 
 
+_ROUNDED_NM = 4
+"""By so much two widths may be too large, and two places across be apart more, when both are halved and rounded."""
+
+
 def nanometres(mm: float) -> int:
     """The whole number of nm nearest to a length in mm."""
     return floor(exact_fraction(mm) * NANOMETRES + Fraction(1, 2))
@@ -105,6 +109,11 @@ class Placed(NamedTuple):
         """The place of its front while the belt is at ``position``."""
         return position - self.origin if self.held is None else self.held
 
+    @property
+    def width(self) -> int:
+        """How much of the width of the belt it takes, nm."""
+        return self.workpiece.extent(self.yaw_q + 1.0)
+
     def zones(self, *, of_marks: bool) -> tuple[tuple[int, int], ...]:
         """Begin and end, from the front, of what a sensor sees: of it, or of its marks."""
         return self.marks if of_marks else ((0, self.length),)
@@ -162,7 +171,7 @@ class Belt(Stateful):
         "per_mm",
         "stride",
     )
-    __slots__ = (*FIXED, "bars", "raised", "workpieces")
+    __slots__ = (*FIXED, "bars", "passings", "raised", "workpieces")
 
     def __init__(self, name: str, length: float, drive: BeltDrive, per_mm: Fraction) -> None:
         """``length`` in mm; ``per_mm``: steps of the grid of its drive."""
@@ -183,6 +192,8 @@ class Belt(Stateful):
         self.across_at: Callable[[Placed, Nanos], int] = lambda placed, now: placed.across
         """How far the middle of a workpiece is left of the middle of the belt, nm."""
         self.bars: tuple[Bar, ...] = ()
+        self.passings = 0
+        """How often one that is pushed has come beside another one, or before or behind it."""
         self.raised: tuple[int, ...] = ()
         """The places of the stops that are on."""
 
@@ -249,8 +260,25 @@ class Belt(Stateful):
 
     # ------------------------------------------------------------------ occupancy
 
-    def occupant(self, low: int, high: int, now: Nanos, *, of_marks: bool = False) -> tuple[Belt, Placed] | None:
+    def are_beside(self, one: Placed, belt: Belt, other: Placed, now: Nanos) -> bool:
+        """Whether one of its workpieces and one of a belt can pass each other, because nothing across the belt is below both."""
+        apart = abs(self.across_at(one, now) - belt.across_at(other, now))
+        return apart > 0 and 2 * apart >= one.width + other.width - _ROUNDED_NM
+
+    def firsts(self, now: Nanos) -> list[Placed]:
+        """Those that come to the end of the belt next, the first one before: none of its workpieces is before one of them."""
+        position, found = self.position(now), list[Placed]()
+        ahead = sorted(self.workpieces, key=lambda one: one.front(position), reverse=True)
+        for n, one in enumerate(ahead):
+            if all(self.are_beside(one, self, other, now) for other in ahead[:n]):
+                found.append(one)
+        return found
+
+    def occupant(
+        self, low: int, high: int, now: Nanos, *, of_marks: bool = False, beside: Placed | None = None
+    ) -> tuple[Belt, Placed] | None:
         """The workpiece, or one with a mark, over the stretch from ``low`` to ``high``, ends included, and the belt of it.
+        ``beside``: another one, which must not be beside it.
 
         Those that this belt moves come first; of several of one belt it is the one that was put there first. What is before
         the beginning of this belt, or beyond its end, is on those before and behind it.
@@ -260,6 +288,8 @@ class Belt(Stateful):
             for one in near.belt.workpieces:
                 begins, front = first if near.has_all_of(one) else max(first, near.joining), one.front(position)
                 zones = one.zones(of_marks=of_marks) if begins <= last else ()
+                if zones and beside is not None and self.are_beside(beside, near.belt, one, now):
+                    continue
                 if any(front - end <= last and front - begin >= begins for begin, end in zones):
                     return near.belt, one
         return None

@@ -33,12 +33,6 @@ class Ahead(NamedTuple):
     """Whether its rear is still on another way."""
 
 
-def first_of(belt: Belt, now: Nanos) -> Placed | None:
-    """The workpiece that comes to the end of the belt next."""
-    position = belt.position(now)
-    return max(belt.workpieces, key=lambda one: one.front(position), default=None)
-
-
 def ahead_of(belt: Belt, first: Placed, now: Nanos) -> Iterator[Ahead]:
     """The workpieces that other belts move, on the way of the first one of a belt."""
     beyond = belt.to_nm(first.front(belt.position(now)))
@@ -52,6 +46,8 @@ def ahead_of(belt: Belt, first: Placed, now: Nanos) -> Iterator[Ahead]:
             front = one.front(position)
             rear = _rear(belt, near, front - one.length)
             if near.has_all_of(one):
+                if belt.are_beside(first, near.belt, one, now):
+                    continue
                 yield Ahead(near, one, rear, is_joining=False)
             elif near.after is not None:
                 yield Ahead(near, one, max(rear, joining), is_joining=rear < joining)
