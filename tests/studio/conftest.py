@@ -84,7 +84,7 @@ class StudioWorld(NamedTuple):
     """A description of a world, and the files that it names."""
 
     text: str = WORLD
-    files: Mapping[str, str] = MappingProxyType({})
+    files: Mapping[str, str | bytes] = MappingProxyType({})
     command: tuple[str, ...] = (STEPTWIN,)
 
 
@@ -106,8 +106,8 @@ class Process:
         world = directory / "hall.toml"
         world.write_text(describe_demo(free_ports=True) if "--demo" in options else served.text)
         shutil.copy(FOLDER / "demo.prg", directory)
-        for name, text in served.files.items():
-            (directory / name).write_text(text)
+        for name, content in served.files.items():
+            (directory / name).write_bytes(content.encode() if isinstance(content, str) else content)
         own = {"XDG_RUNTIME_DIR": str(directory), "TERM": "dumb"}
         self.environment = {"XDG_STATE_HOME": str(directory / "state"), **os.environ, **own}
         self._opened = ExitStack()

@@ -5,12 +5,15 @@ from __future__ import annotations
 import re
 import shutil
 from collections.abc import Callable, Iterator
+from io import BytesIO
 
 import pytest
+from PIL import Image
 from playwright.sync_api import Browser, Page, expect
 from studio_page import PICTURES, Studio, button, serious
 from tests.conftest import until
 from tests.studio.conftest import Process, StudioWorld
+from tests.support.models import glb, png
 
 WORLD = """
 [world]
@@ -60,6 +63,11 @@ name = "hand"
 at = [0, -200, 0]
 size = [80, 80, 200]
 when = "door.pressed == 1"
+[[body]]
+name = "sign"
+at = [-250, 0, 0]
+size = [200, 10, 200]
+model = "sign.glb"
 [[collision]]
 name = "crash"
 when = "x.position > 150"
@@ -72,7 +80,7 @@ inputs = ["table.OUT1", "table.OUT2"]
 
 @pytest.fixture
 def studio_world() -> StudioWorld:
-    return StudioWorld(WORLD)
+    return StudioWorld(WORLD, {"sign.glb": glb(image=png(16, 16))})
 
 
 def part(element: str, material: str) -> str:
@@ -173,6 +181,16 @@ def graphics(browser: Browser) -> Iterator[Browser]:
     started.close()
 
 
+MANY = 200
+
+
+def greens(png: bytes) -> int:
+    """Pixels of the color of `glb`, however it is lit."""
+    with Image.open(BytesIO(png)) as image:
+        pixels = image.convert("RGB").tobytes()
+    return sum(2 * red < green > 1.5 * blue for red, green, blue in zip(*[iter(pixels)] * 3, strict=True))
+
+
 HAS_CONTEXT = """() => {
   const canvas = document.querySelector("canvas[data-engine]");
   const gl = canvas.getContext("webgl2");
@@ -188,6 +206,7 @@ def test_three_dimensions_come_back_after_the_context_was_lost(start_studio: Cal
     canvas = page.locator("canvas[data-engine]")
     expect(canvas).to_be_visible()
     PICTURES.mkdir(parents=True, exist_ok=True)
+    until(lambda: greens(canvas.screenshot()) > MANY, "the image of the model has come")
     whole = canvas.screenshot(path=PICTURES / "space.png")
     page.evaluate("""() => {
       const gl = document.querySelector("canvas[data-engine]").getContext("webgl2");
@@ -199,6 +218,7 @@ def test_three_dimensions_come_back_after_the_context_was_lost(start_studio: Cal
     page.evaluate("window.lose.restoreContext()")
     until(lambda: page.evaluate(HAS_CONTEXT), "the context is back")
     until(lambda: len(canvas.screenshot()) > 0.8 * len(whole), "it is drawn again")
+    assert greens(canvas.screenshot()) > MANY
     button(page, "3D").click()
     expect(canvas).to_have_count(0)
     expect(page.locator(part("x", "moving"))).to_be_visible()

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Awaitable, Callable, Coroutine, Mapping
-from functools import cache
+from functools import cache, partial
 from pathlib import PurePath
 from typing import Any, NamedTuple, TypeAlias
 
@@ -23,6 +23,7 @@ from steptwin.eventloop import result_of
 from steptwin.later import start
 from steptwin.messages import Message
 from steptwin.studio.hub import Hub
+from steptwin.studio.modelfiles import ModelFiles
 from steptwin.studio.requests import ALL, OF_CONNECTION, permit_of
 from steptwin.studio.schema import answer_schemas
 from steptwin.studio.viewersession import STOPS, ViewerSession
@@ -84,6 +85,12 @@ class Rest:
         if self._hub.around.recordings is not None:
             what = "A saved recording, or an export of one, as a file."
             _Reading("/api/recordings/{file}", self._recording, "get_recording", what, RECORDING_FILE, is_file=True).add_to(app)
+        models = self._hub.around.models
+        if models is not None:
+            what = "The model of a body, as a file."
+            _Reading("/api/models/{file:path}", partial(self._model, models), "get_model", what, MODEL_FILE, is_file=True).add_to(
+                app
+            )
         if self._hub.around.campaigns is not None:
             what = "A file of the results of a campaign."
             _Reading("/api/campaigns/{file:path}", self._result, "get_result", what, RESULT_FILE, is_file=True).add_to(app)
@@ -123,6 +130,10 @@ class Rest:
         name = request.path_params["file"]
         found = await self._file(request, lambda: self._hub.recordings.file(name))
         return found if isinstance(found, Response) else FileResponse(found, filename=name, media_type=FILE_TYPE, headers=UNKEPT)
+
+    async def _model(self, models: ModelFiles, request: Request) -> Response:
+        found = await self._file(request, lambda: models.file(request.path_params["file"]))
+        return found if isinstance(found, Response) else FileResponse(found, media_type=FILE_TYPE, headers=UNKEPT)
 
     async def _result(self, request: Request) -> Response:
         """Pages are shown, without access to the studio; other files are downloads."""
@@ -190,6 +201,7 @@ def _parameter(name: str, place: str, meaning: str | None = None, *, is_required
 CONTROLLER = _parameter("controller", "query", is_required=False)
 POINT_NAMES = _parameter("names", "query", "Points with commas between them, such as table.M1.position,time.")
 RECORDING_FILE = _parameter("file", "path", "NAME.json: a saved recording; NAME.vcd and so on: what is made of it.")
+MODEL_FILE = _parameter("file", "path", "The model of a body in the scene of the description.")
 RESULT_FILE = _parameter(
     "file", "path", "The folder of results in the answer to campaigns, and a file there: press.results/report.html."
 )

@@ -15,6 +15,7 @@ from steptwin.diagnostics import SourceText
 from steptwin.studio.branchrequests import Branches
 from steptwin.studio.campaignrequests import Campaigns
 from steptwin.studio.drawingrequests import Arrangement
+from steptwin.studio.modelfiles import ModelFiles
 from steptwin.studio.programs import ProgramTexts
 from steptwin.studio.recordingrequests import Recordings
 from steptwin.studio.requests import LineUse
@@ -141,6 +142,8 @@ class Surroundings:
     """None without a world."""
     arrangement: Arrangement | None = None
     """None without a world."""
+    models: ModelFiles | None = None
+    """None without a world whose description is in a file."""
     services: WorldServices | None = None
     """None without a world."""
     campaigns: Campaigns | None = None

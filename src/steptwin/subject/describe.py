@@ -107,7 +107,7 @@ def _scene(world: Simulation) -> SceneDescription:
     return SceneDescription(
         tuple(_frame(world, name, one) for name, one in frames.items()),
         tuple(
-            BodyDescription(one.name, one.size, one.diameter, one.height, one.color, one.when, one.lit)
+            BodyDescription(one.name, one.size, one.diameter, one.height, one.color, one.when, one.lit, one.model)
             for one in elements.of(BODY)
         ),
         tuple(CupDescription(one.name, one.diameter) for one in elements.of(VACUUM) if one.name in frames),

@@ -43,6 +43,7 @@ class BodyDescription:
     color: Annotated[str | None, "#RRGGBB"]
     when: Annotated[str | None, "The condition under which it is there"]
     lit: Annotated[str | None, "The condition under which it shines"]
+    model: Annotated[str | None, "A file that is seen in its place: .stl in mm with z up, .glb in m with y up"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,6 +42,7 @@ from steptwin.live.studio.branches import BranchStart, WorldBranches
 from steptwin.live.studio.campaigns import FolderCampaigns
 from steptwin.live.studio.demo import demo_world
 from steptwin.live.studio.drawing import WorldArrangement
+from steptwin.live.studio.models import FolderModels
 from steptwin.live.studio.openpage import DEFAULT, OpenedPage, has_desktop
 from steptwin.live.studio.options import StudioOptions
 from steptwin.live.studio.owntokens import new_tokens, own_tokens
@@ -237,6 +238,7 @@ class _Page:
             services=None if beside is None else LiveServices(running.gateways),
             campaigns=campaigns,
             arrangement=_arrangement(live, None if beside is None else beside.world),
+            models=_models(live, None if beside is None else beside.world),
             traffic=partial(_traffic, live),
         )
         await self._serve(server, subject, moment, around)
@@ -335,6 +337,12 @@ def _arrangement(live: LiveWorld, path: Path | None) -> WorldArrangement:
     shown = live.subject.description
     names = [part.name for part in (*shown.axes, *shown.elements)]
     return WorldArrangement(live.world.spec, names, None if path is None or is_recording(path) else path)
+
+
+def _models(live: LiveWorld, path: Path | None) -> FolderModels | None:
+    """Models that bodies have, beside their description."""
+    names = [body.model for body in live.subject.description.scene.bodies if body.model is not None]
+    return None if path is None or is_recording(path) else FolderModels(path.parent, names)
 
 
 def _campaigns(path: Path | None) -> FolderCampaigns | None:

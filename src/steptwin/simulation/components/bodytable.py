@@ -28,6 +28,13 @@ def size_value(value: Any) -> tuple[float, float, float]:
     return x, y, z
 
 
+@permitting("the name of a file .stl or .glb")
+def model_value(value: Any) -> str:
+    if not isinstance(value, str) or not value.lower().endswith((".stl", ".glb")):
+        raise Misuse(f"{value!r}: expected the name of a file .stl or .glb")
+    return value
+
+
 _COLOR = re.compile(r"#[0-9A-Fa-f]{6}\Z")
 
 
@@ -53,6 +60,9 @@ class BodySpec(NamedSpec, MountSpec):
         flag, "whether it pushes workpieces across belts that it moves across", default=False, needs="on", excludes=("when",)
     )
     color: str | None = key(color_value, "of its picture: #RRGGBB", default=None)
+    model: str | None = key(
+        model_value, "a file .stl (mm, z up) or .glb (m, y up) that is seen in three dimensions instead of it", default=None
+    )
     lit: str | None = key(
         text_value, "the condition under which it shines, such as the output of a lamp, 'table.OUT3'", default=None
     )

@@ -12,9 +12,11 @@ import {
   LineSegments,
   Mesh,
   MeshStandardMaterial,
+  Object3D,
   PerspectiveCamera,
   Raycaster,
   Scene,
+  Texture,
   Vector2,
   Vector3,
   WebGLRenderer,
@@ -29,6 +31,8 @@ import type { Trail } from "../../lib/scene/trail";
 import { frameOf, VIEWS, type ViewName } from "../../lib/scene/view";
 import type { Marks } from "./drawing";
 
+/** The layer of what the camera does not see. */
+const UNSEEN = 1;
 /** Of the camera, upright. [degrees] */
 const ANGLE = 20;
 
@@ -54,6 +58,8 @@ export class Space {
   /** The solid of what is selected that moves with it; below 0: none. */
   private goes = -1;
   private view: ViewName = "oblique";
+  private readonly models: Object3D[] = [];
+  private isEnded = false;
   private readonly trails: Line[] = [];
   private readonly trailLook = new LineBasicMaterial({ depthTest: false });
   /** Something has changed since the last picture. */
@@ -148,6 +154,28 @@ export class Space {
     line.geometry.setDrawRange(0, trail.count);
   }
 
+  /** The model of a body is seen in its place, from its origin on. A shape has the colour of the body, and other models their own. */
+  dress(element: string, model: BufferGeometry | Object3D): void {
+    const n = this.stage.solids.findIndex((one) => one.element === element && one.material !== "ghost");
+    const [mesh, solid] = [this.meshes[n], this.stage.solids[n]];
+    if (mesh === undefined || solid === undefined || this.isEnded) return;
+    const [x, y, z] = solid.at;
+    if (model instanceof BufferGeometry) {
+      const edges = new EdgesGeometry(model.translate(-x, -y, -z), 40);
+      this.geometries.set(`model ${element}`, [model, edges]);
+      mesh.geometry = model;
+      (mesh.children[0] as LineSegments).geometry = edges;
+    } else {
+      const moved = new Object3D();
+      moved.position.set(-x, -y, -z);
+      this.models.push(model);
+      mesh.add(moved.add(model));
+      mesh.children.forEach((one) => (one.visible = one === moved));
+      mesh.layers.set(UNSEEN); // it is what a click finds
+    }
+    this.isStale = true;
+  }
+
   mark(marks: Marks): void {
     this.goes = this.stage.solids
       .slice(0, this.stage.fixed)
@@ -181,6 +209,7 @@ export class Space {
   at(x: number, y: number): string {
     const { left, top, width, height } = this.canvas.getBoundingClientRect();
     const ray = new Raycaster();
+    ray.layers.enable(UNSEEN);
     ray.setFromCamera(new Vector2((2 * (x - left)) / width - 1, 1 - (2 * (y - top)) / height), this.camera);
     const seen = this.meshes.filter((mesh, n) => mesh.visible && this.stage.solids[n]?.material !== "ghost");
     const [hit] = ray.intersectObjects(seen, false);
@@ -188,6 +217,8 @@ export class Space {
   }
 
   end(): void {
+    this.isEnded = true;
+    for (const model of this.models) model.traverse(dispose);
     this.canvas.removeEventListener("webglcontextrestored", this.change);
     this.controls.dispose();
     for (const [shape, edges] of this.geometries.values()) {
@@ -301,6 +332,16 @@ function geometryOf({ size: [x, y, z], prism }: Solid): BufferGeometry {
       attribute.setXYZ(n, u, v, w);
     }
   return geometry;
+}
+
+function dispose(part: Object3D): void {
+  if (!(part instanceof Mesh)) return;
+  const { geometry, material } = part as Mesh;
+  geometry.dispose();
+  for (const one of [material].flat()) {
+    for (const value of Object.values(one)) if (value instanceof Texture) value.dispose();
+    one.dispose();
+  }
 }
 
 /** Gives whether it is another one. */
