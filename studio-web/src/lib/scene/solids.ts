@@ -71,20 +71,26 @@ function switches(
   }
 }
 
-/** How far from its middle something is carried on a frame. */
-function reach({ scene }: Known, carrier: string): number {
-  const sizes = new Map(scene.bodies.map(({ name, size, diameter }) => [name, size ?? [diameter ?? 0, diameter ?? 0]]));
+/** How far from the axis about which a frame turns something is carried on it. */
+function reach({ scene }: Known, { frame, axis }: Builder): number {
+  const sizes = new Map(
+    scene.bodies.map(({ name, size, diameter, height }) => [name, size ?? [diameter ?? 0, diameter ?? 0, height ?? 0]]),
+  );
   const far = scene.frames.flatMap(({ name, on, at }) => {
-    if (on !== carrier) return [];
-    const [x = 0, y = 0] = sizes.get(name) ?? [];
-    return [Math.hypot(at[0] as number, at[1] as number) + Math.max(x, y) / 2];
+    if (on !== frame.name) return [];
+    const size = sizes.get(name) ?? [0, 0, 0];
+    const middle = plus(at as unknown as Vector, [0, 0, (size[2] as number) / 2]);
+    const across = [0, 1, 2].filter((k) => k !== axis);
+    return [
+      Math.hypot(...across.map((k) => middle[k] as number)) + Math.max(...across.map((k) => size[k] as number)) / 2,
+    ];
   });
   return Math.max(0, ...far);
 }
 
 /** A disc on a housing; marks let one see that it turns. */
 function turntable(build: Builder, known: Known): void {
-  const radius = between(30, 1.1 * reach(known, build.frame.name) || 70, 1500);
+  const radius = between(30, 1.1 * reach(known, build) || 70, 1500);
   const thick = between(5, 0.1 * radius, 25);
   // What is on it stands above.
   const down = build.axis === 2 ? -build.sign : -1;
@@ -215,7 +221,7 @@ function follower(build: Builder, element: Element): void {
 }
 
 function shaft(build: Builder, known: Known): void {
-  if (reach(known, build.frame.name) > 0) return turntable(build, known);
+  if (reach(known, build) > 0) return turntable(build, known);
   build.rod([-20, 0, 0], 0, 100, 14, "rod", { isCarried: true });
   // Out of its middle, as a cam is.
   build.rod([0, 8, 0], 0, 14, 60, "moving", { isCarried: true });
