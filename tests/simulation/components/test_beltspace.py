@@ -151,6 +151,27 @@ def test_what_is_put_down_beside_a_belt_falls() -> None:
     assert world.read("cup.dropped") == 1
 
 
+def test_what_lies_on_a_workpiece_leaves_with_it() -> None:
+    """The next one is let go of above the first one on the belt, which then runs to its end."""
+    world = picked(CELL)
+    cell = world.mic488["c"]
+    cell.write("M1_POS_ABS", 0.0)
+    cell.write("OUT3", 1)
+    world.run(for_=2.0)
+    world.run(until="stop.seen")
+    cell.write("OUT3", 0)
+    for register, value in (("OUT1", 1), ("OUT2", 1), ("OUT1", 0), ("M1_POS_ABS", 300.0), ("OUT2", 0), ("OUT4", 1)):
+        cell.write(register, value)
+        world.run(for_=1.2)
+    world.run(until="outfeed.delivered == 1", for_="5 s")
+    assert told(world)[-4:] == [
+        "infeed.2 falls 41 mm",
+        "infeed.2 lies on infeed.1",
+        "infeed.1 leaves outfeed",
+        "infeed.2 leaves with infeed.1",
+    ]
+
+
 def test_what_is_put_on_the_rear_of_another_one_falls_to_the_floor() -> None:
     """Its middle is beside that, so that it does not lie on it."""
     world = picked(CELL)

@@ -57,6 +57,10 @@ COLLIDES = Message("simulation.workpieces-collide", "{workpiece} collides with {
 STANDS_AT = Message("simulation.stands-on-a-belt", "{workpiece} stands at {place:g} mm of {belt}")
 
 
+def _nothing(workpiece: str, now: Nanos) -> None:
+    """Nothing lies on workpieces."""
+
+
 class Conveyor(TerminalComponent):
     """A belt with its workpieces.
 
@@ -74,6 +78,7 @@ class Conveyor(TerminalComponent):
         "following",
         "preceding",
         "spec",
+        "takes_along",
     )
     __slots__ = (
         *FIXED,
@@ -116,6 +121,8 @@ class Conveyor(TerminalComponent):
         self.following: Conveyor | None = None
         self.preceding: dict[str, Conveyor] = {}
         """Those of which it is the following one, by name."""
+        self.takes_along: Callable[[str, Nanos], None] = _nothing
+        """Lets what lies on a workpiece leave with it at the end of the last belt."""
         self.fed = 0
         """How many workpieces it was fed with."""
         self.delivered = 0
@@ -337,7 +344,9 @@ class Conveyor(TerminalComponent):
                 self.delivered += 1
                 self.remove(belt, placed)
                 self._report(LEAVES, placed, "leaves")
-                if self.following is not None:
+                if self.following is None:
+                    self.takes_along(placed.workpiece.name, now)
+                else:
                     goes_on = True
                     self.following.take_over(self._left_alone(placed, now), belt, front - belt.length, now)
             elif front < 0:

@@ -11,7 +11,7 @@ from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.beltspace import add_belts
 from steptwin.simulation.components.bodytable import BodySpec, body_of
-from steptwin.simulation.components.conveyor import COLLIDES
+from steptwin.simulation.components.conveyor import COLLIDES, CONVEYOR
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.frames import Frames, check_upright, sources_of, tilting_axis
 from steptwin.simulation.components.nesttable import NestSpec
@@ -43,6 +43,7 @@ LIES_ON = Message("simulation.workpiece-lies-on", "{workpiece} lies on {on}")
 LIES_ON_FLOOR = Message("simulation.workpiece-lies-on-floor", "{workpiece} lies on the floor")
 
 
+LEAVES = Message("simulation.workpiece-leaves", "{workpiece} leaves with {other}")
 LIES_CROOKED = Message("simulation.workpiece-lies-crooked", "{workpiece} lies crooked on {on}")
 
 
@@ -81,9 +82,9 @@ class Piles(NamedTuple):
 class Resting(Stateful):
     """A `steptwin.simulation.components.workpieces.Holder`, and a part of a scheduler.
 
-    What lies on a workpiece goes wherever that goes. What loses what it lies on, and what is let go of higher than
-    `REACH_NM` above what is below it, falls straight down for √(2 h / g), and lies on what is below it then; if that is lower, it
-    falls on.
+    What lies on a workpiece goes wherever that goes, also out of the world at the end of a belt. What loses
+    what it lies on otherwise, and what is let go of higher than `REACH_NM` above what is below it, falls straight down for
+    √(2 h / g), and lies on what is below it then; if that is lower, it falls on.
     """
 
     FIXED: ClassVar[tuple[str, ...]] = (
@@ -274,6 +275,12 @@ class Resting(Stateful):
         self._report(LIES_ON_FLOOR(workpiece=workpiece.name), workpiece, "on the floor")
         return found is None
 
+    def take_along(self, name: str, now: Nanos) -> None:
+        """All that lies on a workpiece leaves the world with it."""
+        for one, below in self.piles().lowest.items():
+            if below == name:
+                self._report(LEAVES(workpiece=one, other=name), self.take(one, now), "leaves")
+
     # ------------------------------------------------------------------ part of a scheduler
 
     def update(self, now: Nanos) -> None:
@@ -339,6 +346,8 @@ def resting_of(context: ElementContext, scheduler: Scheduler) -> Resting:
         supports[name] = nest.bottom(frames.base(name))
     made = Resting(scheduler, frames, workpieces, supports, nests)
     add_belts(context.objects)
+    for conveyor in context.objects.built(CONVEYOR).values():
+        conveyor.takes_along = made.take_along
     workpieces.holders.append(made)
     workpieces.falling = made.falling
     scheduler.add_part(made, None, WORKPIECES)
