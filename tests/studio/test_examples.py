@@ -41,7 +41,7 @@ def test_curl(start_studio: Start) -> None:
         answers.append(json.loads(ran.stdout))
     assert [one["point"] for one in answers[0]["ok"]] == ["table.M1.position", "table.M1.status"]
     assert answers[1]["ok"] is None
-    assert answers[3]["ok"] == {"controllers": ["table", "drum", "feeder"], "scripts": ["event-1"]}
+    assert answers[3]["ok"] == {"controllers": ["table", "drum", "shuttle"], "scripts": ["event-1"]}
 
 
 def test_curl_with_the_token(start_studio: Start, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

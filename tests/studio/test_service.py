@@ -477,7 +477,7 @@ def test_the_demo_machine_is_shown_without_a_file(start_studio: Start) -> None:
                 pytest.skip(f"port {port} is in use here")
     studio = start_studio("--itself")
     described = httpx.get(f"{studio.url}/api/describe").json()["ok"]
-    assert [one["name"] for one in described["controllers"]] == ["table", "drum", "feeder"]
+    assert [one["name"] for one in described["controllers"]] == ["table", "drum", "shuttle"]
     assert studio.end_points["tcp"]["port"] in (5020, 5022)
     assert "Modbus TCP, bus    127.0.0.1:5020" in studio.output
     assert f"studio             {studio.url}/" in studio.output

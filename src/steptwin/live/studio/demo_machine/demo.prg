@@ -3,7 +3,6 @@
 #ejector OUT1
 #busy OUT2
 #infeed OUT3
-#outfeed OUT4
 #isHeld IN10
 #isThere IN11
 #up 5
@@ -20,7 +19,6 @@ WAITPOS
 HOME M1 -60
 HOME M2 -60
 WAITPOS
-outfeed = ON
 SET done = 0
 
 MAIN:
