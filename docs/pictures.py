@@ -431,7 +431,7 @@ def main() -> None:
     )
 
     with World.load(IMAGES.parents[1] / "examples/worlds/palletizer/palletizer.toml") as palletizer:
-        palletizer.run(for_=22.0)
+        palletizer.run(for_=35.0)
         write_picture(palletizer, IMAGES / "palletizer.svg")
 
 

@@ -4,10 +4,12 @@
 #unbrake OUT2
 #full OUT3
 #holdBelt OUT4
+#nextPallet OUT8
 #isThere IN4
 #isHeld IN5
 #hasPower IN6
 #start IN7
+#hasPallet IN8
 #homeSpeed -150
 
 // In mm. Home is above the box that waits on the belt, so high that a box in the cup passes over it.
@@ -15,7 +17,7 @@
 #atBelt 109
 #atPallet 259
 #firstX 300
-#firstY 60
+#firstY 160
 #pitchX 130
 #pitchY 110
 #boxHeight 80
@@ -27,6 +29,10 @@ OUTPUTS = 0
 SET isLost = ON
 CFGINT_IN6 = FALL
 SET n = 0
+
+MAIN:
+nextPallet = ON
+n = 0
 WHILE n < boxes
     SET x = 0
     SET y = 0
@@ -41,6 +47,8 @@ WHILE n < boxes
     z = top
     JUMP GO
     holdBelt = OFF
+    WAIT hasPallet = ON
+    nextPallet = OFF
     JUMP PLACE_OF_N
     JUMP GO
     z = atPallet - lift
@@ -52,10 +60,11 @@ WHILE n < boxes
     JUMP GO
 ENDWHILE
 
-STACKED:
-    full = ON
-    WAIT full = OFF
-JUMP STACKED
+// The pallet leaves when its stop lets it go.
+full = ON
+WAIT hasPallet = OFF
+full = OFF
+JUMP MAIN
 
 // The place of box n, cell by cell and layer by layer.
 PLACE_OF_N:
