@@ -16,7 +16,7 @@ from steptwin.simulation.components.logic import TerminalComponent
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementLocation, StatementUse
-from steptwin.simulation.logic.expression import parse_condition
+from steptwin.simulation.logic.expression import parse_condition, parse_expression
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
@@ -242,7 +242,8 @@ class Causes:
         workpiece = self._of_workpiece(name, change)
         if workpiece is not None:
             return workpiece
-        if not sources and (followed := self._of_followed(name, change)) is not None:
+        followed = self._of_followed(name, change) if not sources or getattr(self._specs[name], "rate", None) else None
+        if followed is not None and all(followed.place > Place(one.time, one.order) for one, _ in last):
             return followed
         acts = Cover.ACTION if type(part).deadline is not TerminalComponent.deadline else None
         latest, source = max(last, key=lambda found: (found[0].time, found[0].order), default=(None, ""))
@@ -267,12 +268,13 @@ class Causes:
         spec: Any = self._specs.get(name)
         if spec is None:
             return ()
-        when, of = getattr(spec, "when", None), getattr(spec, "of", None)
-        axes = [getattr(spec, one, None) for one in ("axis", "other")] if not (when or of) else []
+        when, of, rate = (getattr(spec, one, None) for one in ("when", "of", "rate"))
+        axes = [getattr(spec, one, None) for one in ("axis", "other")] if not (when or of or rate) else []
         turned_by = getattr(spec, "shaft", None)
-        found = [*(parse_condition(when).names() if when else ()), *([of] if of and of != TIME else ())]
+        found = [*(parse_condition(when).names() if when else ()), *([of] if of else ())]
+        found += parse_expression(rate).names() if rate else ()
         found += [f"{axis}.position" for axis in axes if axis]
-        return (*dict.fromkeys(found), *(self._followed(turned_by) if turned_by else ()))
+        return (*dict.fromkeys(one for one in found if one != TIME), *(self._followed(turned_by) if turned_by else ()))
 
     def _of_followed(self, name: str, change: Change) -> FoundCause:
         """The last cause by a moment of what an element follows; that of the same moment, if there is one."""

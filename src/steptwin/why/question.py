@@ -446,19 +446,22 @@ class Why:
         return causes.at_moment(owner, time, wanted, rest)
 
     def _moving(self, signal: str, at: Nanos) -> Asking:
-        """Cause of a quantity that changes all the time: the motion, or since when a point of a controller stands."""
+        """Cause of a quantity that changes all the time: the motion, or since when it stands."""
         world = self.log.world
         other = yield from self._world_at(at)
         value, full = other.read(signal), self._canonical(signal)
         unit = world.signal(signal).unit
         state = IS_IN_UNIT(name=signal, value=value, unit=unit) if unit else IS(signal=signal, value=f"{value:.6g}")
         standing = other.signal(signal)
-        if self._point(signal) is not None and isinstance(standing, SignalOf) and rest_of(standing, at) is not None:
+        if isinstance(standing, SignalOf) and rest_of(standing, at) is not None:
             _, since = yield from self._from_run(f"{signal} == {value!r}", {signal: full}, at, is_bare=False)
-            changed = None if since is None else self._changed((full,), since)
+            if self._point(signal) is None:  # what left it where it is may have come a moment after it was there
+                changed = covered(self._of_unrecorded(full, at), Cover.LEVEL)
+            else:
+                changed = None if since is None else self._changed((full,), since)
             return (yield from self._answer(signal, at, state, since, changed))
         first = self._of_unrecorded(full, at)
-        return (yield from self._answer(signal, at, state, None if first is None else first.link.time, first))
+        return (yield from self._answer(signal, at, state, at, first))
 
     # ------------------------------------------------------------------ programs
 

@@ -131,6 +131,8 @@ TABLE = (
         "OUT2 = ON\nOUT3 = ON\nDELAY 0.1\nOUT3 = OFF\nDELAY 0.1\nOUT1 = ON\nDELAY 1\n", 1, 200, "OUT2 = ON\n" + SLEEP,
     ),
     Acts("brown-out element=e from_s=0.2", "[[supply]]\nname = 'e'\nfeeds = 'c'\n", SLEEP, 1, 200, None),
+    Acts("dead-motor element=e", "[[dcmotor]]\nname = 'e'\nspeed = 60\nrun = 'c.OUT1'\n", ON, 1, 100),
+    Acts("other-rate element=e", "[[integrator]]\nname = 'e'\nrate = '2 * c.OUT1'\n", ON, 1, 100),
     Acts("other-load element=e", MOTOR + "[[load]]\nname = 'e'\naxis = 'x'\nmass = 0.1\nwhen = 'c.OUT1'\n", ON, 1, 100),
     Acts("other-load element=e factor=0", MOTOR + "[[load]]\nname = 'e'\naxis = 'x'\nmass = 0.1\nwhen = 'c.OUT1'\n", ON, 1, 100),
 )  # fmt: skip
