@@ -38,6 +38,24 @@ def test_sides_to_which_a_program_homes(text: str, expected: dict[int, frozenset
     assert sides(text) == expected
 
 
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("M1 = ON\nVABS M1 5\nWAITPOS\n", 3),
+        ("M1 = ON\nM2 = ON\nVABS M1 -5\nOUT1 = ON\nPABS M2 3\nWAITPOS\nBRAKE M1\n", 6),
+        ("M1 = ON\nVABS M1 5\nDELAY 1\nBRAKE M1\nWAITPOS\n", None),
+        ("M1 = ON\nVABS M1 5\nPABS M1 0\nWAITPOS\n", None),
+        ("M1 = ON\nVABS M1 0\nWAITPOS\n", None),  # it brakes
+        ("M1 = ON\nVABS M1 5\nM1 = OFF\nWAITPOS\n", None),
+        ("M1 = ON\nVABS M1 5\nIF IN1 = ON\nSTOP M1\nENDIF\nWAITPOS\n", None),  # perhaps
+        ("CFGINT_IN1 = RIS\nM1 = ON\nVABS M1 5\nWAITPOS\nEND\nINT_IN1:\nSTOP M1\nRETURN\n", None),
+    ],
+)
+def test_a_wait_for_the_end_of_a_velocity(text: str, line: int | None) -> None:
+    found = [one for one in check(text).diagnostics if one.code == "W225"]
+    assert [text.count("\n", 0, one.span.start) + 1 for one in found] == ([] if line is None else [line])
+
+
 def test_an_interrupt_without_label_is_told_once() -> None:
     found = check("CFGINT_IN1 = RIS\nCFGINT_IN2 = RIS\nDELAY 1\nCFGINT_IN1 = ON\n").diagnostics
     assert [one.message for one in found if "interrupt" in one.message] == [

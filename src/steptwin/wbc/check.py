@@ -62,6 +62,7 @@ def check_program(
     executable = resolution.executable
     diagnostics += resolution.diagnostics
     diagnostics += usage.endless_waits(executable)
+    diagnostics += usage.waits_for_velocity(executable)
     wrong = [step for step in executable.steps if isinstance(step, IllegalStep)]
     if not any(step.opaque for step in wrong):
         paths = flow.flow_of(executable.steps)

@@ -166,5 +166,6 @@ WAITS_FOR_VARIABLE = _row("W221", "a WAIT for variables that no interrupt change
 LONG_TIME = _row("W222", "a time in seconds that looks like milliseconds")
 TOO_FAST = _row("W223", "a velocity above what the pulse outputs give")
 NOT_IN_REAL = _row("W224", "a number that REAL cannot hold by half or more")
+WAITS_FOR_VELOCITY = _row("W225", "a WAITPOS for an axis that moves with a velocity, without end")
 TABLE_NAME = _row("W250", "a name of the position table cannot be written after @")
 INFERRED = _row("W260", "statements of an image whose form was inferred")

@@ -26,6 +26,10 @@ HOME_POSITIVE = Message(
     "wbc.home-positive", "give In{side} of [Axis{axis}] an input, or home to {other} with a positive velocity"
 )
 GEARS_OF_AXES = Message("wbc.gears-of-axes", "GEAR of M1 is {one:g}, of M2 {other:g} pulses per unit")
+WAITS_FOR_VELOCITY = Message(
+    "wbc.waits-for-velocity", "this WAITPOS does not end by itself: VABS moves M{axis} until something stops it"
+)
+STOP_IT_BEFORE = Message("wbc.stop-it-before", "write BRAKE M{axis} before it; otherwise only a limit switch or a master ends it")
 WAIT_NEVER_ENDS = Message("wbc.wait-never-ends", "this WAIT never ends: its condition is never true")
 READS = Message("wbc.reads", "{name} reads {domain}")
 ABOVE_OUTPUTS = Message("wbc.above-outputs", "{value} u/s at GEAR {gear:g} of M{axis} are {speed_p:.10g} pulses/s")
@@ -73,6 +77,34 @@ def endless_waits(executable: s.Executable) -> list[Diagnostic]:
         for step in executable.steps
         if isinstance(step, s.WaitStep) and outcome(step.condition) is False
     ]
+
+
+def waits_for_velocity(executable: s.Executable) -> list[Diagnostic]:
+    """WAITPOS straight behind a VABS of an axis that nothing stops between them."""
+    if executable.entries:
+        return []  # an interrupt may stop it
+    steps, found = executable.steps, dict[int, Diagnostic]()
+    for begin, motion in enumerate(steps):
+        if not isinstance(motion, s.MotionStep) or motion.keyword != "VABS":
+            continue
+        if not isinstance(motion.value, s.Literal) or _is_zero(motion.value):
+            continue
+        for number in range(begin + 1, len(steps)):
+            step = steps[number]
+            if isinstance(step, s.WaitPosStep):
+                message = WAITS_FOR_VELOCITY(axis=motion.axis)
+                found[number] = f.WAITS_FOR_VELOCITY.at(step, message, STOP_IT_BEFORE(axis=motion.axis))
+                break
+            if step.after(number) != (number + 1,) or _may_stop(step, motion.axis):
+                break
+    return list(found.values())
+
+
+def _may_stop(step: s.ProgramStep, axis: int) -> bool:
+    effect = step.effect()
+    target = step.target if isinstance(step, s.SetStep) else None
+    is_register = isinstance(target, s.RegisterOperand) and target.row.key != "OUT"
+    return is_register or effect.any_drive or effect.drive == axis
 
 
 def _domain_hint(condition: s.StepCondition) -> MessageText | None:
