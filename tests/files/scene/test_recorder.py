@@ -141,7 +141,8 @@ def test_a_recorded_scene_is_where_the_world_is(path: str | None) -> None:
     scene = recorded(World.load(file), 16.0)
     wanted = SceneScript(scene.machine).wanted()
     assert set(wanted["signals"]) <= scene.motions.keys()
-    assert set(wanted["levels"]) <= scene.levels.keys()
+    assert set(wanted["levels"]) <= scene.levels.keys() | scene.motions.keys()
+    lamps = [f"{body.name}.lit" for body in scene.machine.scene.bodies if body.lit is not None]
     world = World.load(file)
     for now in moments(16.0, 150):
         world.advance(now)
@@ -155,6 +156,8 @@ def test_a_recorded_scene_is_where_the_world_is(path: str | None) -> None:
                 )
         for signal, changes in scene.levels.items():
             assert [level for moment, level in changes if moment <= now][-1] == world.read(signal), (signal, now)
+        for lamp in lamps:
+            assert scene.value(lamp, now) == world.read(lamp), (lamp, now)
         check_workpieces(scene, world, now)
 
 
