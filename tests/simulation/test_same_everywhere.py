@@ -19,7 +19,7 @@ FAULTS = {
     "pick_and_place_1d": "leak element=cup from_s=8.2 until_s=8.4",
     "pick_and_place": "leak element=cup from_s=8.2 until_s=8.4",
     "plotter": "stall machine=cell axis=3 at_s=4 for_s=0.5",
-    "winder": "stuck-follower element=guide from_s=8",
+    "winder": "dead-motor element=reel from_s=8",
 }
 """What makes more happen."""
 RUN_S = 20

@@ -117,6 +117,14 @@ def test_an_encoder_on_a_belt_of_an_axis_counts_its_load() -> None:
     assert device.axis[1].encoder == 140, "7 units are 14 mm"
 
 
+def test_an_encoder_on_a_motor_slips() -> None:
+    here = world()
+    here.fault("slip machine=c axis=2 counts=-40 at_s=1")
+    here.mic488["c"].write("OUT1", 1)
+    here.run(until=3.0)
+    assert here.mic488["c"].axis[2].encoder == 1460
+
+
 def test_a_dead_motor_coasts() -> None:
     here = world()
     here.fault("dead-motor element=reel from_s=2 until_s=3")

@@ -107,6 +107,7 @@ class Mechanism(Stateful):
 
     FIXED: ClassVar[tuple[str, ...]] = (
         "_encoders",
+        "_others",
         "_name",
         "_power",
         "_revision",
@@ -156,6 +157,8 @@ class Mechanism(Stateful):
         self.number = number
         self.build = build
         self._encoders: list[EncoderBuild] = []
+        self._others: list[EncoderBuild] = []
+        """Encoders of its axis that it does not turn."""
         self._coupled = False
         """Whether the encoders were coupled to a trajectory instead of the drive."""
         self._due: Nanos | None = None
@@ -488,6 +491,10 @@ class Mechanism(Stateful):
             self._simple = False
         self._turn_encoders(now)
 
+    def read(self, encoder: EncoderBuild) -> None:
+        """Let an encoder that something else turns slip as one of its own does."""
+        self._others.append(encoder)
+
     @property
     def may_turn(self) -> set[str]:
         """Controllers whose encoders it may turn without an event of theirs."""
@@ -555,7 +562,7 @@ class Mechanism(Stateful):
 
     def slip(self, counts: int, now: Nanos) -> None:
         """Let the encoders slip by ``counts`` on their shaft."""
-        for encoder in self._encoders:
+        for encoder in (*self._encoders, *self._others):
             encoder.device.turn_encoder(encoder.axis, counts, now)
         self._scheduler.notify(self.controller)
 
