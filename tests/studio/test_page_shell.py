@@ -175,7 +175,7 @@ def test_nor_with_the_panels_of_a_machine_open(start_studio: Callable[..., Proce
     found += [f"Keys: {what}" for what in serious(page)]
     page.keyboard.press("Escape")
     show(page, "Axes")
-    button(page, "Jog feeder +").hover()
+    button(page, "Jog shuttle +").hover()
     page.mouse.down()
     found += [f"a held button: {what}" for what in serious(page)]
     page.mouse.up()
