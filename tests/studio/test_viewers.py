@@ -6,12 +6,15 @@ import asyncio
 import contextlib
 import json
 from collections.abc import Awaitable, Callable
-from typing import Any
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from tests.support.studio_rig import Studio, check_message
 from virtual_loop import run_virtually
 
+from steptwin.studio.servicerequests import ShownGateway, WorldServices
 from steptwin.studio.viewers import MOST_UNSENT, PATIENCE_S, ViewerConnection
 
 ASKED = {"type": "websocket.receive", "text": '{"do": "time"}'}
@@ -237,3 +240,29 @@ def test_a_viewer_that_comes_later_has_the_events_from_before_and_is_sent_what_s
     studio.run(2000)
     first.read()
     assert [name for message in first.messages[sent:] for name in message if name == "standing"] == []
+
+
+def test_a_gateway_that_is_down_stands_since_it_was_up_last() -> None:
+    studio = Studio()
+    shown = ShownGateway(
+        "mqtt", "MQTT", "mqtt://127.0.0.1:1", is_up=False, text="refused", shown=1, has_clients=False, clients=()
+    )
+    gateways = [shown]
+    services = SimpleNamespace(gateways=lambda: gateways)
+    studio.hub.around = replace(studio.hub.around, services=cast("WorldServices", services))
+
+    def down(standing: list[dict[str, Any]]) -> list[tuple[str, str, str | None]]:
+        return [(one["name"], one["text"], one["since_ns"]) for one in standing if one["kind"] == "gateway"]
+
+    tab = studio.open()
+    assert down(tab.newest("hello")["standing"]) == [("mqtt", "refused", None)]
+    gateways[:] = [replace(shown, is_up=True)]
+    studio.run(300)
+    tab.read()
+    assert down(tab.newest("standing")) == []
+    gateways[:] = [shown]
+    studio.run(300)
+    tab.read()
+    ((_, _, since),) = down(tab.newest("standing"))
+    assert since is not None
+    assert 300_000_000 <= int(since) <= 600_000_000

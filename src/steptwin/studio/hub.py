@@ -356,7 +356,9 @@ class Hub:
     def present(self) -> tuple[dict[str, object], int]:
         """The state of the subject for the message hello but its description, and the number of the command that has read it."""
         plans = [plan.to_json() for plan in self.subject.plans(filter_of(["plan", "sample"]))]
-        data: dict[str, object] = {**self.subject.present(), "plans": plans, **self.log.to_json()}
+        self._look_at_standing()
+        standing = [to_json(one) for one in self._standing]
+        data: dict[str, object] = {**self.subject.present(), "standing": standing, "plans": plans, **self.log.to_json()}
         self.streams.flush()
         return data, self.subject.result_of(None).number
 

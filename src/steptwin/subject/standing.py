@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from steptwin.controller import SECOND, Nanos
-from steptwin.controllerstate import StatusLevel
+from steptwin.controllerstate import ProgramActivity, StatusLevel
 from steptwin.diagnostics import visible
 from steptwin.jsonvalues import Moment, Sentence
-from steptwin.messages import Message, MessageText
+from steptwin.messages import Message, MessageText, text_of
 from steptwin.simulation.components.element import Stands
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.faults import ActiveFault, Layer
@@ -49,6 +49,7 @@ class StandingState:
 
 
 WAITS_AT = Message("subject.waits-at", "waits at line {line}: {statement}")
+ALARM_WITH_PROGRAM = Message("subject.alarm-with-program", "{status}; the program is {program}")
 FAULT_IS_SET = Message("subject.fault-is-set", "fault {fault}")
 WITH_LEVELS = Message("subject.waits-with-levels", "{text} ({levels})")
 LEVEL_IS = Message("subject.level-is", "{name} is {level:g}")
@@ -112,7 +113,14 @@ class Standing:
             reader = self._world.kind(name).state
             status = reader.status(controller, now)
             if status.level is not StatusLevel.OK:
-                yield StandingState(StandingKind.ALARM, name, status.text, self._since(now, name), name)
+                program = reader.program(controller, now)
+                has_ended = program.state is ProgramActivity.STOPPED and program.text != status.text
+                text = (
+                    ALARM_WITH_PROGRAM(status=text_of(status.text), program=text_of(program.text)) if has_ended else status.text
+                )
+                has_point = any(one.path == "status" for one in reader.datasheet(controller).points)
+                question = f"{name}.status" if has_point else name
+                yield StandingState(StandingKind.ALARM, name, text, self._since(now, name), question)
             for axis in reader.datasheet(controller).axes:
                 found = reader.axis(controller, axis, now).status
                 if found.level is not StatusLevel.OK:
