@@ -127,7 +127,7 @@ class _Gltf:
 
     def _add_solids(self, frames: Sequence[str]) -> None:
         scene = self._scene
-        pieces = {name: next(one.place for one in stints if one.place is not None) for name, stints in scene.workpieces.items()}
+        pieces = {name: place for name, stints in scene.workpieces.items() for _, place in stints[::-1] if place is not None}
         solids = SceneScript(scene.machine).call("solids", to_json(tuple(pieces.values())))
         for solid in solids[: len(solids) - len(pieces)]:
             carrying = self._carrying if solid["isCarried"] else self._standing
@@ -158,7 +158,7 @@ class _Gltf:
     # ------------------------------------------------------------------ motions
 
     def _spans(self, signal: str, begin: Nanos, end: Nanos) -> list[tuple[Nanos, Cubic]]:
-        """Polynomials from ``begin`` to ``end``, each with its end; none where all is at rest at 0."""
+        """Polynomials from ``begin`` to ``end``, each with its end; none where the signal is unknown."""
         spans = self._scene.motions.get(signal, [])
         first = max(bisect_right(spans, begin, key=lambda one: one.begin) - 1, 0)
         last = bisect_right(spans, end, key=lambda one: one.begin)
