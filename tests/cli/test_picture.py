@@ -75,7 +75,9 @@ def test_formats_of_a_machine_in_space(run: Run, tmp_path: Path) -> None:
     assert trace.with_suffix(".glb").read_bytes()[:4] == b"glTF"
     assert "steptwinScene" in trace.with_suffix(".html").read_text("utf-8")
     flat = tmp_path / "f.glb"
-    code, _, err = run("run", EXAMPLES / "winder/winder.toml", "--for", "1s", "--trace", flat)
+    world = tmp_path / "flat.toml"
+    world.write_text('[[mic488]]\nname = "table"\n', "utf-8")
+    code, _, err = run("run", world, "--for", "1s", "--trace", flat)
     assert code == 2
     assert "this trace has no machine in space" in err
     assert not flat.exists()

@@ -68,10 +68,8 @@ def test_files(tmp_path: Path, name: str, begin: bytes) -> None:
 
 
 def test_a_world_without_space_and_a_script_that_was_not_built(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    with pytest.raises(
-        Misuse, match=r"^winder has no places in space, so nothing can be drawn: give its elements at, on or along"
-    ):
-        write_picture(World.load(WORLDS / "winder/winder.toml"), tmp_path / "p.svg")
+    with pytest.raises(Misuse, match=r"^flat has no places in space, so nothing can be drawn: give its elements at, on or along"):
+        write_picture(World.from_toml('[world]\nname = "flat"\n[[mic488]]\nname = "t"\n'), tmp_path / "p.svg")
     with pytest.raises(Misuse, match=r"p.pdf: pictures are .svg or .png$"):
         write_picture(World.load(WORLDS / "hoist/hoist.toml"), tmp_path / "p.pdf")
     with monkeypatch.context() as without:
