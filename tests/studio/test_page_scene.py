@@ -168,6 +168,12 @@ def test_a_thing_is_selected_in_the_picture_or_in_the_list(studio: Studio) -> No
     expect(page.get_by_label("x place")).to_have_text("0.00")
     expect(card).to_have_count(0)
     assert serious(page) == []
+    page.get_by_label("Selected").select_option("belt")
+    button(page, "Remove belt.1").click()
+    expect(button(page, "Remove belt.2")).to_be_visible()  # which was fed into its place
+    expect(button(page, "Remove belt.1")).to_have_count(0)
+    button(page, "Put a workpiece").click()
+    expect(page.get_by_text(re.compile("room"))).to_be_visible()
     page.get_by_label("Selected").select_option("")
     expect(page.get_by_label("x place")).to_have_count(0)
 

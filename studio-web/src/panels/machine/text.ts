@@ -60,6 +60,9 @@ export const t = texts(
     clear: "Clear",
     clearFault: "Clear {name}",
     setFault: "Set a fault",
+    put: "Put a workpiece",
+    remove: "Remove",
+    removePiece: "Remove {name}",
   },
   {
     title: "Maszyna",
@@ -118,5 +121,8 @@ export const t = texts(
     clear: "Usuń",
     clearFault: "Usuń {name}",
     setFault: "Ustaw usterkę",
+    put: "Połóż detal",
+    remove: "Zabierz",
+    removePiece: "Zabierz {name}",
   },
 );
