@@ -232,3 +232,61 @@ def test_a_viewer_gets_workpieces_when_they_go_elsewhere() -> None:
     assert [one / 1e6 for one in pose(body.frame, FLOOR, world.now).at] == pytest.approx([350, -2 - way, 100], abs=1e-4)
     world.run(for_=9.0)
     assert "infeed.1" not in {one.name for one in subject.workpieces()}
+
+
+LIFT = """
+[[mic488]]
+name = "c"
+[[conveyor]]
+name = "main"
+length = 200
+speed = 100
+run = "c.OUT1"
+feed_every = "2 s"
+workpiece = [40, 30, 20]
+next = "up"
+at = [0, 0, 100]
+[[cylinder]]
+name = "lift"
+extend = "c.OUT2"
+stroke = 80
+at = [200, 0, 20]
+along = "+z"
+[[conveyor]]
+name = "up"
+length = 200
+speed = 100
+run = "c.OUT3"
+on = "lift"
+at = [0, 0, 0]
+"""
+
+
+def test_a_belt_hands_over_where_the_next_one_begins_at_that_moment(tmp_path: Path) -> None:
+    """The middle of a workpiece comes to the end 2.2 s after it was fed; a lift that is 80 mm lower catches the first one."""
+    script = """
+    [[script]]
+    name = "s"
+    steps = [{ write = { "c.OUT1" = 1 } }, { wait = "4.5 s" }, { write = { "c.OUT2" = 1, "c.OUT3" = 1 } }]
+    """
+    world = World.from_toml(LIFT + script)
+    check_it_can_be_restored(world, World.from_toml(LIFT + script), 4.25, 6.25, tmp_path)
+    events = [(one.time / SECOND, str(one.value)) for one in world.trace.of("event") if "main.3" not in str(one.value)]
+    assert [text for _, text in events[2:]] == [
+        "main.1 leaves main",
+        "main.1 falls 80 mm",
+        "main.1 is on up",
+        "main.2 leaves main",
+        "main.2 is on up",
+    ]
+    assert [time for time, _ in events[2:]] == pytest.approx([4.2, 4.2, 4.2 + (0.16 / 9.80665) ** 0.5, 6.2, 6.2], abs=2e-8)
+    there = {name: pose(body.frame, FLOOR, world.now).at for name, body in world.objects.workpieces.bodies().items()}
+    assert there["main.2"] == pytest.approx([205 * 10**6, 0, 100 * 10**6], abs=10)
+
+
+def test_what_comes_to_the_end_while_the_next_belt_is_higher_falls_to_the_floor() -> None:
+    world = World.from_toml(LIFT.replace("20]\nalong", "180]\nalong"))
+    world.mic488["c"].write("OUT1", 1)
+    world.run(until=5.0)
+    assert told(world)[-1] == "main.1 lies on the floor"
+    assert world.read("up.count") == 0

@@ -12,8 +12,8 @@ from steptwin.messages import Message
 from steptwin.simulation.components.builtobjects import BuiltObjects
 from steptwin.simulation.components.conveyor import CONVEYOR, Conveyor
 from steptwin.simulation.components.frames import Frames, check_upright, sources_of
-from steptwin.simulation.components.mount import to_nm
-from steptwin.simulation.components.workpieces import Lie, body_in
+from steptwin.simulation.components.mount import UPRIGHT, to_nm
+from steptwin.simulation.components.workpieces import REACH_NM, Lie, body_in
 from steptwin.simulation.mechanics.belt import Belt, BeltDrive, ConstantDrive, Placed
 from steptwin.simulation.mechanics.mechanics import Mechanism
 from steptwin.simulation.mechanics.rampeddrive import RampedDrive
@@ -31,6 +31,7 @@ from steptwin.simulation.space.frames import (
     out_of_plane,
     path,
     placement,
+    pose,
 )
 from steptwin.simulation.space.pieces import (
     Gear,
@@ -41,6 +42,7 @@ from steptwin.simulation.space.pieces import (
     geared,
     pieces_of_drive,
     pieces_of_trajectory,
+    standing,
     summed,
 )
 
@@ -202,6 +204,22 @@ class BeltSpace:
         """How far a box reaches along and across the belt from its middle."""
         x, y = body.shape.half[:2] if isinstance(body.shape, Box) else (body.shape.radius, body.shape.radius)
         return (x, y) if self._along.axis == X else (y, x)
+
+    # ------------------------------------------------------------------ its end
+
+    def beyond_end(self, placed: Placed, now: Nanos) -> Frame | None:
+        """Where a workpiece is when its middle has left the end of the belt; None where the following belt begins there now: not
+        more than 2 mm lower or higher, and no farther away than it is long, besides half of both widths."""
+        following, spec = self._conveyor.following, self._conveyor.spec
+        if following is None or following.spec.name not in self._frames:
+            return None
+        beginning, end = self._frames.base(following.spec.name), self._at(to_nm(spec.length), 0)
+        x, y, z = (there - here for there, here in zip(pose(beginning, self._frame, now).at, end, strict=True))
+        room = placed.workpiece.length + (to_nm(spec.width) + to_nm(following.spec.width)) // 2
+        if abs(z) <= REACH_NM and max(abs(x), abs(y)) <= room:
+            return None
+        at = self._at(to_nm(spec.length) + EDGE_NM, self._across_at(placed, now))
+        return Frame(placed.workpiece.name, self._frame, at, Joint(standing(self._belt_q + placed.yaw_q), UPRIGHT, turns=True))
 
     # ------------------------------------------------------------------ taking and putting
 

@@ -75,6 +75,7 @@ class Conveyor(TerminalComponent):
         "_seen",
         "_stops",
         "_turning_points",
+        "drop",
         "following",
         "preceding",
         "spec",
@@ -118,6 +119,8 @@ class Conveyor(TerminalComponent):
         self._turning_points = turning_points
         self._then = belt.position(block.scheduler.now)
         """The position of the belt at the last update: since then it has moved one way while anything stands."""
+        self.drop: Callable[[Placed, Nanos], bool] = lambda placed, now: False
+        """Lets a workpiece fall at its end where the following one does not begin there now. Whether it does."""
         self.following: Conveyor | None = None
         self.preceding: dict[str, Conveyor] = {}
         """Those of which it is the following one, by name."""
@@ -346,7 +349,7 @@ class Conveyor(TerminalComponent):
                 self._report(LEAVES, placed, "leaves")
                 if self.following is None:
                     self.takes_along(placed.workpiece.name, now)
-                else:
+                elif not self.drop(placed, now):
                     goes_on = True
                     self.following.take_over(self._left_alone(placed, now), belt, front - belt.length, now)
             elif front < 0:

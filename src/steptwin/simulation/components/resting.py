@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
+from functools import partial
 from math import sqrt
 from typing import ClassVar, NamedTuple
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message
-from steptwin.simulation.components.beltspace import add_belts
+from steptwin.simulation.components.beltspace import BeltSpace, add_belts
 from steptwin.simulation.components.bodytable import BodySpec, body_of
 from steptwin.simulation.components.conveyor import COLLIDES, CONVEYOR
 from steptwin.simulation.components.elementcontext import ElementContext
@@ -26,6 +27,7 @@ from steptwin.simulation.components.workpieces import (
     lie_in,
     workpiece_of,
 )
+from steptwin.simulation.mechanics.belt import Placed
 from steptwin.simulation.mechanics.workpiece import Workpiece
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.space.bodies import Body, half_height
@@ -263,6 +265,13 @@ class Resting(Stateful):
         self._report(FALLS(workpiece=workpiece.name, height=height / NM_PER_MM), workpiece, "falls")
         return False
 
+    def drop_from(self, belt: BeltSpace, placed: Placed, now: Nanos) -> bool:
+        """Let a workpiece fall at the end of a belt, unless the following belt begins there."""
+        frame = belt.beyond_end(placed, now)
+        if frame is not None:
+            self.release(placed.workpiece, frame, now)
+        return frame is not None
+
     def _lay(self, workpiece: Workpiece, frame: Frame, found: Below | None, now: Nanos) -> bool:
         """It lies on what is below it, otherwise on the floor. Whether it does: not where another workpiece is in its way."""
         if found is not None:
@@ -348,6 +357,9 @@ def resting_of(context: ElementContext, scheduler: Scheduler) -> Resting:
     add_belts(context.objects)
     for conveyor in context.objects.built(CONVEYOR).values():
         conveyor.takes_along = made.take_along
+    for belt in workpieces.holders:
+        if isinstance(belt, BeltSpace):
+            belt.conveyor.drop = partial(made.drop_from, belt)
     workpieces.holders.append(made)
     workpieces.falling = made.falling
     scheduler.add_part(made, None, WORKPIECES)

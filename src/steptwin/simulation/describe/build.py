@@ -10,10 +10,12 @@ from steptwin.controller import ControllerEvent, Nanos
 from steptwin.errors import Misuse
 from steptwin.simulation.components.beltspace import add_belts
 from steptwin.simulation.components.builtobjects import BuiltObjects
+from steptwin.simulation.components.conveyor import CONVEYOR
 from steptwin.simulation.components.element import AnyElement
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import NamedSpec
 from steptwin.simulation.components.registry import ELEMENTS
+from steptwin.simulation.components.resting import resting_of
 from steptwin.simulation.describe.blueprint import Blueprint, memory_file
 from steptwin.simulation.describe.connected import connected_names
 from steptwin.simulation.faults import Faults
@@ -166,6 +168,9 @@ class _Builder:
         for name in () if self.blueprint.memo.is_checked else frames:
             text.unless_wrong(frames.described[name].path, partial(frames.__getitem__, name))
         add_belts(self.objects)
+        for spec in self.spec.elements.of(CONVEYOR):
+            if spec.leaves_what_moves(self.spec.elements) and not text.findings:
+                resting_of(self.context, self.context.scheduler(spec.name))
 
     def _waits(self, element: AnyElement, spec: TableSpec) -> bool:
         """Whether it is over a signal of an element that is not built yet."""
