@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from io import BytesIO
 from pathlib import Path
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
+from PIL import Image
+from resvg_py import svg_to_bytes
 
 from steptwin.controller import SECOND
-from steptwin.files.scene.picture import write_picture
+from steptwin.files.scene.picture import View, picture, write_picture
 from steptwin.files.world import World
+from steptwin.live.studio.demo import FOLDER, describe_demo
+from steptwin.simulation.world.simulation import Simulation
 
 IMAGES = Path(__file__).parent / "images"
 CONTROLLER = """
@@ -383,6 +388,23 @@ until_s = 1.8
 """
 
 
+def draw_moving(name: str, world: Simulation, begin_s: int, seconds: int) -> None:
+    """A machine in space that moves, ten pictures a second."""
+    frames = []
+    for n in range(10 * seconds):
+        world.advance(begin_s * SECOND + n * SECOND // 10)
+        frames.append(as_image(picture(world, View.ISO), 720))
+    palette = frames[0].quantize(64)
+    first, *rest = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
+    first.save(IMAGES / f"{name}.gif", save_all=True, append_images=rest, duration=100, loop=0, optimize=True)
+
+
+def as_image(svg: str, width: int) -> Image.Image:
+    return Image.open(BytesIO(svg_to_bytes(svg_string=svg, width=width, background="white", skip_system_fonts=True))).convert(
+        "RGB"
+    )
+
+
 def main() -> None:
     mpl.rcParams["svg.hashsalt"] = "steptwin"
     presses = ((0.5, "stop1+"), (1.0, "stop1-"), (2.0, "stop2+"), (2.05, "stop2-"))
@@ -429,6 +451,8 @@ def main() -> None:
     draw(
         "gripper", GRIPPER, tries, 1.6, ("jaws.position",), ("table.OUT1", "jaws.pick", "jaws.opened", "jaws.closed", "jaws.held")
     )
+    demo = World.from_toml(describe_demo(free_ports=True), {"demo.prg": (FOLDER / "demo.prg").read_bytes()})
+    draw_moving("demo", demo, 6, 8)
 
     with World.load(IMAGES.parents[1] / "examples/worlds/palletizer/palletizer.toml") as palletizer:
         palletizer.run(for_=35.0)
