@@ -43,8 +43,9 @@ def missing(what: str, extra: str) -> Misuse:
     """
     names = lacking(extra)
     state = f"which {'is' if len(names) == 1 else 'are'} not installed"
-    if not names:  # installed, and broken
-        names, state = [_name(library) for library in libraries_of(extra)], "which could not be imported"
+    if not names:  # installed, and broken; or it was installed before it had this extra
+        names = [_name(library) for library in libraries_of(extra)] or [f"the extra {extra}"]
+        state = "which could not be imported"
     *others, last = names
     return Misuse(
         f"{what} needs {' and '.join([', '.join(others), last] if others else [last])}, {state}: "
