@@ -20,8 +20,8 @@ const kind = (fields: Partial<FaultKind>) => ({ layer: "physics", elements: [], 
 test("kinds are offered that something of the machine can have", () => {
   expect(canHappen(kind({ layer: "element", elements: ["cylinder"] }), model)).toBe(true);
   expect(canHappen(kind({ layer: "element", elements: ["relay"] }), model)).toBe(false);
-  expect(canHappen(kind({ layer: "bytes", lines: ["m1486"] }), model)).toBe(false);
-  expect(canHappen(kind({ layer: "frames", lines: ["modbus"] }), model)).toBe(true);
+  expect(canHappen(kind({ layer: "bytes", lines: ["M1486"] }), model)).toBe(false);
+  expect(canHappen(kind({ layer: "frames", lines: ["Modbus RTU", "M1486"] }), model)).toBe(true);
 });
 
 test("places and levels are chosen from what there is", () => {

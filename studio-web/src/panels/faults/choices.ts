@@ -5,7 +5,8 @@ import type { Model } from "../../lib/state/model";
 export function canHappen({ layer, elements, lines }: FaultKind, model: Model): boolean {
   if (layer === "element") return model.elements.some(({ kind }) => elements.includes(kind));
   if (layer === "physics") return model.controllers.some(({ isReal }) => !isReal);
-  return model.lines.some(({ kind }) => !lines.length || lines.includes(kind));
+  // `lines` are protocols, such as Modbus RTU on a line of kind modbus.
+  return model.lines.some(({ kind }) => !lines.length || lines.some((one) => one.toLowerCase().startsWith(kind)));
 }
 
 /** What a parameter can be, of what there is in the machine; none where it is a number or a text. */
