@@ -33,6 +33,7 @@ from steptwin.simulation.script.control import (
     Seek,
     StopAxes,
 )
+from steptwin.simulation.toml.keypaths import Path
 from steptwin.simulation.toml.names import WrongTerminal
 from steptwin.simulation.toml.reader import Key
 from steptwin.simulation.toml.table import TableSpec, key, table
@@ -152,6 +153,21 @@ class MotionEnds(NamedTuple):
     """No motion to a target is in progress."""
     reached: str
     """The last motion has reached its target."""
+
+
+class EndSwitch(NamedTuple):
+    """The input for the switch at an end of an axis (from 1), as a controller is configured."""
+
+    axis: int
+    direction: int
+    """That of pulses towards it: 1 or -1."""
+    pin: str
+    active: float
+    """Level of the pin at which it is on for the controller."""
+    stops: bool
+    """Whether the axis cannot move towards it while it is on."""
+    key: Path
+    """The key in the controller's table that names the pin."""
 
 
 class LineUnit(NamedTuple):
@@ -333,6 +349,14 @@ class ControllerKind(OptionalMethods, ABC, Generic[S, M, V]):
 
     def refuse_taken(self, controller: M, pin: str, /) -> None:
         """Raises `Misuse` for a pin that is neither input nor output as the controller is configured."""
+
+    def end_switches(self, controller: M, /) -> Iterable[EndSwitch]:
+        """Its inputs for the switches of its axes."""
+        return ()
+
+    def would_end_seek(self, controller: M, pin: str, /) -> bool:
+        """Whether a seek of an input (`steptwin.simulation.script.control.Seek`) would end without any motion now."""
+        return False
 
     @abstractmethod
     def scale(self, given: GivenScale, controller: M, axis: int, /) -> DriveScale:

@@ -8,7 +8,7 @@ again. A fixed sequence of steps is a `Walk`, whose state is its place in the se
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable
+from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias, cast
 
@@ -289,6 +289,15 @@ Step: TypeAlias = (
 )
 Steps: TypeAlias = Generator[Step, Any, None]
 """A script in Python: its steps may depend on the results of earlier steps."""
+
+
+def flat(steps: Iterable[Step]) -> Iterator[Step]:
+    """Steps with those that are repeated instead of each `Repeat`, once."""
+    for step in steps:
+        if isinstance(step, Repeat):
+            yield from flat(step.steps)
+        else:
+            yield step
 
 
 @dataclass(frozen=True, slots=True)

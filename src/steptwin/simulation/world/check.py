@@ -10,6 +10,7 @@ from steptwin.diagnostics import Diagnostic, SourceText, in_order
 from steptwin.errors import Misuse
 from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.description import describe
+from steptwin.simulation.describe.endswitches import check_end_switches
 from steptwin.simulation.describe.includes import is_include
 from steptwin.simulation.describe.overlaps import check_overlaps
 from steptwin.simulation.describe.reach import check_reach
@@ -52,6 +53,7 @@ def diagnose(name: str, text: str, read: Callable[[str], bytes]) -> Diagnosis:
         objects = Simulation(blueprint, keep_trace=False, keep_inputs=False).objects
         check_overlaps(spec.text, objects)
         check_reach(spec.text, objects)
+        check_end_switches(spec, objects)
         found: Sequence[Diagnostic] = in_order([*spec.text.findings, *spec.text.warnings])
     except WorldError as error:
         found = error.findings

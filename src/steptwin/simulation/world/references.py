@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 from steptwin.errors import Misuse, Refusal
+from steptwin.messages import Message
+from steptwin.simulation.describe.overlaps import DOUBTFUL
 from steptwin.simulation.describe.spec import ScriptSpec
 from steptwin.simulation.describe.steptable import STEPS
 from steptwin.simulation.faults import Fault
+from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.control import Seek
 from steptwin.simulation.toml.keypaths import Path
@@ -20,11 +23,17 @@ from steptwin.simulation.world.model import Model
 from steptwin.simulation.world.motions import motion_ends, ordered
 from steptwin.tables import complete
 
+SETS_DRIVEN = Message("simulation.sets-driven", "{pin} is driven from {where}: this level lasts only until that drives it again")
+STUCK_INSTEAD = Message(
+    "simulation.stuck-instead-hint",
+    "{{ fault = {{ kind = 'stuck', machine = '{name}', pin = '{pin}', value = {level:g} }} }} holds it",
+)
+
 
 def check_scripts(model: Model, scripts: Sequence[ScriptSpec]) -> None:
     """Report every invalid step in the text of the description."""
     text = model.spec.text
-    set_somewhere = [step.fault for script in scripts for step in _all(script.steps) if isinstance(step, do.SetFault)]
+    set_somewhere = [step.fault for script in scripts for step in do.flat(script.steps) if isinstance(step, do.SetFault)]
     for script in scripts:
         if script.when is not None:
             try:
@@ -51,14 +60,6 @@ def _is_on_something_broken(model: Model, fault: Fault) -> bool:
     return any(map(text.may_be_broken, named)) if named else text.is_any_wrong(*text.controllers, "line", "axis")
 
 
-def _all(steps: Iterable[do.Step]) -> Iterator[do.Step]:
-    for step in steps:
-        if isinstance(step, do.Repeat):
-            yield from _all(step.steps)
-        else:
-            yield step
-
-
 def _check(model: Model, steps: Iterable[do.Step], path: Path, set_somewhere: Sequence[Fault]) -> None:
     text = model.spec.text
     for n, step in enumerate(steps):
@@ -74,8 +75,22 @@ def _check(model: Model, steps: Iterable[do.Step], path: Path, set_somewhere: Se
         for part in _parts(step):
             try:
                 check_step(model, part)
+                if isinstance(part, do.Set):
+                    _warn_of_driven(model, part, (*path, n))
             except Misuse as error:
                 text.wrong_reference((*path, n), error, f"step {n + 1}: ")
+
+
+def _warn_of_driven(model: Model, step: do.Set, path: Path) -> None:
+    """Warn of a level for an input that something else sets as well."""
+    ((name, given, level),) = step.levels
+    pin = PinName(name, model.input_pin(name, given, level))
+    its = model.objects.driven.get(pin)
+    if its is not None:
+        message = SETS_DRIVEN(pin=str(pin), where=model.spec.text.where(its))
+        model.spec.text.warn(
+            (*path, "set", f"{name}.{given}"), DOUBTFUL, message, STUCK_INSTEAD(name=name, pin=pin.pin, level=level)
+        )
 
 
 def _parts(step: do.Step) -> Sequence[do.Step]:

@@ -15,7 +15,7 @@ from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.eeprom import image_of, unpack
 from steptwin.m1486.lines import SEEK_ENDS_LOW, STEP_DIRECTION, interface
 from steptwin.m1486.microsteps import FULL_STEP, UNIT
-from steptwin.m1486.pins import CONTROL_PINS, LINE_PINS, OUTPUT_PINS, WAVEFORM, refuse_taken, settable_pin
+from steptwin.m1486.pins import CONTROL_PINS, LINE_PINS, OUTPUT_PINS, WAVEFORM, refuse_taken, seek_ends, settable_pin
 from steptwin.m1486.present import describe_program, state_of
 from steptwin.m1486.signals import STEP_PULSE_NS
 from steptwin.m1486.variants import Store, variant
@@ -119,6 +119,10 @@ class M1486Kind(ControllerKind[M1486Spec, M1486Chip, M1486View]):
 
     def refuse_taken(self, chip: M1486Chip, pin: str) -> None:
         refuse_taken(pin, chip.interface)
+
+    def would_end_seek(self, chip: M1486Chip, pin: str) -> bool:
+        line = line_number(pin)
+        return seek_ends(line, chip.io.levels[line])
 
     def scale(self, given: GivenScale, chip: M1486Chip, axis: int) -> DriveScale:
         per_rev, full_steps = motor(given.pulses_per_rev, given.full_steps)

@@ -11,7 +11,7 @@ from steptwin.diagnostics import SourceText
 from steptwin.errors import Refusal
 from steptwin.messages import Message
 from steptwin.mic488 import datasheet, points
-from steptwin.mic488.config import examine_config
+from steptwin.mic488.config import NO_INPUT, encoder_channel, examine_config
 from steptwin.mic488.configtext import config_text
 from steptwin.mic488.core import ANALOG_PINS, ENABLE_PINS, INPUT_PINS, OUTPUT_PINS, check_pin, check_turn
 from steptwin.mic488.device import Mic488Device
@@ -30,6 +30,7 @@ from steptwin.simulation.kinds.kind import (
     BuildContext,
     ControllerKind,
     EncoderInputs,
+    EndSwitch,
     LineUnit,
     MotionEnds,
     RunningWorld,
@@ -152,6 +153,16 @@ class Mic488Kind(ControllerKind[Mic488Spec, Mic488Device, Mic488View]):
     def input_pin(self, pin: str, level: float) -> str:
         check_pin(pin, level)
         return pin.upper()
+
+    def end_switches(self, device: Mic488Device) -> Iterator[EndSwitch]:
+        for axis in device.axes:
+            config = axis.config
+            for direction, bit, attribute in ((-1, 1, "in_kl"), (1, 2, "in_kr")):
+                pin = getattr(config, attribute)
+                if pin != NO_INPUT and encoder_channel(pin) is None:
+                    active = 1.0 - device.config.inputs[pin].level
+                    stops = bool(config.limit_mode & bit)
+                    yield EndSwitch(axis.number, direction, f"IN{pin + 1}", active, stops, (f"M{axis.number}", attribute))
 
     def scale(self, given: GivenScale, device: Mic488Device, axis: int) -> DriveScale:
         its = device.axes[axis - 1]
