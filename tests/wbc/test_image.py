@@ -217,13 +217,20 @@ def test_wbc_40_inferred_forms_are_written_only_on_request(row: str) -> None:
     assert data[64:80].hex(" ") == bytes.fromhex(record).ljust(16, b"\0").hex(" ")
 
 
-@pytest.mark.parametrize("line", ["END", "PULSE(OUT1, 2)", "OUT1 = IN1 + IN2", "$I5 = 1", "WAIT StatM1 >= 3"])
-def test_wbc_40_what_cannot_be_inferred_stays_refused(line: str) -> None:
+@pytest.mark.parametrize(
+    ("line", "hint"),
+    [
+        *((line, None) for line in ("END", "PULSE(OUT1, 2)", "OUT1 = IN1 + IN2", "$I5 = 1")),
+        ("WAIT StatM1 >= 3", "< is its opposite: an IF with < and its branches exchanged does the same"),
+        ("WAIT StatM1 <= 3", "> is its opposite: an IF with > and its branches exchanged does the same"),
+    ],
+)
+def test_wbc_40_what_cannot_be_inferred_stays_refused(line: str, hint: str | None) -> None:
     executable = check(f"M1 = ON\n{line}\n").executable
     assert executable is not None
     data, diagnostics = build(executable, parse_positions("")[0], inferred=True)
     assert data is None
-    assert [(d.code, d.hint) for d in diagnostics] == [("W160", None)]
+    assert [(d.code, d.hint) for d in diagnostics] == [("W160", hint)]
 
 
 def test_variables_and_other_interrupts_are_refused() -> None:

@@ -70,6 +70,7 @@ INFERRED_CLASSES = {
 }
 CONDITION_SIGNS = "=<>"
 """Conditions are one character: there is no room for <= and >=."""
+_OPPOSITES = {"<=": ">", ">=": "<"}
 
 _REAL = struct.Struct("<f")
 _SLOT_NUMBER = struct.Struct("<H")
@@ -77,6 +78,10 @@ _SLOT_NUMBER = struct.Struct("<H")
 
 class _NotEncodable(Exception):
     """A step whose record format is not documented; the text names it."""
+
+    def __init__(self, what: str, hint: str | None = None) -> None:
+        super().__init__(what)
+        self.hint = hint
 
 
 def build(executable: s.Executable, positions: PositionTable, *, inferred: bool = False) -> tuple[bytes | None, list[Diagnostic]]:
@@ -97,7 +102,8 @@ def build(executable: s.Executable, positions: PositionTable, *, inferred: bool 
             record = _Record(number)
             records.append(record.of(step).ljust(SLOT_BYTES, b"\0"))
         except _NotEncodable as reason:
-            diagnostics.append(f.NOT_ENCODABLE.at(step, MessageText(f"{reason} has no documented form in the image")))
+            message = MessageText(f"{reason} has no documented form in the image")
+            diagnostics.append(f.NOT_ENCODABLE.at(step, message, None if reason.hint is None else MessageText(reason.hint)))
         else:
             if record.inferred and not inferred:
                 message = f"{record.inferred[0]} has no documented form in the image"
@@ -189,7 +195,9 @@ class _Record:
 
     def condition(self, condition: s.StepCondition) -> bytes:
         if condition.sign not in CONDITION_SIGNS:
-            raise _NotEncodable(f"the comparison {condition.sign}")
+            opposite = _OPPOSITES[condition.sign]
+            hint = f"{opposite} is its opposite: an IF with {opposite} and its branches exchanged does the same"
+            raise _NotEncodable(f"the comparison {condition.sign}", hint)
         return self.value(condition.left) + condition.sign.encode("ascii") + self.value(condition.right)
 
     def value(self, source: s.ValueSource) -> bytes:
