@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from steptwin.controller import MILLISECOND, Nanos
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.motion.trig import QUARTER, cosine, length, sine
 from steptwin.simulation.space.bodies import (
     OVERLAP_NM,
@@ -30,6 +30,9 @@ NOISE_NM = 1e-5
 """More than the rounding errors of positions up to 10 m."""
 MOST_LOOKS = 4000
 """Looks of one search. What it has not come to by then is left to the next one."""
+
+TURNS_AHEAD_NS = 10 * SECOND
+"""What turns is searched no further: each turn costs looks, and most turns without an end, as in homing, are stopped soon."""
 
 
 class Look(NamedTuple):
@@ -149,7 +152,8 @@ class _Stretch:
 
     def _first(self, most: int, *, overlap: bool) -> Look:
         stays = self._stays_apart if overlap else self._stays_over
-        ahead = [(self.look(self._begin), self.look(self._end))]
+        last = min(self._end, self._begin + TURNS_AHEAD_NS) if self._turns else self._end
+        ahead = [(self.look(self._begin), self.look(last))]
         while ahead:
             begin, end = ahead.pop()
             if (begin.apart < OVERLAP_NM) is overlap:
@@ -164,7 +168,7 @@ class _Stretch:
                 return Look(begin.now)
             middle = self.look((begin.now + end.now) // 2)
             ahead += (middle, end), (begin, middle)
-        return NEVER
+        return NEVER if last == self._end else Look(last)
 
     def _stays_apart(self, begin: _Spot, end: _Spot) -> bool:
         """Whether they are apart along one direction all the time."""
