@@ -152,8 +152,11 @@ class _Stretch:
 
     def _first(self, most: int, *, overlap: bool) -> Look:
         stays = self._stays_apart if overlap else self._stays_over
-        last = min(self._end, self._begin + TURNS_AHEAD_NS) if self._turns else self._end
-        ahead = [(self.look(self._begin), self.look(last))]
+        begin, end = self.look(self._begin), self.look(self._end)
+        last = min(self._end, self._begin + TURNS_AHEAD_NS)
+        if self._turns and last < self._end and not stays(begin, end):
+            end = self.look(last)
+        ahead, last = [(begin, end)], end.now
         while ahead:
             begin, end = ahead.pop()
             if (begin.apart < OVERLAP_NM) is overlap:
