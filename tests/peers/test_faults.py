@@ -34,7 +34,7 @@ def test_time_out_and_exception_on_tcp(serve: Callable[..., Any]) -> None:
     with ModbusTcpClient("127.0.0.1", port=twin.tcp_port, timeout=WAIT_S, retries=0) as client:
         assert [read(client) for _ in range(3)] == ["answer", "exception 6", "no answer"]
     fault = twin.command("fault", "--json")
-    assert [(active["name"], active["happened"]) for active in json.loads(fault.stdout)] == [
+    assert [(active["name"], active["acted"]) for active in json.loads(fault.stdout)] == [
         ("busy", 1),
         ("no-answer", 1),
         ("late", 0),

@@ -56,7 +56,7 @@ Observe: TypeAlias = Callable[[World, Path], object]
 
 
 class FaultSeen(NamedTuple):
-    """A fault that is set. ``happened``: how often it has occurred."""
+    """A fault that is set. ``happened``: how often it has made a difference."""
 
     name: str
     fault: str
@@ -294,9 +294,9 @@ class LineRig(Rig):
 
     @property
     def faults(self) -> list[FaultSeen]:
-        """The faults that are set, and how often each has occurred. The twin's."""
+        """The faults that are set, and how often each has made a difference. The twin's."""
         __tracebackhide__ = True
-        return [FaultSeen(one["name"], one["fault"], one["happened"]) for one in self._do("faults", command.ListFaults())]
+        return [FaultSeen(one["name"], one["fault"], one["acted"]) for one in self._do("faults", command.ListFaults())]
 
 
 def _shortened(item: object) -> str:

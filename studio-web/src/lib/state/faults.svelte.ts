@@ -28,7 +28,7 @@ export interface ActiveFault {
   name: string;
   fault: string;
   seen: number;
-  happened: number;
+  acted: number;
 }
 
 const READ_MS = 1000;
