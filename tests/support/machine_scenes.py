@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from plant_scenes import CHIP
-from scenes import DRIVES, IN_MM, MOVES, QUICK, Scene, axis, controller, switch, table, wire
+from scenes import DRIVES, IN_MM, MOVES, OUTPUTS, QUICK, Scene, axis, controller, switch, table, wire
 
 PROGRAM = """
 COUNT = 0
@@ -66,6 +66,26 @@ HELD = "\n" + "\n".join(
 )
 
 MACHINE_SCENES: dict[str, Scene] = {
+    "quantities": Scene(
+        f"""
+{controller("c")}
+{table("cylinder", "valve", 'extend = "c.OUT1"', 'extend_time = "⟨60..200⟩ ms"', 'retract_time = "⟨20..90⟩ ms"', "stroke = 10")}
+{table("dcmotor", "pump", 'run = "c.OUT2"', "speed = ⟨30..300⟩", '?run_up = "⟨20..300⟩ ms"', '?coast = "⟨20..300⟩ ms"')}
+{table("integrator", "tank", 'unit = "l"', "start = 2.0", "low = 0.0", "high = ⟨3..6⟩")}
+rate = "⟨0.01..0.05⟩ * pump.speed - ⟨0.1..0.9⟩ * valve.position"
+?reset = "c.OUT3"
+{switch("integrator", "c.IN1", "above = ⟨2..3⟩", "?hysteresis = 0.2")}
+{switch("integrator", "c.IN2", "below = ⟨0.2..2.0⟩", '?contact = "NC"', '?bounce = "⟨1..5⟩ ms"')}
+{table("integrator", "used", 'unit = "l"', '?reset = "c.OUT4"')}
+rate = "0.5 * valve.position * (1 - tank.at_low) + 0.1 * tank.rate"
+
+! kind = "other-rate", element = "⟨tank|used⟩", factor = ⟨0.2..3.0⟩
+! kind = "dead-motor", element = "pump"
+* tank.value ⟨>|<⟩ ⟨1..4⟩ or used.value > ⟨0.1..2.0⟩
+* pump.speed > ⟨20..90⟩ and not tank.at_high
+""",
+        OUTPUTS,
+    ),
     "supplies": Scene(
         f"""
 {controller("c", 'program = "p.prg"', "start = true")}

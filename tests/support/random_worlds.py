@@ -143,7 +143,8 @@ def do_from_outside(world: World, text: str, files: Mapping[str, bytes]) -> None
         toml = TomlText("steps", f"steps = [{text}]")
         for step in read_steps(toml, ("steps",), toml.data["steps"]):
             if type(step) in ACTIONS:
-                world.apply_input(step)
+                with suppress(Refusal):  # no room, or no such workpiece
+                    world.apply_input(step)
             else:
                 world.at(world.time, step)
         return

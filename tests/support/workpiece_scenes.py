@@ -55,7 +55,13 @@ build_up = "⟨10..50⟩ ms"
 * cup.held or low.seen and tray.count < ⟨#1..5⟩
 * cup.dropped > ⟨#0..1⟩ or bump.hit
 """,
-        OUTPUTS + MOVES,
+        OUTPUTS
+        + MOVES
+        + """
+{ put = "p", front = ⟨1..90⟩ }
+{ put = "⟨p|tray⟩" }
+{ remove = "⟨p|tray⟩.⟨#1..4⟩" }
+""",
     ),
     "jaws in space": Scene(
         f"""
