@@ -452,7 +452,7 @@ def main() -> None:
         "gripper", GRIPPER, tries, 1.6, ("jaws.position",), ("table.OUT1", "jaws.pick", "jaws.opened", "jaws.closed", "jaws.held")
     )
     demo = World.from_toml(describe_demo(free_ports=True), {"demo.prg": (FOLDER / "demo.prg").read_bytes()})
-    draw_moving("demo", demo, 6, 8)
+    draw_moving("demo", demo, 6, 10)
 
     with World.load(IMAGES.parents[1] / "examples/worlds/palletizer/palletizer.toml") as palletizer:
         palletizer.run(for_=35.0)
