@@ -9,6 +9,7 @@ import pytest
 from world_rig import check_it_can_be_restored
 
 from steptwin.controller import SECOND
+from steptwin.errors import Refusal
 from steptwin.files.world import World
 from steptwin.simulation.space.frames import FLOOR, pose
 from steptwin.simulation.toml.reader import WorldError
@@ -229,6 +230,43 @@ def test_what_it_cannot_push_is_an_event() -> None:
     text = BELT + ROD + BLADE + TRAY.replace("75", "40").replace("330", "300")
     world = pushing(text.replace('feed_every = "2 s"\n', ""), 6.0)
     assert [str(one.value) for one in world.trace.of("event")] == ["blade and tray.1 collide"]
+
+
+def test_what_it_comes_into_from_above_is_not_thrown_aside() -> None:
+    down = '[[cylinder]]\nname = "rod"\nextend = "c.OUT2"\nstroke = 90\nat = [300, 3, 200]\nalong = "-z"\n'
+    world = pushing(BELT + down + BLADE, 5.9)
+    assert [text for _, text in told(world)] == ["blade and main.1 collide"]
+    assert place_of(world, "main.1")[1] == 0.0
+    assert world.read("blade.pushed") == 0
+
+
+def test_nothing_is_put_where_it_is() -> None:
+    world = World.from_toml(BELT + ROD.replace("stroke = 120", "stroke = 80") + BLADE)
+    world.mic488["c"].write("OUT2", 1)
+    world.run(until=1.0)
+    with pytest.raises(Refusal, match="main has no room there"):
+        world.put("main", front=320.0)
+    world.put("main", front=200.0)
+
+
+@pytest.mark.parametrize(
+    ("stroke", "moves", "fed", "begins"),
+    [
+        (120, {5.0: 1, 6.0: 1}, "main.2", 5.0 + 100.0 / 400.0),  # pushed so that its strip begins at 15 mm
+        (80, {0.0: 1, 6.0: 0}, "main.1", 6.0 + 20.0 / 80.0 * 0.3),  # the blade has been in the way
+    ],
+)
+def test_a_feeder_that_waits_feeds_as_soon_as_there_is_room(
+    stroke: int, moves: dict[float, int], fed: str, begins: float
+) -> None:
+    belt = BELT.replace("length = 600", "length = 600\nwidth = 400").replace('"2 s"', '"2 s"\nfeed_waits = true')
+    world = World.from_toml(belt + ROD.replace("[300", "[-20").replace("stroke = 120", f"stroke = {stroke}") + BLADE)
+    for moment, level in moves.items():
+        world.run(until=moment)
+        world.mic488["c"].write("OUT2", level)
+    world.run(until=6.5)
+    times = [one.time / SECOND for one in world.trace.of("event") if str(one.value) == f"{fed} is on main"]
+    assert times == seconds(begins)
 
 
 @pytest.mark.parametrize(

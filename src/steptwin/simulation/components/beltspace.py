@@ -20,6 +20,7 @@ from steptwin.simulation.mechanics.rampeddrive import RampedDrive
 from steptwin.simulation.mechanics.workpiece import Workpiece
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.space.bodies import Body, Box
+from steptwin.simulation.space.contacts import Pair
 from steptwin.simulation.space.frames import (
     NM_PER_MM,
     Direction,
@@ -73,7 +74,9 @@ class BeltSpace:
         box = self._box(length // 2, to_nm(spec.width) // 2, 0)
         self._left = Direction(1 - self._along.axis, self._along.sign if self._along.axis == X else -self._along.sign)
         self._pushing: dict[str, Motion] = {}
+        self._pushers: list[Body] = []
         conveyor.belt.across_at = self._across_at
+        conveyor.belt.is_in_the_way = self._is_in_the_way
         self._top = Body(spec.name, self._frame, box, self._at(length // 2, 0))
         self._made: dict[Placed, Body] = {}
 
@@ -141,6 +144,15 @@ class BeltSpace:
             if step.joint is not None and step.joint.along.axis == self._left.axis:
                 yield step.frame, self._left.sign * step.joint.along.sign * (-1 if step.is_back else 1)
 
+    def add_pusher(self, pusher: Body) -> None:
+        """Raises `Misuse` for one that turns against the belt."""
+        self.pushing(pusher.name)
+        self._pushers.append(pusher)
+
+    def _is_in_the_way(self, placed: Placed, now: Nanos) -> bool:
+        room = self.rectangle(placed)
+        return any(Pair(pusher, room).overlap(now) for pusher in self._pushers)
+
     def pushing(self, pusher: str) -> Motion:
         """How a pusher moves to the left."""
         if pusher not in self._pushing:
@@ -172,6 +184,10 @@ class BeltSpace:
     def lane(self, placed: Placed) -> Body:
         """The space that it takes along the belt, whatever is beside it."""
         return self._space(placed, self._frame, (0, 0, 0), FAR_ASIDE_NM)
+
+    def entry(self, now: Nanos) -> Body:
+        """The space that the next workpiece takes at the beginning."""
+        return self.rectangle(self._conveyor.next_at(0, now))
 
     def strip(self, placed: Placed) -> Body:
         """The width that it takes, all along the belt."""

@@ -217,8 +217,13 @@ class Conveyor(TerminalComponent):
 
     def room_at(self, front: int, now: Nanos) -> bool:
         """Whether there is room for one of its workpieces with its front ``front`` steps from the beginning."""
-        placed = self.belt.place(self._workpiece(), front, now)
-        return self.belt.occupant(front - placed.length, front, now, beside=placed) is None
+        placed = self.next_at(front, now)
+        found = self.belt.occupant(front - placed.length, front, now, beside=placed)
+        return found is None and not self.belt.is_in_the_way(placed, now)
+
+    def next_at(self, front: int, now: Nanos) -> Placed:
+        """How the next one of its workpieces would lie with its front ``front`` steps from the beginning."""
+        return self.belt.place(self._workpiece(), front, now)._replace(held=front)
 
     def put_new(self, front: int, now: Nanos) -> str:
         """Put one of its workpieces where there is room for it; gives its name."""

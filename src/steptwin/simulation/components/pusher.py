@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
 from math import ceil, floor
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, TypeAlias
 
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
@@ -38,6 +38,14 @@ JAMS = Message("simulation.pusher-jams", "{pusher} stands: {workpiece} is pushed
 JAMS_NO_MORE = Message("simulation.pusher-is-free-again", "{pusher} is free again")
 
 
+_Strip: TypeAlias = tuple[str, int, int, str]
+"""What a workpiece takes of the width of a belt: the belt, how far its middle is to the left, the width, what pushes it."""
+
+
+def _strip_of(belt: BeltSpace, placed: Placed) -> _Strip:
+    return belt.conveyor.spec.name, placed.across, placed.width, placed.pusher
+
+
 class _Pushed(NamedTuple):
     """A workpiece that is pushed, and what may happen to it."""
 
@@ -67,11 +75,13 @@ class Pusher(Stateful):
     FIXED: ClassVar[tuple[str, ...]] = (
         "_belts",
         "_body",
+        "_entries",
         "_frames",
         "_probe",
         "_pushed",
         "_resting",
         "_scheduler",
+        "_strips",
         "_workpieces",
         "name",
     )
@@ -91,8 +101,14 @@ class Pusher(Stateful):
         """Workpieces that it is in, and cannot push."""
         self._jammed: tuple[str, str] | None = None
         """A belt, and the workpiece on it that is pushed against another one."""
-        self._lines: tuple[tuple[str, str], ...] = ()
-        """Workpieces that it pushes, and those that cannot pass them."""
+        self._entries = tuple(
+            (belt, BodyContact(SweptBody(body), SweptBody(belt.entry(scheduler.now)))) for belt in self._waiting()
+        )
+        """Of the belts whose feeders wait for room: whether it is in the way."""
+        self._strips: dict[tuple[_Strip, _Strip], BodyContact] = {}
+        """Whether two strips have something in common."""
+        self._lines: tuple[tuple[_Strip, ...], ...] = ()
+        """Strips of workpieces that it pushes with those that have something in common with them; the beginnings where it is."""
         self._due: Nanos | None = None
         self.count = 0
         """How often it began to push one."""
@@ -126,6 +142,8 @@ class Pusher(Stateful):
         before, behind = its_along + its_far - along + far, along + far - its_along + its_far
         conveyor = belt.conveyor
         least = min(to_left, to_right, before, behind)
+        if least >= TOUCH_NM:
+            return True
         if least in (to_left, to_right):
             # It is moved to where it only touches.
             moved, room = belt.pushing(self.name).at(now), aside + its_aside
@@ -133,7 +151,7 @@ class Pusher(Stateful):
             conveyor.belt.push(placed, place, self.name)
             self.count += 1
             self._report(PUSHES(pusher=self.name, workpiece=name, belt=conveyor.spec.name), name, "pushed")
-        elif least == before and before < TOUCH_NM:
+        elif least == before:
             conveyor.belt.bars += (Bar(name, conveyor.belt.from_nm(floor(along - far)), self.name),)
         else:
             return True
@@ -189,17 +207,26 @@ class Pusher(Stateful):
             self._jam(belt, name, others[0], now)
         yield from (back, facts.beside.change(now), facts.above.change(now), facts.against.change(now), facts.close.change(now))
 
+    def _waiting(self) -> Iterator[BeltSpace]:
+        return (belt for belt in self._belts if belt.conveyor.spec.feed_waits)
+
     def _pass(self, now: Nanos) -> Iterator[Nanos | None]:
-        """Let workpieces on the belts go on past those that it pushes, or no longer. When that changes."""
-        lines: list[tuple[str, str]] = []
+        """Let workpieces go on, or come onto a belt, past it and those that it pushes, or no longer. When that changes."""
+        strips: dict[tuple[_Strip, _Strip], BodyContact] = {}
         for belt, placed in self._those():
             near = [one for one in self._belts if one.conveyor.spec.name in belt.conveyor.line]
-            for its, other in ((one, other) for one in near for other in one.conveyor.belt.workpieces):
-                if other is not placed:
-                    contact = BodyContact(SweptBody(belt.strip(placed)), SweptBody(its.strip(other)))
-                    if contact.holds(now):
-                        lines.append((placed.workpiece.name, other.workpiece.name))
-                    yield contact.change(now)
+            others = [(one, other) for one in near for other in one.conveyor.belt.workpieces if other is not placed]
+            others += [(one, one.conveyor.next_at(0, now)) for one in self._waiting()]
+            # Most have their strip in common.
+            for strip, (its, other) in {_strip_of(*one): one for one in others}.items():
+                key = _strip_of(belt, placed), strip
+                strips[key] = self._strips.get(key) or BodyContact(SweptBody(belt.strip(placed)), SweptBody(its.strip(other)))
+        self._strips = strips
+        lines: list[tuple[_Strip, ...]] = [key for key, contact in strips.items() if contact.holds(now)]
+        entries = [(_strip_of(belt, belt.conveyor.next_at(0, now)), contact) for belt, contact in self._entries]
+        lines += [(strip,) for strip, contact in entries if contact.holds(now)]
+        for contact in (*strips.values(), *(one for _, one in entries)):
+            yield contact.change(now)
         if tuple(lines) != self._lines:
             self._lines = tuple(lines)
             for belt in self._belts:
@@ -279,6 +306,9 @@ class Pusher(Stateful):
         super().set_state(plain)
         self._probe.forget()
         self._pushed.clear()
+        self._strips = {}
+        for _, contact in self._entries:
+            contact.forget()
 
     def _report(self, text: str, name: str, what: str) -> None:
         scheduler = self._scheduler
@@ -311,9 +341,10 @@ def pusher_of(spec: BodySpec, context: ElementContext) -> Pusher:
     check_upright(spec.name, body.frame)
     around = body.shape if isinstance(body.shape, Box) else Box((body.shape.radius, body.shape.radius, body.shape.half))
     belts = [holder for holder in workpieces.holders if isinstance(holder, BeltSpace)]
+    pusher = Body(spec.name, body.frame, around, body.centre)
     for belt in belts:
-        belt.pushing(spec.name)
-    made = Pusher(scheduler, context, belts, Body(spec.name, body.frame, around, body.centre))
+        belt.add_pusher(pusher)
+    made = Pusher(scheduler, context, belts, pusher)
     sources = (*workpieces.sources, *sources_of(frames.carrying(body.frame)))
     scheduler.add_part(made, sources, spec.name)
     return made

@@ -164,6 +164,7 @@ class Belt(Stateful):
         "across_at",
         "drive",
         "following",
+        "is_in_the_way",
         "length",
         "name",
         "near",
@@ -191,9 +192,11 @@ class Belt(Stateful):
         self.workpieces: tuple[Placed, ...] = ()
         self.across_at: Callable[[Placed, Nanos], int] = lambda placed, now: placed.across
         """How far the middle of a workpiece is left of the middle of the belt, nm."""
+        self.is_in_the_way: Callable[[Placed, Nanos], bool] = lambda placed, now: False
+        """Whether something that pushes workpieces is where one is to lie."""
         self.bars: tuple[Bar, ...] = ()
         self.passings = 0
-        """How often one that is pushed has come beside another one, or before or behind it."""
+        """How often what is pushed or pushes has come beside a workpiece or a place for one, or before or behind it."""
         self.raised: tuple[int, ...] = ()
         """The places of the stops that are on."""
 
