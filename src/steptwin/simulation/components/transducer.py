@@ -100,7 +100,9 @@ def _measured(spec: TransducerSpec, scheduler: Scheduler, context: ElementContex
         signal.watch(name)
         if all(source.scheduler is not scheduler for source in signal.sync(scheduler.now)):
             raise Misuse(f"of = {spec.of!r} is not a quantity of what {spec.target[0]!r} is connected to")
-    return signals[quantity.text] if isinstance(quantity, SignalName) else CalculatedSignal(quantity, signals)
+    if isinstance(quantity, SignalName):
+        return signals[quantity.text]
+    return CalculatedSignal(quantity, signals, lambda: scheduler.now)
 
 
 def _build(spec: TransducerSpec, context: ElementContext) -> Transducer:

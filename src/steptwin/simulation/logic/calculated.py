@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from steptwin.controller import Nanos
@@ -23,7 +23,8 @@ class CalculatedSignal:
 
     unit = ""
 
-    def __init__(self, quantity: Quantity, signals: Mapping[str, Signal]) -> None:
+    def __init__(self, quantity: Quantity, signals: Mapping[str, Signal], clock: Callable[[], Nanos]) -> None:
+        """``clock`` gives the present moment of what computes the signals."""
         moving = [name for name, signal in signals.items() if signal.continuous]
         if len(moving) > 1:
             raise Misuse(SEVERAL_MOVE(names=moving))
@@ -32,7 +33,8 @@ class CalculatedSignal:
         self._value = value_of(quantity, {name: signal.value for name, signal in signals.items()})
         self._signals = tuple(signals.values())
         self._moving = signals[moving[0]] if moving else None
-        self._is_alone = len(signals) == 1
+        self._resting = tuple(signal for signal in signals.values() if not signal.continuous)
+        self._clock = clock
 
     @property
     def continuous(self) -> bool:
@@ -48,5 +50,9 @@ class CalculatedSignal:
         return iter(()) if self._moving is None else self._moving.turning_points(now)
 
     def version(self) -> object:
-        """None where others change it at events."""
-        return self._moving.version() if self._moving is not None and self._is_alone else None
+        """That of what moves, with the values of what does not."""
+        moving = None if self._moving is None else self._moving.version()
+        if self._moving is not None and moving is None:
+            return None
+        now = self._clock()
+        return moving, tuple(signal.value(now) for signal in self._resting)
