@@ -151,9 +151,9 @@ def test_what_is_on_it_moves_by_its_value() -> None:
     [
         ("pump.speed -", "pump.angle -", "rate: 'pump.angle' changes between events, and is not known to go on"),
         ("pump.speed -", "tank.rate -", "'tank' depends on itself"),
-        ("pump.speed -", "pump.speed * valve.position -", "pump.speed, valve.position change between events: multiplied"),
-        ("0.01 * pump.speed", "abs(pump.speed)", "pump.speed change between events: multiplied"),
-        ("0.01 *", "1 / pump.speed *", "pump.speed change between events: multiplied"),
+        ("pump.speed -", "pump.speed * valve.position -", "pump.speed, valve.position: multiplied"),
+        ("0.01 * pump.speed", "abs(pump.speed)", "pump.speed: multiplied"),
+        ("0.01 *", "1 / pump.speed *", "pump.speed: multiplied"),
         ("pump.speed -", "pump.sped -", r"no signal 'pump.sped' \(did you mean 'speed'\?\)"),
         ("0.01 *", "0.01 cm *", "0.01 cm is compared with what has no unit"),
         ("start = 20", "start = 50", "start = 50 is beyond low = 0 and high = 40"),

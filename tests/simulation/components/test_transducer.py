@@ -219,7 +219,7 @@ def test_it_follows_an_expression() -> None:
     [
         ("x.position + gap.volts", "'gap' depends on itself"),
         ("x.position + a.M2.position", "x.position, a.M2.position change between events: of the signals"),
-        ("x.position * x.position", "x.position change between events: multiplied"),
+        ("x.position * x.position", "x.position: multiplied"),
         ("x.position +", "ends too early"),
     ],
 )

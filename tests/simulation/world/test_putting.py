@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
@@ -100,10 +101,19 @@ def test_one_that_is_removed_is_gone_wherever_it_was() -> None:
     ("step", "error", "problem"),
     [
         (do.Put("lin"), Misuse, "no conveyor or nest is called 'lin' (did you mean 'line'?); there are line, flat, tray"),
-        (do.Put("line", 301.0), Misuse, "front = 301 mm: permitted are 0 to 300, the length of line"),
-        (do.Put("tray", 1.0), Misuse, "front = 1: tray is a nest, which takes a workpiece into its first free cell"),
+        (do.Put("line", 301.0), Misuse, "front = 301.0 mm: permitted are 0 to 300, the length of line"),
+        *(
+            (do.Put("line", front), Misuse, f"front = {front!r} mm: permitted are 0 to 300")  # type: ignore[arg-type]
+            for front in (-0.5, math.nan, math.inf, True, "5")
+        ),
+        (do.Put(None), Misuse, "None: expected the name of a conveyor or nest"),  # type: ignore[arg-type]
+        (do.Put("tray", 1.0), Misuse, "front = 1.0: tray is a nest, which takes a workpiece into its first free cell"),
         (do.Put("line", 130.0), Refusal, "line has no room there for another workpiece"),
         (do.Remove("line.7"), Refusal, "there is no line.7 now"),
+        *(
+            (do.Remove(name), Misuse, f"{name!r}: expected the name of a workpiece, such as line.3")  # type: ignore[arg-type]
+            for name in (None, 5, "", ".", "line", "line.", "line.x")
+        ),
         (do.Remove("lin.1"), Misuse, "no conveyor or nest is called 'lin'"),
     ],
 )

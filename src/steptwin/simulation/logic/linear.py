@@ -14,7 +14,7 @@ from steptwin.simulation.mechanics.scale import exact_fraction
 
 NOT_STRAIGHT = Message(
     "simulation.not-straight",
-    "{names} change between events: multiplied with each other, divided by, compared, or in abs or %, they give no straight line",
+    "{names}: multiplied with each other, divided by, compared, or in abs or %, what changes between events is no straight line",
 )
 
 

@@ -112,7 +112,8 @@ class Number:
             is_quoted = isinstance(value, str) and _NUMERIC.match(value) is not None
             raise Misuse(f"{value!r}: expected a number{', without quotes and unit' if is_quoted else ''}")
         if abs(value) > MOST:
-            raise Misuse(f"{value!r}: permitted are numbers from {-MOST:g} to {MOST:g}")
+            least, most = -MOST if self.least is None else self.least, MOST if self.most is None else self.most
+            raise Misuse(f"{value!r}: permitted are {Number(least, most, self.above).permitted.replace('number', 'numbers', 1)}")
         low = self.least is not None and (value <= self.least if self.above else value < self.least)
         if low or (self.most is not None and value > self.most):
             raise Misuse(f"{value!r}: permitted are {self.permitted.replace('number', 'numbers', 1)}")

@@ -22,9 +22,11 @@ from steptwin.simulation.world.model import Model
 A_CONVEYOR_OR_NEST = Message("simulation.conveyor-or-nest", "conveyor or nest")
 NO_SIZE = Message("simulation.nest-without-workpiece", "{nest}: its table does not say how large its workpieces are")
 ONLY_ON_BELTS = Message(
-    "simulation.place-only-on-belts", "front = {front:g}: {nest} is a nest, which takes a workpiece into its first free cell"
+    "simulation.place-only-on-belts", "front = {front}: {nest} is a nest, which takes a workpiece into its first free cell"
 )
-BEYOND_END = Message("simulation.put-beyond-the-end", "front = {front:g} mm: permitted are 0 to {length:g}, the length of {belt}")
+BEYOND_END = Message("simulation.put-beyond-the-end", "front = {front} mm: permitted are 0 to {length:g}, the length of {belt}")
+NO_NAME = Message("simulation.expected-the-name-of-one", "{given}: expected the name of a {what}")
+NO_WORKPIECE_NAME = Message("simulation.no-name-of-a-workpiece", "{name}: expected the name of a workpiece, such as {example}")
 NO_WORKPIECE = Message("simulation.workpiece-is-not-there", "there is no {workpiece} now")
 NO_ROOM = Message("simulation.no-room-for-a-workpiece", "{on} has no room there for another workpiece")
 
@@ -39,16 +41,18 @@ class Act(NamedTuple):
 def put(model: Model, on: str, front: float | None) -> Act:
     """Put a new workpiece on a conveyor, its front at ``front`` mm, or into the first free cell of a nest. Raises
     `Misuse` for what is neither and for a place beyond its end, `Refusal` where there is no room now."""
+    if not isinstance(on, str):
+        raise Misuse(NO_NAME(given=repr(on), what=A_CONVEYOR_OR_NEST()))
     objects, now = model.objects, model.now
     conveyor, nest = objects.built(CONVEYOR).get(on), objects.built(NEST).get(on)
     if conveyor is not None:
-        return _put_on_belt(conveyor, front or 0.0, now)
+        return _put_on_belt(conveyor, 0.0 if front is None else front, now)
     if nest is None:
         raise model.unknown(A_CONVEYOR_OR_NEST(), on, _sources(model))
     if nest.spec.workpiece is None:
         raise Misuse(NO_SIZE(nest=on))
     if front is not None:
-        raise Misuse(ONLY_ON_BELTS(front=front, nest=on))
+        raise Misuse(ONLY_ON_BELTS(front=repr(front), nest=on))
     rest = nest.resting.next_in(nest.spec, now)
     if rest is None:
         raise Refusal(NO_ROOM(on=on))
@@ -57,8 +61,8 @@ def put(model: Model, on: str, front: float | None) -> Act:
 
 def _put_on_belt(conveyor: Conveyor, front_mm: float, now: Nanos) -> Act:
     spec = conveyor.spec
-    if front_mm > spec.length:
-        raise Misuse(BEYOND_END(front=front_mm, length=spec.length, belt=spec.name))
+    if isinstance(front_mm, bool) or not isinstance(front_mm, int | float) or not 0 <= front_mm <= spec.length:
+        raise Misuse(BEYOND_END(front=repr(front_mm), length=spec.length, belt=spec.name))
     front = conveyor.belt.to_grid(front_mm)
     if not conveyor.room_at(front, now):
         raise Refusal(NO_ROOM(on=spec.name))
@@ -68,11 +72,14 @@ def _put_on_belt(conveyor: Conveyor, front_mm: float, now: Nanos) -> Act:
 def remove(model: Model, name: str) -> Act:
     """Take a workpiece out of the world. Raises `Misuse` for a name that none can have, `Refusal` where it is not there now."""
     there, sources = dict(_all(model.objects)), _sources(model)
-    if name.rpartition(".")[0] not in sources and name not in there:
-        raise model.unknown(A_CONVEYOR_OR_NEST(), name.rpartition(".")[0], sources)
-    if name not in there:
-        raise Refusal(NO_WORKPIECE(workpiece=name))
-    return there[name]
+    if isinstance(name, str) and name in there:
+        return there[name]
+    source, _, number = name.rpartition(".") if isinstance(name, str) else ("", "", "")
+    if not source or not number.isdecimal():
+        raise Misuse(NO_WORKPIECE_NAME(name=repr(name), example=f"{next(iter(sources), 'infeed')}.3"))
+    if source not in sources:
+        raise model.unknown(A_CONVEYOR_OR_NEST(), source, sources)
+    raise Refusal(NO_WORKPIECE(workpiece=name))
 
 
 def _sources(model: Model) -> list[str]:
