@@ -240,6 +240,24 @@ def test_what_it_comes_into_from_above_is_not_thrown_aside() -> None:
     assert world.read("blade.pushed") == 0
 
 
+def test_a_face_that_overtakes_the_one_that_pushes_takes_over() -> None:
+    """The first one stands at 80 mm, where the second one comes 0.3 s * 80 / 120 after 6 s. A tine moves with the first one."""
+    first = BLADE.replace("[60, 10, 30]", "[10, 10, 30]\nat = [-15, 0, 0]")
+    with_it = first.replace("blade", "tine").replace("-15", "15")
+    second = ROD.replace('"rod"', '"rod2"').replace("OUT2", "OUT3") + BLADE.replace("rod", "rod2").replace("blade", "second")
+    rod = ROD.replace("stroke = 120", "stroke = 80")
+    belt = BELT.replace("length = 600", "length = 600\nwidth = 300").replace('feed_every = "2 s"\n', "")
+    world = World.from_toml(belt + rod + first + with_it + second.replace("[60", "[10"))
+    world.put("main", front=320.0)
+    for output, until in (("OUT2", 6.0), ("OUT3", 8.0)):
+        world.mic488["c"].write(output, 1)
+        world.run(until=until)
+    times, texts = zip(*told(world), strict=True)
+    assert texts == ("blade pushes main.1 on main", "second pushes main.1 on main")
+    assert list(times) == seconds(0.3 * 60.0 / 80.0, 6.0 + 0.3 * 80.0 / 120.0)
+    assert place_of(world, "main.1")[1] == pytest.approx(60.0, abs=5e-6)
+
+
 def test_nothing_is_put_where_it_is() -> None:
     world = World.from_toml(BELT + ROD.replace("stroke = 120", "stroke = 80") + BLADE)
     world.mic488["c"].write("OUT2", 1)

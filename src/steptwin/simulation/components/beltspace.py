@@ -74,7 +74,7 @@ class BeltSpace:
         box = self._box(length // 2, to_nm(spec.width) // 2, 0)
         self._left = Direction(1 - self._along.axis, self._along.sign if self._along.axis == X else -self._along.sign)
         self._pushing: dict[str, Motion] = {}
-        self._pushers: list[Body] = []
+        self._pushers: dict[str, Body] = {}
         conveyor.belt.across_at = self._across_at
         conveyor.belt.is_in_the_way = self._is_in_the_way
         self._top = Body(spec.name, self._frame, box, self._at(length // 2, 0))
@@ -147,11 +147,11 @@ class BeltSpace:
     def add_pusher(self, pusher: Body) -> None:
         """Raises `Misuse` for one that turns against the belt."""
         self.pushing(pusher.name)
-        self._pushers.append(pusher)
+        self._pushers[pusher.name] = pusher
 
     def _is_in_the_way(self, placed: Placed, now: Nanos) -> bool:
         room = self.rectangle(placed)
-        return any(Pair(pusher, room).overlap(now) for pusher in self._pushers)
+        return any(Pair(pusher, room).overlap(now) for pusher in self._pushers.values())
 
     def pushing(self, pusher: str) -> Motion:
         """How a pusher moves to the left."""
@@ -163,6 +163,21 @@ class BeltSpace:
                 lambda now: summed([geared(motion.pieces(now), gear) for motion, gear in parts]),
             )
         return self._pushing[pusher]
+
+    def gaining(self, pusher: str, other: str) -> Motion:
+        """How a pusher moves to the left against another one, or (an empty name) against the belt."""
+        own = self.pushing(pusher)
+        if not other:
+            return own
+        its = self.pushing(other)
+        return Motion(
+            lambda: (own.version(), its.version()),
+            lambda now: summed([own.pieces(now), geared(its.pieces(now), Gear(-1.0))]),
+        )
+
+    def way(self, pusher: str, placed: Placed, now: Nanos) -> int:
+        """To which side of the belt one pushes a workpiece: left (+1) or right (-1)."""
+        return 1 if self.in_belt(self.rectangle(placed), now)[1] > self.in_belt(self._pushers[pusher], now)[1] else -1
 
     def _pushed(self, placed: Placed) -> Frame:
         """The frame across which a workpiece is as its table says."""

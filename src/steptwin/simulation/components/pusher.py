@@ -97,8 +97,8 @@ class Pusher(Stateful):
         self._body = body
         self._probe = Probe(body, {}, self._workpieces, self._to_meet)
         self._pushed: dict[str, _Pushed] = {}
-        self._over: tuple[str, ...] = ()
-        """Workpieces that it is in, and cannot push."""
+        self._over: tuple[tuple[str, str], ...] = ()
+        """Workpieces that it is in, and cannot push, with what does."""
         self._jammed: tuple[str, str] | None = None
         """A belt, and the workpiece on it that is pushed against another one."""
         self._entries = tuple(
@@ -130,33 +130,39 @@ class Pusher(Stateful):
         found = ((belt, belt.placed(name)) for belt in self._belts)
         return next(((belt, placed) for belt, placed in found if placed is not None), (None, None))
 
-    def _meet(self, name: str, now: Nanos) -> bool:
-        """It has come to touch a workpiece, or that it. Whether it cannot push it, and is no bar for it."""
+    def _meet(self, name: str, now: Nanos) -> tuple[bool, Nanos | None]:
+        """It touches a workpiece that it does not push. Whether it can neither push it nor is a bar for it; when its face goes
+        forward, or before that of the one that pushes it."""
         belt, placed = self._on_belt(name)
-        if belt is None or placed is None or placed.pusher:
-            return True
+        if belt is None or placed is None:
+            return True, None
         other = belt.rectangle(placed)
         (along, across), (far, aside) = belt.in_belt(self._body, now), belt.halves(self._body)
         (its_along, its_across), (its_far, its_aside) = belt.in_belt(other, now), belt.halves(other)
         to_left, to_right = across + aside - its_across + its_aside, its_across + its_aside - across + aside
         before, behind = its_along + its_far - along + far, along + far - its_along + its_far
         conveyor = belt.conveyor
-        least = min(to_left, to_right, before, behind)
-        if least >= TOUCH_NM:
-            return True
-        if least in (to_left, to_right):
+        by_side = min(to_left, to_right)
+        least = by_side if placed.pusher else min(by_side, before, behind)
+        way = 1 if by_side == to_left else -1
+        if least >= TOUCH_NM or (placed.pusher and belt.way(placed.pusher, placed, now) != way):
+            return True, None
+        if least == by_side:
+            forward = first_back(belt.gaining(self.name, placed.pusher), now, -way)
+            if forward is None or forward > now:
+                return False, forward
             # It is moved to where it only touches.
             moved, room = belt.pushing(self.name).at(now), aside + its_aside
-            place = ceil(across + room - moved) if least == to_left else floor(across - room - moved)
+            place = ceil(across + room - moved) if way > 0 else floor(across - room - moved)
             conveyor.belt.push(placed, place, self.name)
             self.count += 1
             self._report(PUSHES(pusher=self.name, workpiece=name, belt=conveyor.spec.name), name, "pushed")
         elif least == before:
             conveyor.belt.bars += (Bar(name, conveyor.belt.from_nm(floor(along - far)), self.name),)
         else:
-            return True
+            return True, None
         self._scheduler.notify(conveyor.spec.name)
-        return False
+        return False, None
 
     # ------------------------------------------------------------------ what it pushes
 
@@ -181,14 +187,10 @@ class Pusher(Stateful):
             )
         return known
 
-    def _way(self, belt: BeltSpace, placed: Placed, now: Nanos) -> int:
-        """To which side of the belt a workpiece is pushed: left (+1) or right (-1)."""
-        return 1 if belt.in_belt(belt.rectangle(placed), now)[1] > belt.in_belt(self._body, now)[1] else -1
-
     def _push_on(self, belt: BeltSpace, placed: Placed, now: Nanos) -> Iterator[Nanos | None]:
         """Let a workpiece go on, or no longer. When something may happen to it."""
         conveyor, name = belt.conveyor, placed.workpiece.name
-        way = self._way(belt, placed, now)
+        way = belt.way(self.name, placed, now)
         facts = self._facts(belt, placed, way)
         back = first_back(belt.pushing(self.name), now, way)
         if not facts.above.holds(now):
@@ -283,11 +285,16 @@ class Pusher(Stateful):
         falling = self._workpieces.falling()
         barred = {bar.workpiece for belt in self._belts for bar in belt.conveyor.belt.bars if bar.by == self.name}
         met = [name for name in self._probe.met(now) if name not in falling and name not in barred]
-        over = [name for name in met if name in self._over or self._meet(name, now)]
-        for name in over:
-            if name not in self._over:
-                self._report(RUNS_INTO(pusher=self.name, workpiece=name), name, "collides")
-        self._over = tuple(over)
+        known, self._over = self._over, ()
+        for name in met:
+            _, placed = self._on_belt(name)
+            one = name, "" if placed is None else placed.pusher
+            is_over, forward = (True, None) if one in known else self._meet(name, now)
+            moments.append(forward)
+            if is_over:
+                self._over += (one,)
+                if all(name != other for other, _ in known):
+                    self._report(RUNS_INTO(pusher=self.name, workpiece=name), name, "collides")
         those = [*self._those()]
         pushed = {placed.workpiece.name: belt.conveyor.spec.name for belt, placed in those}
         self._pushed = {name: known for name, known in self._pushed.items() if name in pushed}
