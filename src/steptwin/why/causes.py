@@ -14,6 +14,8 @@ from steptwin.motion.divisions import profile_of
 from steptwin.simulation.components.elementspec import NamedSpec
 from steptwin.simulation.components.logic import TerminalComponent
 from steptwin.simulation.components.registry import ELEMENTS
+from steptwin.simulation.components.touch import JAM
+from steptwin.simulation.faults.kinds_physics import LOSES_PULSES
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementLocation, StatementUse
 from steptwin.simulation.logic.expression import parse_condition, parse_expression
@@ -25,7 +27,7 @@ from steptwin.simulation.world.inputs import Download, See, SetVariable
 from steptwin.why import points
 from steptwin.why.answer import ChainLink, Cover, since_before
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing, unknown
-from steptwin.why.log import LAST, MOST_LOOKED_BACK, CauseLog, Change, sets
+from steptwin.why.log import LAST, MOST_LOOKED_BACK, OF_MECHANICS, CauseLog, Change, sets
 from steptwin.why.roots import Act, Sent
 from steptwin.why.sentences import Frames, describe_input, statement
 
@@ -56,6 +58,9 @@ LONGEST_REACTION_NS: Nanos = 510 * MILLISECOND
 """Limit of the time after which a statement goes on when what it waits for has come: inputs may be filtered for 500 ms."""
 TIME = "time"
 """What an element may be over that is no signal."""
+POSITION = "position"
+OF_WORKPIECES = ("count", "crooked", "mass")
+"""Signals of the workpieces on an element."""
 MOST_UNDECIDED = 5000
 """Limit of the statements among which the one that decided is looked for."""
 
@@ -77,6 +82,10 @@ class Causes:
         self._specs = {spec.name: spec for spec in every if isinstance(spec, NamedSpec) and spec.name}
         self._parts: dict[str, TerminalComponent] = {
             name: part for kind, parts in built.items() if ELEMENTS[kind].terminals is not None for name, part in parts.items()
+        }
+        compare = ("between", "all", "sees")
+        self._spatial = {
+            name for name in self._parts if name in self._specs and any(getattr(self._specs[name], one, None) for one in compare)
         }
 
     # ------------------------------------------------------------------ signals
@@ -104,17 +113,91 @@ class Causes:
         found = None if power is None else self.last((self._name(PinName(*power)),), until, GIVES_POWER(axis=axis))
         return covered(found, Cover.MOTION)
 
-    def moved(self, axis: str, until: Nanos, before: int = LAST) -> FoundCause:
-        """Cause before an order that moved the load of an axis last, or left it where it is: a motion, or the power of its motor
-        meanwhile."""
+    def moved(self, axis: str, until: Nanos, before: int = LAST, *, is_held: bool = True) -> FoundCause:
+        """Cause before an order that moved the load of an axis last, or left it where it is: a motion, the power of its motor
+        meanwhile, or what keeps its rotor from following the motion. ``is_held``: also what does so since before the motion."""
         built = self._world.axes[axis]
         controller, number = built.spec.drive[0], built.spec.drive[1].removeprefix("M")
         motion, power = self.motion(controller, number, until, axis, before), self.power(axis, until)
-        if power is None or (motion is not None and motion.link.time >= power.link.time):
-            return motion
-        plans = self._log.plans_in_force(controller, number, power.link.time)
-        matters = built.mechanism.build.coasts_unpowered or any(self._end(plan)[0] > power.link.time for plan in plans)
-        return power if matters else motion
+        plan = max(self._log.plans_in_force(controller, number, until, before), default=None)
+        began = -1 if plan is None else plan.time
+        events = [one for one in self._of_rotor(axis) if (one.time, one.order) < (until, before)]
+        lasting = [one for one in events if one.time >= began or (is_held and self._holds_rotor(one, events))]
+        event = max(lasting, key=lambda one: (one.time, one.order), default=None)
+        is_unpowered = power is not None and (motion is None or motion.link.time < power.link.time)
+        if power is not None and is_unpowered:
+            plans = self._log.plans_in_force(controller, number, power.link.time)
+            is_unpowered = built.mechanism.build.coasts_unpowered or any(self._end(one)[0] > power.link.time for one in plans)
+        if event is not None and not (is_unpowered and power is not None and power.place > Place(event.time, event.order)):
+            return self._rotor_event(axis, event)
+        if is_unpowered:
+            return power
+        lost = self._lost_by_fault(axis, until, before)
+        is_last = lost is not None and (motion is None or (motion.cover is None and lost.place > motion.place))
+        return lost if is_last else motion
+
+    def slipped(self, axis: str, until: Nanos, subjects: Collection[str] = OF_MECHANICS) -> FoundCause:
+        """The last event by a moment after which the rotor of an axis is elsewhere than counted; its motion, if there is none."""
+        events = (one for one in self._of_rotor(axis) if one.time <= until and self._log.record(one).subject in subjects)
+        event = max(events, key=lambda one: (one.time, one.order), default=None)
+        found = None if event is None else self._rotor_event(axis, event)
+        lost = self._lost_by_fault(axis, until)
+        last = max((one for one in (found, lost) if one is not None), key=lambda one: one.place, default=None)
+        return self.moved(axis, until) if last is None else last
+
+    def _of_rotor(self, axis: str) -> Iterator[Change]:
+        """Events of a rotor that does not follow its motion, or does again: of its motor, its stops, what jams it."""
+        yield from self._log.mechanics.get(axis, ())
+        yield from self._jams(axis)
+
+    def _jams(self, name: str) -> Iterator[Change]:
+        """Events of the collisions that jam an axis or element."""
+        for one, spec in self._specs.items():
+            if getattr(spec, "effect", None) == JAM and f"{name}.{POSITION}" in self._followed(one):
+                yield from self._log.mechanics.get(one, ())
+
+    def _holds_rotor(self, event: Change, events: Sequence[Change]) -> bool:
+        """Whether a rotor has not followed its motion since an event of it."""
+        record = self._log.record(event)
+        last = max((one for one in events if self._is_like(self._log.record(one), record)), key=lambda one: (one.time, one.order))
+        return last is event and _begins(record)
+
+    def _is_like(self, one: TraceRecord, other: TraceRecord) -> bool:
+        return one.subject == other.subject and dict(one.facts)["element"] == dict(other.facts)["element"]
+
+    def _rotor_event(self, axis: str, event: Change) -> Cause:
+        """An event of a rotor, whose cause is what led to it."""
+        record = self._log.record(event)
+        owner = str(dict(record.facts)["element"])
+        text = text_of(record.value if isinstance(record.value, str) else str(record.value))
+        if owner == axis:
+            before = partial(self._of_rotor_event, axis, event, begins=_begins(record))
+        else:
+            before = partial(self._of_followed, owner, event)
+        return Cause(ChainLink(event.time, owner, text), Place(event.time, event.order), before, Cover.MOTION)
+
+    def _of_rotor_event(self, axis: str, event: Change, *, begins: bool) -> FoundCause:
+        """What a rotor followed no longer, or the command with which it follows again."""
+        controller, name = self._world.axes[axis].spec.drive
+        wanted = Resource(ResourceKind.AXIS, name.removeprefix("M"))
+        motion = self.motion(controller, wanted.name, event.time, axis)
+        if begins and motion is not None and motion.place.time == event.time:  # recorded after what it leads to at once
+            return motion._replace(place=min(motion.place, Place(event.time, event.order, -1)))
+        command = None if begins else self._commanded(controller, event, wanted)
+        return command or self.moved(axis, event.time, event.order, is_held=begins)
+
+    def _lost_by_fault(self, axis: str, until: Nanos, before: int = LAST) -> FoundCause:
+        """The last fault by a moment, before an order, that let an axis lose pulses."""
+        controller, name = self._world.axes[axis].spec.drive
+        for change in reversed(self._log.faults.get(controller, ())):
+            record = self._log.record(change)
+            text = record.value
+            if not isinstance(text, MessageText) or text.id != LOSES_PULSES.id:
+                continue
+            if name == f"M{text.values['axis']}" and (change.time, change.order) < (until, before):
+                older = self._of_fault(record, change.order)
+                return Cause(self.fault_link(record), Place(change.time, change.order), older, Cover.FAULT)
+        return None
 
     def _of_change(self, signal: str, change: Change) -> FoundCause:
         owner, _, terminal = signal.partition(".")
@@ -173,9 +256,9 @@ class Causes:
         before_it = older if act is None else partial(Cause, *_acted(act)[:2], older, Cover.FAULT)
         return Cause(link, place, before_it, Cover.FAULT)
 
-    def of_element(self, name: str, signal: str, time: Nanos) -> FoundCause:
-        """Cause of a change of an element that no record shows: what drives a terminal, an output at the same moment, or an
-        input."""
+    def of_element(self, name: str, signal: str, time: Nanos, before: int = LAST) -> FoundCause:
+        """Cause before an order of a change of an element that no record shows: a collision that jams it, what drives a terminal,
+        an output at the same moment, or an input."""
         part = self._parts.get(name)
         if part is not None and signal.upper() in _inputs(part):
             return self.last(list(self._sources(PinName(name, signal.upper()))), time)
@@ -184,11 +267,19 @@ class Causes:
         workpiece = self._of_workpiece(name, change)
         if workpiece is not None:
             return workpiece
+        jams = [one for one in self._jams(name) if (one.time, one.order) < (time, before)] if signal == POSITION else []
+        jam = next((one for one in jams if self._holds_rotor(one, jams)), None)
+        if jam is not None:
+            return self._rotor_event(name, jam)
+        removed = next((act for act in self._log.acts_at(time, LAST) if isinstance(act.what, do.Remove)), None)
+        if removed is not None and signal in OF_WORKPIECES:
+            return _acted(removed)
         if part is None and self._followed(name):
             return self._of_followed(name, change)
         channels = [one for one in self._log.changes if one == name or one.startswith(f"{name}.")]
         found = None if part is None else self._of_element(name, change)
-        return self.last(channels, time) if found is None else found
+        found = self.last(channels, time) if found is None else found
+        return covered(found, Cover.ACTION) if found is not None and found.cover is None else found
 
     def _at_element(self, name: str, change: Change) -> FoundCause:
         """Cause of an event of an element."""
@@ -242,7 +333,11 @@ class Causes:
         workpiece = self._of_workpiece(name, change)
         if workpiece is not None:
             return workpiece
-        followed = self._of_followed(name, change) if not sources or getattr(self._specs[name], "rate", None) else None
+        followed = (
+            self._of_followed(name, change)
+            if not sources or name in self._spatial or getattr(self._specs[name], "rate", None)
+            else None
+        )
         if followed is not None and all(followed.place > Place(one.time, one.order) for one, _ in last):
             return followed
         acts = Cover.ACTION if type(part).deadline is not TerminalComponent.deadline else None
@@ -268,17 +363,37 @@ class Causes:
         spec: Any = self._specs.get(name)
         if spec is None:
             return ()
+        if name in self._spatial:
+            return self._moved_in_space(spec)
         when, of, rate = (getattr(spec, one, None) for one in ("when", "of", "rate"))
         axes = [getattr(spec, one, None) for one in ("axis", "other")] if not (when or of or rate) else []
         turned_by = getattr(spec, "shaft", None)
         found = [*(parse_condition(when).names() if when else ()), *([of] if of else ())]
         found += parse_expression(rate).names() if rate else ()
-        found += [f"{axis}.position" for axis in axes if axis]
+        found += [f"{axis}.{POSITION}" for axis in axes if axis]
         return (*dict.fromkeys(one for one in found if one != TIME), *(self._followed(turned_by) if turned_by else ()))
 
+    def _moved_in_space(self, spec: Any) -> tuple[str, ...]:
+        """The signals that move the bodies that an element compares or sees, or the belt with the workpieces."""
+        described = self._world.objects.described
+        names = [spec.name] if hasattr(spec, "sees") else []
+        names += [name for key, name in spec.others(described) if key != "except"]
+        found: dict[str, None] = {}
+        for name in names:
+            one: Any = self._specs.get(name)
+            while one is not None:
+                if one.name in self._world.axes or (one.name in self._parts and getattr(one, "moves_others", False)):
+                    found[f"{one.name}.{POSITION}"] = None
+                elif one.name != spec.name:
+                    found |= dict.fromkeys(self._followed(one.name))
+                one = self._specs.get(getattr(one, "on", None) or "")
+        belts = [name for name in names if hasattr(self._specs.get(name), "feed_every")]
+        return tuple(found) or tuple(f"{name}.travel" for name in belts if len(belts) == 1)
+
     def _of_followed(self, name: str, change: Change) -> FoundCause:
-        """The last cause by a moment of what an element follows; that of the same moment, if there is one."""
-        found: list[Cause] = []
+        """The last cause by a moment of what an element follows; that of the same moment, if there is one, or of an axis that
+        moves then."""
+        found: list[tuple[bool, bool, Cause]] = []
         for signal in self._followed(name):
             owner, _, rest = signal.partition(".")
             before = self._before(signal, change, change.time)
@@ -289,10 +404,13 @@ class Causes:
             elif owner in self._world.controllers:
                 cause = self.at_moment(owner, change.time, Resource(ResourceKind.AXIS, ""), rest)
             else:
-                cause = covered(self.of_element(owner, rest, change.time), Cover.ACTION)
+                cause = covered(self.of_element(owner, rest, change.time, change.order), Cover.ACTION)
             if cause is not None and cause.place < Place(change.time, change.order):
-                found.append(cause)
-        return max(found, key=lambda cause: cause.place, default=None)
+                drive = self._world.axes[owner].spec.drive if owner in self._world.axes else None
+                moves = drive is not None and self._is_moving(drive[0], drive[1].removeprefix("M"), change.time)
+                found.append((cause.place.time == change.time, moves, cause))
+        best = max(found, key=lambda one: (one[0], one[1], one[2].place), default=None)
+        return None if best is None else best[2]
 
     def _before(self, signal: str, change: Change, until: Nanos) -> tuple[Change, str] | None:
         """The last change of a signal by a moment and before ``change``."""
@@ -377,6 +495,13 @@ class Causes:
 
     def in_controller(self, controller: str, change: Change, wanted: Resource | None, point: str = "") -> FoundCause:
         """Cause of a change in a controller at a moment; ``wanted``: the resource, if it is known; ``point``: that changed."""
+        commanded = self._commanded(controller, change, wanted, point)
+        if commanded is not None:
+            return commanded
+        return self._asked_before(controller, change) or self._inside(controller, change, wanted)
+
+    def _commanded(self, controller: str, change: Change, wanted: Resource | None, point: str = "") -> FoundCause:
+        """A statement, request or action at the moment of a change in a controller."""
         index = self._statement_at(controller, change, wanted)
         since = -1 if index is None else self._log.executed[controller][index].order
         outside = self._from_outside(controller, change, since, point)
@@ -385,9 +510,7 @@ class Causes:
         if index is not None:
             return self.statement(controller, index)
         act = next((act for act in self._log.acts_at(change.time, change.order) if _changes(act, controller)), None)
-        if act is not None:
-            return _acted(act)
-        return self._asked_before(controller, change) or self._inside(controller, change, wanted)
+        return None if act is None else _acted(act)
 
     def _statement_at(self, controller: str, change: Change, wanted: Resource | None) -> int | None:
         """The number of the statement that was executed at the moment of a change, before it, and changes what is wanted."""
@@ -429,7 +552,7 @@ class Causes:
                 continue
             if record.kind == "edge" and self._is_input(PinName(controller, record.subject)):
                 inputs.append((order, f"{controller}.{record.subject}"))
-            elif record.kind == "event":
+            elif record.kind == "event" and record.subject != "workpiece":
                 event = order, record
         limit = change.order if event is None else event[0]
         last = max((one for one in inputs if one[0] < limit), default=None)
@@ -544,9 +667,31 @@ class Causes:
             text, cover = BEGAN_TO_MOVE(axis=shown), Cover.MOTION
 
         def planned() -> FoundCause:
-            return covered(self.in_controller(controller, plan, Resource(ResourceKind.AXIS, record.subject)), Cover.MOTION)
+            found = self.in_controller(controller, plan, Resource(ResourceKind.AXIS, record.subject))
+            if found is None or found.place.time < plan.time:
+                found = self._turned(controller, record.subject, plan) or found
+            return covered(found, Cover.MOTION)
 
         return Cause(ChainLink(place.time, controller, text), place, planned, cover)
+
+    def _turned(self, controller: str, number: str, plan: Change) -> FoundCause:
+        """What turned the encoder that an axis follows by the moment of a plan: another axis, a motor, a hand."""
+        for axis in self._world.axes.values():
+            if axis.spec.drive != (controller, f"M{number}"):
+                continue
+            follows = getattr(axis.spec.encoder, "follows", None)
+            if follows in self._world.axes:
+                return self.moved(follows, plan.time, plan.order)
+            if follows in self._parts:
+                return self.of_element(follows, "", plan.time)
+        acts = self._log.acts_before(plan.time, plan.order)
+        turned = (
+            act
+            for act in acts
+            if isinstance(act.what, do.Turn) and (act.what.controller, act.what.axis) == (controller, int(number))
+        )
+        act = next(turned, None)
+        return None if act is None else _acted(act)
 
     def _end(self, plan: Change) -> tuple[float, Nanos]:
         """When the motion of a plan ends, which may be never; of several at once, the one planned last."""
@@ -709,6 +854,11 @@ class Causes:
             return None
         first = self._log.executed[controller][0]
         return Cause(ChainLink(first.time, controller, PROGRAM_STARTED()), Place(first.time, first.order), nothing, Cover.PROGRAM)
+
+
+def _begins(record: TraceRecord) -> bool:
+    """Whether a rotor does not follow its motion from an event on."""
+    return any(dict(record.facts).get(one) is True for one in ("stalled", "pushes", "touches"))
 
 
 def _inputs(part: TerminalComponent) -> list[str]:

@@ -37,6 +37,8 @@ MOST_LOOKED_BACK = 20_000
 """Limit of the records, actions and statements that are searched for one cause."""
 LAST = sys.maxsize
 """The order of what is after all that was noted."""
+OF_MECHANICS = ("stall", "hard-stop", "collision")
+"""Events after which the rotor of an axis does not follow its motion, or does again."""
 STATEMENTS_AT_ONCE = 2000
 """Most statements of one program between two parts of a run."""
 
@@ -118,6 +120,8 @@ class CauseLog:
         self.plans: dict[tuple[str, str], list[Change]] = defaultdict(list)
         """Moments and positions of the plans of an axis, by controller and number."""
         self.faults: dict[str, list[Change]] = defaultdict(list)
+        self.mechanics: dict[str, list[Change]] = defaultdict(list)
+        """Events of `OF_MECHANICS` by axis or collision."""
         """Moments at which faults began or ended, by controller or element."""
         self.acts: list[Act] = []
         self._fault_acts: dict[str, list[Act]] = defaultdict(list)
@@ -191,6 +195,9 @@ class CauseLog:
             case "frame":
                 for name in self._timed.get(record.controller, ()):
                     self.points.executes(name, record.time, keeps=True)
+            case "event" if record.subject in OF_MECHANICS:
+                element = str(dict(record.facts)["element"])
+                self.mechanics[element].append(Change(record.time, 0.0, group, len(records), order))
             case "fault":
                 self.faults[record.controller].append(Change(record.time, 0.0, group, len(records), order))
                 self._note_holds(record.controller, record.time)

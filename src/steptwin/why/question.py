@@ -24,7 +24,7 @@ from steptwin.why import points
 from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Cover, since_before
 from steptwin.why.causes import FAULT, IS, IS_SINCE, Causes
 from steptwin.why.chain import NOT_KNOWN, Cause, Place, broken, covered, nothing
-from steptwin.why.log import LAST, MOST_NOTED, CauseLog, in_parts
+from steptwin.why.log import LAST, MOST_NOTED, OF_MECHANICS, CauseLog, in_parts
 from steptwin.why.replayed import ReplayedSignals, TimeSeries, watch_truth, watch_value
 from steptwin.why.search import Asked
 from steptwin.why.sentences import statement
@@ -40,6 +40,8 @@ LONGEST_AHEAD_NS: Nanos = 60 * SECOND
 
 SWITCH = "switch"
 """The type of a point that is 0 or 1."""
+SLIPS = {"stalled": ("stall",), "lost": OF_MECHANICS}
+"""Signals of an axis that its rotor has, with the events between which they stand."""
 _AXIS = re.compile(r"(?:M|ENC)(\d+)[._]|moving$", re.IGNORECASE)
 """A point that a motion changes; the group is the number of its axis, none where the controller has one only."""
 
@@ -280,8 +282,15 @@ class Why:
         """Whether a quantity changes between events, but not from one level to the other as ``moving`` at the end of a motion."""
         if self.log.has(name) or not self.log.world.signal(name).continuous:
             return False
+        if self._is_of_rotor(name) and name.endswith(".stalled"):
+            return False
         point = self._point(name)
         return point is None or point.point.type != SWITCH
+
+    def _is_of_rotor(self, name: str) -> bool:
+        """Whether a signal stands between the events of a rotor, also while its axis moves."""
+        owner, _, rest = name.partition(".")
+        return owner in self.log.world.axes and rest in SLIPS
 
     def _point(self, name: str) -> LivePoint | None:
         """The point of a controller with this name; None for what is none."""
@@ -432,6 +441,8 @@ class Why:
         owner, _, rest = signal.partition(".")
         world, causes = self.log.world, self._causes
         if owner in world.axes:
+            if rest in SLIPS:
+                return causes.slipped(owner, time, SLIPS[rest])
             if rest != "power":
                 return causes.moved(owner, time)
             drive, switched = world.axes[owner].spec.drive, causes.power(owner, time)
@@ -453,9 +464,11 @@ class Why:
         unit = world.signal(signal).unit
         state = IS_IN_UNIT(name=signal, value=value, unit=unit) if unit else IS(signal=signal, value=f"{value:.6g}")
         standing = other.signal(signal)
-        if isinstance(standing, SignalOf) and rest_of(standing, at) is not None:
+        if isinstance(standing, SignalOf) and (self._is_of_rotor(full) or rest_of(standing, at) is not None):
             _, since = yield from self._from_run(f"{signal} == {value!r}", {signal: full}, at, is_bare=False)
-            if self._point(signal) is None:  # what left it where it is may have come a moment after it was there
+            if since is None and self._is_of_rotor(full):
+                changed = None
+            elif self._point(signal) is None:  # what left it where it is may have come a moment after it was there
                 changed = covered(self._of_unrecorded(full, at), Cover.LEVEL)
             else:
                 changed = None if since is None else self._changed((full,), since)
