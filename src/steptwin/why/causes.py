@@ -15,7 +15,7 @@ from steptwin.simulation.components.elementspec import NamedSpec
 from steptwin.simulation.components.logic import TerminalComponent
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.components.touch import JAM
-from steptwin.simulation.faults.kinds_physics import LOSES_PULSES
+from steptwin.simulation.faults.kinds_physics import IS_BLOCKED, LOSES_PULSES
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementLocation, StatementUse
 from steptwin.simulation.logic.expression import parse_condition, parse_expression
@@ -121,7 +121,7 @@ class Causes:
         motion, power = self.motion(controller, number, until, axis, before), self.power(axis, until)
         plan = max(self._log.plans_in_force(controller, number, until, before), default=None)
         began = -1 if plan is None else plan.time
-        events = [one for one in self._of_rotor(axis) if (one.time, one.order) < (until, before)]
+        events = list(self._of_rotor(axis, until, before))
         lasting = [one for one in events if one.time >= began or (is_held and self._holds_rotor(one, events))]
         event = max(lasting, key=lambda one: (one.time, one.order), default=None)
         is_unpowered = power is not None and (motion is None or motion.link.time < power.link.time)
@@ -132,23 +132,28 @@ class Causes:
             return self._rotor_event(axis, event)
         if is_unpowered:
             return power
-        lost = self._lost_by_fault(axis, until, before)
+        lost = self._lost_by_fault(axis, until, before, LOSES_PULSES)
         is_last = lost is not None and (motion is None or (motion.cover is None and lost.place > motion.place))
         return lost if is_last else motion
 
     def slipped(self, axis: str, until: Nanos, subjects: Collection[str] = OF_MECHANICS) -> FoundCause:
         """The last event by a moment after which the rotor of an axis is elsewhere than counted; its motion, if there is none."""
-        events = (one for one in self._of_rotor(axis) if one.time <= until and self._log.record(one).subject in subjects)
+        events = (one for one in self._of_rotor(axis, until) if self._log.record(one).subject in subjects)
         event = max(events, key=lambda one: (one.time, one.order), default=None)
         found = None if event is None else self._rotor_event(axis, event)
-        lost = self._lost_by_fault(axis, until)
+        lost = self._lost_by_fault(axis, until, LAST, LOSES_PULSES, IS_BLOCKED)
         last = max((one for one in (found, lost) if one is not None), key=lambda one: one.place, default=None)
         return self.moved(axis, until) if last is None else last
 
-    def _of_rotor(self, axis: str) -> Iterator[Change]:
-        """Events of a rotor that does not follow its motion, or does again: of its motor, its stops, what jams it."""
-        yield from self._log.mechanics.get(axis, ())
-        yield from self._jams(axis)
+    def _of_rotor(self, axis: str, until: Nanos, before: int = LAST) -> Iterator[Change]:
+        """Events by a moment, before an order, after which a rotor does not follow its motion, or does again: of its motor, its
+        stops, and what jams it before its motion has ended."""
+        controller, name = self._world.axes[axis].spec.drive
+        plans = self._log.plans_in_force(controller, name.removeprefix("M"), until, before)
+        end = max((self._end(plan)[0] for plan in plans), default=0)
+        jams = (one for one in self._jams(axis) if one.time <= end)
+        every = (*self._log.mechanics.get(axis, ()), *jams)
+        return (one for one in every if (one.time, one.order) < (until, before))
 
     def _jams(self, name: str) -> Iterator[Change]:
         """Events of the collisions that jam an axis or element."""
@@ -186,13 +191,13 @@ class Causes:
         command = None if begins else self._commanded(controller, event, wanted)
         return command or self.moved(axis, event.time, event.order, is_held=begins)
 
-    def _lost_by_fault(self, axis: str, until: Nanos, before: int = LAST) -> FoundCause:
-        """The last fault by a moment, before an order, that let an axis lose pulses."""
+    def _lost_by_fault(self, axis: str, until: Nanos, before: int, *kinds: Message) -> FoundCause:
+        """The last fault by a moment, before an order, that was reported as one of ``kinds`` at an axis."""
         controller, name = self._world.axes[axis].spec.drive
         for change in reversed(self._log.faults.get(controller, ())):
             record = self._log.record(change)
             text = record.value
-            if not isinstance(text, MessageText) or text.id != LOSES_PULSES.id:
+            if not isinstance(text, MessageText) or text.id not in {kind.id for kind in kinds}:
                 continue
             if name == f"M{text.values['axis']}" and (change.time, change.order) < (until, before):
                 older = self._of_fault(record, change.order)
