@@ -322,6 +322,22 @@ def test_a_body_is_only_there_while_its_condition_holds() -> None:
     assert hits(world) == [(4.000000001, "crash: head and post touch"), (4.5, "crash: apart again")]
 
 
+BELOW = """
+[[integrator]]
+name = "dip"
+rate = "a.OUT1"
+at = [500, 0, 0]
+[[body]]
+name = "pen"
+on = "dip"
+size = [1, 1, 1]
+[[collision]]
+name = "c"
+between = ["pen", "post"]
+effect = "jam"
+"""
+
+
 @pytest.mark.parametrize(
     ("more", "problem"),
     [
@@ -340,6 +356,10 @@ def test_a_body_is_only_there_while_its_condition_holds() -> None:
         (
             '[[body]]\nname = "wall"\nat = [0, 0, 480]\nsize = [10, 10, 10]\n[[collision]]\nname = "c"\nall = true',
             "'head' and 'wall' overlap when the world begins",
+        ),
+        (
+            BELOW,
+            "effect = 'jam': post and pen are moved against each other by dip, which nothing stops",
         ),
     ],
 )

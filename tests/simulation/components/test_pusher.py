@@ -297,6 +297,10 @@ def test_a_feeder_that_waits_feeds_as_soon_as_there_is_room(
             BELT + ROD + 'on = "t"\n[[axis]]\nname = "t"\ndrive = "c.M2"\nkind = "rotary"\nat = [0, 0, 0]\n' + BLADE,
             "'blade' pushes, but 't' turns it against 'main': what pushes moves straight",
         ),
+        (
+            BELT + '[[integrator]]\nname = "rod"\nrate = "c.OUT2"\nalong = "+y"\n' + BLADE,
+            "'blade' pushes, but rod moves it, and cannot stand where a workpiece is in the way",
+        ),
     ],
 )
 def test_what_does_not_fit_is_refused(text: str, problem: str) -> None:

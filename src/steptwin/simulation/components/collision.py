@@ -99,7 +99,7 @@ PARTS_TOUCH = Message("simulation.parts-touch", "{zone}: parts touch")
 def _make(spec: CollisionSpec, context: ElementContext) -> Touch:
     block, jams = context.terminal_block(spec.name), spec.effect == JAM
     if spec.when is None:
-        compared = Compared(block, context, spec.between, spec.apart_from, every_body=spec.all)
+        compared = Compared(block, context, spec.between, spec.apart_from, every_body=spec.all, jams=jams)
         return Touch(block, jams, compared.contacts, compared.depends_on)
     axes = dict(_axes_of(spec, context))
     text = partial(AXES_TOUCH, zone=spec.name, axes=" and ".join(axes)) if axes else partial(PARTS_TOUCH, zone=spec.name)

@@ -29,13 +29,17 @@ from steptwin.simulation.space.frames import Frame
 from steptwin.simulation.space.sweeps import SweptBody
 
 BODIES_TOUCH = Message("simulation.bodies-touch", "{zone}: {one} and {other} touch")
+CANNOT_JAM = Message(
+    "simulation.cannot-jam", "effect = 'jam': {one} and {other} are moved against each other by {movers}, which nothing stops"
+)
 
 
 class Compared:
     """A body, a cup or jaws with what they carry, and all workpieces are units; those of one group are compared with those of
     others.
 
-    Raises `Misuse` where nothing can touch, and where bodies overlap when the world begins.
+    Raises `Misuse` where nothing can touch, where bodies overlap when the world begins, and where they are to stand and nothing
+    that moves them can be stopped.
     """
 
     def __init__(
@@ -46,8 +50,10 @@ class Compared:
         apart: Iterable[tuple[str, str]],
         *,
         every_body: bool,
+        jams: bool,
     ) -> None:
         self._block = block
+        self._jams = jams
         self._context = context
         self._described = {one.name: one for one in context.objects.described.of(BODY)}
         self._bodies = {name: body_of(one, context.frames) for name, one in self._described.items()}
@@ -91,7 +97,8 @@ class Compared:
                 if not conditions and not is_checked and contact.pair.overlap(now):
                     raise Misuse(f"{one!r} and {other!r} overlap when the world begins")
                 moved = self._context.frames.between(self._bodies[one].frame, self._bodies[other].frame)
-                yield self._contact(contact, moved, partial(BODIES_TOUCH, zone=self._block.name, one=one, other=other))
+                text = partial(BODIES_TOUCH, zone=self._block.name, one=one, other=other)
+                yield self._contact(contact, moved, text, (one, other))
 
     def _whens(self, name: str) -> list[SignalCondition]:
         """The condition under which a body is there."""
@@ -99,11 +106,18 @@ class Compared:
         return [] if when is None else [condition_of(when, self._block, self._context)]
 
     def _contact(
-        self, meeting: BodyContact | ConditionalContact | CarriedContact, moved: Iterable[Movement], text: Callable[[], str]
+        self,
+        meeting: BodyContact | ConditionalContact | CarriedContact,
+        moved: Iterable[Movement],
+        text: Callable[[], str],
+        parts: tuple[str, str],
     ) -> Contact:
         those = list(moved)
+        blocks = tuple(dict.fromkeys(drive for one in those for drive in one.blocks))
+        if self._jams and those and not blocks:
+            raise Misuse(CANNOT_JAM(one=parts[0], other=parts[1], movers=sources_of(those)))
         self._moved += those
-        return Contact(meeting, tuple(dict.fromkeys(drive for one in those for drive in one.blocks)), text)
+        return Contact(meeting, blocks, text)
 
     # ------------------------------------------------------------------ workpieces
 
@@ -129,7 +143,8 @@ class Compared:
         check_upright(name, body.frame)
         probe = Probe(body, {}, self._context.objects.workpieces, partial(_unless_on, self._grasping))
         text = partial(_touching, self._block, name, probe)
-        return self._contact(ConditionalContact(probe, self._whens(name)), self._context.frames.carrying(body.frame), text)
+        meeting = ConditionalContact(probe, self._whens(name))
+        return self._contact(meeting, self._context.frames.carrying(body.frame), text, (name, WORKPIECES))
 
     def _carried(self, grasp: Grasp, other: str) -> Contact:
         """Contact of what a cup or jaws carry with a body, with what others carry, or with any workpiece."""
@@ -145,7 +160,7 @@ class Compared:
         else:
             meeting = CarriedContact(grasp, {}, pieces, partial(_unless_on, frozenset((grasp.frame,))))
             moved = frames.carrying(grasp.frame)
-        return self._contact(meeting, moved, partial(_carrying, self._block, meeting))
+        return self._contact(meeting, moved, partial(_carrying, self._block, meeting), (grasp.frame.name, other))
 
 
 def _unless_on(frames: frozenset[Frame], body: Body) -> Body | None:

@@ -32,6 +32,10 @@ TOUCH_NM = 1000
 """Less than a workpiece and a body overlap when they have come to touch."""
 
 NO_BELTS = Message("simulation.no-belts-to-push-across", "{pusher!r} pushes, but no [[conveyor]] has a place in space")
+CANNOT_STAND = Message(
+    "simulation.pusher-cannot-stand",
+    "{pusher!r} pushes, but {movers} moves it, and cannot stand where a workpiece is in the way",
+)
 PUSHES = Message("simulation.pushes-workpiece", "{pusher} pushes {workpiece} on {belt}")
 RUNS_INTO = Message("simulation.runs-into-workpiece", "{pusher} and {workpiece} collide")
 JAMS = Message("simulation.pusher-jams", "{pusher} stands: {workpiece} is pushed against {other}")
@@ -242,7 +246,14 @@ class Pusher(Stateful):
             if movement is not None:
                 yield movement, sign
 
-    def _blocks(self, belt: BeltSpace) -> Iterable[Block]:
+    def check(self) -> None:
+        """Raise `Misuse` where something moves it across a belt, and nothing of that can be stopped."""
+        for belt in self._belts:
+            movers = [movement for movement, _ in self._moving(belt)]
+            if movers and not self._blocks(belt):
+                raise Misuse(CANNOT_STAND(pusher=self.name, movers=sources_of(movers)))
+
+    def _blocks(self, belt: BeltSpace) -> Mapping[Block, None]:
         return dict.fromkeys(block for movement, _ in self._moving(belt) for block in movement.blocks)
 
     def _jam(self, belt: BeltSpace, name: str, other: str, now: Nanos) -> None:
@@ -337,7 +348,8 @@ def _unless_on(frame: Frame, body: Body) -> Body | None:
 
 
 def pusher_of(spec: BodySpec, context: ElementContext) -> Pusher:
-    """The part that a body is that pushes. Raises `Misuse` for one that turns against a belt, and where there is none."""
+    """The part that a body is that pushes. Raises `Misuse` for one that turns against a belt or cannot stand, and where there is
+    none."""
     frames, workpieces = context.frames, context.objects.workpieces
     conveyors = [one for name, one in context.objects.built(CONVEYOR).items() if name in frames]
     if not conveyors:
@@ -352,6 +364,7 @@ def pusher_of(spec: BodySpec, context: ElementContext) -> Pusher:
     for belt in belts:
         belt.add_pusher(pusher)
     made = Pusher(scheduler, context, belts, pusher)
+    made.check()
     sources = (*workpieces.sources, *sources_of(frames.carrying(body.frame)))
     scheduler.add_part(made, sources, spec.name)
     return made
