@@ -123,6 +123,16 @@ def test_against_an_integration() -> None:
         levels[output], before = level, moment
 
 
+def test_a_switch_of_a_small_quantity_changes_when_its_value_is_there() -> None:
+    """A millilitre in cubic metres."""
+    drip = '[[integrator]]\nname = "drip"\nunit = "m3"\nrate = "0.0000001 * c.OUT1"\n'
+    drip += '[[integrator.switch]]\nabove = 1e-6\nto = "c.IN2"\n'
+    here = world(TEXT + drip)
+    write(here, OUT1=1)
+    here.run(until="c.IN2 == 1", for_="20 s")
+    assert here.now == pytest.approx(10 * SECOND, abs=1.5)
+
+
 def test_its_rate_may_be_multiplied_by_a_fault() -> None:
     here = world()
     here.fault("other-rate element=tank factor=0.5 from_s=1")

@@ -34,15 +34,15 @@ from steptwin.simulation.mechanics.integral import Integral, Limits, Straight
 from steptwin.simulation.mechanics.scale import LENGTHS, exact_fraction
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.space.frames import NM_PER_MM
-from steptwin.simulation.space.pieces import Motion, Piece, SteadyPiece, StillPiece, gear_of, geared
+from steptwin.simulation.space.pieces import Motion, Piece, SteadyPiece, StillPiece
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table, tables_in
 from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, number, text_value
 from steptwin.state import Plain
 
 RESET, AT_LOW, AT_HIGH = "RESET", "AT_LOW", "AT_HIGH"
-GRID_PER_UNIT = 10**6
-"""Steps of the grid of its switches in a unit: nanometres of a millimetre."""
+GRID_PER_UNIT = 10**24
+"""Steps of the grid of its switches in a unit, which may be a cubic metre of what drips: finer than what is measured in it."""
 
 NO_STRAIGHT_LINE = Message(
     "simulation.no-straight-line",
@@ -188,18 +188,18 @@ class Integrator(TerminalComponent):
         if self.plan.end is not None and self.plan.end > now:
             yield self.plan.end
 
-    def pieces(self, now: Nanos) -> Iterator[Piece]:
-        """Steps of its grid."""
+    def pieces(self, now: Nanos, per_unit: Fraction) -> Iterator[Piece]:
+        """Whole nm, ``per_unit`` of them for a unit."""
         plan = self.plan
         end = next(self.ends(now), None)
         if plan.rate or plan.slope:
             fastest = max(abs(plan.rate_at(at)) for at in (now, now if end is None else end))
-            per_s = float(fastest * GRID_PER_UNIT * SECOND)
-            yield SteadyPiece(now, end, partial(_place, plan), per_s, float(plan.slope * GRID_PER_UNIT * SECOND * SECOND))
+            per_s = float(fastest * per_unit * SECOND)
+            yield SteadyPiece(now, end, partial(_place, plan, per_unit), per_s, float(plan.slope * per_unit * SECOND * SECOND))
             if end is None:
                 return
             now = end
-        yield StillPiece(now, None, float(_on_grid(plan.at(now))))
+        yield StillPiece(now, None, float(_place(plan, per_unit, now)))
 
     @property
     def drawing(self) -> Drawing:
@@ -210,12 +210,12 @@ class Integrator(TerminalComponent):
         return Drawing(SLIDE, max(ends) - min(ends) or 1.0, ("value",), sensors=sensors, low=min(ends))
 
 
-def _on_grid(value: Fraction) -> int:
-    return floor(value * GRID_PER_UNIT + Fraction(1, 2))
+def _on_grid(value: Fraction, per_unit: Fraction | int = GRID_PER_UNIT) -> int:
+    return floor(value * per_unit + Fraction(1, 2))
 
 
-def _place(plan: Integral, now: Nanos) -> int:
-    return _on_grid(plan.at(now))
+def _place(plan: Integral, per_unit: Fraction, now: Nanos) -> int:
+    return _on_grid(plan.at(now), per_unit)
 
 
 OTHER_RATE = Message("simulation.other-rate", "the rate of {name} is {factor:g} times what it should be")
@@ -279,8 +279,7 @@ def _moves(spec: IntegratorSpec, integrator: Integrator) -> Sequence[Movement]:
     if given is None and metres is None:
         raise Misuse(f"{spec.name!r} counts in {spec.unit}: what is on it needs its mm_per_unit")
     mm = exact_fraction(given) if given is not None else (metres or 0) * 1000
-    gear = gear_of(Fraction(mm * NM_PER_MM, GRID_PER_UNIT))
-    motion = Motion(integrator.version, lambda now: geared(integrator.pieces(now), gear))
+    motion = Motion(integrator.version, lambda now: integrator.pieces(now, Fraction(mm * NM_PER_MM)))
     ends = None if spec.low is None or spec.high is None else (spec.low, spec.high)
     return (Movement("value", motion, spec.towards(), float(mm), (), (spec.name,), travel=ends),)
 
