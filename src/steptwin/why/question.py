@@ -466,8 +466,8 @@ class Why:
         standing = other.signal(signal)
         if isinstance(standing, SignalOf) and (self._is_of_rotor(full) or rest_of(standing, at) is not None):
             _, since = yield from self._from_run(f"{signal} == {value!r}", {signal: full}, at, is_bare=False)
-            if since is None and self._is_of_rotor(full):
-                changed = None
+            if self._is_of_rotor(full):
+                changed = None if since is None else covered(self._of_unrecorded(full, since), Cover.LEVEL)
             elif self._point(signal) is None:  # what left it where it is may have come a moment after it was there
                 changed = covered(self._of_unrecorded(full, at), Cover.LEVEL)
             else:
