@@ -447,10 +447,13 @@ def test_of_a_file_that_is_something_else_nothing_more_is_told(top: str, message
     assert message in found
 
 
-@pytest.mark.parametrize("followed", ["belt", "q"])
-def test_what_an_encoder_follows_is_reported_where_it_is_written(followed: str) -> None:
-    """An element that is not an axis, and a name that nothing has; the element is joined by it, and no mistake of its own."""
+@pytest.mark.parametrize(
+    ("followed", "wrongly"), [("belt", "follows = 'belt' needs counts_per_unit"), ("q", "follows = 'q': permitted are x")]
+)
+def test_what_an_encoder_follows_is_reported_where_it_is_written(followed: str, wrongly: str) -> None:
+    """A belt without the counts of its encoder, and a name that nothing has; the belt is joined by it, and no mistake of its own."""
     belt = '[[conveyor]]\nname = "belt"\nlength = 200\nspeed = 100\n'
     told = wrong(f'{AXIS}pitch = 4.0\n[axis.encoder]\nfollows = "{followed}"\n{belt if followed == "belt" else ""}')
-    assert told.startswith(f"w.toml:8:1: error D009: encoder: follows = '{followed}': axes are x\n  8 | follows")
+    assert told.startswith(f"w.toml:8:1: error D009: encoder: {wrongly}")
+    assert "\n  8 | follows" in told
     assert told.count(": error ") == 1

@@ -47,7 +47,7 @@ def grown(work: Callable[[], None], times: int) -> int:
 
 
 def live_world(*, keep_inputs: bool = False) -> LiveWorld:
-    text = (EXAMPLES / "feeder.toml").read_text().replace('timing = "real"', 'timing = "off"')
+    text = Path(__file__).with_name("feeder.toml").read_text().replace('timing = "real"', 'timing = "off"')
     files = {path.name: path.read_bytes() for path in EXAMPLES.iterdir() if path.is_file() and path.suffix != ".toml"}
     return LiveWorld(World.from_toml(text, files, keep_trace=False, keep_inputs=keep_inputs))
 

@@ -12,7 +12,7 @@ from steptwin.controller import SECOND
 from steptwin.files.world import World
 from steptwin.simulation.script import steps as do
 
-FEEDER = (Path(__file__).parents[2] / "examples" / "worlds" / "feeder.toml").read_text()
+FEEDER = Path(__file__).with_name("feeder.toml").read_text()
 DAY_S = 24 * 3600
 CYCLE = """
 [[script]]
