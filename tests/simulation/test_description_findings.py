@@ -451,7 +451,7 @@ def test_of_a_file_that_is_something_else_nothing_more_is_told(top: str, message
     ("followed", "wrongly"), [("belt", "follows = 'belt' needs counts_per_unit"), ("q", "follows = 'q': permitted are x")]
 )
 def test_what_an_encoder_follows_is_reported_where_it_is_written(followed: str, wrongly: str) -> None:
-    """A belt without the counts of its encoder, and a name that nothing has; the belt is joined by it, and no mistake of its own."""
+    """A belt without counts, and a name that nothing has; the belt is joined by it, and no mistake of its own."""
     belt = '[[conveyor]]\nname = "belt"\nlength = 200\nspeed = 100\n'
     told = wrong(f'{AXIS}pitch = 4.0\n[axis.encoder]\nfollows = "{followed}"\n{belt if followed == "belt" else ""}')
     assert told.startswith(f"w.toml:8:1: error D009: encoder: {wrongly}")

@@ -179,9 +179,10 @@ def test_what_elements_of_a_kind_do() -> None:
 
 EDGES = """
 beam.skewed belt.sensor1 both.out box.acts bump.hit clamp.extended clamp.retracted cup.held cycles.out
-glance.seen head.x_switch1 hold.released jaws.closed jaws.held jaws.opened knife.switch1
+glance.seen head.x_switch1 hold.released ic.hit ig.at_high ig.at_low ig.switch1 ih.at_high ih.at_low
+jaws.closed jaws.held jaws.opened knife.switch1
 lifter.held nudge.hit power.nc power.no rail.good seen.out slide.switch1 start start-time.out
-turret.switch1
+turret.switch1 va.extended va.retracted
 """
 
 
