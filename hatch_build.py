@@ -31,5 +31,7 @@ def sources(root: Path) -> list[Path]:
 
 def is_current(root: Path) -> bool:
     built = [root / "src/steptwin/studio/page/index.html", root / "src/steptwin/files/export/page/scene.js"]
+    if not all(one.exists() for one in built):
+        return False
     newest = max(path.stat().st_mtime for path in sources(root))
-    return all(one.exists() and one.stat().st_mtime >= newest for one in built)
+    return all(one.stat().st_mtime >= newest for one in built)

@@ -112,7 +112,9 @@ def test_the_session_is_the_run_of_the_case(found: list[FoundFailure], campaign:
         assert one.files.page is not None
         page = one.files.page.read_text(encoding="utf-8")
         assert one.files.timeline.name in page
-        assert "script go" in page[page.index("<h2>Why") : page.index("<h2>Timeline")]
+        why = page[page.index("<h2>Why") : page.index("<h2>Timeline")]
+        (fault,) = one.shrunk.case.faults if one.shrunk is not None else ()
+        assert f"fault {fault.fault.split()[0]}" in why
         assert one.to_json(campaign.parent)["files"]["session"].startswith("out")
 
 

@@ -121,7 +121,15 @@ def test_the_source_archive_has_the_page_and_builds_without_node(require_page: P
     built = {path.relative_to(require_page) for path in require_page.rglob("*") if path.is_file()}
     copy = source / "src/steptwin/studio/page"
     assert {path.relative_to(copy) for path in copy.rglob("*") if path.is_file()} == built
-    assert not (source / "studio-web").exists()
+    for needed in (
+        "studio-web/package.json",
+        "tests/conftest.py",
+        "examples/worlds",
+        "Makefile",
+        "requirements/dev.txt",
+        "docs/index.md",
+    ):
+        assert (source / needed).exists(), needed
     without_node = {**os.environ, "PATH": str(tmp_path)}
     subprocess.run([*build, "-t", "wheel"], cwd=source, check=True, capture_output=True, env=without_node)
     (wheel,) = tmp_path.glob("*.whl")

@@ -258,6 +258,9 @@ def test_a_wrong_point_is_named() -> None:
 class _Bounds(Mock):
     """A history that says between which moments it is read."""
 
+    def gateways(self) -> tuple[()]:
+        return ()
+
     async def values(self, points: object, run: int, begin_s: float, end_s: float | None) -> None:
         raise Refusal(f"{begin_s} to {end_s}")
 
