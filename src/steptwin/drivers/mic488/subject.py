@@ -73,6 +73,7 @@ class Mic488Part:
         self._pins = {pin.name: pin for pin in self.datasheet.pins}
         self._from_status = _from_status()
         self._last: Mic488Status | None = None
+        self._shown: dict[int, SamplePayload] = {}
 
     @property
     def line(self) -> DriverLine[ModbusQuery, bytes]:
@@ -260,9 +261,10 @@ class Mic488Part:
         found: list[Payload] = []
         if "sample" in kinds:
             for axis, position in zip(ALL_AXES, status.positions, strict=True):
-                velocity = status.velocities[axis - 1]
-                if before is None or (position, velocity) != (before.positions[axis - 1], before.velocities[axis - 1]):
-                    found.append(SamplePayload(str(axis), position, status.units[axis - 1], velocity))
+                sample = SamplePayload(str(axis), position, status.units[axis - 1], status.velocities[axis - 1])
+                if sample != self._shown.get(axis):  # looks before may have been for other kinds
+                    self._shown[axis] = sample
+                    found.append(sample)
         if before is None:
             return found
         return found + [payload for payload in (*_edges(before, status), *_changes(before, status)) if payload.kind in kinds]
@@ -272,6 +274,7 @@ class Mic488Part:
 
     def forget(self) -> None:
         self._last = None
+        self._shown.clear()
 
     # ------------------------------------------------------------------ what faces need besides
 
