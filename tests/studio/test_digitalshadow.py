@@ -44,7 +44,8 @@ class Rig:
         return self.state()["axes"][0]["samples"]
 
     def until_at(self, position: float) -> None:
-        until(lambda: self.samples()[-1][1] == position, f"the device is seen at {position}")
+        """There are no samples before the device has been polled once."""
+        until(lambda: [one[1] for one in self.samples()[-1:]] == [position], f"the device is seen at {position}")
 
     def close(self) -> None:
         self._client.close()
