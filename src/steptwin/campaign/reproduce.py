@@ -112,7 +112,7 @@ def summary(result: CaseResult) -> str:
 
 
 def where(case: Case, description: CampaignDescription) -> str:
-    """What is particular to one case of a campaign, in a line."""
+    """Values, faults and steps that are particular to one case of a campaign, in a line."""
     return "; ".join(parts_of(case, description))
 
 

@@ -1,4 +1,4 @@
-"""What of this computer steptwin uses and may lack: the page of the studio, libraries, ports, permissions, a browser."""
+"""Things that steptwin uses and this computer may lack: the page of the studio, libraries, ports, permissions, a browser."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from steptwin.system import HAS_OWNERS, reason
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """What was examined, what was found, and what to do where it is not as it should be."""
+    """One thing that was examined, what was found, and what to do where it is not as it should be."""
 
     what: str
     found: str

@@ -268,7 +268,7 @@ class PlannedSubject(Subject, Protocol):
         ...
 
     def standing(self) -> Sequence[StandingState]:
-        """What stands: programs that wait, alarms, elements, faults that are set."""
+        """Things that stand: programs that wait, alarms, elements, faults that are set."""
         ...
 
 

@@ -1,4 +1,4 @@
-"""What stands in a world, and since when: programs that wait, alarms, elements, faults."""
+"""Things that stand in a world, and since when: programs that wait, alarms, elements, faults."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.wiring import connections
 
 LEAST_NS: Nanos = SECOND
-"""What has lasted for less is not reported: it may be on its way."""
+"""Least time that something has stood when it is reported: less, and it may be on its way."""
 
 
 class StandingKind(enum.Enum):
@@ -63,7 +63,7 @@ class Standing:
         self._changed: dict[str, Nanos] = {}
         """By a pin or terminal (``table.OUT1``), a controller or its axis (``table.M1``): its last edge or event."""
         self._around = defaultdict[str, set[str]](set)
-        """What drives the inputs of an element, and its own outputs, by its name."""
+        """Drivers of the inputs of an element, and its own outputs, by its name."""
         for one in connections(world.objects):
             self._around[one.target[0]].add(one.source)
         for name, terminals in world.objects.terminals.items():
@@ -168,7 +168,7 @@ class Standing:
 
 
 def place_of(world: Simulation, fault: ActiveFault) -> str:
-    """What a fault is set on: an element, a controller, a pin or axis of it (``table.IN3``), a line. Empty: all lines."""
+    """The place of a fault: an element, a controller, a pin or axis of it (``table.IN3``), a line. Empty: all lines."""
     get = fault.fault.get
     if (element := get("element")) is not None:
         return str(element)

@@ -329,7 +329,7 @@ class WorldSubject:
         return self._workpieces
 
     def standing(self) -> Sequence[StandingState]:
-        """What stands now. The moments since when are known from the first call on, and those of programs always."""
+        """Things that stand now. The moments since when are known from the first call on, and those of programs always."""
         if self._standing is None:
             self._standing = Standing(self.world)
         return tuple(self._standing.states())

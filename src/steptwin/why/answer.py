@@ -53,7 +53,7 @@ class ChainLink:
     subject: str
     text: MessageText
     root: Root | None = field(default=None, compare=False)
-    """What the run can be repeated without, if it is that."""
+    """The input, act, request or fault that the run can be repeated without, if it is one."""
 
     def to_json(self) -> dict[str, Any]:
         return with_messages({"time_ns": str(self.time), "subject": self.subject, "text": self.text})

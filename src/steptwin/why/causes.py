@@ -57,7 +57,7 @@ PROGRAM_STARTED = Message("why.program-started", "the program started")
 LONGEST_REACTION_NS: Nanos = 510 * MILLISECOND
 """Limit of the time after which a statement goes on when what it waits for has come: inputs may be filtered for 500 ms."""
 TIME = "time"
-"""What an element may be over that is no signal."""
+"""States of an element that are over at a moment and are no signal."""
 POSITION = "position"
 OF_WORKPIECES = ("count", "crooked", "mass")
 """Signals of the workpieces on an element."""
@@ -182,7 +182,7 @@ class Causes:
         return Cause(ChainLink(event.time, owner, text), Place(event.time, event.order), before, Cover.MOTION)
 
     def _of_rotor_event(self, axis: str, event: Change, *, begins: bool) -> FoundCause:
-        """What a rotor followed no longer, or the command with which it follows again."""
+        """The field that a rotor followed no longer, or the command with which it follows again."""
         controller, name = self._world.axes[axis].spec.drive
         wanted = Resource(ResourceKind.AXIS, name.removeprefix("M"))
         motion = self.motion(controller, wanted.name, event.time, axis)
@@ -680,7 +680,7 @@ class Causes:
         return Cause(ChainLink(place.time, controller, text), place, planned, cover)
 
     def _turned(self, controller: str, number: str, plan: Change) -> FoundCause:
-        """What turned the encoder that an axis follows by the moment of a plan: another axis, a motor, a hand."""
+        """The thing that turned the encoder that an axis follows by the moment of a plan: another axis, a motor, a hand."""
         for axis in self._world.axes.values():
             if axis.spec.drive != (controller, f"M{number}"):
                 continue

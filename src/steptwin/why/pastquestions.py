@@ -30,7 +30,7 @@ FIRST_STATEMENTS = 5500
 """Most statements of a program at first: some more than the last ones, among which the one that decided is looked for."""
 FURTHER = 8
 STANDS_NS: Nanos = SECOND
-"""What has lasted for so long may be because of any fault that has acted before."""
+"""Time after which a state may be because of any fault that has acted before."""
 MOST_SUSPECTS = 4
 """Limit of the faults that are tried for one question, the last ones first."""
 WITHOUT_IT = Message("why.without-it", "{what}; without it: {state}")

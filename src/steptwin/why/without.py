@@ -112,7 +112,7 @@ class _RunWithout:
         return is_left_out
 
     def inputs(self, inputs: Sequence[RecordedInput]) -> list[RecordedInput]:
-        """What comes from outside, without it."""
+        """Inputs from outside, without it."""
         root = self._root
         match root:
             case Sent(time):

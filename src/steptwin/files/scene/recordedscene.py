@@ -21,7 +21,7 @@ _IN_A_LINE = 10_000
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """What is drawn of a subject."""
+    """The part of a subject that is drawn."""
 
     name: str
     scene: SceneDescription

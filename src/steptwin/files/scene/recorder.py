@@ -189,7 +189,7 @@ class SceneRecorder:
                 self._follow(_signal(world, signal), self._motions.setdefault(signal, _Planned(one.motion, per_unit, slack)))
 
     def _follow_elements(self, world: Simulation) -> None:
-        """What moves besides frames, what is there only sometimes, and all levels that are shown."""
+        """Signals of what moves besides frames, of what is there only sometimes, and all levels that are shown."""
         machine, placed = machine_of(describe(world)), set(world.objects.frames)
         for body in machine.scene.bodies:
             for what, text in (("present", body.when), ("lit", body.lit)):

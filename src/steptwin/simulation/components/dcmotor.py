@@ -28,7 +28,7 @@ from steptwin.simulation.toml.values import OUTPUT_PIN, Terminal, number, time_v
 RUN = "RUN"
 TURN = 360
 STEPS_PER_REV = SECOND
-"""Of its grid: at one revolution a second it moves one step in a nanosecond."""
+"""Steps of its grid: at one revolution a second it moves one step in a nanosecond."""
 
 
 @table("[[dcmotor]]")

@@ -26,7 +26,7 @@ NEEDS_COUNTS = Message("simulation.encoder-needs-counts", "encoder: follows = {n
 
 
 class Turned(NamedTuple):
-    """What turns encoders: ``key`` of `EncoderSpec` gives the counts for each ``unit``, which ``steps`` of the drive are."""
+    """A kind of drive that turns encoders: ``key`` of `EncoderSpec` has the counts for each ``unit``, of so many ``steps``."""
 
     name: str
     drive: Mechanism | ConstantDrive | RampedDrive

@@ -107,7 +107,7 @@ class Integrator(TerminalComponent):
         self._resting = tuple(signal for signal in signals.values() if not signal.continuous)
         self._reads = {name: signal.value for name, signal in signals.items()}
         self._seen: object = None
-        """What its plan is made from."""
+        """Values that its plan is made from."""
         self.factor = 1.0
         """Fault: what its rate is multiplied by."""
         now = block.scheduler.now

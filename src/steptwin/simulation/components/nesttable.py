@@ -92,7 +92,7 @@ class NestSpec(TerminalComponentSpec, MountSpec):
 
     @property
     def middles(self) -> list[tuple[int, int]]:
-        """Of its cells, nm."""
+        """Middles of its cells, nm from its origin."""
         (nx, ny), (px, py) = self.cells, map(to_nm, self.pitch)
         return [(n % nx * px, n // nx * py) for n in range(nx * ny)]
 

@@ -43,7 +43,7 @@ JAMS_NO_MORE = Message("simulation.pusher-is-free-again", "{pusher} is free agai
 
 
 _Strip: TypeAlias = tuple[str, int, int, str]
-"""What a workpiece takes of the width of a belt: the belt, how far its middle is to the left, the width, what pushes it."""
+"""The part of the width of a belt that a workpiece takes: the belt, its middle to the left, the width, what pushes it."""
 
 
 def _strip_of(belt: BeltSpace, placed: Placed) -> _Strip:
@@ -108,7 +108,7 @@ class Pusher(Stateful):
         self._entries = tuple(
             (belt, BodyContact(SweptBody(body), SweptBody(belt.entry(scheduler.now)))) for belt in self._waiting()
         )
-        """Of the belts whose feeders wait for room: whether it is in the way."""
+        """Whether it is in the way of feeders that wait for room, by belt."""
         self._strips: dict[tuple[_Strip, _Strip], BodyContact] = {}
         """Whether two strips have something in common."""
         self._lines: tuple[tuple[_Strip, ...], ...] = ()
@@ -240,7 +240,7 @@ class Pusher(Stateful):
                 self._scheduler.notify(belt.conveyor.spec.name)
 
     def _moving(self, belt: BeltSpace) -> Iterator[tuple[Movement, int]]:
-        """What moves it across a belt, and to which side."""
+        """Movers of it across a belt, and to which side."""
         for frame, sign in belt.joints_to(self.name):
             movement = self._frames.movement(frame)
             if movement is not None:

@@ -43,7 +43,7 @@ class ActiveFault(Stateful):
         self.left = 0
         """Bytes still to be lost."""
         self.doing: object = None
-        """What it does at present, while it lasts; nothing if that is false."""
+        """The effect that it has at present, while it lasts; nothing if that is false."""
         self.due: Nanos | None = self._moment("at_s")
         """The next moment of a timed fault."""
         self.worn: list[int] = []

@@ -1,4 +1,4 @@
-"""What a rate that changes in a straight line adds up to: a parabola of time, exact in fractions.
+"""The integral of a rate that changes in a straight line: a parabola of time, exact in fractions.
 
 From a moment on with the value v, the rate r and its slope s it is v + r·t + s·t²/2. The rate has no other line before ``end``; a
 value that comes to a limit ends its line there, too.

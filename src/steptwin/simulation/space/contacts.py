@@ -32,7 +32,7 @@ MOST_LOOKS = 4000
 """Looks of one search. What it has not come to by then is left to the next one."""
 
 TURNS_AHEAD_NS = 10 * SECOND
-"""What turns is searched no further: each turn costs looks, and most turns without an end, as in homing, are stopped soon."""
+"""Time for which what turns is searched at once: each turn costs looks, and homing, a turn without an end, is stopped soon."""
 
 
 class Look(NamedTuple):

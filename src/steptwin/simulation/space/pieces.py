@@ -280,7 +280,7 @@ def pieces_of_travel(travel: Travel, now: Nanos) -> Iterator[Piece]:
 
 
 def pieces_of_drive(drive: ConstantDrive | RampedDrive, now: Nanos) -> Iterator[Piece]:
-    """What a drive with a speed moves, in its steps."""
+    """Motion by a drive with a speed, in its steps."""
     if isinstance(drive, RampedDrive) and now < (straight := drive.straight_from()):
         rate, acceleration = float(drive.whole_speed * SECOND), float(drive.acceleration * SECOND * SECOND)
         yield SteadyPiece(now, straight, drive.grid_position, rate, acceleration)
@@ -372,7 +372,7 @@ def sag(least: float, most: float, width: Nanos) -> float:
 
 
 DROP_NM = 1e-6
-"""What a motion goes back at least before that is found: more than the rounding errors of positions up to 10 m."""
+"""Least distance that a motion goes back before that is found: more than the rounding errors of positions up to 10 m."""
 
 
 def first_back(motion: Motion, now: Nanos, way: int, most: int = 256) -> Nanos | None:

@@ -65,7 +65,7 @@ class EndScripts(NamedTuple):
 
 
 class Refused(NamedTuple):
-    """What a script from outside commanded could not be done; a replay has the command no more."""
+    """A command of a script from outside that could not be done; a replay has the command no more."""
 
     text: str
 

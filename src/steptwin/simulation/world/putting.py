@@ -32,7 +32,7 @@ NO_ROOM = Message("simulation.no-room-for-a-workpiece", "{on} has no room there 
 
 
 class Act(NamedTuple):
-    """What is to be done, and in which scheduler."""
+    """The act to be done, and its scheduler."""
 
     scheduler: Scheduler
     do: Callable[[Nanos], object]
