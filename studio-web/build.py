@@ -93,7 +93,7 @@ def install(project: Path, *, tests: bool) -> None:
 
 def build() -> None:
     install(HERE, tests=False)
-    npm(HERE, "run", "--silent", "build", "--", "--logLevel", "warn")
+    npm(HERE, "run", "--silent", "build")
 
 
 def script(name: str, project: Path = HERE) -> None:
