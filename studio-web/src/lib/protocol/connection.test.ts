@@ -1,6 +1,6 @@
 import { beforeEach, expect, test } from "vitest";
 import { Connection, RequestError, type ConnectionState, type Hello } from "./connection";
-import type { LinkEvents } from "./link";
+import type { LinkEvents } from "./backend";
 import type { Pushed } from "./types";
 
 /** The other end: what was sent to it, and what it sends. */
@@ -12,7 +12,7 @@ class Server {
     return this.links.at(-1)!;
   }
 
-  open = (_url: string, events: LinkEvents) => {
+  open = (_path: string, events: LinkEvents) => {
     this.links.push(events);
     return { send: (text: string) => void this.sent.push(JSON.parse(text)), close: () => events.closed(1000) };
   };
@@ -69,7 +69,7 @@ beforeEach(() => {
     pushed: (messages: readonly Pushed[]) => void pushed.push(...messages),
     state: (state: ConnectionState) => void states.push(state),
   };
-  connection = new Connection("ws://x/ws", () => ({ lang: "en" }), events, server.open, alarm);
+  connection = new Connection(() => ({ lang: "en" }), events, server.open, alarm);
   connection.open();
   server.link.opened();
 });

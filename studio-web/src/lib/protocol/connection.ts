@@ -1,4 +1,4 @@
-import type { OpenLink, Link } from "./link";
+import type { OpenLink, Link } from "./backend";
 import type { Said } from "../../text";
 import { en } from "../../text/en";
 import { fill } from "../../text/texts.svelte";
@@ -86,7 +86,6 @@ export class Connection {
   private stateNow: ConnectionState = "connecting";
 
   constructor(
-    private readonly url: string,
     private readonly greeting: () => Fields<"hello">,
     private readonly events: ConnectionEvents,
     private readonly openLink: OpenLink,
@@ -94,7 +93,7 @@ export class Connection {
   ) {}
 
   open(): void {
-    this.link = this.openLink(this.url, {
+    this.link = this.openLink("/ws", {
       opened: () => this.opened(),
       messages: (messages) => this.received(messages),
       closed: (code) => this.closed(code),

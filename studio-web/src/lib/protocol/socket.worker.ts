@@ -1,5 +1,5 @@
 import { Batches } from "./batches";
-import type { FromWorker, ToWorker } from "./link";
+import type { FromWorker, ToWorker } from "./served";
 
 const BOUND = 5000;
 

@@ -1,19 +1,14 @@
 import { Matrix4, Object3D, TextureLoader, type BufferGeometry } from "three";
 import { GLTFLoader, type GLTFParser } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { STLLoader } from "three/examples/jsm/loaders/STLLoader.js";
-import { errorOf } from "../protocol/connection";
-import { tokenHeaders } from "../state/greeting";
-import type { Answer } from "../protocol/types";
+import type { Backend } from "../protocol/backend";
 
 /** Of glTF: metres with y up, as mm with z up. */
 const UPRIGHT = new Matrix4().makeRotationX(Math.PI / 2).scale(new Object3D().scale.setScalar(1000));
 
 /** The model of a body: in STL a shape without colours. The studio has looked at it. Rejects with the words of the studio. */
-export async function modelOf(file: string): Promise<BufferGeometry | Object3D> {
-  const address = `/api/models/${file.split("/").map(encodeURIComponent).join("/")}`;
-  const response = await fetch(address, { headers: tokenHeaders() });
-  if (!response.ok) throw errorOf(((await response.json()) as { error: NonNullable<Answer["error"]> }).error);
-  const data = await response.arrayBuffer();
+export async function modelOf(file: string, backend: Backend): Promise<BufferGeometry | Object3D> {
+  const data = await (await backend.file("models", file)).arrayBuffer();
   if (file.toLowerCase().endsWith(".stl")) return new STLLoader().parse(data);
   const loader = new GLTFLoader();
   loader.register((parser: GLTFParser) => {

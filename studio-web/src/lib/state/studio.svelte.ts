@@ -8,8 +8,7 @@ import {
   type RequestName,
 } from "../protocol/connection";
 import type { Said } from "../../text";
-import { openInWorker } from "../protocol/link";
-import { stopAllOverHttp } from "../stop";
+import type { Backend } from "../protocol/backend";
 import type { Pushed, Requests, SubjectEvent } from "../protocol/types";
 import { AxisState } from "./axis.svelte";
 import { WorldClock, type Pace } from "./clock";
@@ -121,7 +120,10 @@ export class Studio {
   private readonly connection: Connection;
   private noticeTimer = 0;
 
-  constructor(url: string, greeting: () => Fields<"hello">) {
+  constructor(
+    readonly backend: Backend,
+    greeting: () => Fields<"hello">,
+  ) {
     const events = {
       hello: (hello: Hello, isNewConnection: boolean) => this.greeted(hello, isNewConnection),
       pushed: (messages: readonly Pushed[]) => messages.forEach((message) => this.pushed(message)),
@@ -131,7 +133,7 @@ export class Studio {
       },
     };
     const first = () => ({ ...greeting(), kinds: [...SUBSCRIBED] });
-    this.connection = new Connection(url, first, events, openInWorker, browserTimers);
+    this.connection = new Connection(first, events, backend.open, browserTimers);
   }
 
   open(): void {
@@ -221,7 +223,7 @@ export class Studio {
   /** Nobody needs control for it, and every role may. */
   stopAll(): void {
     this.stops++;
-    const asked = this.link === "refused" ? stopAllOverHttp() : this.ask("stop_all", {});
+    const asked = this.link === "refused" ? this.backend.stopAll() : this.ask("stop_all", {});
     asked.catch((error: unknown) => {
       this.report(error);
       clearTimeout(this.noticeTimer); // something still moves: it stays until it is closed

@@ -18,6 +18,7 @@ import {
 import { highlightSelectionMatches, search, searchKeymap } from "@codemirror/search";
 import { EditorState, type Extension, type Text } from "@codemirror/state";
 import { EditorView, drawSelection, highlightActiveLine, keymap } from "@codemirror/view";
+import type { OpenLink } from "../../../lib/protocol/backend";
 import { saidBy, sentence, type Inner, type Said } from "../../../text";
 import { breakpoints, handlersOf, marksAre, type GutterEvents, type Mark } from "./breakpoints";
 import { Documents, OpenText, textOf, type Finding } from "./documents";
@@ -80,7 +81,7 @@ export class ProgramEditor {
   private isEnding = false;
 
   constructor(
-    url: string,
+    openLink: OpenLink,
     private readonly phrases: Record<string, string>,
     private readonly events: EditorEvents,
   ) {
@@ -114,7 +115,7 @@ export class ProgramEditor {
       ],
     });
     this.documents = this.client.workspace as Documents;
-    this.socket = new EditorSocket(url, {
+    this.socket = new EditorSocket(openLink, {
       opened: () => {
         this.isOpen = true;
         this.documents.opensAnew();

@@ -1,0 +1,28 @@
+/** One connection to a studio, wherever that is. What it hands over is already read from JSON. */
+export interface Link {
+  send(text: string): void;
+  close(): void;
+}
+
+export interface LinkEvents {
+  opened(): void;
+  /** In the order in which they came. */
+  messages(messages: readonly unknown[]): void;
+  /** `code`: that of the WebSocket; 0 where there was none. */
+  closed(code: number): void;
+}
+
+export type OpenLink = (path: "/ws" | "/editor", events: LinkEvents) => Link;
+
+export type FileKind = "recordings" | "models" | "campaigns";
+
+/** The studio behind the page: a service, or a worker of the page. What it can do is in its hello, not here. */
+export interface Backend {
+  open: OpenLink;
+  /** Rejects with the words of the studio. */
+  file(kind: FileKind, name: string): Promise<Blob>;
+  /** An address at which the browser shows a file; null where it has to be fetched. */
+  address(kind: FileKind, name: string): string | null;
+  /** Stop all where the studio does not accept this page: a stop needs no token. Rejects with the words of the studio. */
+  stopAll(): Promise<void>;
+}
