@@ -12,7 +12,7 @@ from steptwin.simulation.kinds.mic488.writes import REGISTERS
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.inputs import Bytes, Download
 from steptwin.simulation.world.snapshotlog import SnapshotLog
-from steptwin.why import causes, pastquestions
+from steptwin.why import pastquestions, programs
 from steptwin.why.pastquestions import PastQuestions
 from steptwin.why.question import finish
 from steptwin.wire.rtu import encode_frame
@@ -429,7 +429,7 @@ def test_a_past_of_many_statements_is_known_near_its_end(monkeypatch: pytest.Mon
         keep_trace=False,
     )
     monkeypatch.setattr(pastquestions, "MOST_NOTED", 20_000)
-    monkeypatch.setattr(causes, "MOST_UNDECIDED", 20_000)
+    monkeypatch.setattr(programs, "MOST_UNDECIDED", 20_000)
     snapshots = SnapshotLog(world)
     for moment in range(1, 11):
         world.run_to(moment * 5 * MILLISECOND)

@@ -442,19 +442,19 @@ class Why:
         world, causes = self.log.world, self._causes
         if owner in world.axes:
             if rest in SLIPS:
-                return causes.slipped(owner, time, SLIPS[rest])
+                return causes.axes.slipped(owner, time, SLIPS[rest])
             if rest != "power":
-                return causes.moved(owner, time)
-            drive, switched = world.axes[owner].spec.drive, causes.power(owner, time)
+                return causes.axes.moved(owner, time)
+            drive, switched = world.axes[owner].spec.drive, causes.axes.power(owner, time)
             if switched is not None and switched.link.time == time:
                 return switched
-            return causes.at_moment(drive[0], time, Resource(ResourceKind.AXIS, drive[1].removeprefix("M")))
+            return causes.controllers.at_moment(drive[0], time, Resource(ResourceKind.AXIS, drive[1].removeprefix("M")))
         if owner not in world.controllers:
-            return causes.of_element(owner, rest, time)
+            return causes.elements.of_element(owner, rest, time)
         axis = _AXIS.match(rest)
         is_of_axis = axis is not None or (self._is_signal(signal) and world.signal(signal).continuous)
         wanted = Resource(ResourceKind.AXIS, (axis and axis[1]) or "") if is_of_axis else None
-        return causes.at_moment(owner, time, wanted, rest)
+        return causes.controllers.at_moment(owner, time, wanted, rest)
 
     def _moving(self, signal: str, at: Nanos) -> Asking:
         """Cause of a quantity that changes all the time: the motion, or since when it stands."""
@@ -486,21 +486,20 @@ class Why:
             raise Misuse(NOTHING_EXECUTED_YET(controller=controller, at=at / SECOND))
         executed = log.executed[controller]
         here = executed[index]
-        use = causes.use(controller, index)
+        use = causes.programs.use(controller, index)
         text, since = statement(log, here), None if log.is_in_progress(here) else here.time
         if not use.waits or at - here.time <= log.world.programs[controller].statement_time:
             state = DOES_NOT_WAIT(controller=controller, statement=text)
-            return (
-                yield from self._answer(controller, at, state, since, covered(causes.statement(controller, index), Cover.PROGRAM))
-            )
+            first = covered(causes.programs.statement(controller, index), Cover.PROGRAM)
+            return (yield from self._answer(controller, at, state, since, first))
         links = [link for resource in use.reads for link in self._awaited(controller, resource, at)]
         is_all = self._most_links != MOST_LINKS or len(links) < MOST_SNAPSHOTS
         if not use.reads:
             links.append(ChainLink(here.time, controller, WAITS_FOR_A_TIME()))
-        found = [cause for resource in use.reads if (cause := causes.resource(controller, resource, index, at))]
+        found = [cause for resource in use.reads if (cause := causes.programs.resource(controller, resource, index, at))]
         changed = [cause for cause in found if cause.link.time > here.time]
         last = max(changed, key=lambda cause: cause.link.time, default=None)
-        first = covered(causes.statement(controller, index), Cover.WAIT) if last is None else covered(last, Cover.LEVEL)
+        first = covered(causes.programs.statement(controller, index), Cover.WAIT) if last is None else covered(last, Cover.LEVEL)
         answer = yield from self._answer(controller, at, WAITS(controller=controller, statement=text), since, first)
         links = list(dict.fromkeys((*links, *answer.links)))
         is_all = is_all and len(links) <= self._most_links
@@ -511,7 +510,7 @@ class Why:
         if resource.kind is ResourceKind.PIN and resource.name:
             yield from self._states(f"{controller}.{resource.name}", at)
         elif resource.kind is ResourceKind.AXIS:
-            motion = self._causes.motion(controller, resource.name, at)
+            motion = self._causes.axes.motion(controller, resource.name, at)
             yield ChainLink(at, controller, NO_AXIS_HAS_MOVED(time=at / SECOND)) if motion is None else motion.link
         else:
             yield ChainLink(at, controller, DEPENDS_ON(name=resource.name or ANY_PIN()))
@@ -548,7 +547,7 @@ class Why:
                 break
             cause = cause.before()
             yield
-        is_followed = cause is None and not self._causes.is_far
+        is_followed = cause is None and not self._causes.programs.is_far
         is_cut = is_followed and not self.log.is_whole and (not chain or chain[-1].before is not nothing)
         is_owed = is_followed and not is_cut and (since is not None or bool(chain))
         links, found = [one.link for one in chain], broken(chain, effect, is_followed=is_owed)

@@ -1,0 +1,209 @@
+"""The causes of what happens to axes: their motions, their power, what keeps a rotor from following."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+from steptwin.controller import SECOND, Nanos
+from steptwin.messages import Message, MessageText, text_of
+from steptwin.motion.divisions import profile_of
+from steptwin.simulation.components.touch import JAM
+from steptwin.simulation.faults.kinds_physics import IS_BLOCKED, LOSES_PULSES
+from steptwin.simulation.kinds.programs import Resource, ResourceKind
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.scheduler.wires import PinName
+from steptwin.simulation.script import steps as do
+from steptwin.why.answer import ChainLink, Cover
+from steptwin.why.chain import Cause, FoundCause, Place, covered, unknown
+from steptwin.why.controllers import acted
+from steptwin.why.log import LAST, OF_MECHANICS, Change
+
+if TYPE_CHECKING:
+    from steptwin.why.causes import Causes
+
+GIVES_POWER = Message("why.gives-power", ", which gives {axis} its power")
+BEGAN_TO_MOVE = Message("why.began-to-move", "{axis} began to move")
+STOPPED = Message("why.stopped", "{axis} stopped")
+MOTION_ENDED = Message("why.motion-ended", "the motion of {axis} ended, which began at {time:.6f} s")
+POSITION = "position"
+
+
+class AxisCauses:
+    """Finds the causes of where the loads of axes are. ``causes`` has those of everything else."""
+
+    def __init__(self, causes: Causes) -> None:
+        self._all = causes
+        self._log = causes.log
+        self._world = causes.log.world
+
+    def motion(self, controller: str, axis: str, until: Nanos, mechanics: str = "", before: int = LAST) -> FoundCause:
+        """The motion of an axis at a moment, begun before an order; of all axes the one that ends last, if ``axis`` is empty."""
+        plan = max(self._log.plans_in_force(controller, axis, until, before), key=self._end, default=None)
+        if plan is None:
+            return None
+        record = self._log.record(plan)
+        profile = profile_of(record.plan())
+        name = f"{controller}.M{record.subject}"
+        shown = f"{mechanics} ({name})" if mechanics else name
+        is_before = not self._log.is_whole and plan.time == self._log.begin
+        if is_before and profile.start < plan.time and profile.segments:
+            return Cause(
+                ChainLink(profile.start, controller, BEGAN_TO_MOVE(axis=shown)), Place(profile.start), unknown, Cover.MOTION
+            )
+        if is_before and not profile.segments:
+            return None
+        place = Place(plan.time, plan.order)
+        cover: Cover | None = None
+        if not profile.segments:
+            text = STOPPED(axis=shown)
+        elif profile.end is not None and profile.end <= until:
+            text, place = MOTION_ENDED(axis=shown, time=plan.time / SECOND), max(place, Place(profile.end))
+        else:
+            text, cover = BEGAN_TO_MOVE(axis=shown), Cover.MOTION
+
+        def planned() -> FoundCause:
+            found = self._all.controllers.in_controller(controller, plan, Resource(ResourceKind.AXIS, record.subject))
+            if found is None or found.place.time < plan.time:
+                found = self._turned(controller, record.subject, plan) or found
+            return covered(found, Cover.MOTION)
+
+        return Cause(ChainLink(place.time, controller, text), place, planned, cover)
+
+    def moved(self, axis: str, until: Nanos, before: int = LAST, *, is_held: bool = True) -> FoundCause:
+        """Cause before an order that moved the load of an axis last, or left it where it is: a motion, the power of its motor
+        meanwhile, or what keeps its rotor from following the motion. ``is_held``: also what does so since before the motion."""
+        built = self._world.axes[axis]
+        controller, number = built.spec.drive[0], built.spec.drive[1].removeprefix("M")
+        motion, power = self.motion(controller, number, until, axis, before), self.power(axis, until)
+        plan = max(self._log.plans_in_force(controller, number, until, before), default=None)
+        began = -1 if plan is None else plan.time
+        events = list(self._of_rotor(axis, until, before))
+        lasting = [one for one in events if one.time >= began or (is_held and self.holds_rotor(one, events))]
+        event = max(lasting, key=lambda one: (one.time, one.order), default=None)
+        is_unpowered = power is not None and (motion is None or motion.link.time < power.link.time)
+        if power is not None and is_unpowered:
+            plans = self._log.plans_in_force(controller, number, power.link.time)
+            is_unpowered = built.mechanism.build.coasts_unpowered or any(self._end(one)[0] > power.link.time for one in plans)
+        if event is not None and not (is_unpowered and power is not None and power.place > Place(event.time, event.order)):
+            return self.rotor_event(axis, event)
+        if is_unpowered:
+            return power
+        lost = self._lost_by_fault(axis, until, before, LOSES_PULSES)
+        is_last = lost is not None and (motion is None or (motion.cover is None and lost.place > motion.place))
+        return lost if is_last else motion
+
+    def power(self, axis: str, until: Nanos) -> FoundCause:
+        """The last change by a moment of the output that gives the motor of an axis power; None for one that always has some."""
+        power = self._world.axes[axis].spec.power
+        found = None if power is None else self._all.last((self._all.name(PinName(*power)),), until, GIVES_POWER(axis=axis))
+        return covered(found, Cover.MOTION)
+
+    def slipped(self, axis: str, until: Nanos, subjects: Collection[str] = OF_MECHANICS) -> FoundCause:
+        """The last event by a moment after which the rotor of an axis is elsewhere than counted; its motion, if there is none."""
+        events = (one for one in self._of_rotor(axis, until) if self._log.record(one).subject in subjects)
+        event = max(events, key=lambda one: (one.time, one.order), default=None)
+        found = None if event is None else self.rotor_event(axis, event)
+        lost = self._lost_by_fault(axis, until, LAST, LOSES_PULSES, IS_BLOCKED)
+        last = max((one for one in (found, lost) if one is not None), key=lambda one: one.place, default=None)
+        return self.moved(axis, until) if last is None else last
+
+    def is_moving(self, controller: str, axis: str, time: Nanos) -> bool:
+        """Whether an axis moves until a moment, or longer."""
+        return any(self._end(plan)[0] >= time for plan in self._log.plans_in_force(controller, axis, time))
+
+    def ended(self, controller: str, axis: str, time: Nanos) -> bool:
+        """Whether a motion of an axis that began earlier ended at a moment."""
+        return any(plan.time < time == self._end(plan)[0] for plan in self._log.plans_in_force(controller, axis, time))
+
+    def _of_rotor(self, axis: str, until: Nanos, before: int = LAST) -> Iterator[Change]:
+        """Events by a moment, before an order, after which a rotor does not follow its motion, or does again: of its motor, its
+        stops, and what jams it before its motion has ended."""
+        controller, name = self._world.axes[axis].spec.drive
+        plans = self._log.plans_in_force(controller, name.removeprefix("M"), until, before)
+        end = max((self._end(plan)[0] for plan in plans), default=0)
+        jams = (one for one in self.jams(axis) if one.time <= end)
+        every = (*self._log.mechanics.get(axis, ()), *jams)
+        return (one for one in every if (one.time, one.order) < (until, before))
+
+    def jams(self, name: str) -> Iterator[Change]:
+        """Events of the collisions that jam an axis or element."""
+        for one, spec in self._all.specs.items():
+            if getattr(spec, "effect", None) == JAM and f"{name}.{POSITION}" in self._all.elements.followed(one):
+                yield from self._log.mechanics.get(one, ())
+
+    def holds_rotor(self, event: Change, events: Sequence[Change]) -> bool:
+        """Whether a rotor has not followed its motion since an event of it."""
+        record = self._log.record(event)
+        last = max((one for one in events if self._is_like(self._log.record(one), record)), key=lambda one: (one.time, one.order))
+        return last is event and _begins(record)
+
+    def _is_like(self, one: TraceRecord, other: TraceRecord) -> bool:
+        return one.subject == other.subject and dict(one.facts)["element"] == dict(other.facts)["element"]
+
+    def rotor_event(self, axis: str, event: Change) -> Cause:
+        """An event of a rotor, whose cause is what led to it."""
+        record = self._log.record(event)
+        owner = str(dict(record.facts)["element"])
+        text = text_of(record.value if isinstance(record.value, str) else str(record.value))
+        if owner == axis:
+            before = partial(self._of_rotor_event, axis, event, begins=_begins(record))
+        else:
+            before = partial(self._all.elements.of_followed, owner, event)
+        return Cause(ChainLink(event.time, owner, text), Place(event.time, event.order), before, Cover.MOTION)
+
+    def _of_rotor_event(self, axis: str, event: Change, *, begins: bool) -> FoundCause:
+        """The field that a rotor followed no longer, or the command with which it follows again."""
+        controller, name = self._world.axes[axis].spec.drive
+        wanted = Resource(ResourceKind.AXIS, name.removeprefix("M"))
+        motion = self.motion(controller, wanted.name, event.time, axis)
+        if begins and motion is not None and motion.place.time == event.time:  # recorded after what it leads to at once
+            return motion._replace(place=min(motion.place, Place(event.time, event.order, -1)))
+        command = None if begins else self._all.controllers.commanded(controller, event, wanted)
+        return command or self.moved(axis, event.time, event.order, is_held=begins)
+
+    def _lost_by_fault(self, axis: str, until: Nanos, before: int, *kinds: Message) -> FoundCause:
+        """The last fault by a moment, before an order, that was reported as one of ``kinds`` at an axis."""
+        controller, name = self._world.axes[axis].spec.drive
+        for change in reversed(self._log.faults.get(controller, ())):
+            record = self._log.record(change)
+            text = record.value
+            if not isinstance(text, MessageText) or text.id not in {kind.id for kind in kinds}:
+                continue
+            if name == f"M{text.values['axis']}" and (change.time, change.order) < (until, before):
+                older = self._all.of_fault(record, change.order)
+                return Cause(self._all.fault_link(record), Place(change.time, change.order), older, Cover.FAULT)
+        return None
+
+    def _turned(self, controller: str, number: str, plan: Change) -> FoundCause:
+        """The thing that turned the encoder that an axis follows by the moment of a plan: another axis, a motor, a hand."""
+        for axis in self._world.axes.values():
+            if axis.spec.drive != (controller, f"M{number}"):
+                continue
+            follows = getattr(axis.spec.encoder, "follows", None)
+            if follows in self._world.axes:
+                return self.moved(follows, plan.time, plan.order)
+            if follows in self._all.parts:
+                return self._all.elements.of_element(follows, "", plan.time)
+        acts = self._log.acts_before(plan.time, plan.order)
+        turned = (
+            act
+            for act in acts
+            if isinstance(act.what, do.Turn) and (act.what.controller, act.what.axis) == (controller, int(number))
+        )
+        act = next(turned, None)
+        return None if act is None else acted(act)
+
+    def _end(self, plan: Change) -> tuple[float, Nanos]:
+        """When the motion of a plan ends, which may be never; of several at once, the one planned last."""
+        profile = profile_of(self._log.record(plan).plan())
+        if not profile.segments:
+            return plan.time, plan.time
+        return math.inf if profile.end is None else profile.end, plan.time
+
+
+def _begins(record: TraceRecord) -> bool:
+    """Whether a rotor does not follow its motion from an event on."""
+    return any(dict(record.facts).get(one) is True for one in ("stalled", "pushes", "touches"))

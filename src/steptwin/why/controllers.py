@@ -1,0 +1,236 @@
+"""The causes of what happens in controllers: statements, requests, actions, inputs."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+from steptwin.controller import Nanos
+from steptwin.messages import Message, text_of
+from steptwin.simulation.kinds.lines import SCRIPTS
+from steptwin.simulation.kinds.programs import Resource, ResourceKind
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.scheduler.wires import PinName
+from steptwin.simulation.script import steps as do
+from steptwin.simulation.script.control import Halt
+from steptwin.simulation.world.inputs import Download, See, SetVariable
+from steptwin.why.answer import ChainLink, Cover
+from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing
+from steptwin.why.log import LAST, MOST_LOOKED_BACK, Change
+from steptwin.why.roots import Act, Sent
+from steptwin.why.sentences import Frames, describe_input
+
+if TYPE_CHECKING:
+    from steptwin.why.causes import Causes
+
+CLIENT = Message("why.client", "client {client}: {meaning}")
+SCRIPT = Message("why.script", "script {name}: {what}")
+FROM_OUTSIDE = Message("why.from-outside", "from outside: {what}")
+REQUEST = Message("why.request", "request: {meaning}")
+
+
+class ControllerCauses:
+    """Finds the causes of changes in controllers. ``causes`` has those of everything else."""
+
+    def __init__(self, causes: Causes) -> None:
+        self._all = causes
+        self._log = causes.log
+        self._world = causes.log.world
+        self._frames = Frames(causes.log.world)
+
+    def at_moment(self, controller: str, time: Nanos, wanted: Resource | None, point: str = "") -> FoundCause:
+        """Cause of a change in a controller that no record shows; ``point``: of that point of it."""
+        group = self._log.group(controller)
+        found = self.in_controller(controller, Change(time, 0.0, group, self._log.position(group, time), LAST), wanted, point)
+        if found is None and wanted is not None:
+            return self._all.axes.motion(controller, wanted.name, time)
+        return found
+
+    def in_controller(self, controller: str, change: Change, wanted: Resource | None, point: str = "") -> FoundCause:
+        """Cause of a change in a controller at a moment; ``wanted``: the resource, if it is known; ``point``: that changed."""
+        commanded = self.commanded(controller, change, wanted, point)
+        if commanded is not None:
+            return commanded
+        return self._asked_before(controller, change) or self._inside(controller, change, wanted)
+
+    def commanded(self, controller: str, change: Change, wanted: Resource | None, point: str = "") -> FoundCause:
+        """A statement, request or action at the moment of a change in a controller."""
+        index = self._statement_at(controller, change, wanted)
+        since = -1 if index is None else self._log.executed[controller][index].order
+        outside = self._from_outside(controller, change, since, point)
+        if outside is not None:
+            return outside
+        if index is not None:
+            return self._all.programs.statement(controller, index)
+        act = next((act for act in self._log.acts_at(change.time, change.order) if _changes(act, controller)), None)
+        return None if act is None else acted(act)
+
+    def _statement_at(self, controller: str, change: Change, wanted: Resource | None) -> int | None:
+        """The number of the statement that was executed at the moment of a change, before it, and changes what is wanted."""
+        executed = self._log.executed[controller]
+        for index in range(self._log.last_executed(controller, change.time), -1, -1):
+            if executed[index].time < change.time:
+                break
+            if executed[index].order < change.order:
+                return index if _matches(self._all.programs.use(controller, index).writes, wanted) else None
+        return None
+
+    def _from_outside(self, controller: str, change: Change, since: int, point: str) -> FoundCause:
+        """A request or another action that reached a controller at the moment of a change, after the order ``since``: the last
+        that names the point that changed, or the last of all."""
+        found: list[Cause] = []
+        on = self._world.objects.line_of.get(controller)
+        for order, record in self._log.at(change.group, change.time):
+            if order < since:
+                break
+            if order >= change.order:
+                continue
+            if (
+                on is not None
+                and record.kind == "frame"
+                and record.controller == on[0].name
+                and self._frames.reaches(record, on[1])
+            ):
+                found.append(self._frame(record, order))
+            elif record.controller == controller and record.kind == "input":
+                found.append(self._input(record, order))
+        return next((one for one in found if point and _name_of(point).search(one.link.text)), next(iter(found), None))
+
+    def _inside(self, controller: str, change: Change, wanted: Resource | None) -> FoundCause:
+        """Cause of an act of the controller itself: an input, or the end of what an earlier statement began."""
+        inputs: list[tuple[int, str]] = []
+        event: tuple[int, TraceRecord] | None = None
+        for order, record in self._log.at(change.group, change.time):
+            if order >= change.order or record.controller != controller:
+                continue
+            if record.kind == "edge" and self._is_input(PinName(controller, record.subject)):
+                inputs.append((order, f"{controller}.{record.subject}"))
+            elif record.kind == "event" and record.subject != "workpiece":
+                event = order, record
+        limit = change.order if event is None else event[0]
+        last = max((one for one in inputs if one[0] < limit), default=None)
+
+        def before() -> FoundCause:
+            if last is None:
+                return self._earlier(controller, change.time, wanted)
+            edge = next(one for one in self._log.changes[last[1]] if one.order == last[0])
+            return self._all.change(last[1], edge)
+
+        if event is None:
+            return self._all.fault(controller, change) or self._ended(controller, change.time, wanted) or before()
+        order, record = event
+        element = str(dict(record.facts).get("element"))
+        if element in self._all.parts:  # such as a supply that is off
+            before = partial(self._all.elements.at_element, element, change._replace(order=order))
+        text = text_of(record.value if isinstance(record.value, str) else str(record.value))
+        return Cause(ChainLink(change.time, controller, text), Place(change.time, order), before)
+
+    def _ended(self, controller: str, time: Nanos, wanted: Resource | None) -> FoundCause:
+        """The motion of an axis that ended at a moment."""
+        if wanted is None or wanted.kind is not ResourceKind.AXIS:
+            return None
+        axes = self._all.axes
+        return axes.motion(controller, wanted.name, time) if axes.ended(controller, wanted.name, time) else None
+
+    def _asked_before(self, controller: str, change: Change) -> FoundCause:
+        """A request on a line with timing, which is answered later than it came."""
+        on = self._world.objects.line_of.get(controller)
+        if on is None or not on[0].is_timed:
+            return None
+        records = self._log.records[change.group]
+        for position in range(change.position - 1, max(-1, change.position - MOST_LOOKED_BACK), -1):
+            record = records[position]
+            if record.kind == "frame" and record.controller == on[0].name:
+                found = self._frame(record, self._log.order(change.group, position))
+                return covered(found, Cover.FRAME) if self._frames.reaches(record, on[1]) else None
+        return None
+
+    def _earlier(self, controller: str, time: Nanos, wanted: Resource | None) -> FoundCause:
+        """The last statement before a moment that changes something: what it began has ended."""
+        if wanted is None:
+            return None
+        executed, programs, axes = self._log.executed[controller], self._all.programs, self._all.axes
+        last = self._log.last_executed(controller, time)
+        for index in range(last, max(-1, last - MOST_LOOKED_BACK), -1):
+            use = programs.use(controller, index)
+            if executed[index].time < time and _matches(use.writes, wanted):
+                is_waiting = use.waits and (index == last or executed[index + 1].time >= time)
+                is_of_axis = wanted.kind is ResourceKind.AXIS and axes.is_moving(controller, wanted.name, time)
+                return covered(
+                    programs.statement(controller, index), Cover.WAIT if use.lasts or is_waiting or is_of_axis else None
+                )
+        return None
+
+    def _is_input(self, pin: PinName) -> bool:
+        return pin in self._world.objects.driven or pin in self._world.objects.circuits
+
+    def _frame(self, record: TraceRecord, order: int) -> Cause:
+        client, place = record.subject.rpartition("/")[0], Place(record.time, order)
+        meaning = self._frames.meaning(record)
+        if client == SCRIPTS:
+            link = ChainLink(record.time, record.controller, REQUEST(meaning=meaning))
+            return Cause(link, place, partial(self._requested, record, order))
+        sent = Sent(record.time, record.controller, client)
+        return Cause(ChainLink(record.time, record.controller, CLIENT(client=client, meaning=meaning), sent), place, nothing)
+
+    def _requested(self, record: TraceRecord, order: int) -> FoundCause:
+        """The step that made a request, which a line with timing carries later."""
+        members = {name for name, (line, _) in self._world.objects.line_of.items() if line.name == record.controller}
+        meaning = self._frames.meaning(record)
+        acts = [act for act in self._log.acts_before(record.time, order) if _requests(act, record.controller, members)]
+        act = next((act for act in acts if _names(act, meaning)), next(iter(acts), None))
+        return None if act is None else covered(acted(act), Cover.FRAME)
+
+    def _input(self, record: TraceRecord, order: int) -> Cause:
+        act = next(self._log.acts_at(record.time, order), None)
+        if act is not None:
+            return acted(act)
+        link = ChainLink(record.time, record.controller, FROM_OUTSIDE(what=f"{record.subject} {record.value}"))
+        return Cause(link, Place(record.time, order), nothing)
+
+
+def _matches(writes: Sequence[Resource], wanted: Resource | None) -> bool:
+    """Whether a statement changes what is wanted. An empty name is any of its kind."""
+    if wanted is None:
+        return bool(writes)
+    return any(one.kind is wanted.kind and (one.name in ("", wanted.name) or not wanted.name) for one in writes)
+
+
+def _names(act: Act, meaning: str) -> bool:
+    """Whether an action writes what a request is about."""
+    match act.what:
+        case do.Write(values):
+            return any(_name_of(name).search(meaning) for _, name, _ in values)
+    return False
+
+
+def _name_of(point: str) -> re.Pattern[str]:
+    """Pattern of a point in the words of a request."""
+    return re.compile(rf"(?<!\w){re.escape(point.partition(':')[0])}(?!\w)", re.IGNORECASE)
+
+
+def _requests(act: Act, line: str, members: Collection[str]) -> bool:
+    """Whether an action sends something over a line."""
+    match act.what:
+        case do.Write(values):
+            return any(controller in members for controller, *_ in values)
+        case do.Request() | do.Send() as what:
+            return what.line == line
+    return False
+
+
+def _changes(act: Act, controller: str) -> bool:
+    match act.what:
+        case do.PowerCycle() | do.Turn() | SetVariable() | Download() | See() | Halt() as what:
+            return what.controller == controller
+        case do.Write(values):
+            return any(name == controller for name, *_ in values)
+    return False
+
+
+def acted(act: Act) -> Cause:
+    what = describe_input(act.what)
+    text = SCRIPT(name=act.script, what=what) if act.script else FROM_OUTSIDE(what=what)
+    return Cause(ChainLink(act.time, act.script or "outside", text, act), Place(act.time, act.order), nothing)

@@ -1,0 +1,195 @@
+"""The causes of what programs execute."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+from steptwin.controller import MILLISECOND, Nanos
+from steptwin.messages import Message
+from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementLocation, StatementUse
+from steptwin.why import points
+from steptwin.why.answer import ChainLink, Cover
+from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing, unknown
+from steptwin.why.log import LAST, MOST_LOOKED_BACK, Change
+from steptwin.why.sentences import statement
+
+if TYPE_CHECKING:
+    from steptwin.why.causes import Causes
+
+WAS_EXECUTED = Message("why.was-executed", "{statement} was executed")
+WAS_IN_EXECUTION = Message("why.was-in-execution", "{statement} was in execution before")
+ENDED = Message("why.ended", "{statement} ended")
+DECIDED = Message("why.decided", "{statement} decided")
+PROGRAM_STARTED = Message("why.program-started", "the program started")
+LONGEST_REACTION_NS: Nanos = 510 * MILLISECOND
+"""Limit of the time after which a statement goes on when what it waits for has come: inputs may be filtered for 500 ms."""
+MOST_UNDECIDED = 5000
+"""Limit of the statements among which the one that decided is looked for."""
+
+
+class ProgramCauses:
+    """Finds what let statements be executed. ``causes`` has the causes of everything else."""
+
+    def __init__(self, causes: Causes) -> None:
+        self._all = causes
+        self._log = causes.log
+        self._world = causes.log.world
+        self._interrupts: dict[tuple[str, str], Sequence[range]] = {}
+        self._uses: dict[tuple[str, StatementLocation], StatementUse] = {}
+        self.is_far = False
+        """Whether the chain that was followed last ends because nothing older was searched (`MOST_UNDECIDED`)."""
+
+    def use(self, controller: str, index: int) -> StatementUse:
+        """Reads and changes of an executed statement; none if its text was replaced since."""
+        executed = self._log.executed[controller][index]
+        if not self._log.is_of_present_text(executed):
+            return StatementUse()
+        key = controller, executed.location
+        found = self._uses.get(key)
+        if found is None:
+            found = self._uses[key] = self._world.programs[controller].use(key[1])
+        return found
+
+    def statement(self, controller: str, index: int) -> Cause:
+        """A statement was executed."""
+        executed = self._log.executed[controller][index]
+        text, place = statement(self._log, executed), Place(executed.time, executed.order, 3 * index + 1)
+        if self._log.is_in_progress(executed):
+            return Cause(ChainLink(executed.time, controller, WAS_IN_EXECUTION(statement=text)), place, unknown)
+        link = ChainLink(executed.time, controller, WAS_EXECUTED(statement=text))
+        return Cause(link, place, partial(self._of_executed, controller, index))
+
+    def _of_executed(self, controller: str, index: int) -> FoundCause:
+        """Value that a statement reads, if it has changed since the last execution, so that another one was written, or of the
+        first execution since that was decided; otherwise what let it be executed."""
+        use = self.use(controller, index)
+        reads = [one for one in use.reads if one not in use.writes]
+        if not reads or not use.writes or use.waits:
+            return self._of_statement(controller, index)
+        before, decided = self._executed_before(controller, index), None
+        here, since = self._log.executed[controller][index], Place(-1)
+        if before is None:
+            decided = self._of_statement(controller, index)
+            since = Place(here.time) if decided is None else decided.place
+        else:
+            last = self._log.executed[controller][before]
+            since = Place(last.time, last.order, 3 * before + 2)
+        found = [cause for one in reads if (cause := self.resource(controller, one, index, here.time, here.order))]
+        changed = max((cause for cause in found if cause.place > since), key=lambda cause: cause.place, default=None)
+        if changed is not None:
+            return covered(changed, Cover.LEVEL)
+        return self._of_statement(controller, index) if decided is None else decided
+
+    def _executed_before(self, controller: str, index: int) -> int | None:
+        """The number of the execution of a statement before this one."""
+        locations = self._log.executed[controller].locations
+        here = locations[index]
+        return next((one for one in range(index - 1, max(-1, index - MOST_LOOKED_BACK), -1) if locations[one] == here), None)
+
+    def _handlers(self, controller: str, text: str) -> Sequence[range]:
+        """The statements of each interrupt of a text, with the one that it begins with."""
+        key = controller, text
+        if key not in self._interrupts:
+            programs = self._world.programs[controller]
+            found = [programs.use(StatementLocation(text, number)) for number in programs.labels(text).values()]
+            self._interrupts[key] = [range(use.governs.start - 1, use.governs.stop) for use in found if use.waits and use.governs]
+        return self._interrupts[key]
+
+    def _of_statement(self, controller: str, index: int) -> FoundCause:
+        """The wait or condition that let a statement be executed."""
+        executed = self._log.executed[controller]
+        number = executed[index].location.number
+        at_once, after = self._world.programs[controller].statement_time, index
+        is_present = self._log.is_of_present_text(executed[index])
+        handlers = self._handlers(controller, executed[index].location.text) if is_present else ()
+        for earlier in range(index - 1, max(-1, index - MOST_UNDECIDED), -1):
+            use, here, ended = self.use(controller, earlier), executed[earlier], executed[after]
+            if any(here.location.number in handler and number not in handler for handler in handlers):
+                continue  # an interrupt that came and returned
+            if use.jumps is not None and ended.location.number == use.jumps <= number:
+                number = here.location.number
+            if use.waits and ended.time - here.time > at_once:
+                return self._decided(controller, earlier, Place(ended.time, ended.order, 3 * after), ENDED)
+            if number in use.governs or (use.is_loop and ended.location.number >= use.governs.stop):
+                return self._decided(controller, earlier, Place(here.time, here.order, 3 * earlier + 2), DECIDED)
+            after = earlier
+        self.is_far = index >= MOST_UNDECIDED
+        return None if self.is_far else self._started(controller)
+
+    def _decided(self, controller: str, index: int, place: Place, how: Message) -> Cause:
+        executed, use = self._log.executed[controller][index], self.use(controller, index)
+        if use.is_loop:  # its condition is written where it begins
+            executed = executed._replace(location=executed.location._replace(number=use.governs.start - 1))
+        link = ChainLink(place.time, controller, how(statement=statement(self._log, executed)))
+        ended = self._of_wait if how is ENDED else self._of_decision
+        return Cause(link, place, partial(ended, controller, index, place), Cover.PROGRAM)
+
+    def _read(self, controller: str, index: int, place: Place) -> Iterator[Cause]:
+        """The last changes of what a statement reads."""
+        for resource in self.use(controller, index).reads:
+            cause = self.resource(controller, resource, index, place.time, place.order)
+            if cause is not None:
+                yield cause
+
+    def _of_decision(self, controller: str, index: int, place: Place) -> FoundCause:
+        """Change by which what a condition reads has had its value since."""
+        last = max(self._read(controller, index, place), key=lambda cause: cause.place, default=None)
+        return self._of_statement(controller, index) if last is None else covered(last, Cover.LEVEL)
+
+    def _of_wait(self, controller: str, index: int, place: Place) -> FoundCause:
+        """Change that a statement waited for, which came while it did, at most `LONGEST_REACTION_NS` before its end. A wait for a
+        time depends on what led to it."""
+        reads = self.use(controller, index).reads
+        if all(resource.kind is ResourceKind.VALUE for resource in reads):
+            began = self._log.executed[controller][index]
+            came = [
+                cause for cause in self._read(controller, index, place) if cause.place > Place(began.time, began.order, 3 * index)
+            ]
+            last = max(came, key=lambda cause: cause.place, default=None)
+            return covered(last or self._of_statement(controller, index), Cover.WAIT)
+        latest = place.time - LONGEST_REACTION_NS
+        passes = any(resource.kind is ResourceKind.AXIS and resource.name for resource in reads)  # a place, not the end
+        came = [
+            cause
+            for cause in self._read(controller, index, place)
+            if (passes if cause.cover is Cover.MOTION else cause.place.time >= latest)
+        ]
+        return covered(max(came, key=lambda cause: cause.place, default=None), Cover.WAIT)
+
+    def resource(self, controller: str, resource: Resource, index: int, time: Nanos, before: int = LAST) -> FoundCause:
+        """The last change of what a statement reads by a moment, before an order."""
+        match resource.kind:
+            case ResourceKind.PIN:
+                every = [name for name in self._log.changes if name.startswith(f"{controller}.")]
+                read = [f"{controller}.{resource.name}"] if resource.name else every
+                return self._all.lasting(read, time, self._all.last(read, time, before=before), before)
+            case ResourceKind.AXIS:
+                return self._all.axes.motion(controller, resource.name, time, before=before)
+            case ResourceKind.VALUE:
+                written = self._register(controller, resource, time, before)
+                if written is not None:
+                    return written
+                for earlier in range(index - 1, max(-1, index - MOST_LOOKED_BACK), -1):
+                    if resource in self.use(controller, earlier).writes:
+                        return covered(self.statement(controller, earlier), Cover.LEVEL)
+        return None
+
+    def _register(self, controller: str, resource: Resource, time: Nanos, before: int) -> FoundCause:
+        """The last change of a register of a controller that a program has a name for, by a moment, before an order."""
+        point = self._world.programs[controller].point(resource.name)
+        series = None if point is None else self._log.points.series(f"{controller}.{point}")
+        since = None if series is None else points.since(series, time)
+        if point is None or since is None:
+            return None
+        group = self._log.group(controller)
+        change = Change(since, 0.0, group, self._log.position(group, since), before if since == time else LAST)
+        return covered(self._all.controllers.in_controller(controller, change, resource, point), Cover.LEVEL)
+
+    def _started(self, controller: str) -> FoundCause:
+        """The statement that was executed first."""
+        if not self._log.is_whole:
+            return None
+        first = self._log.executed[controller][0]
+        return Cause(ChainLink(first.time, controller, PROGRAM_STARTED()), Place(first.time, first.order), nothing, Cover.PROGRAM)
