@@ -64,14 +64,3 @@ def test_names_in_docstrings_exist() -> None:
     assert {name: file for name, file in cited.items() if not exists(name)} == {}
     assert not exists("steptwin.controller.WirePort")
     assert not exists("steptwin.room.Port")
-
-
-def test_elements_have_pictures() -> None:
-    """Each chapter of docs/elements.md about elements has one."""
-    text = (Path(__file__).parents[1] / "docs" / "elements.md").read_text(encoding="utf-8")
-    chapters = {part.partition("\n")[0]: part for part in text.split("\n## ")[1:]}
-    without = {name for name, part in chapters.items() if "](images/" not in part}
-    assert without == {"Connections", "Faults", "Guard doors and light barriers", "Signals"}
-    assert all(
-        (Path(__file__).parents[1] / "docs" / "images" / one).is_file() for one in re.findall(r"\]\(images/([^)]+)\)", text)
-    )

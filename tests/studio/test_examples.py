@@ -1,4 +1,4 @@
-"""The examples of docs/studio.md, against a demo machine."""
+"""The examples of docs/studio/rest.md, against a demo machine."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pages import only
 from tests.conftest import until
 from tests.studio.conftest import Process
 
-PAGE = (Path(__file__).parents[2] / "docs/studio.md").read_text("utf-8")
+PAGE = (Path(__file__).parents[2] / "docs/studio/rest.md").read_text("utf-8")
 DEMO = "http://127.0.0.1:8488"
 Start = Callable[..., Process]
 

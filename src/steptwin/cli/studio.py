@@ -1,6 +1,6 @@
 """``steptwin studio``: a world, or devices, in a browser. Exit code 1 if an expectation of the world's scripts did not hold.
 
-From another program: the WebSocket and REST, which docs/studio.md explains.
+From another program: the WebSocket and REST, which docs/studio/rest.md explains.
 """
 
 from __future__ import annotations
