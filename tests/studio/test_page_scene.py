@@ -98,6 +98,12 @@ def left(page: Page, element: str, material: str) -> float:
     return box["x"] + box["width"] / 2
 
 
+def pixels_of_a_mm(page: Page) -> float:
+    ruler = page.locator(".ruler").bounding_box()
+    assert ruler is not None
+    return ruler["width"] / float(page.locator(".ruler").inner_text().split()[0])
+
+
 def test_the_machine_in_space_is_what_one_sees_first(studio: Studio) -> None:
     """With its axes beside it and curves below; what is drawn is no strip too, and what has no place is one."""
     page = studio.page(panel=None)
@@ -122,9 +128,7 @@ def test_what_moves_is_drawn_where_it_is(studio: Studio) -> None:
     until(lambda: studio.at(1) == 120.0, "the axis has moved")
     lamp = page.locator(part("x", "lamp"))
     expect(lamp).to_have_class(re.compile(r"\bon\b"))
-    pixels = page.locator(".ruler").bounding_box()
-    assert pixels is not None
-    scale = pixels["width"] / float(page.locator(".ruler").inner_text().split()[0])
+    scale = pixels_of_a_mm(page)
     assert left(page, "x", "moving") - before == pytest.approx(120.0 * scale, abs=2.0)
     assert left(page, "lift", "moving") - hanging == pytest.approx(120.0 * scale, abs=2.0)
     hand, pieces = page.locator(part("hand", "frame")), page.locator("svg .solid.piece")
@@ -140,6 +144,28 @@ def test_what_moves_is_drawn_where_it_is(studio: Studio) -> None:
     expect(hand).to_be_visible()
     page.mouse.up()
     expect(hand).to_be_hidden()
+
+
+def test_travel_is_shown_of_all_axes_or_of_the_selected_one(studio: Studio) -> None:
+    """Also where the soft limits are, by the count of the controller."""
+    studio.master.reals(10128, 150.0)  # M1_POSLIM_R
+    page = studio.page(panel="Machine")
+    button(page, "Front").click()
+    travel = page.locator(part("x", "travel")).filter(visible=True)
+    expect(page.locator(part("x", "moving"))).to_be_visible()
+    expect(travel).to_have_count(0)
+    button(page, "Travel").click()
+    expect(travel).to_have_count(6)  # the bar and its ends, the pointer, and two plates, one of them out of the picture
+
+    def places() -> list[float]:
+        boxes = [box for one in travel.all() if (box := one.bounding_box()) is not None]
+        return [(box["x"] + box["width"] / 2 - left(page, "x", "moving")) / pixels_of_a_mm(page) for box in boxes]
+
+    until(lambda: all(any(abs(at - end) < 2.0 for at in places()) for end in (-10.0, 0.0, 150.0, 200.0)), "ends and the limit")
+    button(page, "Travel").click()
+    expect(travel).to_have_count(0)
+    page.get_by_label("Selected").select_option("x")
+    expect(travel).to_have_count(6)
 
 
 def test_a_collision_is_said(studio: Studio) -> None:

@@ -102,6 +102,8 @@ class MechanicsDescription:
     switches: tuple[SwitchDescription, ...] = ()
     pulses_per_unit: float = 1.0
     """Pulses per unit of its drive; negative if positive pulses move it in the negative direction."""
+    brake: str | None = None
+    """The brake on its motor."""
 
 
 @dataclass(frozen=True, slots=True)

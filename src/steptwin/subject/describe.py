@@ -9,6 +9,7 @@ from steptwin.controller import Nanos
 from steptwin.simulation.components.axis import AXIS, MECHANICS
 from steptwin.simulation.components.beam import BEAM
 from steptwin.simulation.components.body import BODY
+from steptwin.simulation.components.brake import BRAKE
 from steptwin.simulation.components.button import BUTTON
 from steptwin.simulation.components.frames import Mounted
 from steptwin.simulation.components.mount import MoverSpec
@@ -79,7 +80,8 @@ def _mechanics(world: Simulation, name: str) -> MechanicsDescription:
     spec = fitted.spec
     switches = tuple(_switch(one.zone) for one in spec.switches)
     scale = fitted.mechanism.build.sign * float(fitted.scale.pulses_per_unit)
-    return MechanicsDescription(name, *place, fitted.scale.unit, points, spec.kind, spec.travel, switches, scale)
+    brake = next((one.name for one in world.spec.elements.of(BRAKE) if one.axis == name), None)
+    return MechanicsDescription(name, *place, fitted.scale.unit, points, spec.kind, spec.travel, switches, scale, brake)
 
 
 def _elements(world: Simulation) -> Iterator[ElementDescription]:

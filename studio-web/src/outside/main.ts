@@ -1,6 +1,6 @@
 import css from "../app.css?raw";
 import type { Piece } from "../lib/scene/pieces";
-import { COLOURS } from "../lib/scene/looks";
+import { colourOf } from "../lib/scene/looks";
 import { palettesOf, pictureOf } from "../lib/scene/picture";
 import { Stage } from "../lib/scene/stage";
 import { VIEWS } from "../lib/scene/view";
@@ -63,7 +63,7 @@ function show(stage: Stage, valueOf: (name: string) => number): void {
 function solids(machine: Machine, pieces: readonly Piece[]) {
   const { light } = PALETTES;
   return stageOf(machine, pieces).solids.map((solid) => {
-    const own = solid.color ?? `--${COLOURS[solid.material]}`;
+    const own = colourOf(solid.material, solid);
     return { ...solid, color: light.get(own) ?? own };
   });
 }

@@ -191,6 +191,7 @@ class SceneRecorder:
     def _follow_elements(self, world: Simulation) -> None:
         """Signals of what moves besides frames, of what is there only sometimes, and all levels that are shown."""
         machine, placed = machine_of(describe(world)), set(world.objects.frames)
+        placed |= {axis.brake for axis in machine.axes if axis.name in placed and axis.brake is not None}
         for body in machine.scene.bodies:
             for what, text in (("present", body.when), ("lit", body.lit)):
                 if text is not None:

@@ -4,7 +4,9 @@ export type Vector = readonly [x: number, y: number, z: number];
 
 /** What a solid is made of; how that looks is said by who draws it. */
 export type Material =
-  "frame" | "rail" | "drive" | "moving" | "rod" | "belt" | "piece" | "mark" | "lamp" | "light" | "glass" | "ghost";
+  "frame" | "rail" | "drive" | "moving" | "rod" | "belt" | "piece" | "mark" | "lamp" | "light" | "glass" | Aid;
+/** Shown besides the machine, at will: where something will be, how far an axis goes, and where what works may be. */
+export type Aid = "ghost" | "travel" | "workspace";
 
 /** A box or a prism that an element is drawn with: it stands on its frame, or is carried by it. */
 export interface Solid {
@@ -28,6 +30,19 @@ export interface Solid {
   pin: string | null;
 }
 
+/** A box, or an upright cylinder. [mm] */
+export interface Size {
+  size: readonly number[] | null;
+  diameter: number | null;
+  height: number | null;
+}
+
+export function shapeOf({ size, diameter, height }: Size): Pick<Solid, "size" | "prism"> {
+  if (size !== null) return { size: size as unknown as Vector, prism: null };
+  const wide = diameter ?? 0;
+  return { size: [wide, wide, height ?? 0], prism: { axis: 2, corners: ROUND, towards: [1, 0, 0] } };
+}
+
 /** Whether a solid has the shape of another one. */
 export function isLike({ size, prism }: Solid, other: Solid | undefined): boolean {
   if (other === undefined || (prism === null) !== (other.prism === null)) return false;
@@ -35,13 +50,14 @@ export function isLike({ size, prism }: Solid, other: Solid | undefined): boolea
 }
 
 type Frame = Scene["frames"][number];
-type Look = Partial<Omit<Solid, "element" | "frame" | "at" | "size">>;
+type Look = Partial<Omit<Solid, "frame" | "at" | "size">>;
 
 /** Corners of what is round. */
 export const ROUND = 32;
 export const unit = (axis: number, length: number): Vector => [+(axis === 0) * length, +(axis === 1) * length, +(axis === 2) * length]; // prettier-ignore
 export const plus = (...vectors: readonly Vector[]): Vector =>
   vectors.reduce((one, other) => [one[0] + other[0], one[1] + other[1], one[2] + other[2]]);
+export const dot = (one: Vector, other: Vector): number => one[0] * other[0] + one[1] * other[1] + one[2] * other[2];
 export const times = (vector: Vector, by: number): Vector => [vector[0] * by, vector[1] * by, vector[2] * by];
 export const between = (low: number, value: number, high: number) => Math.min(high, Math.max(low, value));
 
@@ -93,14 +109,9 @@ export class Builder {
     return plus(times(this.along, along), times(this.across, across), times(this.up, up));
   }
 
-  private add(at: Vector, size: Vector, material: Material, look: Look): void {
+  /** In the directions of the frame. */
+  add(at: Vector, size: Vector, material: Material, look: Look = {}): void {
     const nothing = { prism: null, color: null, slide: null, shown: null, pin: null, isCarried: false };
     this.put({ ...nothing, element: this.frame.name, frame: this.place, at, size, material, ...look });
   }
 }
-
-/** A solid of an element, without a place and a size. */
-export const plain = ({ frame, place }: Builder) => ({
-  ...{ element: frame.name, frame: place, isCarried: false },
-  ...{ prism: null, color: null, slide: null, shown: null, pin: null },
-}); // prettier-ignore

@@ -1,5 +1,5 @@
 import type { Element } from "../state/model";
-import { between, Builder, plain, plus, times, unit, type Vector } from "./builder";
+import { between, Builder, plus, times, unit, type Vector } from "./builder";
 import { directionOf, type Scene } from "./poses";
 
 /** What takes workpieces, holds them and sees them. */
@@ -78,26 +78,19 @@ export function beam(build: Builder, { beams }: Scene): void {
   const pin = `${its.name}.seen`;
   const across = unit(axis, sign);
   const [high, wide] = [(count - 1) * pitch, between(8, 0.03 * length, 24)];
-  const place = (along: number, n: number) => plus(times(build.along, along), times(across, n * pitch));
   if (count === 1 && length <= NEAR_MM) {
     build.rod([-20, 0, 0], 0, 36, 12, "rod");
     build.rod([-1, 0, 0], 0, 2, 10, "lamp", { pin });
   } else {
-    for (const [along, material] of [
-      [-wide / 2, "drive"],
-      [length + wide / 2, "drive"],
-    ] as const) {
-      const at = plus(times(build.along, along), times(across, high / 2));
-      const size = [wide, wide, wide];
-      size[axis] = high + wide;
-      build.put({ ...plain(build), at, size: size as unknown as Vector, material });
-    }
-    build.put({ ...plain(build), at: plus(times(build.along, -wide / 2), times(across, high + wide / 2 + 1)), size: [0.6 * wide, 0.6 * wide, 0.6 * wide], material: "lamp", pin }); // prettier-ignore
+    const middle = times(across, high / 2);
+    const post = plus([wide, wide, wide], times(unit(axis, 1), high));
+    for (const along of [-wide / 2, length + wide / 2])
+      build.add(plus(times(build.along, along), middle), post, "drive");
+    const lamp = plus(times(build.along, -wide / 2), times(across, high + wide / 2 + 1));
+    build.add(lamp, [0.6 * wide, 0.6 * wide, 0.6 * wide], "lamp", { pin });
   }
+  const light = plus([LIGHT_MM, LIGHT_MM, LIGHT_MM], unit(build.axis, length - LIGHT_MM));
   const step = Math.ceil(count / MOST_LINES);
-  for (let n = 0; n < count; n += step) {
-    const size = [LIGHT_MM, LIGHT_MM, LIGHT_MM];
-    size[build.axis] = length;
-    build.put({ ...plain(build), at: place(length / 2, n), size: size as unknown as Vector, material: "light", pin });
-  }
+  for (let n = 0; n < count; n += step)
+    build.add(plus(times(build.along, length / 2), times(across, n * pitch)), light, "light", { pin });
 }

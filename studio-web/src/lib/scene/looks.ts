@@ -10,7 +10,7 @@ export interface Levels {
 }
 
 /** Properties of app.css. */
-export const COLOURS: Readonly<Record<Look, string>> = {
+const COLOURS: Readonly<Record<Look, string>> = {
   frame: "metal-strong",
   rail: "metal",
   drive: "motor",
@@ -24,6 +24,8 @@ export const COLOURS: Readonly<Record<Look, string>> = {
   glass: "rubber",
   shining: "good",
   ghost: "accent",
+  travel: "dim",
+  workspace: "trace-6",
   interrupted: "danger",
   on: "good",
   stalled: "danger-fill",
@@ -31,6 +33,11 @@ export const COLOURS: Readonly<Record<Look, string>> = {
 
 /** Of its own colour, that a lamp shows which does not shine. */
 export const DARK = 0.35;
+
+/** The colour of a solid, or a property of app.css: its own where it has one, and its state does not give it another. */
+export function colourOf(look: Look, { material, color }: Solid): string {
+  return (look === material || look === "shining" ? color : null) ?? `--${COLOURS[look]}`;
+}
 
 export function lookOf({ element, material, pin }: Solid, { levelOf, isStalled }: Levels): Look {
   if (material === "moving" && isStalled(element)) return "stalled";

@@ -1,7 +1,8 @@
-import { COLOURS, DARK, lookOf, type Levels } from "./looks";
+import { facesOf } from "./faces";
+import { colourOf, DARK, lookOf, type Levels } from "./looks";
 import { POSE } from "./poses";
 import type { Stage } from "./stage";
-import { facesOf, frameOf, Order, spotX, spotY, type View } from "./view";
+import { frameOf, Order, spotX, spotY, type View } from "./view";
 
 /** Values of properties of app.css, `--ink`: `#16191d`. */
 export type Palette = ReadonlyMap<string, string>;
@@ -50,8 +51,8 @@ export function pictureOf(
     const solid = stage.solids[n];
     if (solid === undefined || !stage.isThere[n]) return "";
     const look = lookOf(solid, levels);
-    const own = look === solid.material || look === "shining" ? solid.color : null;
-    const whole = own === null ? colour(`--${COLOURS[look]}`) : own.startsWith("--") ? colour(own) : own;
+    const own = colourOf(look, solid);
+    const whole = own.startsWith("--") ? colour(own) : own;
     const fill = look === "glass" ? mixed(whole, DARK, colour("--rubber")) : whole;
     const isLight = solid.material === "light";
     const faces = facesOf(solid, stage.places, n * POSE, view);

@@ -1,5 +1,5 @@
 import type { Hello } from "../protocol/connection";
-import { ROUND, type Solid, type Vector } from "./builder";
+import { shapeOf, type Solid } from "./builder";
 import { copyPose, directionOf, POSE, shift, turn, type Poses, type Scene } from "./poses";
 
 export type Piece = Hello["workpieces"][number];
@@ -37,17 +37,12 @@ export class Pieces {
     this.signals = [...new Set(pieces.flatMap(({ travel }) => travel ?? []))];
     this.values = Float64Array.from(this.signals, (signal) => known.get(signal) ?? NaN);
     this.names = pieces.map(({ name }) => name);
-    this.solids = pieces.map((piece): Solid => {
-      const [diameter, height] = [piece.diameter ?? 0, piece.height];
-      const isRound = piece.size === null;
-      return {
-        ...{ element: piece.on ?? "", frame: frames.findIndex(({ name }) => name === piece.on), isCarried: true },
-        ...{ at: [0, 0, 0], slide: null, shown: null, pin: null, material: "piece" },
-        size: isRound ? [diameter, diameter, height] : (piece.size as unknown as Vector),
-        prism: isRound ? { axis: 2, corners: ROUND, towards: [1, 0, 0] } : null,
-        color: colorOf(piece, this.scene),
-      };
-    });
+    this.solids = pieces.map((piece): Solid => ({
+      ...{ element: piece.on ?? "", frame: frames.findIndex(({ name }) => name === piece.on), isCarried: true },
+      ...{ at: [0, 0, 0], slide: null, shown: null, pin: null, material: "piece" },
+      ...shapeOf(piece),
+      color: colorOf(piece, this.scene),
+    }));
     this.ways = Int32Array.from(pieces, ({ travel }) => (travel === null ? -1 : this.signals.indexOf(travel)));
     this.from = Float64Array.from(pieces, ({ travel_at }) => travel_at);
     this.at = Float64Array.from(

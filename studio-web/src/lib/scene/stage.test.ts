@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import type { Mechanics, Model } from "../state/model";
+import type { Model } from "../state/model";
 import { POSE, type Scene } from "./poses";
 import { Stage } from "./stage";
 
@@ -14,8 +14,14 @@ const SCENE = {
   nests: [],
   beams: [],
 } as unknown as Scene; // prettier-ignore
-const AXIS = { name: "x", kind: "linear", travel: [0, 50], switches: [] } as unknown as Mechanics;
-const MODEL = { mechanics: [AXIS], elements: [{ name: "cup", kind: "vacuum", drawing: null }] } as unknown as Model;
+const AXIS = { name: "x", controller: "table", axis: "1", kind: "linear", travel: [0, 50], switches: [], brake: "b" };
+const LIMITS = ["table.M1_POSLIM_L", "table.M1_POSLIM_R"];
+const controllers = [{ name: "table", axes: [{ number: 1, limits: LIMITS }] }];
+const MODEL = {
+  controllers,
+  mechanics: [AXIS],
+  elements: [{ name: "cup", kind: "vacuum", drawing: null }],
+} as unknown as Model;
 
 test("what works on workpieces is drawn where its motion ends, while it goes there and somebody wants to see it", () => {
   const stage = new Stage(SCENE, MODEL, [], true);
@@ -33,4 +39,27 @@ test("what works on workpieces is drawn where its motion ends, while it goes the
   expect(shown(10, 30)).toEqual([100, 300]);
   expect(shown(29.95, 30)).toEqual([299.5, null]);
   expect(shown(30, NaN)).toEqual([300, null]);
+});
+
+test("the travel of an axis is beside it, with plates at the soft limits that are known, and the cup has a box where it can be", () => {
+  const stage = new Stage(SCENE, MODEL, [], true);
+  stage.poses.values[stage.poses.signals.indexOf("x.position")] = 10;
+  stage.poses.values[stage.poses.signals.indexOf("table.M1_POSLIM_R")] = 45;
+  const shown = (name: string | null) => {
+    stage.travelShown = name;
+    stage.update();
+    return stage.solids.flatMap(({ material, size }, n) =>
+      n >= stage.aids && stage.isThere[n] ? [[material, stage.places[n * POSE + 9], size[0] > 100] as const] : [],
+    );
+  };
+  expect(shown("")).toEqual([]);
+  // The bar, its ends, the pointer and one plate.
+  expect(shown("x")).toEqual([250, 0, 500, 100, 450].map((at) => ["travel", at, at === 250]));
+  expect(shown("cup")).toEqual([["workspace", 250, true]]);
+  expect(shown(null)).toHaveLength(6);
+});
+
+test("a brake is behind the motor of its axis, and shows when it lets go", () => {
+  const shoes = new Stage(SCENE, MODEL).solids.filter(({ pin }) => pin === "b.released");
+  expect(shoes.map(({ element, material }) => [element, material])).toEqual(Array(2).fill(["b", "lamp"]));
 });

@@ -1,10 +1,10 @@
 import type { Model } from "../state/model";
+import { aidsOf, rangesOf } from "./aids";
 import type { Solid, Vector } from "./builder";
 import { Pieces, type Piece } from "./pieces";
 import { copyPose, POSE, Poses, shift, type Scene } from "./poses";
-import { solidsOf, travelOf } from "./solids";
+import { solidsOf } from "./solids";
 
-const GHOST = { material: "ghost", color: null, pin: null, shown: null } as const;
 /** What goes less far is not drawn at its target. */
 const GONE_MM = 1;
 const WORKS = new Set(["vacuum", "gripper", "tool"]);
@@ -29,8 +29,9 @@ export class Stage {
   solids: readonly Solid[];
   readonly poses: Poses;
   readonly pieces: Pieces;
-  /** Solids of elements. */
+  /** Solids of elements; those from `aids` on are shown at will. */
   readonly fixed: number;
+  readonly aids: number;
   /** Changes with the workpieces. */
   revision = 0;
   /** Poses of the middles of the solids. */
@@ -46,20 +47,21 @@ export class Stage {
   readonly tips: readonly number[];
   /** Whether tips are drawn where they are going, too. */
   showsTargets = false;
+  /** The element whose travel is shown; null: all. */
+  travelShown: string | null = "";
   /** Values of the signals of `poses` where motions will end; NaN: it stands, or that is not known. */
   readonly targets: Float64Array;
   private readonly aims: Poses;
   private readonly slides: Int32Array;
   private readonly shown: Int32Array;
 
-  /** `hasTargets`: solids for what is drawn where it is going. */
-  constructor(scene: Scene, model: Model, pieces: readonly Piece[] = [], hasTargets = false) {
+  /** `hasAids`: with solids that are shown at will. */
+  constructor(scene: Scene, model: Model, pieces: readonly Piece[] = [], hasAids = false) {
     const solids = solidsOf(scene, model);
     this.tips = tipsOf(scene);
-    const isTip = ({ frame, isCarried }: Solid) =>
-      hasTargets && this.tips.includes(frame) && (isCarried || scene.frames[frame]?.joints.length === 0);
-    this.solids = [...solids, ...solids.filter(isTip).map((one): Solid => ({ ...one, ...GHOST }))];
+    this.solids = hasAids ? [...solids, ...aidsOf(scene, model, solids, this.tips)] : solids;
     this.fixed = this.solids.length;
+    this.aids = solids.length;
     this.pieces = new Pieces(scene);
     const more = this.solids.flatMap(({ slide, shown }) => [slide?.signal ?? [], shown ?? []].flat());
     this.poses = new Poses(scene, more);
@@ -106,7 +108,7 @@ export class Stage {
       const { isCarried, frame, at, slide, material } = this.solids[n] as Solid;
       const from = n * POSE;
       const isGhost = material === "ghost";
-      if (isGhost && !(this.showsTargets && this.isGoing(frame))) {
+      if (n >= this.aids && !this.isAsked(n)) {
         this.isThere[n] = 0;
         continue;
       }
@@ -121,6 +123,15 @@ export class Stage {
       this.isThere[n] = shown < 0 || (poses.values[shown] as number) > 0 ? 1 : 0;
       this.bound(n);
     }
+  }
+
+  /** Whether somebody wants to see an aid that there is now. */
+  private isAsked(n: number): boolean {
+    const { element, frame, material } = this.solids[n] as Solid;
+    if (material === "ghost") return this.showsTargets && this.isGoing(frame);
+    const slides = this.slides[n] as number;
+    const isKnown = slides < 0 || !Number.isNaN(this.poses.values[slides]);
+    return isKnown && (this.travelShown === null || this.travelShown === element);
   }
 
   /** Whether a tip is not where it will be. */
@@ -154,32 +165,11 @@ export class Stage {
       });
       this.update();
       for (let k = 0; k < this.lows.length; k++) {
+        if (!this.isThere[Math.floor(k / 3)]) continue;
         low[k % 3] = Math.min(low[k % 3] as number, this.lows[k] as number);
         high[k % 3] = Math.max(high[k % 3] as number, this.highs[k] as number);
       }
     }
     return { low: low as unknown as Vector, high: high as unknown as Vector };
   }
-}
-
-/** Where signals of motion may be, in their units. */
-function rangesOf({ frames }: Scene, model: Model): Map<string, readonly [number, number]> {
-  const found = new Map<string, readonly [number, number]>();
-  for (const { joints } of frames)
-    for (const { signal, turns, per_unit } of joints) if (turns) found.set(signal, [0, 360 / per_unit]);
-  for (const axis of model.mechanics) {
-    const joint = frames.find(({ name }) => name === axis.name)?.joints[0];
-    if (joint !== undefined && !joint.turns) found.set(joint.signal, travelOf(axis, joint.per_unit));
-  }
-  for (const { name, drawing } of model.elements) {
-    if (drawing === null || drawing.shape === "dial") continue;
-    const { low, length, across_low, across } = drawing;
-    drawing.places.forEach((place, k) =>
-      found.set(
-        `${name}.${place}`,
-        drawing.shape === "plane" && k === 1 ? [across_low, across_low + across] : [low, low + length],
-      ),
-    );
-  }
-  return found;
 }

@@ -2,7 +2,8 @@ import { expect, test } from "vitest";
 import type { Model } from "../state/model";
 import type { Scene } from "./poses";
 import { Stage } from "./stage";
-import { facesOf, frameOf, Order, spotX, spotY, VIEWS, type ViewName } from "./view";
+import { facesOf } from "./faces";
+import { frameOf, Order, spotX, spotY, VIEWS, type ViewName } from "./view";
 
 type Box = readonly [name: string, at: readonly number[], size: readonly number[], on?: string];
 

@@ -1,4 +1,4 @@
-import type { Solid, Vector } from "./builder";
+import { dot, type Vector } from "./builder";
 import type { Extent, Stage } from "./stage";
 
 /** A parallel view: where right, up, and towards who looks are in space. */
@@ -7,8 +7,6 @@ export interface View {
   up: Vector;
   near: Vector;
 }
-
-const dot = (one: Vector, other: Vector) => one[0] * other[0] + one[1] * other[1] + one[2] * other[2];
 
 /** Seen from an angle about the upright [degrees], 0 is from the front, and from so far above. */
 function viewFrom(around: number, above: number): View {
@@ -34,83 +32,6 @@ export function frameOf({ right, up }: View, { low, high }: Extent): [number, nu
   return [dot(right, middle) - wide, -dot(up, middle) - tall, 2 * wide, 2 * tall];
 }
 
-/** What is drawn of a solid, about its middle, as the data of paths: its outline and faces by how much light they have. */
-export interface Faces {
-  front: string;
-  side: string;
-  top: string;
-}
-
-type Flat = readonly [number, number];
-
-const pathOf = (points: readonly Flat[]) =>
-  points.length ? `M${points.map(([x, y]) => `${x.toFixed(2)} ${y.toFixed(2)}`).join("L")}Z` : "";
-
-/** Counterclockwise, by the monotone chain of Andrew. */
-function hullOf(points: readonly Flat[]): Flat[] {
-  const sorted = [...points].sort((one, other) => one[0] - other[0] || one[1] - other[1]);
-  const turns = (o: Flat, a: Flat, b: Flat) => (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]);
-  const half = (list: readonly Flat[]) => {
-    const chain: Flat[] = [];
-    for (const point of list) {
-      while (chain.length > 1 && turns(chain.at(-2) as Flat, chain.at(-1) as Flat, point) <= 1e-9) chain.pop();
-      chain.push(point);
-    }
-    return chain.slice(0, -1);
-  };
-  return [...half(sorted), ...half(sorted.reverse())];
-}
-
-/** The corners of the ends of a prism, or of a box as one that is upright: first those of the lower one, then of the upper. */
-export function cornersOf({ size, prism }: Pick<Solid, "size" | "prism">): [Vector[], Vector[]] {
-  const axis = prism?.axis ?? 2;
-  const [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
-  const count = prism?.corners ?? 4;
-  const first = prism === null ? Math.PI / 4 : Math.atan2(prism.towards[b] as number, prism.towards[a] as number);
-  // The corners of a box are on a circle about it only where it is a square.
-  const reach = prism === null ? Math.SQRT1_2 : 0.5;
-  const end = (side: number) =>
-    Array.from({ length: count }, (_, k): Vector => {
-      const angle = first + (2 * Math.PI * k) / count;
-      const corner = [0, 0, 0];
-      corner[axis] = (side * (size[axis] as number)) / 2;
-      corner[a] = Math.cos(angle) * reach * (size[a] as number);
-      corner[b] = Math.sin(angle) * reach * (size[b] as number);
-      return corner as unknown as Vector;
-    });
-  return [end(-1), end(1)];
-}
-
-const SEEN = 1e-6;
-
-/** A solid in a view, turned by the pose at `from`. */
-export function facesOf(solid: Solid, poses: Float64Array, from: number, { right, up, near }: View): Faces {
-  const turned = (vector: Vector): Vector => {
-    const row = (k: number) => poses.subarray(from + 3 * k, from + 3 * k + 3) as unknown as Vector;
-    return [dot(row(0), vector), dot(row(1), vector), dot(row(2), vector)];
-  };
-  const flat = (corner: Vector): Flat => [dot(right, corner), -dot(up, corner)];
-  const [lower, upper] = cornersOf(solid).map((end) => end.map(turned)) as [Vector[], Vector[]];
-  const faces: Faces = { front: "", side: "", top: "" };
-  const add = (corners: readonly Vector[], normal: Vector) => {
-    if (dot(normal, near) < SEEN) return;
-    const light = Math.abs(normal[2]) > 0.7 ? "top" : Math.abs(dot(normal, right)) > 0.5 ? "side" : "front";
-    faces[light] += pathOf(corners.map(flat));
-  };
-  const axis = solid.prism?.axis ?? 2;
-  const upright = turned([+(axis === 0), +(axis === 1), +(axis === 2)]);
-  if (solid.prism === null) {
-    for (let k = 0; k < 4; k++) {
-      const next = (k + 1) % 4;
-      const corners = [lower[k], lower[next], upper[next], upper[k]] as Vector[];
-      add(corners, turned(k === 0 ? [0, 1, 0] : k === 1 ? [-1, 0, 0] : k === 2 ? [0, -1, 0] : [1, 0, 0]));
-    }
-  } else faces.front = pathOf(hullOf([...lower, ...upper].map(flat)));
-  add(upper, upright);
-  add(lower, upright.map((one) => -one) as unknown as Vector);
-  return faces;
-}
-
 /** Of a direction that is nearly in the picture. */
 const FLAT = 0.01;
 const TOUCHING_MM = 0.01;
@@ -122,7 +43,7 @@ interface Ends {
   to: number;
 }
 
-/** In what order solids are drawn, those behind first. */
+/** In what order solids are drawn, those behind first, and aids above all. */
 export class Order {
   drawn = new Int32Array();
   private state = new Uint8Array();
@@ -149,7 +70,10 @@ export class Order {
       this.span(n, this.view.right, 4 * n);
       this.span(n, this.view.up, 4 * n + 2);
     }
-    for (let n = 0; n < this.drawn.length; n++) this.visit(n);
+    const { aids, fixed } = this.stage;
+    this.state.fill(1, aids, fixed);
+    for (let n = 0; n < count; n++) this.visit(n);
+    for (let n = aids; n < fixed; n++) this.drawn[this.count++] = n;
   }
 
   /** After all that is behind it. */

@@ -1,9 +1,11 @@
+import { isAid } from "../../lib/scene/aids";
 import { isLike, type Solid } from "../../lib/scene/builder";
-import type { Levels } from "../../lib/scene/looks";
+import { facesOf } from "../../lib/scene/faces";
+import { colourOf, lookOf, type Levels, type Look } from "../../lib/scene/looks";
 import { POSE } from "../../lib/scene/poses";
 import type { Stage } from "../../lib/scene/stage";
 import type { Trail } from "../../lib/scene/trail";
-import { facesOf, frameOf, Order, spotX, spotY, type View } from "../../lib/scene/view";
+import { frameOf, Order, spotX, spotY, type View } from "../../lib/scene/view";
 
 const SVG = "http://www.w3.org/2000/svg";
 const LIGHTS = ["front", "side", "top"] as const;
@@ -39,6 +41,8 @@ function grown(numbers: Float64Array<ArrayBuffer>, length: number): Float64Array
 /** A scene in one parallel view, as lines and areas of an SVG that are moved, and drawn anew only where they have turned. */
 export class Drawing {
   private readonly parts: SVGGElement[] = [];
+  /** How each of them looks. */
+  private readonly painted: string[] = [];
   private solids: readonly Solid[] = [];
   private turns = new Float64Array();
   private spots = new Float64Array();
@@ -66,9 +70,8 @@ export class Drawing {
     this.all = create("g", svg);
     this.order = new Order(stage, view);
     this.renew();
-    const fixed = stage.solids.slice(0, stage.fixed);
+    const fixed = stage.solids.slice(0, stage.aids);
     fixed.forEach(({ element, material }, n) => {
-      if (material === "ghost") return;
       if (material !== "frame" || fixed.some((one) => one.element === element && one.material !== "frame"))
         this.named.set(element, [...(this.named.get(element) ?? []), n]);
     });
@@ -123,13 +126,11 @@ export class Drawing {
     this.trails[tip]?.setAttribute("d", d);
   }
 
-  mark({ levelOf, isStalled, selected, labels }: Marks): void {
+  mark(marks: Marks): void {
+    const { selected, labels } = marks;
     for (let n = 0; n < this.stage.fixed; n++) {
-      const { element, pin, material } = this.stage.solids[n] as Solid;
-      const { classList } = this.parts[n] as SVGGElement;
-      classList.toggle("on", pin !== null && levelOf(pin) === 1);
-      classList.toggle("stalled", material === "moving" && isStalled(element));
-      classList.toggle("selected", element === selected);
+      const solid = this.stage.solids[n] as Solid;
+      this.paint(n, lookOf(solid, marks), solid.element === selected && !isAid(solid));
     }
     for (const [name, label] of this.labels) {
       label.classList.toggle("selected", name === selected);
@@ -148,7 +149,7 @@ export class Drawing {
       const solid = solids[n] as Solid;
       const part = (parts[n] ??= this.part(solid));
       part.dataset["element"] = solid.element;
-      if (solid.color !== null) part.style.setProperty("--fill", valueOf(solid.color));
+      this.paint(n, solid.material, false);
       if (n >= stage.fixed) (part.lastChild as Element).textContent = stage.pieces.names[n - stage.fixed] ?? "";
       if (!isLike(solid, this.solids[n])) this.turns.fill(NaN, 9 * n, 9 * n + 9);
     }
@@ -157,8 +158,20 @@ export class Drawing {
     this.ordered_ms = -ORDER_MS;
   }
 
+  /** As a state of its element has it. */
+  private paint(n: number, look: Look, isSelected: boolean): void {
+    const solid = this.stage.solids[n] as Solid;
+    const part = this.parts[n] as SVGGElement;
+    const color = colourOf(look, solid);
+    const name = `solid ${solid.material} ${look === solid.material ? "" : look} ${isSelected ? "selected" : ""} ${color}`;
+    if (this.painted[n] === name) return;
+    this.painted[n] = name;
+    part.setAttribute("class", name);
+    part.style.setProperty("--fill", valueOf(color));
+  }
+
   private part({ material }: Solid): SVGGElement {
-    const part = create("g", this.all, `solid ${material}`);
+    const part = create("g", this.all);
     for (const light of LIGHTS) create("path", part, light);
     if (material === "piece") create("title", part);
     return part;

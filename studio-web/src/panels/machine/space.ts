@@ -1,15 +1,15 @@
 import {
   AmbientLight,
-  BoxGeometry,
   BufferAttribute,
   BufferGeometry,
-  CylinderGeometry,
   DirectionalLight,
   EdgesGeometry,
+  Float32BufferAttribute,
   HemisphereLight,
   Line,
   LineBasicMaterial,
   LineSegments,
+  MathUtils,
   Mesh,
   MeshStandardMaterial,
   Object3D,
@@ -23,9 +23,12 @@ import {
   type Matrix4,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import { POSE } from "../../lib/scene/poses";
+import { toCreasedNormals } from "three/examples/jsm/utils/BufferGeometryUtils.js";
+import { isAid } from "../../lib/scene/aids";
 import type { Solid } from "../../lib/scene/builder";
-import { COLOURS, DARK, lookOf, type Look } from "../../lib/scene/looks";
+import { facetsOf } from "../../lib/scene/faces";
+import { colourOf, DARK, lookOf, type Look } from "../../lib/scene/looks";
+import { POSE } from "../../lib/scene/poses";
 import type { Stage } from "../../lib/scene/stage";
 import type { Trail } from "../../lib/scene/trail";
 import { frameOf, VIEWS, type ViewName } from "../../lib/scene/view";
@@ -35,6 +38,9 @@ import type { Marks } from "./drawing";
 const UNSEEN = 1;
 /** Of the camera, upright. [degrees] */
 const ANGLE = 20;
+
+/** Faces with more between their directions have an edge. [radians] */
+const EDGE = Math.PI / 5;
 
 type SolidMesh = Mesh<BufferGeometry, MeshStandardMaterial>;
 
@@ -156,12 +162,12 @@ export class Space {
 
   /** The model of a body is seen in its place, from its origin on. A shape has the colour of the body, and other models their own. */
   dress(element: string, model: BufferGeometry | Object3D): void {
-    const n = this.stage.solids.findIndex((one) => one.element === element && one.material !== "ghost");
+    const n = this.stage.solids.findIndex((one) => one.element === element);
     const [mesh, solid] = [this.meshes[n], this.stage.solids[n]];
     if (mesh === undefined || solid === undefined || this.isEnded) return;
     const [x, y, z] = solid.at;
     if (model instanceof BufferGeometry) {
-      const edges = new EdgesGeometry(model.translate(-x, -y, -z), 40);
+      const edges = new EdgesGeometry(model.translate(-x, -y, -z), MathUtils.radToDeg(EDGE));
       this.geometries.set(`model ${element}`, [model, edges]);
       mesh.geometry = model;
       (mesh.children[0] as LineSegments).geometry = edges;
@@ -184,8 +190,8 @@ export class Space {
     this.isStale = true;
     for (let n = 0; n < this.stage.fixed; n++) {
       const solid = this.stage.solids[n] as Solid;
-      const isSelected = solid.element === marks.selected;
-      (this.meshes[n] as SolidMesh).material = this.materialOf(lookOf(solid, marks), solid.color, isSelected);
+      const isSelected = solid.element === marks.selected && !isAid(solid);
+      (this.meshes[n] as SolidMesh).material = this.materialOf(lookOf(solid, marks), solid, isSelected);
     }
   }
 
@@ -193,9 +199,8 @@ export class Space {
   paint(): void {
     const style = getComputedStyle(this.canvas);
     for (const [name, material] of this.looks) {
-      const [look, own, selected] = name.split(" ");
-      const property = own?.startsWith("--") ? own : `--${COLOURS[look as Look]}`;
-      const color = own && own !== property ? own : style.getPropertyValue(property);
+      const [look, own = "", selected] = name.split(" ");
+      const color = own.startsWith("--") ? style.getPropertyValue(own) : own;
       material.color.set(color).multiplyScalar(look === "glass" ? DARK : 1);
       material.emissive.set(selected ? style.getPropertyValue("--trace-6") : look === "shining" ? color : "#000000");
       material.emissiveIntensity = look === "shining" ? 0.9 : 0.45;
@@ -211,7 +216,7 @@ export class Space {
     const ray = new Raycaster();
     ray.layers.enable(UNSEEN);
     ray.setFromCamera(new Vector2((2 * (x - left)) / width - 1, 1 - (2 * (y - top)) / height), this.camera);
-    const seen = this.meshes.filter((mesh, n) => mesh.visible && this.stage.solids[n]?.material !== "ghost");
+    const seen = this.meshes.filter((mesh, n) => mesh.visible && (n < this.stage.aids || n >= this.stage.fixed));
     const [hit] = ray.intersectObjects(seen, false);
     return hit === undefined ? "" : (this.stage.solids[this.meshes.indexOf(hit.object as never)]?.element ?? "");
   }
@@ -264,7 +269,7 @@ export class Space {
       const lines = mesh.children[0] as LineSegments;
       lines.geometry = edges;
       lines.visible = solid.material !== "light";
-      mesh.material = this.materialOf(solid.material, solid.color, false);
+      mesh.material = this.materialOf(solid.material, solid, false);
     }
     this.revision = stage.revision;
     this.isStale = true;
@@ -275,7 +280,7 @@ export class Space {
     const found = this.geometries.get(name);
     if (found !== undefined) return found;
     const shape = geometryOf(solid);
-    const made = [shape, new EdgesGeometry(shape, 40)] as const;
+    const made = [shape, new EdgesGeometry(shape, MathUtils.radToDeg(EDGE))] as const;
     this.geometries.set(name, made);
     return made;
   }
@@ -293,14 +298,18 @@ export class Space {
     return mesh;
   }
 
-  private materialOf(look: string, own: string | null, isSelected: boolean): MeshStandardMaterial {
-    const name = `${look} ${own ?? ""} ${isSelected ? "!" : ""}`;
+  private materialOf(look: Look, solid: Solid, isSelected: boolean): MeshStandardMaterial {
+    const name = `${look} ${colourOf(look, solid)} ${isSelected ? "!" : ""}`;
     let found = this.looks.get(name);
     if (found === undefined) {
       const isMetal = look === "rod" || look === "rail";
       found = new MeshStandardMaterial({ roughness: isMetal ? 0.35 : 0.7, metalness: isMetal ? 0.25 : 0 });
-      found.transparent = look === "light" || look === "ghost";
-      found.opacity = found.transparent ? 0.3 : 1;
+      // Edges lie on faces, and are seen.
+      found.polygonOffset = true;
+      found.polygonOffsetFactor = found.polygonOffsetUnits = 1;
+      found.opacity = look === "workspace" ? 0.1 : look === "light" || look === "ghost" ? 0.3 : 1;
+      found.transparent = found.opacity < 1;
+      found.depthWrite = look !== "workspace";
       this.looks.set(name, found);
       this.paint();
     }
@@ -308,30 +317,14 @@ export class Space {
   }
 }
 
-function geometryOf({ size: [x, y, z], prism }: Solid): BufferGeometry {
-  if (prism === null) return new BoxGeometry(x, y, z);
-  const { axis, corners, towards } = prism;
-  const [a, b] = [(axis + 1) % 3, (axis + 2) % 3];
-  const first = Math.atan2(towards[b] as number, towards[a] as number);
-  // That of three stands along y; its first corner is along z, from where the others follow towards x.
-  const geometry = new CylinderGeometry(0.5, 0.5, 1, corners, 1, false, first);
-  const place = geometry.getAttribute("position");
-  const normal = geometry.getAttribute("normal");
-  const size = [x, y, z];
-  for (const [attribute, isPlace] of [
-    [place, true],
-    [normal, false],
-  ] as const)
-    // prettier-ignore
-    for (let n = 0; n < attribute.count; n++) {
-      const own = [0, 0, 0];
-      own[axis] = attribute.getY(n);
-      own[a] = attribute.getZ(n);
-      own[b] = attribute.getX(n);
-      const [u = 0, v = 0, w = 0] = own.map((one, k) => (isPlace ? one * (size[k] as number) : one));
-      attribute.setXYZ(n, u, v, w);
-    }
-  return geometry;
+/** The triangles of all faces; edges of less than that are smooth. */
+function geometryOf(solid: Solid): BufferGeometry {
+  const corners = facetsOf(solid).flatMap(([first, ...others]) =>
+    others.slice(1).flatMap((corner, k) => [first, others[k], corner]),
+  );
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new Float32BufferAttribute(corners.flatMap((one) => [...(one ?? [])]), 3)); // prettier-ignore
+  return toCreasedNormals(geometry, EDGE);
 }
 
 function dispose(part: Object3D): void {

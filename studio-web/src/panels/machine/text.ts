@@ -47,6 +47,9 @@ export const t = texts(
     pathWord: "Path",
     pathHelp:
       "The way of what works on workpieces in the last 10 s, as it was seen here, and where its motion will end.",
+    travelWord: "Travel",
+    travelHelp:
+      "How far the axes go, and the box in which the tool can be. That of one axis is shown when it is selected.",
     selected: "Selected",
     nothingSelected: "Nothing selected",
     isStalled: "{name} is stalled",
@@ -108,6 +111,9 @@ export const t = texts(
     labels: "Nazwy",
     pathWord: "Tor",
     pathHelp: "Droga narzędzia w ostatnich 10 s, tak jak ją tu widziano, i miejsce, w którym jego ruch się skończy.",
+    travelWord: "Zakres",
+    travelHelp:
+      "Zakres ruchu osi i przestrzeń, w której może być narzędzie. Zakres jednej osi widać, gdy jest wybrana.",
     selected: "Wybrany element",
     nothingSelected: "Nic nie wybrano",
     isStalled: "utyk: {name}",
