@@ -172,6 +172,7 @@ def test_snapshots_and_sessions_have_it(moment_s: float, tmp_path: Path) -> None
         ("42.5", "42.5 s", "42.5 s is compared with 'mm'"),
         ("when", "if", "has no 'if'"),
         ('reset = "a.OUT3"', 'reset = "a.IN3"', "a.IN3 is not an output"),
+        ("left.position + 42.5 >= right.position", "a.OUT3", "effect = 'jam': 'a.OUT3' names no axis, and nothing that an axis"),
     ],
 )
 def test_mistakes_have_their_places(old: str, new: str, text: str) -> None:

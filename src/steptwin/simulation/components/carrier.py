@@ -13,7 +13,6 @@ from steptwin.simulation.components.mount import MountSpec
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.workpiece import Workpiece
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
-from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, number
 
@@ -24,17 +23,20 @@ PICK, PLACE, HELD = "PICK", "PLACE", "HELD"
 class CarrierSpec(TerminalComponentSpec, MountSpec):
     """With a place in space it takes what it meets there; otherwise PICK and PLACE say where it is."""
 
-    pick: Terminal | None = key(OUTPUT_PIN, "output connected to PICK: it is where it picks up", default=None)
-    place: Terminal | None = key(OUTPUT_PIN, "output connected to PLACE: it is where it puts down", default=None)
+    pick: Terminal | None = key(OUTPUT_PIN, "output connected to PICK: it is where it picks up", default=None, in_space=False)
+    place: Terminal | None = key(OUTPUT_PIN, "output connected to PLACE: it is where it puts down", default=None, in_space=False)
     source: str | None = key(
         NameOf("conveyor"),
         "conveyor that it picks from; without one a workpiece is there whenever PICK is on",
         default=None,
         name="from",
+        in_space=False,
     )
-    pick_at: float = key(number(0.0), "with from: mm from the beginning of the belt", default=0.0)
-    onto: str | None = key(NameOf("conveyor"), "conveyor that it puts on", default=None)
-    place_at: float = key(number(0.0), "with onto: mm from the beginning of the belt, of the front of the workpiece", default=0.0)
+    pick_at: float = key(number(0.0), "with from: mm from the beginning of the belt", default=0.0, needs="from")
+    onto: str | None = key(NameOf("conveyor"), "with from: conveyor that it puts on", default=None, needs="from", in_space=False)
+    place_at: float = key(
+        number(0.0), "with onto: mm from the beginning of the belt, of the front of the workpiece", default=0.0, needs="onto"
+    )
 
     @property
     @abstractmethod
@@ -60,13 +62,6 @@ class CarrierSpec(TerminalComponentSpec, MountSpec):
     @property
     def holds_workpieces(self) -> bool:
         return True
-
-    def check(self, text: TomlText) -> None:
-        given = [name for name in ("pick", "place", "from", "onto") if text.is_given((*self.path, name))]
-        there = [name for name in ("on", "at", "along") if text.is_given((*self.path, name))]
-        if given and there:
-            message = f"{given[0]} and {there[0]} exclude each other: in space it takes what is there"
-            text.wrong((*self.path, given[0]), "D007", message)
 
     def others(self, described: ElementSpecs) -> Iterable[tuple[str, str]]:
         if self.is_mounted:

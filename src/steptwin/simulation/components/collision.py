@@ -94,6 +94,9 @@ class CollisionSpec(TerminalComponentSpec):
 
 AXES_TOUCH = Message("simulation.axes-touch", "{zone}: {axes} touch")
 PARTS_TOUCH = Message("simulation.parts-touch", "{zone}: parts touch")
+NOTHING_JAMS = Message(
+    "simulation.nothing-jams", "effect = 'jam': {when!r} names no axis, and nothing that an axis moves, so nothing would stand"
+)
 
 
 def _make(spec: CollisionSpec, context: ElementContext) -> Touch:
@@ -102,6 +105,8 @@ def _make(spec: CollisionSpec, context: ElementContext) -> Touch:
         compared = Compared(block, context, spec.between, spec.apart_from, every_body=spec.all, jams=jams)
         return Touch(block, jams, compared.contacts, compared.depends_on)
     axes = dict(_axes_of(spec, context))
+    if jams and not axes:
+        raise Misuse(NOTHING_JAMS(when=spec.when))
     text = partial(AXES_TOUCH, zone=spec.name, axes=" and ".join(axes)) if axes else partial(PARTS_TOUCH, zone=spec.name)
     blocks = tuple(mechanism.block for mechanism in axes.values())
     return Touch(block, jams, [Contact(condition_of(spec.when, block, context), blocks, text)])

@@ -42,11 +42,13 @@ def _mark_places(value: Any) -> tuple[float, ...]:
 class ConveyorSpec(TerminalComponentSpec, MoverSpec):
     length: float = key(number(0.0, above=True), "mm")
     speed: float | None = key(number(0.0, above=True), "mm/s while RUN is on", default=None)
-    run: Terminal | None = key(OUTPUT_PIN, "with speed: output connected to RUN; without it a wire may be", default=None)
+    run: Terminal | None = key(
+        OUTPUT_PIN, "with speed: output connected to RUN; without it a wire may be", default=None, needs="speed"
+    )
     ramp_up: Nanos = key(time_value, "from rest to speed when RUN is switched on; default at once", default=0, needs="speed")
     ramp_down: Nanos = key(time_value, "from speed to rest when it is switched off; default at once", default=0, needs="speed")
     axis: str | None = key(NameOf("axis"), "the axis that moves the belt, instead of speed", default=None)
-    mm_per_unit: float = key(number(0.0, above=True), "with axis: mm of the belt per unit of the axis", default=1.0)
+    mm_per_unit: float = key(number(0.0, above=True), "with axis: mm of the belt per unit of the axis", default=1.0, needs="axis")
     feed: Terminal | None = key(
         OUTPUT_PIN, "output connected to FEED, which puts a workpiece on when it is switched on", default=None
     )
@@ -63,7 +65,7 @@ class ConveyorSpec(TerminalComponentSpec, MoverSpec):
     marks: tuple[float, ...] = key(
         _mark_places, "mm from the front of a workpiece to each of its marks, such as [10, 35]", default=()
     )
-    mark_width: float = key(number(0.0, above=True), "length of a mark, mm", default=2.0)
+    mark_width: float = key(number(0.0, above=True), "length of a mark, mm", default=2.0, needs="marks")
     next: str | None = key(NameOf("conveyor"), "the conveyor on which workpieces go on", default=None)
     width: float = key(number(0.0, above=True), "mm across, in space; its top face is at its origin", default=100.0, order=2)
     sensors: tuple[SensorSpec, ...] = tables_in("sensor", SensorSpec)
@@ -89,7 +91,7 @@ class ConveyorSpec(TerminalComponentSpec, MoverSpec):
 
     @property
     def joints(self) -> Iterable[Joint]:
-        if self.run is not None and self.speed is not None:
+        if self.run is not None:
             yield Joint("run", RUN, self.run)
         if self.feed is not None:
             yield Joint("feed", FEED, self.feed)

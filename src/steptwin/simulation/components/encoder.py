@@ -15,6 +15,8 @@ class EncoderSpec(TableSpec):
     index: bool = key(flag, "whether channel C gives an index once per revolution", default=False)
     offset: float = key(number(), "position of an index, in the unit of the axis", default=0.0, needs="index")
     index_width: int = key(whole(1, 10**6), "width of the index in pulses", default=4, needs="index")
-    mount: str = key(word("motor", "load"), "on the motor, or on the load behind the play", default="motor")
+    mount: str = key(
+        word("motor", "load"), "on the motor, or on the load behind the play", default="motor", excludes=("follows",)
+    )
     follows: str | None = key(name_value, "another axis, a conveyor or a DC motor that turns it", default=None)
     slip: float = key(number(0.0, 1.0), "share of the motion that its coupling loses", default=0.0)

@@ -42,13 +42,14 @@ class GripperSpec(CarrierSpec, MoverSpec):
         order=-1,
     )
     stroke: float = key(number(0.0, above=True), "mm between the open jaws", default=20.0)
-    width: float = key(number(0.0), "mm of a workpiece between the jaws", default=10.0)
+    width: float = key(number(0.0), "mm of a workpiece between the jaws", default=10.0, in_space=False)
     close_time: Nanos = key(positive_time, "from open to closed, without a workpiece", default=100 * MILLISECOND)
     open_time: Nanos = key(positive_time, "from closed to open", default=100 * MILLISECOND)
     overlap: float = key(
         number(0.0, 1000.0),
         "in space: mm of a workpiece that are between the jaws, from their tips up",
         default=5.0,
+        in_space=True,
         order=2,
     )
 

@@ -60,7 +60,11 @@ class IntegratorSpec(TerminalComponentSpec, MoverSpec):
     high: float | None = key(number(), "the value that it does not rise above", default=None)
     reset: Terminal | None = key(OUTPUT_PIN, "output connected to RESET; it is at start while that is on", default=None)
     mm_per_unit: float | None = key(
-        number(0.0, above=True), "mm that it moves what is on it per unit, where its unit is no length", default=None, order=2
+        number(0.0, above=True),
+        "mm that it moves what is on it per unit, where its unit is no length",
+        default=None,
+        in_space=True,
+        order=2,
     )
     switches: tuple[SwitchSpec, ...] = tables_in("switch", SwitchSpec)
 

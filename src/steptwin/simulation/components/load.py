@@ -56,11 +56,11 @@ class LoadSpec(TerminalComponentSpec):
     inertia: float = key(_not_negative, "kg·m² at the motor", default=0.0)
     load: float = key(number_value(), "N·m at the motor; positive pulls towards lower positions", default=0.0)
     friction: float = key(_not_negative, "N·m against motion, at the motor", default=0.0)
-    of: str | None = key(text_value, "the signal that points are over, such as x.position or time", default=None)
+    of: str | None = key(text_value, "the signal that points are over, such as x.position or time", default=None, needs="points")
     points: tuple[tuple[float, float], ...] | None = key(
-        points, "[[value, share], ...] of all its values there is, linear between; default 1", default=None
+        points, "[[value, share], ...] of all its values there is, linear between; default 1", default=None, needs="of"
     )
-    resolution: float = key(number_value(0.0001, 1.0), "steps in which the share changes", default=0.01)
+    resolution: float = key(number_value(0.0001, 1.0), "steps in which the share changes", default=0.01, needs="points")
 
     @property
     def terminals(self) -> Terminals:
@@ -87,9 +87,6 @@ class LoadSpec(TerminalComponentSpec):
             check_owners(text, (*self.path, "of"), self.name, (owner_of(self.of),))
         if not any(self.loading):
             text.wrong(self.path, "D007", f"{self.name!r} weighs nothing: give it a mass, a force, a friction or an inertia")
-        if (self.of is None) is not (self.points is None):
-            key, other = ("of", "points") if self.points is None else ("points", "of")
-            text.means_nothing((*self.path, key), f"{key} means nothing without {other}")
         shares = [share for _, share in self.points or ()]
         if not all(0.0 <= share <= MOST_SHARE for share in shares):
             there = f"{min(shares):g} to {max(shares):g}"

@@ -37,8 +37,12 @@ class VacuumSpec(CarrierSpec):
     threshold: float = key(number(0.0, 101.0, above=True), "kPa, from which HELD is on", default=50.0)
     build_up: Nanos = key(positive_time, "from 0 to the threshold", default=100 * MILLISECOND)
     release: Nanos = key(positive_time, "from vacuum to the threshold", default=40 * MILLISECOND)
-    diameter: float = key(number(0.0, 10_000.0), "in space: mm of the cup, which points down", default=20.0, order=2)
-    reach: float = key(number(0.0, 1000.0, above=True), "in space: mm from which it draws a workpiece", default=2.0, order=2)
+    diameter: float = key(
+        number(0.0, 10_000.0), "in space: mm of the cup, which points down", default=20.0, in_space=True, order=2
+    )
+    reach: float = key(
+        number(0.0, 1000.0, above=True), "in space: mm from which it draws a workpiece", default=2.0, in_space=True, order=2
+    )
 
     @property
     def terminals(self) -> Terminals:

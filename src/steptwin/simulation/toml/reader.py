@@ -384,6 +384,8 @@ class Key:
     """Keys that give the same value in another way."""
     kinds: tuple[str, ...] = ()
     """The values of the key ``kind`` with which it has a meaning; empty: all."""
+    in_space: bool | None = None
+    """Whether it has a meaning with a place in space only, or without one only; None: with and without."""
     is_required: bool = field(init=False)
 
     def __post_init__(self) -> None:

@@ -148,6 +148,8 @@ class _Rules(TypedDict, total=False):
     """Keys that give the same value in another way."""
     kinds: tuple[str, ...]
     """The values of the key ``kind`` with which it has a meaning; empty: all."""
+    in_space: bool
+    """Whether it has a meaning with a place in space only, or without one only."""
     order: int
     """Below 0: before the other keys in documentation and messages, above 0: behind them. Otherwise those of base classes come
     first."""
