@@ -19,17 +19,17 @@ class Clock:
     ``wall_ns`` must never go back; the monotonic clock, which is the default, does not.
     """
 
-    __slots__ = ("_from_ns", "_start_ns", "_wall_ns", "is_stopped", "speed")
+    __slots__ = ("_from_ns", "_start_ns", "is_stopped", "speed", "wall_ns")
 
     def __init__(self, speed: float = 1.0, wall_ns: Callable[[], Nanos] = time.monotonic_ns, begin: Nanos = 0) -> None:
-        self._wall_ns = wall_ns
+        self.wall_ns = wall_ns
         self._from_ns = begin
         self.run(speed)
 
     def now(self) -> Nanos:
         if self.is_stopped:
             return self._from_ns
-        passed = self._wall_ns() - self._start_ns
+        passed = self.wall_ns() - self._start_ns
         return self._from_ns + (passed if self.speed == 1.0 else int(passed * self.speed))
 
     def wait_s(self, moment: Nanos) -> float:
@@ -53,5 +53,5 @@ class Clock:
         if not 0.0 < speed < inf:
             raise Misuse(SPEED_IS_OUT_OF_RANGE(speed=speed))
         self.speed = speed
-        self._start_ns = self._wall_ns()
+        self._start_ns = self.wall_ns()
         self.is_stopped = False

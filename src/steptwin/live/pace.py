@@ -167,10 +167,10 @@ class Pace:
         """Run without a clock, in slices."""
         world, end = self._live.world, self._live.now + SLICE_NS
         self._turn = None
-        if self._live.run_control is None:
+        if self._live.run_control is None and self._realtime.longest_ns is None:
             world.run(for_=SLICE_NS / SECOND)
             end = world.now
-        self._live.advance(end)
+        self._realtime.advance(end)
         self._realtime.clock.stop(world.now)
         if not self.is_paused and world.stopped is None:
             self._turn = asyncio.get_running_loop().call_soon(self._run_freely)

@@ -7,7 +7,7 @@ import asyncio
 from collections.abc import Callable
 from typing import Protocol
 
-from steptwin.controller import MILLISECOND, Nanos
+from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.live.batches import batches
 from steptwin.live.clock import Clock
 
@@ -16,6 +16,9 @@ LONGEST_WAIT_S = 3600.0
 
 LONGEST_DELAY_NS: Nanos = 500 * MILLISECOND
 """Delay of a deadline, in real time, above which the process was stopped or cannot keep up, ns; below it is jitter."""
+
+
+LEAST_PART_NS, MOST_PART_NS = MILLISECOND, SECOND // 4
 
 
 class Advanceable(Protocol):
@@ -34,12 +37,30 @@ class RealTimeDriver:
     """Controllers in real time, advanced together at their deadlines and when an input arrives.
 
     While the process does not run, virtual time stands still, so that there is no backlog; ``on_lag`` is called with the delay.
+
+    ``longest_ns``: real time that an advance takes at most where nothing else can run meanwhile; virtual time that does not fit
+    into it is delayed. None: each advance ends at the present.
     """
 
-    __slots__ = ("_armed_for", "_batch", "_batches", "_loop", "_timer", "clock", "moments", "on_lag", "scheduler")
+    __slots__ = (
+        "_armed_for",
+        "_batch",
+        "_batches",
+        "_loop",
+        "_part",
+        "_timer",
+        "clock",
+        "longest_ns",
+        "moments",
+        "on_lag",
+        "scheduler",
+    )
 
-    def __init__(self, scheduler: Advanceable, clock: Clock) -> None:
+    def __init__(self, scheduler: Advanceable, clock: Clock, longest_ns: Nanos | None = None) -> None:
         self.scheduler = scheduler
+        self.longest_ns = longest_ns
+        self._part: Nanos = LEAST_PART_NS
+        """Virtual time between two readings of the wall clock, in an advance that is bounded."""
         self.clock = clock
         self.on_lag: Callable[[Nanos], None] | None = None
         self._loop = asyncio.get_running_loop()
@@ -67,8 +88,28 @@ class RealTimeDriver:
         due = self._armed_for
         if due is not None and now - due > LONGEST_DELAY_NS * self.clock.speed:
             now = self._held_up(due, now)
-        self.scheduler.advance(now)
-        return now
+        reached = self.advance(now)
+        if reached < now and not self.clock.is_stopped:
+            self.clock.lag(now - reached)
+        return reached
+
+    def advance(self, to: Nanos) -> Nanos:
+        """Advance the controllers, within `longest_ns`, and give the moment that was reached."""
+        if self.longest_ns is None:
+            self.scheduler.advance(to)
+            return to
+        begin = before = self.clock.wall_ns()
+        while True:
+            part = min(to, self.scheduler.now + self._part)
+            self.scheduler.advance(part)
+            now = self.clock.wall_ns()
+            if now - before > self.longest_ns // 4:
+                self._part = max(self._part // 2, LEAST_PART_NS)
+            elif now - before < self.longest_ns // 16:
+                self._part = min(self._part * 2, MOST_PART_NS)
+            if part == to or self.scheduler.now < part or now - begin >= self.longest_ns:
+                return self.scheduler.now
+            before = now
 
     def leave(self) -> None:
         """Let signals settle after an input, and set the timer for the next deadline."""

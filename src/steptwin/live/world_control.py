@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, TypeVar
 
 from steptwin.live.debugging import Debugging
@@ -22,9 +23,9 @@ T = TypeVar("T")
 
 
 class WorldControl:
-    """The commands of a live world. ``end_points``: its addresses."""
+    """The commands of a live world. ``end_points``: its addresses; None where it cannot have any."""
 
-    def __init__(self, realtime: RealTimeDriver, live: LiveWorld, pace: Pace, end_points: Callable[[], object]) -> None:
+    def __init__(self, realtime: RealTimeDriver, live: LiveWorld, pace: Pace, end_points: Callable[[], object] | None) -> None:
         self._realtime = realtime
         self._live = live
         self.subject = live.subject
@@ -35,9 +36,15 @@ class WorldControl:
                 **Debugging(live, realtime, pace).actions(),
                 debugcommands.AskWhy: LiveWhy(live).ask,
                 command.Time: lambda _: pace.where(),
-                command.EndPoints: lambda _: end_points(),
             }
         )
+        if end_points is not None:
+            self.subject.dispatcher.add({command.EndPoints: lambda _: end_points()})
+        else:
+            described = self.subject.description
+            self.subject.description = replace(
+                described, commands=tuple([one for one in described.commands if one != "end_points"])
+            )
 
     @property
     def description(self) -> Description:

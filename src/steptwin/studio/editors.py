@@ -1,8 +1,7 @@
 """The editor server over WebSockets: help while typing, for the page and for any other client of its protocol.
 
 The first message is ``hello`` with a token, as at the other WebSocket; what follows are messages of the Language Server
-Protocol. Texts are analysed in a thread of its own: checking a long one takes longer than a master waits. Nothing but texts
-goes from one thread to the other.
+Protocol.
 """
 
 from __future__ import annotations
@@ -10,9 +9,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import threading
-from collections.abc import Callable, Mapping
-from typing import Protocol, TypeVar
+from collections.abc import Awaitable, Callable, Mapping
+from typing import Any, Protocol, TypeAlias
 
 from steptwin.access.rate import RateLimit
 from steptwin.access.tokens import AccessGate
@@ -23,7 +21,6 @@ from steptwin.studio.requests import REQUESTS
 from steptwin.studio.viewers import (
     BINARY_MESSAGE,
     HELLO_S,
-    PATIENCE_S,
     REFUSED,
     SILENT,
     AsgiReceive,
@@ -42,7 +39,8 @@ MOST_WAITING = 1000
 RATE, BURST = 200.0, 1000.0
 """Messages of a client in a second, and at once."""
 
-T = TypeVar("T")
+Analyse: TypeAlias = Callable[[Callable[[], Any]], Awaitable[Any]]
+"""Calls, and gives what the call gives."""
 
 
 class Conversation(Protocol):
@@ -61,14 +59,16 @@ TOO_MANY_TEXTS = Message("studio.too-many-texts", "too many texts: permitted are
 
 
 class Editors:
-    """All connections. ``files`` gives the present texts of the subject by address, ``clock`` the wall clock in nanoseconds."""
+    """All connections. ``files`` gives the present texts of the subject by address, ``clock`` the wall clock in nanoseconds;
+    ``analyse`` calls where the time that it takes matters to nobody else."""
 
-    def __init__(self, gate: AccessGate, files: Callable[[], Mapping[str, bytes]], clock: Callable[[], Nanos]) -> None:
+    def __init__(
+        self, gate: AccessGate, files: Callable[[], Mapping[str, bytes]], clock: Callable[[], Nanos], analyse: Analyse
+    ) -> None:
         self._gate = gate
         self._files = files
         self._clock = clock
-        self._loop: asyncio.AbstractEventLoop | None = None
-        self._thread: threading.Thread | None = None
+        self._analyse = analyse
         self._count = 0
 
     async def serve(self, scope: AsgiScope, receive: AsgiReceive, send: AsgiSend) -> None:
@@ -111,12 +111,12 @@ class Editors:
                 outgoing.put_nowait(text)
 
         def say(text: str) -> None:
-            """Called in the other thread."""
+            """Called where texts are analysed."""
             with contextlib.suppress(RuntimeError):  # the service has ended
                 loop.call_soon_threadsafe(put, text)
 
         files = self._files()
-        there = await self._elsewhere(lambda: _begin(files, say))
+        there = await self._analyse(lambda: _begin(files, say))
         await outgoing.put(json.dumps({"ok": None}))
         try:
             await until_first(self._read(receive, there, token), _write(outgoing, send), is_full.wait())
@@ -125,7 +125,7 @@ class Editors:
         except (TimeoutError, OSError):
             pass  # it does not read, or is gone
         finally:
-            await self._elsewhere(there.close)
+            await self._analyse(there.close)
 
     async def _read(self, receive: AsgiReceive, there: Conversation, token: str | None) -> None:
         limit = RateLimit(RATE, BURST)
@@ -136,28 +136,8 @@ class Editors:
             self._gate.enter(token)  # it may be asked for since a device was connected
             if not limit.allows(self._clock()):
                 raise Refusal(TOO_MANY_MESSAGES(rate=RATE))
-            if await self._elsewhere(lambda text=text: _receive(there, text)) > MOST_DOCUMENTS:
+            if await self._analyse(lambda text=text: _receive(there, text)) > MOST_DOCUMENTS:
                 raise Refusal(TOO_MANY_TEXTS(most=MOST_DOCUMENTS))
-
-    async def _elsewhere(self, call: Callable[[], T]) -> T:
-        """Result of a call in the other thread."""
-        if self._loop is None:
-            self._loop = asyncio.new_event_loop()
-            self._thread = threading.Thread(target=self._loop.run_forever, name="editor server", daemon=True)
-            self._thread.start()
-
-        async def called() -> T:
-            return call()
-
-        return await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(called(), self._loop))
-
-    def close(self) -> None:
-        if self._loop is not None and self._thread is not None:
-            self._loop.call_soon_threadsafe(self._loop.stop)
-            self._thread.join(PATIENCE_S)
-            if not self._thread.is_alive():
-                self._loop.close()
-            self._loop = self._thread = None
 
 
 def _begin(files: Mapping[str, bytes], say: Callable[[str], None]) -> Conversation:

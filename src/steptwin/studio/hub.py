@@ -28,6 +28,7 @@ from steptwin.studio.recordingrequests import Recordings
 from steptwin.studio.requests import (
     OF_BRANCHES,
     OF_CAMPAIGNS,
+    OF_DEVICES,
     OF_DRAWINGS,
     OF_RECORDINGS,
     OF_SERVICES,
@@ -39,7 +40,7 @@ from steptwin.studio.requests import (
 )
 from steptwin.studio.servicerequests import WorldServices
 from steptwin.studio.streams import Streams
-from steptwin.studio.surroundings import Served, Surroundings
+from steptwin.studio.surroundings import Connections, LongWork, Served, Surroundings
 from steptwin.studio.watches import Watches
 from steptwin.subject import commands as command
 from steptwin.subject.commands import COMMANDS
@@ -108,6 +109,7 @@ NO_WORLD_TO_BRANCH = Message("studio.no-world-to-branch", "no world to branch he
 NO_WORLD_TO_DRAW = Message("studio.no-world-to-draw", "no world to draw here: start the studio with the file of a world")
 NO_WORLD_WITH_GATEWAYS = Message("studio.no-world-with-gateways", "no world here, so no gateways and no history")
 NO_FILE_FOR_CAMPAIGNS = Message("studio.no-file-for-campaigns", "no campaigns here: start the studio with the file of a world")
+NO_DEVICES = Message("studio.no-devices", "devices cannot be connected here: that needs the studio on a computer")
 NO_WORLD_WITH_LINES = Message("studio.no-world-with-lines", "no world here, so no lines whose traffic is counted")
 TOO_MANY_VIEWERS = Message("studio.too-many-viewers", "there are {most} viewers already, the most possible")
 TOO_FAST_FOR_A_JOG = Message(
@@ -201,6 +203,20 @@ class Hub:
             raise Refusal(NO_FILE_FOR_CAMPAIGNS())
         return self.around.campaigns
 
+    @property
+    def connections(self) -> Connections:
+        """Raises `Refusal` where no device can be connected."""
+        if self.around.connections is None:
+            raise Refusal(NO_DEVICES())
+        return self.around.connections
+
+    @property
+    def work(self) -> LongWork:
+        """Raises as `connections`."""
+        if self.around.work is None:
+            raise Refusal(NO_DEVICES())
+        return self.around.work
+
     def traffic(self) -> WorldTraffic:
         """Raises `Refusal` where there is no world."""
         if self.around.traffic is None:
@@ -239,6 +255,7 @@ class Hub:
             (around.arrangement, OF_DRAWINGS),
             (around.services, OF_SERVICES),
             (around.campaigns, OF_CAMPAIGNS),
+            (around.connections, OF_DEVICES),
             (around.traffic, frozenset({"traffic"})),
         )
         missing = frozenset[str]().union(*(names for part, names in needed if part is None))
@@ -374,7 +391,9 @@ class Hub:
 
     async def _configuration(self, controller: str) -> SourceText | None:
         given = self.around.configuration(controller)
-        return await self.around.connections.configuration(controller) if given is None else given
+        if given is not None or self.around.connections is None:
+            return given
+        return await self.around.connections.configuration(controller)
 
     # ------------------------------------------------------------------ time
 

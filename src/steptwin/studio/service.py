@@ -13,6 +13,7 @@ from steptwin.access.origin import Origins
 from steptwin.httpservice import HttpService, Tls
 from steptwin.studio import editors, viewers
 from steptwin.studio.editors import Editors
+from steptwin.studio.editorthread import EditorThread
 from steptwin.studio.guard import Guard
 from steptwin.studio.hub import Hub
 from steptwin.studio.rest import Rest, describe_api
@@ -32,8 +33,9 @@ class StudioService:
         clock = time.monotonic_ns
         self._viewers = Viewers(hub, clock)
         around = hub.around
-        self._editors = Editors(around.gate, around.programs.files, clock)
-        sockets = {viewers.PATH: self._viewers.serve, editors.PATH: self._editors.serve}
+        self._analysis = EditorThread()
+        editing = Editors(around.gate, around.programs.files, clock, self._analysis)
+        sockets = {viewers.PATH: self._viewers.serve, editors.PATH: editing.serve}
         guarded = Guard(make_app(hub, clock), sockets, origins, clock, around.on_internal)
         self._http = HttpService(
             guarded,
@@ -52,7 +54,7 @@ class StudioService:
     async def close(self) -> None:
         await self._viewers.close()
         await self._http.close()
-        self._editors.close()
+        self._analysis.close()
 
 
 def make_app(hub: Hub, clock: Callable[[], int]) -> FastAPI:

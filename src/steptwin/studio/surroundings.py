@@ -130,8 +130,10 @@ class Surroundings:
     program: str
     """Version of steptwin."""
     programs: ProgramTexts
-    connections: Connections
-    work: LongWork
+    connections: Connections | None = None
+    """None where no device can be connected."""
+    work: LongWork | None = None
+    """As ``connections``."""
     configuration: Callable[[str], SourceText | None] = lambda controller: None
     """The configuration file of a twin by name; None without one."""
     time_travel: TimeTravel | None = None

@@ -196,10 +196,10 @@ class ViewerSession:
         return await (self._hub.subject.do(wanted) if action is None else action(wanted, identity))
 
     async def _connect(self, wanted: ask.Connect) -> ask.ConnectedDevice:
-        return ask.ConnectedDevice(await self._hub.around.connections.connect(wanted.address, wanted.name))
+        return ask.ConnectedDevice(await self._hub.connections.connect(wanted.address, wanted.name))
 
     async def _read_settings(self, wanted: device.ReadSettings) -> device.DeviceSettings:
-        return device.DeviceSettings(wanted.controller, await self._hub.around.connections.settings(wanted.controller))
+        return device.DeviceSettings(wanted.controller, await self._hub.connections.settings(wanted.controller))
 
     async def _view_recording(self, wanted: recording.ViewRecording) -> recording.ViewAddress:
         return recording.ViewAddress(await self._hub.recordings.view(wanted.name))
@@ -450,7 +450,7 @@ class ViewerSession:
             "time_ns": str(moment.time),
             "pace": {key: value for key, value in moment.to_json().items() if key != "time_ns"},
             "virtual": hub.is_virtual,
-            "device_kinds": list(hub.around.connections.kinds),
+            "device_kinds": [] if hub.around.connections is None else list(hub.around.connections.kinds),
             **present,
         }
         text = json.dumps(whole, separators=(",", ":"))
@@ -475,9 +475,9 @@ class ViewerSession:
             ask.ListPrograms: _list_programs,
             ask.ReadProgram: _read_program,
             ask.ReadMemory: _read_memory,
-            ask.ListPorts: lambda self, _: self._hub.around.connections.ports(),
+            ask.ListPorts: lambda self, _: self._hub.connections.ports(),
             ask.Connect: _connect,
-            ask.Disconnect: lambda self, wanted: self._hub.around.connections.disconnect(wanted.controller),
+            ask.Disconnect: lambda self, wanted: self._hub.connections.disconnect(wanted.controller),
             ask.ReadTraffic: lambda self, _: self._hub.traffic(),
             ask.ReadAudit: lambda self, wanted: self._hub.around.audit.last(wanted.most),
             tool.ReadConfiguration: lambda self, wanted: self._hub.configurations.read(wanted.controller),
@@ -487,10 +487,8 @@ class ViewerSession:
             tool.ConvertGear: lambda _, one: gear(one.motor_steps, one.microsteps, one.ratio, one.lead),
             tool.MakeCapture: lambda _, one: tool.CaptureFile(b64encode(b"".join(capture(one.frames))).decode("ascii")),
             device.ReadSettings: _read_settings,
-            device.ReadDigitalShadow: lambda self, wanted: self._hub.around.connections.shadow_of(
-                wanted.controller, wanted.after
-            ),
-            device.SetDigitalShadow: lambda self, wanted: self._hub.around.connections.shadow(wanted.controller, on=wanted.on),
+            device.ReadDigitalShadow: lambda self, wanted: self._hub.connections.shadow_of(wanted.controller, wanted.after),
+            device.SetDigitalShadow: lambda self, wanted: self._hub.connections.shadow(wanted.controller, on=wanted.on),
             recording.ReadRecordings: lambda self, _: self._hub.recordings.list(),
             recording.SaveRecording: lambda self, wanted: self._hub.recordings.save(wanted.name),
             recording.ViewRecording: _view_recording,
@@ -509,10 +507,10 @@ class ViewerSession:
             campaign.EndCampaign: lambda self, wanted: self._hub.campaigns.end(wanted.campaign),
             drawing.ReadDrawing: lambda self, _: self._hub.arrangement.drawing(),
             drawing.SaveDrawing: lambda self, wanted: self._hub.arrangement.save(wanted.places),
-            work.Scan: lambda self, one: self._hub.around.work.scan(one.places, one.kind, one.units, one.baud, one.timeout),
-            work.Verify: lambda self, wanted: self._hub.around.work.verify(wanted.address, write=wanted.write),
-            work.ReadWork: lambda self, _: self._hub.around.work.last,
-            work.CancelWork: lambda self, _: self._hub.around.work.cancel(),
+            work.Scan: lambda self, one: self._hub.work.scan(one.places, one.kind, one.units, one.baud, one.timeout),
+            work.Verify: lambda self, wanted: self._hub.work.verify(wanted.address, write=wanted.write),
+            work.ReadWork: lambda self, _: self._hub.work.last,
+            work.CancelWork: lambda self, _: self._hub.work.cancel(),
         },
     )
     """Actions of the requests of the studio, by class. The answer of one that asks a subject may come later."""

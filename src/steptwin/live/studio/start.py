@@ -7,12 +7,10 @@ import asyncio
 import socket
 import sys
 import time
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import partial
-from math import inf
 from pathlib import Path
 
 from steptwin import __version__
@@ -23,8 +21,6 @@ from steptwin.access.tokens import AccessGate, Token
 from steptwin.devices.composite import CompositeSubject
 from steptwin.devices.connections import Computer, DeviceConnections
 from steptwin.devices.device import DeviceSurroundings
-from steptwin.devices.worldmember import WorldMember
-from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.explain.model import MemoryUse
 from steptwin.files.auditfile import AuditFile, wall_clock
@@ -41,7 +37,6 @@ from steptwin.live.server import EndPoint, Server
 from steptwin.live.studio.branches import BranchStart, WorldBranches
 from steptwin.live.studio.campaigns import FolderCampaigns
 from steptwin.live.studio.demo import demo_world
-from steptwin.live.studio.drawing import WorldArrangement
 from steptwin.live.studio.models import FolderModels
 from steptwin.live.studio.openpage import DEFAULT, OpenedPage, has_desktop
 from steptwin.live.studio.options import StudioOptions
@@ -49,8 +44,8 @@ from steptwin.live.studio.owntokens import new_tokens, own_tokens
 from steptwin.live.studio.recorded import recorded
 from steptwin.live.studio.recordings import WorldRecordings
 from steptwin.live.studio.services import LiveServices
+from steptwin.live.studio.shownworld import ShownWorld
 from steptwin.live.studio.work import LineWork
-from steptwin.live.timetravel import WorldTimeTravel
 from steptwin.live.twins import find_device
 from steptwin.live.withoutworld import serve_without_world
 from steptwin.live.world import LiveWorld
@@ -60,14 +55,12 @@ from steptwin.simulation.describe.description import read_world
 from steptwin.simulation.describe.includes import given_files
 from steptwin.simulation.toml.addresses import Address, is_loopback, parse_address
 from steptwin.simulation.world.snapshotlog import SnapshotLog
-from steptwin.simulation.world.worldprograms import ShownProgram, ShownProgramText, WorldPrograms, configuration_text
+from steptwin.simulation.world.worldprograms import ShownProgram, ShownProgramText
 from steptwin.studio.hub import Hub
-from steptwin.studio.requests import LineUse
 from steptwin.studio.service import StudioService
 from steptwin.studio.surroundings import PresentMoment, Surroundings
 from steptwin.studio.work import DeviceWork
 from steptwin.subject.events import Numbering
-from steptwin.subject.jogs import WorldJogs
 
 ANY = ("0.0.0.0", "::")
 
@@ -205,43 +198,24 @@ class _Page:
     async def open(self, running: Running, *, beside: UpOptions | None = None, snapshots: SnapshotLog | None = None) -> None:
         """Serve it in the event loop of a world, with the past of one that has one already. ``beside``: of the world whose
         recordings are saved; a branch has none."""
-        live, pace, server = running.live, running.pace, running.server
-
-        def moment() -> PresentMoment:
-            clock = server.realtime.clock
-            goes = not pace.is_paused and live.world.stopped is None
-            return PresentMoment(max(clock.now(), live.now) if goes and pace.speed != inf else live.now, goes, pace.speed)
-
-        jogs = WorldJogs(live.subject, running.control.at_present)
-        live.external_actor = jogs
-        world = WorldMember(running.control, live.subject.subscribers, jogs)
-        subject = CompositeSubject(world, lambda: moment().time, live.subject.numbering)
-
-        def configuration(controller: str) -> SourceText | None:
-            return configuration_text(live.world, controller) if controller in live.world.controllers else None
-
-        time_travel = WorldTimeTravel(live, server.realtime, pace, snapshots)
-        server.join(time_travel)
+        live, server, world = running.live, running.server, None if beside is None else beside.world
+        shown = ShownWorld(live, server.realtime, running.pace, running.control, file=world, snapshots=snapshots)
+        server.join(shown.time_travel)
         recordings = None if beside is None else self._recordings(running, beside)
-        branches = WorldBranches(live, server.realtime, time_travel, self._branch_options())
+        branches = WorldBranches(live, server.realtime, shown.time_travel, self._branch_options())
         server.join(branches)
-        campaigns = _campaigns(None if beside is None else beside.world)
+        campaigns = _campaigns(world)
         if campaigns is not None:
             server.join(campaigns)
         around = partial(
-            Surroundings,
-            programs=WorldPrograms(live.world),
-            configuration=configuration,
-            time_travel=time_travel,
+            shown.surroundings,
             branches=branches,
             recordings=recordings,
             services=None if beside is None else LiveServices(running.gateways),
             campaigns=campaigns,
-            arrangement=_arrangement(live, None if beside is None else beside.world),
-            models=_models(live, None if beside is None else beside.world),
-            traffic=partial(_traffic, live),
+            models=_models(live, world),
         )
-        await self._serve(server, subject, moment, around)
+        await self._serve(server, shown.subject, around)
 
     def _recordings(self, running: Running, beside: UpOptions) -> WorldRecordings:
         live, server = running.live, running.server
@@ -274,13 +248,12 @@ class _Page:
             return PresentMoment(time.monotonic_ns() - begin, running=True, speed=1.0)
 
         subject = CompositeSubject(None, lambda: moment().time, Numbering({}))
-        await self._serve(server, subject, moment, partial(Surroundings, programs=_NoPrograms()))
+        await self._serve(server, subject, partial(Surroundings, moment=moment, programs=_NoPrograms()))
 
     async def _serve(
         self,
         server: Server,
         subject: CompositeSubject,
-        moment: Callable[[], PresentMoment],
         surroundings: Callable[..., Surroundings],
     ) -> None:
         loop = asyncio.get_running_loop()
@@ -292,7 +265,6 @@ class _Page:
         connections = DeviceConnections(subject, of_devices, Computer(ports=_ports, find=find_device))
         work = DeviceWork(LineWork(), report)
         around = surroundings(
-            moment=moment,
             gate=self._entrance.gate(lambda: subject.has_devices),
             audit=self._audit,
             program=__version__,
@@ -330,13 +302,6 @@ class _Page:
                     )
             except Misuse as error:
                 server.notice(str(error))
-
-
-def _arrangement(live: LiveWorld, path: Path | None) -> WorldArrangement:
-    """Arrangement of the description at ``path``, or of a recording, whose description is in no file."""
-    shown = live.subject.description
-    names = [part.name for part in (*shown.axes, *shown.elements)]
-    return WorldArrangement(live.world.spec, names, None if path is None or is_recording(path) else path)
 
 
 def _models(live: LiveWorld, path: Path | None) -> FolderModels | None:
@@ -386,11 +351,6 @@ class _NoPrograms:
 
     def text(self, controller: str, place: str) -> ShownProgramText:
         raise Misuse(TEXTS_OF_A_DEVICE(controller=controller))
-
-
-def _traffic(live: LiveWorld) -> tuple[LineUse, ...]:
-    connected = Counter(port.line for port in live.ports)
-    return tuple([LineUse(name, connected[name], *line.traffic) for name, line in live.world.lines.items()])
 
 
 def _ports() -> Sequence[Mapping[str, object]]:

@@ -1,0 +1,179 @@
+"""The studio inside a page, as its worker runs it: messages in, messages out, one event loop, time as an argument."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Callable
+from textwrap import dedent
+from typing import Any
+
+import pytest
+from studio_rig import WORLD, check_message
+from virtual_loop import VirtualLoop, run_virtually
+
+from steptwin.controller import MILLISECOND, SECOND, Nanos
+from steptwin.errors import Misuse
+from steptwin.inpage.editor import page_editor
+from steptwin.inpage.host import PageTwin
+from steptwin.studio.viewers import MOST_UNSENT
+from steptwin.subject.commands import VERSION
+
+
+class Page:
+    """The other end. What it is sent it takes at once, as long as ``reads``."""
+
+    def __init__(self) -> None:
+        self.reads = True
+        self.twin: PageTwin | None = None
+        self.messages: list[dict[str, Any]] = []
+        self.unread = 0
+        self.events: list[tuple[str, int]] = []
+        self.errors: list[Exception] = []
+        self._id = 0
+
+    def opened(self, number: int) -> None:
+        self.events.append(("opened", number))
+
+    def send(self, number: int, text: str) -> None:
+        self.messages.append(json.loads(text))
+        check_message(self.messages[-1])
+        if self.reads and self.twin is not None:
+            self.twin.viewers.taken(number, len(text))
+        else:
+            self.unread += len(text)
+
+    def closed(self, number: int, code: int) -> None:
+        self.events.append(("closed", code))
+
+    async def enter(self, number: int = 1) -> None:
+        assert self.twin is not None
+        self.twin.viewers.open(number)
+        await self.ask("hello", number, version=VERSION, kinds=["plan", "status"])
+
+    async def ask(self, name: str, number: int = 1, **fields: object) -> Any:
+        assert self.twin is not None
+        self._id += 1
+        self.twin.viewers.receive(number, json.dumps({"do": name, "id": self._id, **fields}))
+        for _ in range(100):
+            await asyncio.sleep(0.01)
+            for one in self.messages:
+                if one.get("id") == self._id:
+                    assert "error" not in one, one
+                    return one["ok"]
+        raise AssertionError(f"{name} was not answered")
+
+
+def make(page: Page, clock: Callable[[], Nanos] | None = None) -> PageTwin:
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualLoop)
+    page.twin = PageTwin(page, dedent(WORLD), {}, "hall", page.errors.append, clock or (lambda: loop.now_ns))
+    page.twin.begin()
+    return page.twin
+
+
+def test_a_viewer_enters_moves_an_axis_and_leaves_while_the_world_goes_on() -> None:
+    async def visit() -> None:
+        page = Page()
+        twin = make(page)
+        await page.enter()
+        (hello,) = [one["hello"] for one in page.messages if "hello" in one]
+        assert hello["role"] == "engineer"
+        assert hello["device_kinds"] == []
+        # What needs a service, files or processes is not offered.
+        missing = {"connect", "ports", "scan", "end_points", "recordings", "branches", "gateways", "campaigns", "history"}
+        assert missing & set(hello["may"]) == set()
+        assert {"move", "fault", "show_moment", "why", "breakpoint", "download", "resume"} <= set(hello["may"])
+        await page.ask("enable", controller="table", axis=1, on=True)
+        await page.ask("move", controller="table", axis=1, to=20.0)
+        await asyncio.sleep(2)
+        assert [one["plan"] for one in page.messages if "events" in one for one in one["events"] if one["kind"] == "plan"]
+        twin.viewers.close(1)
+        await asyncio.sleep(0.1)
+        assert page.events == [("opened", 1), ("closed", 1000)]
+        before = twin.hub.around.moment().time
+        await asyncio.sleep(1)
+        assert twin.hub.around.moment().time == before + SECOND
+        assert page.errors == []
+
+    run_virtually(visit())
+
+
+def test_a_page_that_takes_nothing_is_sent_no_more_than_may_be_unread() -> None:
+    async def visit() -> None:
+        page = Page()
+        twin = make(page)
+        await page.enter()
+        page.reads = False
+        for _ in range(200):
+            twin.viewers.receive(1, json.dumps({"do": "describe"}))
+        await asyncio.sleep(1)
+        assert MOST_UNSENT < page.unread < 2 * MOST_UNSENT
+        was = page.unread
+        page.reads = True
+        twin.viewers.taken(1, was)
+        await page.ask("time")
+
+    run_virtually(visit())
+
+
+def test_a_world_that_cannot_keep_up_is_delayed_and_a_stop_is_answered_between_two_slices() -> None:
+    """To compute a second takes 20 ms here."""
+
+    async def visit() -> None:
+        loop = asyncio.get_running_loop()
+        assert isinstance(loop, VirtualLoop)
+
+        computed = 0
+
+        def slow() -> Nanos:
+            nonlocal computed
+            if page.twin is not None:
+                now = page.twin.world.now
+                loop.now_ns += (now - computed) // 50
+                computed = now
+            return loop.now_ns
+
+        page = Page()
+        twin = make(page, slow)
+        await page.enter()
+        await page.ask("resume", speed=1000)
+        begin, real = twin.hub.around.moment().time, loop.now_ns
+        await asyncio.sleep(2)
+        passed = twin.hub.around.moment().time - begin
+        assert 20 < passed / (loop.now_ns - real) < 50
+        asked = loop.now_ns
+        await page.ask("stop_all")
+        assert loop.now_ns - asked < 100 * MILLISECOND
+
+    run_virtually(visit())
+
+
+def test_a_wrong_description_is_refused_with_its_place() -> None:
+    async def visit() -> None:
+        with pytest.raises(Misuse, match="hall"):
+            PageTwin(Page(), '[world]\nname = "hall"\n[[nonsense]]\n', {}, "hall", lambda _: None)
+
+    run_virtually(visit())
+
+
+def test_the_editor_server_answers_in_its_worker() -> None:
+    class Editor(Page):
+        def send(self, number: int, text: str) -> None:
+            self.messages.append(json.loads(text))
+
+    async def visit() -> None:
+        page = Editor()
+        editor = page_editor(page, {"steptwin:///table/P1.prg": b"a = 1\n"}, page.errors.append)
+        editor.open(1)
+        editor.receive(1, json.dumps({"do": "hello", "token": None}))
+        await asyncio.sleep(0.1)
+        assert page.messages == [{"ok": None}]
+        editor.receive(1, json.dumps({"jsonrpc": "2.0", "id": 1, "method": "initialize", "params": {"capabilities": {}}}))
+        await asyncio.sleep(0.1)
+        assert page.messages[1]["result"]["serverInfo"]["name"]
+        editor.close(1)
+        await asyncio.sleep(0.1)
+        assert page.events == [("opened", 1), ("closed", 1000)]
+
+    run_virtually(visit())
