@@ -19,7 +19,7 @@ from steptwin.simulation.script import steps as do
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, covered, unknown
 from steptwin.why.controllers import acted
-from steptwin.why.log import LAST, OF_MECHANICS, Change
+from steptwin.why.log import JAMS, LAST, OF_MECHANICS, Change
 
 if TYPE_CHECKING:
     from steptwin.why.causes import Causes
@@ -131,7 +131,8 @@ class AxisCauses:
     def jams(self, name: str) -> Iterator[Change]:
         """Events of the collisions that jam an axis or element."""
         for one, spec in self._all.specs.items():
-            if getattr(spec, "effect", None) == JAM and f"{name}.{POSITION}" in self._all.elements.followed(one):
+            is_jam = getattr(spec, "effect", None) == JAM or getattr(spec, "pushes", False)
+            if is_jam and f"{name}.{POSITION}" in self._all.elements.followed(one):
                 yield from self._log.mechanics.get(one, ())
 
     def holds_rotor(self, event: Change, events: Sequence[Change]) -> bool:
@@ -206,4 +207,5 @@ class AxisCauses:
 
 def _begins(record: TraceRecord) -> bool:
     """Whether a rotor does not follow its motion from an event on."""
-    return any(dict(record.facts).get(one) is True for one in ("stalled", "pushes", "touches"))
+    facts = dict(record.facts)
+    return facts.get("what") == JAMS[0] or any(facts.get(one) is True for one in ("stalled", "pushes", "touches"))

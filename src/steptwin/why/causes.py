@@ -21,6 +21,7 @@ from steptwin.why.controllers import ControllerCauses, acted
 from steptwin.why.elements import ElementCauses, inputs
 from steptwin.why.log import LAST, CauseLog, Change, sets
 from steptwin.why.programs import ProgramCauses
+from steptwin.why.workpieces import WorkpieceCauses
 
 BECAME = Message("why.became", "{signal} became {value:g}{how}")
 IS_SINCE = Message("why.is-since", "{signal} is {value:g} {since}{how}")
@@ -47,6 +48,7 @@ class Causes:
         }
         self.axes, self.programs = AxisCauses(self), ProgramCauses(self)
         self.controllers, self.elements = ControllerCauses(self), ElementCauses(self)
+        self.workpieces = WorkpieceCauses(self)
 
     def change(self, signal: str, change: Change, how: MessageText | None = None) -> Cause:
         """A signal took its value."""
@@ -75,7 +77,7 @@ class Causes:
         if fault is not None:
             return fault
         if owner in self.parts:
-            return self.elements._of_element(owner, change)
+            return self.elements.of_inputs(owner, change)
         if owner in self._world.controllers:
             return self._of_pin(PinName(owner, terminal), change)
         if owner in self._world.axes:

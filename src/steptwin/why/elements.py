@@ -5,24 +5,23 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from steptwin.controller import SECOND, Nanos
-from steptwin.messages import Message, text_of
+from steptwin.messages import Message
 from steptwin.simulation.components.logic import TerminalComponent
 from steptwin.simulation.kinds.programs import Resource, ResourceKind
 from steptwin.simulation.logic.expression import parse_condition, parse_expression
-from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
-from steptwin.why.answer import ChainLink, Cover
+from steptwin.why.answer import Cover
 from steptwin.why.axes import POSITION
-from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing
+from steptwin.why.chain import Cause, FoundCause, Place, covered
 from steptwin.why.controllers import acted
 from steptwin.why.log import LAST, Change
-from steptwin.why.roots import Act
+from steptwin.why.movers import FALLS, GOES_ON, PUSHED, TRAVEL
+from steptwin.why.workpieces import HAS_ACTED_SINCE
 
 if TYPE_CHECKING:
     from steptwin.why.causes import Causes
 
-HAS_ACTED_SINCE = Message("why.has-acted-since", ", on which {name} has acted since")
 FOLLOWS_AFTER = Message("why.follows-after", ", {name} follows after {delay_ms:g} ms")
 TIME = "time"
 """States of an element that are over at a moment and are no signal."""
@@ -51,8 +50,8 @@ class ElementCauses:
         if part is not None and signal.upper() in inputs(part):
             return self._all.last(list(self._all.sources(PinName(name, signal.upper()))), time)
         group = self._log.group(name)
-        change = Change(time, 0.0, group, self._log.position(group, time), LAST)
-        workpiece = self._of_workpiece(name, change)
+        change = Change(time, 0.0, group, self._log.position(group, time), before)
+        workpiece = None if signal == POSITION else self._all.workpieces.at(name, change)
         if workpiece is not None:
             return workpiece
         jams = [one for one in self._all.axes.jams(name) if (one.time, one.order) < (time, before)] if signal == POSITION else []
@@ -65,44 +64,15 @@ class ElementCauses:
         if part is None and self.followed(name):
             return self.of_followed(name, change)
         channels = [one for one in self._log.changes if one == name or one.startswith(f"{name}.")]
-        found = None if part is None else self._of_element(name, change)
+        found = None if part is None else self.of_inputs(name, change)
         found = self._all.last(channels, time) if found is None else found
         return covered(found, Cover.ACTION) if found is not None and found.cover is None else found
 
     def at_element(self, name: str, change: Change) -> FoundCause:
         """Cause of an event of an element."""
-        return self._all.fault(name, change) or self._of_element(name, change)
+        return self._all.fault(name, change) or self.of_inputs(name, change)
 
-    def _of_workpiece(self, name: str, change: Change) -> FoundCause:
-        """Event of a workpiece at an element at the moment of a change, before it, or to the only one anywhere."""
-        found = [
-            (order, str(dict(record.facts).get("element")), record)
-            for order, record in self._log.at(change.group, change.time)
-            if order < change.order and record.kind == "event" and record.subject == "workpiece"
-        ]
-        mine = [one for one in found if one[1] == name] or (found if len(found) == 1 else [])
-        if not mine:
-            return None
-        order, owner, record = mine[0]
-        text = text_of(record.value if isinstance(record.value, str) else str(record.value))
-
-        act = next((act for act in self._log.acts_at(record.time, order) if _moves(act, record)), None)
-        every = getattr(self._all.specs.get(owner), "feed_every", None)
-        is_fed = act is None and ("what", "on") in record.facts and every and record.time % every == 0
-
-        def before() -> FoundCause:
-            if act is not None:
-                return acted(act)
-            # What takes a workpiece from an element, or lets go of it there, acts.
-            actor = str(getattr(record.value, "values", {}).get("cup", owner))
-            cause = self._of_element(actor, change._replace(order=order)) if actor in self._all.parts else None
-            # What comes onto a belt does not by what moves that.
-            comes = ("what", "on") in record.facts and cause is not None and cause.place.time < record.time
-            return None if comes else cause
-
-        return Cause(ChainLink(record.time, owner, text), Place(record.time, order), nothing if is_fed else before)
-
-    def _of_element(self, name: str, change: Change) -> FoundCause:
+    def of_inputs(self, name: str, change: Change) -> FoundCause:
         """Cause of a change of an element's output: an input at the same moment, or one before, as much earlier as it delays."""
         part = self._all.parts[name]
         sources = [source for terminal in inputs(part) for source in self._all.sources(PinName(name, terminal))]
@@ -118,7 +88,7 @@ class ElementCauses:
                 latest, source = max(exact, key=lambda found: found[0].order)
                 how = FOLLOWS_AFTER(name=name, delay_ms=delay / SECOND * 1000) if delay else None
                 return covered(self._all.change(source, latest, how), Cover.DELAY)
-        workpiece = self._of_workpiece(name, change)
+        workpiece = self._all.workpieces.at(name, change)
         if workpiece is not None:
             return workpiece
         followed = (
@@ -145,8 +115,8 @@ class ElementCauses:
         spec: Any = self._all.specs.get(name)
         if spec is None:
             return ()
-        if name in self._spatial:
-            return self._moved_in_space(spec)
+        if name in self._spatial or getattr(spec, "pushes", False):
+            return self._moved_in_space(name, spec)
         when, of, rate = (getattr(spec, one, None) for one in ("when", "of", "rate"))
         axes = [getattr(spec, one, None) for one in ("axis", "other")] if not (when or of or rate) else []
         turned_by = getattr(spec, "shaft", None)
@@ -155,29 +125,30 @@ class ElementCauses:
         found += [f"{axis}.{POSITION}" for axis in axes if axis]
         return (*dict.fromkeys(one for one in found if one != TIME), *(self.followed(turned_by) if turned_by else ()))
 
-    def _moved_in_space(self, spec: Any) -> tuple[str, ...]:
-        """The signals that move the bodies that an element compares or sees, or the belt with the workpieces."""
+    def _moved_in_space(self, name: str, spec: Any) -> tuple[str, ...]:
+        """The signals that move a pusher, or the bodies that an element compares or sees, or the belt with the workpieces."""
         described = self._world.objects.described
-        names = [spec.name] if hasattr(spec, "sees") else []
-        names += [name for key, name in spec.others(described) if key != "except"]
+        names = [] if hasattr(spec, "between") else [spec.name]
+        if name in self._spatial:
+            names += [other for key, other in spec.others(described) if key != "except"]
         found: dict[str, None] = {}
-        for name in names:
-            one: Any = self._all.specs.get(name)
+        for other in names:
+            one: Any = self._all.specs.get(other)
             while one is not None:
                 if one.name in self._world.axes or (one.name in self._all.parts and getattr(one, "moves_others", False)):
                     found[f"{one.name}.{POSITION}"] = None
                 elif one.name != spec.name:
                     found |= dict.fromkeys(self.followed(one.name))
                 one = self._all.specs.get(getattr(one, "on", None) or "")
-        belts = [name for name in names if hasattr(self._all.specs.get(name), "feed_every")]
-        return tuple(found) or tuple(f"{name}.travel" for name in belts if len(belts) == 1)
+        belts = [other for other in names if hasattr(self._all.specs.get(other), "feed_every")]
+        return tuple(found) or tuple(f"{other}.travel" for other in belts if len(belts) == 1)
 
     def of_followed(self, name: str, change: Change) -> FoundCause:
         """The last cause by a moment of what an element follows; that of the same moment, if there is one, or of an axis that
         moves then."""
         found: list[tuple[bool, bool, Cause]] = []
-        for signal in self.followed(name):
-            owner, _, rest = signal.partition(".")
+        for signal in self._log.movers.get((name, change.time)) or self.followed(name):
+            owner, _, rest = signal.rpartition(".")
             before = self._all.before(signal, change, change.time)
             if before is not None:
                 cause = covered(self._all.change(signal, before[0]), Cover.ACTION)
@@ -185,6 +156,10 @@ class ElementCauses:
                 cause = covered(self._all.axes.moved(owner, change.time, change.order), Cover.MOTION)
             elif owner in self._world.controllers:
                 cause = self._all.controllers.at_moment(owner, change.time, Resource(ResourceKind.AXIS, ""), rest)
+            elif owner in self._log.events and rest in (PUSHED, FALLS, GOES_ON):
+                cause = self._all.workpieces.last(owner, rest, change)
+            elif rest == TRAVEL:
+                cause = self._all.workpieces.travel(owner, change)
             else:
                 cause = covered(self.of_element(owner, rest, change.time, change.order), Cover.ACTION)
             if cause is not None and cause.place < Place(change.time, change.order):
@@ -193,12 +168,6 @@ class ElementCauses:
                 found.append((cause.place.time == change.time, moves, cause))
         best = max(found, key=lambda one: (one[0], one[1], one[2].place), default=None)
         return None if best is None else best[2]
-
-
-def _moves(act: Act, record: TraceRecord) -> bool:
-    """Whether somebody has put a workpiece there."""
-    facts = dict(record.facts)
-    return isinstance(act.what, do.Put) and facts["what"] == "on" and str(facts["workpiece"]).startswith(f"{act.what.on}.")
 
 
 def inputs(part: TerminalComponent) -> list[str]:

@@ -17,6 +17,7 @@ from typing import NamedTuple
 from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
+from steptwin.simulation.components.beam import BEAM, SEEN
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.faults.active import ActiveFault, HeldLevel
 from steptwin.simulation.kinds.programs import Programs, StatementLocation
@@ -29,6 +30,7 @@ from steptwin.simulation.world.snapshot import RecordedInput
 from steptwin.simulation.world.snapshotlog import SLICE_NS, replay
 from steptwin.statements import StatementHook
 from steptwin.why import points
+from steptwin.why.movers import movers
 from steptwin.why.roots import Act, SetFault
 
 MOST_NOTED = 20_000_000
@@ -39,6 +41,9 @@ LAST = sys.maxsize
 """The order of what is after all that was noted."""
 OF_MECHANICS = ("stall", "hard-stop", "collision")
 """Events after which the rotor of an axis does not follow its motion, or does again."""
+WORKPIECE = "workpiece"
+JAMS = ("jams", "free again")
+"""Events of a pusher after which what moves it stands, or moves again."""
 STATEMENTS_AT_ONCE = 2000
 """Most statements of one program between two parts of a run."""
 
@@ -110,6 +115,8 @@ class CauseLog:
         numbers = {id(scheduler): number for number, scheduler in enumerate(world.schedulers)}
         self._group_of = {name: numbers[id(scheduler)] for name, scheduler in parts.scheduler_of.items()}
         self._timed = on_timed_lines(world)
+        self._beams = {f"{name}.{SEEN.lower()}": beam for name, beam in parts.built(BEAM).items()}
+        self._along = {spec.name: spec.towards().axis for spec in parts.described.of(BEAM)}
         self._pins = {name: frozenset(controller.pins()) for name, controller in world.controllers.items()}
         self.first_levels = levels_of(world)
         self.records: dict[int, list[TraceRecord]] = defaultdict(list)
@@ -120,9 +127,13 @@ class CauseLog:
         self.plans: dict[tuple[str, str], list[Change]] = defaultdict(list)
         """Moments and positions of the plans of an axis, by controller and number."""
         self.faults: dict[str, list[Change]] = defaultdict(list)
-        self.mechanics: dict[str, list[Change]] = defaultdict(list)
-        """Events of `OF_MECHANICS` by axis or collision."""
         """Moments at which faults began or ended, by controller or element."""
+        self.mechanics: dict[str, list[Change]] = defaultdict(list)
+        """Events of `OF_MECHANICS` by axis or collision, and jams of pushers."""
+        self.events: dict[str, list[Change]] = defaultdict(list)
+        """Events of workpieces: all, and by the workpiece and by the element."""
+        self.movers: dict[tuple[str, Nanos], tuple[str, ...]] = {}
+        """The signals that moved what a beam sees or a collision compares, by its name, at its changes."""
         self.acts: list[Act] = []
         self._fault_acts: dict[str, list[Act]] = defaultdict(list)
         """Those that set or clear a fault, by its name."""
@@ -189,20 +200,34 @@ class CauseLog:
             case "edge":
                 signal = self.signal_of(record)
                 order = self._of_input(record) if self._is_input(record, signal) else order
+                if (beam := self._beams.get(signal)) is not None:
+                    name = beam.block.name
+                    self.movers[name, record.time] = movers(self.world, name, beam.by, record.time, self._along[name])
                 self.changes[signal].append(Change(record.time, record.level(), group, len(records), order))
             case "plan":
                 self.plans[record.controller, record.subject].append(Change(record.time, 0.0, group, len(records), order))
             case "frame":
                 for name in self._timed.get(record.controller, ()):
                     self.points.executes(name, record.time, keeps=True)
-            case "event" if record.subject in OF_MECHANICS:
-                element = str(dict(record.facts)["element"])
-                self.mechanics[element].append(Change(record.time, 0.0, group, len(records), order))
+            case "event" if record.subject in (*OF_MECHANICS, WORKPIECE):
+                self._note_event(record, Change(record.time, 0.0, group, len(records), order))
             case "fault":
                 self.faults[record.controller].append(Change(record.time, 0.0, group, len(records), order))
                 self._note_holds(record.controller, record.time)
         records.append(record)
         self._orders[group].append(order)
+
+    def _note_event(self, record: TraceRecord, event: Change) -> None:
+        facts = dict(record.facts)
+        element = str(facts["element"])
+        if record.subject == WORKPIECE:
+            for name in (WORKPIECE, element, str(facts["workpiece"])):
+                self.events[name].append(event)
+        if record.subject in OF_MECHANICS or facts["what"] in JAMS:
+            self.mechanics[element].append(event)
+        one, other = (getattr(record.value, "values", {}).get(part) for part in ("one", "other"))
+        if record.subject == "collision" and one and other:
+            self.movers[element, record.time] = movers(self.world, str(one), str(other).partition(",")[0], record.time)
 
     @property
     def _order(self) -> int:
@@ -308,6 +333,19 @@ class CauseLog:
             return points.level(series, now)
         last = self.last_change(signal, now)
         return self.first_levels.get(signal, 0.0) if last is None else last.value
+
+    def events_at(self, time: Nanos) -> Iterator[Change]:
+        """The events of workpieces at a moment, the last one first."""
+        return takewhile(lambda one: one.time == time, self.events_before(WORKPIECE, Change(time, 0.0, -1, 0, LAST)))
+
+    def events_before(self, name: str, event: Change) -> Iterator[Change]:
+        """The events of a workpiece, or at an element, before another one, the last one first."""
+        return (one for one in reversed(self.events.get(name, ())) if (one.time, one.order) < (event.time, event.order))
+
+    def last_event(self, name: str, until: Nanos, before: int = LAST, what: str = "") -> Change | None:
+        """The last event of a workpiece, or at an element, by a moment, before an order; of a kind, if that is given."""
+        found = (one for one in reversed(self.events.get(name, ())) if (one.time, one.order) < (until, before))
+        return next((one for one in found if not what or ("what", what) in self.record(one).facts), None)
 
     def last_change(self, signal: str, until: Nanos, before: int = LAST) -> Change | None:
         """The last change of a signal by a moment, before an order."""

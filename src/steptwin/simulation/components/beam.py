@@ -95,7 +95,7 @@ class Beam(TerminalComponent):
     """SEEN is on while anything that it sees is in one of its beams."""
 
     FIXED: ClassVar[tuple[str, ...]] = ("_depends_on", "_far", "_near")
-    __slots__ = (*FIXED, "_due", "_sees")
+    __slots__ = (*FIXED, "_due", "_sees", "by")
 
     def __init__(self, block: TerminalBlock, near: Sequence[Probe], far: Sequence[Probe], depends_on: tuple[str, ...]) -> None:
         """``far``: the probes while it sees something."""
@@ -103,6 +103,8 @@ class Beam(TerminalComponent):
         self._near, self._far = tuple(near), tuple(far)
         self._depends_on = depends_on
         self._sees = False
+        self.by = ""
+        """The part or workpiece that it sees, or saw last."""
         self._due: Nanos | None = None
 
     @property
@@ -110,7 +112,8 @@ class Beam(TerminalComponent):
         return self._depends_on
 
     def update(self, now: Nanos) -> None:
-        self._sees = any(probe.holds(now) for probe in (self._far if self._sees else self._near))
+        there = next((name for probe in (self._far if self._sees else self._near) for name in probe.met(now)), None)
+        self._sees, self.by = there is not None, there or self.by
         self.block.put(SEEN, float(self._sees))
         changes = (probe.change(now) for probe in (self._far if self._sees else self._near))
         self._due = min((due for due in changes if due is not None), default=None)

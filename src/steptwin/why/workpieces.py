@@ -1,0 +1,125 @@
+"""The causes of what happens to workpieces."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+from steptwin.controller import Nanos
+from steptwin.messages import Message, text_of
+from steptwin.simulation.components.conveyortable import RUN
+from steptwin.simulation.scheduler.trace import TraceRecord
+from steptwin.simulation.scheduler.wires import PinName
+from steptwin.simulation.script import steps as do
+from steptwin.why.answer import ChainLink, Cover
+from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing
+from steptwin.why.controllers import acted
+from steptwin.why.log import Change
+from steptwin.why.movers import FALLS, GOES_ON, PUSHED
+from steptwin.why.roots import Act
+
+if TYPE_CHECKING:
+    from steptwin.why.causes import Causes
+
+HAS_ACTED_SINCE = Message("why.has-acted-since", ", on which {name} has acted since")
+COMES = ("on", "crooked", "on the floor")
+STAYS = ("stands", GOES_ON, "goes back", "collides", "jams", "free again")
+"""Events after which a workpiece may still be pushed."""
+
+
+class WorkpieceCauses:
+    """Finds the causes of events of workpieces. ``causes`` has those of everything else."""
+
+    def __init__(self, causes: Causes) -> None:
+        self._all = causes
+        self._log = causes.log
+        self._world = causes.log.world
+
+    def at(self, name: str, change: Change) -> FoundCause:
+        """Event of a workpiece at an element at the moment of a change, before it, or to the only one anywhere."""
+        mine = self._log.last_event(name, change.time, change.order)
+        if mine is None or mine.time != change.time:
+            found = [one for one in self._log.events_at(change.time) if one.order < change.order]
+            mine = found[0] if len(found) == 1 else None
+        return None if mine is None else self.event(mine)
+
+    def last(self, workpiece: str, what: str, change: Change) -> FoundCause:
+        """The last event of a kind of a workpiece before a change."""
+        event = self._log.last_event(workpiece, change.time, change.order, what)
+        return None if event is None else covered(self.event(event), Cover.ACTION)
+
+    def event(self, event: Change) -> Cause:
+        """An event of a workpiece."""
+        record = self._log.record(event)
+        facts = dict(record.facts)
+        text = text_of(record.value if isinstance(record.value, str) else str(record.value))
+        act = next((act for act in self._log.acts_at(event.time, event.order) if _moves(act, record)), None)
+        if act is not None:
+            before = partial(acted, act)
+        elif self._is_fed(event, record):
+            before = nothing
+        else:
+            before = partial(self._of_event, event, record)
+        return Cause(ChainLink(event.time, str(facts["element"]), text), Place(event.time, event.order), before)
+
+    def _is_fed(self, event: Change, record: TraceRecord) -> bool:
+        """Whether a workpiece comes into the world by the clock of a feeder."""
+        facts = dict(record.facts)
+        feeder, workpiece = str(facts["element"]), str(facts["workpiece"])
+        every = getattr(self._all.specs.get(feeder), "feed_every", None)
+        is_new = facts["what"] == "on" and workpiece.startswith(f"{feeder}.") and self._same(event, workpiece) is None
+        return bool(every) and is_new and event.time % every == 0
+
+    def _same(self, event: Change, workpiece: str) -> Change | None:
+        """The event of a workpiece before another one of the same moment."""
+        found = self._log.last_event(workpiece, event.time, event.order)
+        return found if found is not None and found.time == event.time else None
+
+    def _of_event(self, event: Change, record: TraceRecord) -> FoundCause:
+        facts = dict(record.facts)
+        owner, workpiece, what = str(facts["element"]), str(facts["workpiece"]), facts["what"]
+        if getattr(self._all.specs.get(owner), "pushes", False):
+            return self._all.elements.of_followed(owner, event)
+        same = self._same(event, workpiece)
+        if same is not None:
+            return self.event(same)
+        if what == FALLS:  # what it lay on is gone
+            below = next((one for one in self._log.events_at(event.time) if one.order < event.order), None)
+            if below is not None:
+                return self.event(below)
+        if what in (*COMES, FALLS):
+            lasts = next((one for one in self._log.events_before(workpiece, event) if self._what(one) not in STAYS), None)
+            if lasts is not None and self._what(lasts) in (PUSHED, FALLS):
+                return covered(self.event(lasts), Cover.ACTION)
+        # What takes a workpiece from an element, or lets go of it there, acts.
+        actor = str(getattr(record.value, "values", {}).get("cup", owner))
+        if actor not in self._all.parts:
+            return None
+        if what in ("leaves", FALLS):
+            return self.travel(actor, event)
+        cause = self._all.elements.of_inputs(actor, event)
+        # What comes onto a belt does not by what moves that.
+        return None if what == "on" and cause is not None and cause.place.time < event.time else cause
+
+    def _what(self, event: Change) -> str:
+        return str(dict(self._log.record(event).facts)["what"])
+
+    def travel(self, belt: str, change: Change) -> FoundCause:
+        """The thing that moves a belt at a moment: its axis, or the output that lets it run."""
+        axis = getattr(self._all.specs.get(belt), "axis", None)
+        if axis is not None:
+            return covered(self._all.axes.moved(axis, change.time, change.order), Cover.MOTION)
+        sources, how = list(self._all.sources(PinName(belt, RUN))), HAS_ACTED_SINCE(name=belt)
+        found = self._all.last(sources, change.time, how, change.order)
+        if found is None and sources:
+            begin: Nanos = self._log.begin
+            found = self._all.first(sources[0], self._log.level(sources[0], begin), Place(begin), how)
+        return covered(found, Cover.ACTION)
+
+
+def _moves(act: Act, record: TraceRecord) -> bool:
+    """Whether somebody has put a workpiece there, or taken it away."""
+    facts = dict(record.facts)
+    if isinstance(act.what, do.Remove):
+        return act.what.workpiece == facts["workpiece"]
+    return isinstance(act.what, do.Put) and facts["what"] == "on" and str(facts["workpiece"]).startswith(f"{act.what.on}.")
