@@ -40,7 +40,7 @@ PEER_PACKAGES := chromium curl mbpoll libmodbus-dev gcc libc6-dev pkg-config mak
   prometheus ser2net tshark
 
 .DEFAULT_GOAL := help
-.PHONY: help run test golden soak extras page vsix release lint format types imports bench docs peers lock clean
+.PHONY: help run test lowest golden soak extras page vsix release lint format types imports bench docs peers lock clean
 
 help:  ## Show the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -51,6 +51,21 @@ run: $(RUN_STAMP)  ## Show a demo machine in the browser (ARGS="MACHINE.toml --s
 
 test: $(DEV_STAMP) $(WEB_STAMP) $(PAGE) $(EXTENSION_STAMP) $(CLIENTS_STAMP)  ## Run the tests (ARGS="-k mic_7 ..."); peers that are missing are skipped
 	$(BIN)/pytest -n auto --dist worksteal $(ARGS)
+
+# Each bound of pyproject.toml as the version that is installed: one file for each extra, and the import of every module.
+LOWEST := build/lowest
+LOWEST_TESTS := test_import_weight.py wire/test_rtu.py cli/test_main.py live/test_rfc2217.py files/export/test_vcd.py \
+  files/export/test_plot.py files/export/test_tables.py files/scene/test_picture.py lsp/test_stdio.py studio/test_openapi.py \
+  gateways/test_prometheus.py gateways/opcua/test_nodetypes.py gateways/mqtt/test_gateway.py gateways/epics/test_channels.py \
+  files/test_certificate.py live/test_telemetry.py bluesky history/test_database.py campaign/test_cases.py \
+  campaign/test_search.py::test_the_same_cases_for_the_same_results \
+  campaign/test_campaign.py::test_a_worker_of_dask_that_is_killed_loses_nothing
+lowest: $(PYTHON_STAMP)  ## Try the lowest versions of libraries that pyproject.toml permits
+	@$(UV) venv --quiet --clear --no-project --python $(BIN)/python $(LOWEST)
+	@$(UV) pip compile --quiet --resolution lowest-direct --all-extras --python $(LOWEST)/bin/python pyproject.toml -o $(LOWEST)/libraries.txt
+	@$(UV) pip install --quiet --python $(LOWEST)/bin/python -r $(LOWEST)/libraries.txt --group build --group test --editable .
+	@$(LOWEST)/bin/steptwin doctor
+	$(LOWEST)/bin/pytest -n auto --dist worksteal $(addprefix tests/,$(LOWEST_TESTS)) $(ARGS)
 
 golden: $(DEV_STAMP)  ## Make the golden files of tests anew (ARGS=tests/mic488/test_registers_golden.py): read the diff
 	@for test in $(ARGS); do PYTHONPATH=tests/support $(BIN)/python $$test || exit 1; done
