@@ -248,6 +248,26 @@ def test_devices_come_and_go(twin: Twin, start_studio: Callable[..., Process]) -
     assert viewer.ask("disconnect", controller="table")["error"]["code"] == "misuse"
 
 
+@pytest.mark.parametrize(
+    ("device", "refused"),
+    [
+        ("tabel=127.0.0.1:1", "--device tabel=127.0.0.1:1: its name must be that of a controller in .*: "),
+        ("{chip}={bus}", "--device .*=...: MIC488.* is there, but .* has .*M1486"),
+    ],
+)
+def test_a_device_takes_the_place_of_a_controller_of_its_kind(twin: Twin, tmp_path: Path, device: str, refused: str) -> None:
+    chip = next(one["name"] for one in json.loads((tmp_path / "ready.json").read_text())["controllers"] if one["kind"] == "m1486")
+    given = device.format(bus=twin.bus, chip=chip)
+    arguments = ["studio", str(tmp_path / "hall.toml"), "--http", "127.0.0.1:0", "--no-browser", "--device", given]
+    with pytest.raises(Misuse, match=refused):
+        CliRunner().invoke(app, arguments, catch_exceptions=False)
+
+
+def test_devices_in_places_are_no_world(tmp_path: Path) -> None:
+    with pytest.raises(Misuse, match="--seed is not for devices without a world"):
+        CliRunner().invoke(app, ["studio", str(tmp_path), "--device", "table=127.0.0.1:1", "--seed=2"], catch_exceptions=False)
+
+
 @pytest.mark.parametrize("option", ["--seed=2", "--from=2s", "--speed=2", "--log-frames"])
 def test_options_of_a_world_need_one(option: str) -> None:
     with pytest.raises(Misuse, match=f"{option.partition('=')[0]} is not for devices without a world: give a MACHINE.toml too"):

@@ -6,12 +6,15 @@ import re
 import shutil
 from collections.abc import Callable, Iterator
 from io import BytesIO
+from pathlib import Path
 
 import pytest
 from PIL import Image
 from playwright.sync_api import Browser, Page, expect
+from pymodbus.client import ModbusTcpClient
 from studio_page import PICTURES, Studio, button, serious
-from tests.conftest import until
+from tests.conftest import Served, until
+from tests.peers.conftest import Master
 from tests.studio.conftest import Process, StudioWorld
 from tests.support.models import glb, png
 
@@ -202,6 +205,41 @@ def test_a_thing_is_selected_in_the_picture_or_in_the_list(studio: Studio) -> No
     expect(page.get_by_text(re.compile("room"))).to_be_visible()
     page.get_by_label("Selected").select_option("")
     expect(page.get_by_label("x place")).to_have_count(0)
+
+
+def test_a_device_moves_the_machine_and_what_is_not_known_is_grey(
+    start_studio: Callable[..., Process], serve: Callable[..., Served], browser: Browser, tmp_path: Path
+) -> None:
+    """The device is a twin that is served; it has no cylinder."""
+    (tmp_path / "table.cfg").write_text("[Axis0]\nUnit=1\nGear=100\nAcc=400\nDec=400\nVel=100\n")
+    twin = serve("--config", str(tmp_path / "table.cfg"))
+    device = f"tcp://127.0.0.1:{twin.tcp_port}"
+    client = ModbusTcpClient("127.0.0.1", port=twin.tcp_port)
+    assert client.connect()
+    master = Master(client)
+    page = browser.new_page(locale="en-US")
+    complaints: list[str] = []
+    page.on("console", lambda message: complaints.append(message.text) if message.type == "error" else None)
+
+    page.goto(start_studio("--device", f"table={device}").url)
+    expect(page.get_by_text("What M1 counts in is not known: connect it with config=FILE.")).to_be_visible()
+    expect(page.locator(part("x", "moving"))).to_have_class(re.compile("unknown"))
+
+    page.goto(start_studio("--device", f"table={device},config={tmp_path / 'table.cfg'}").url)
+    button(page, "Front").click()
+    carriage, rod = page.locator(part("x", "moving")), page.locator(part("lift", "rod"))
+    expect(carriage).not_to_have_class(re.compile("unknown"))
+    before = left(page, "x", "moving")
+    master.enable(1)
+    master.move(1, 120.0)
+    until(lambda: left(page, "x", "moving") - before == pytest.approx(120.0 * pixels_of_a_mm(page), abs=2.0), "it is there")
+    expect(rod).to_have_class(re.compile("unknown"))
+    expect(page.get_by_text("there may be workpieces")).to_be_visible()
+    expect(page.get_by_text("not known: connect")).to_have_count(0)
+    expect(page.locator("svg .solid.piece")).to_have_count(0)
+    page.close()
+    client.close()
+    assert complaints == []
 
 
 @pytest.fixture

@@ -45,9 +45,9 @@ def command(
         from steptwin.extras import missing
 
         raise missing("the studio", "studio") from None
-    if page.device and world is None:
+    if page.device and (world is None or page.has_no_world):
         for group in (live, options):
-            group.refuse("devices without a world: give a MACHINE.toml too")
+            group.refuse("devices without a world" if page.has_no_world else "devices without a world: give a MACHINE.toml too")
     if page.view:
         for group in (live, options):
             group.refuse("a recording that is only viewed")

@@ -69,17 +69,25 @@ class CompositeSubject:
 
     A command goes to the member whose controller or line it names; one that names none to ``world``, or to the only device.
 
-    ``clock`` and ``numbering`` are those of the world where there is one; all devices use them.
+    ``clock`` and ``numbering`` are those of the world where there is one; all devices use them. ``machine``: what devices move,
+    without a world; nothing is known of it but what they have.
     """
 
-    def __init__(self, world: WorldMember | None, clock: Callable[[], Nanos], numbering: Numbering) -> None:
+    def __init__(
+        self,
+        world: WorldMember | None,
+        clock: Callable[[], Nanos],
+        numbering: Numbering,
+        machine: Description | None = None,
+    ) -> None:
         self._world = world
         self._members: list[MemberSubject] = [] if world is None else [world]
         self.now = clock
         self.numbering = numbering
         self._subscriptions: list[Subscription] = []
-        self._gone: set[str] = set()
-        """Controllers that were removed: values of them are unknown to viewers that still watch them."""
+        self._machine = machine
+        self._unknown: set[str] = set() if machine is None else {one.name for one in (*machine.axes, *machine.elements)}
+        """Owners of values that are unknown: parts of a machine, and removed controllers, which may still be watched."""
         self._describe()
 
     # ------------------------------------------------------------------ members
@@ -94,7 +102,7 @@ class CompositeSubject:
         self._members.remove(member)
         for subscription in self._subscriptions:
             member.subscribers.remove(subscription)
-        self._gone |= {controller.name for controller in member.description.controllers}
+        self._unknown |= {controller.name for controller in member.description.controllers}
         self._describe()
 
     @property
@@ -117,9 +125,9 @@ class CompositeSubject:
         """Lines with several devices."""
         can = {name for one in all_of for name in one.commands}
         controllers = tuple(controller for one in all_of for controller in one.controllers)
-        base = (
-            all_of[0] if self._world is not None else Description(", ".join(one.name for one in controllers) or "no device", ())
-        )
+        base = self._machine or Description(", ".join(one.name for one in controllers) or "no device", ())
+        if self._world is not None:
+            base = all_of[0]
         self.description = replace(
             base,
             controllers=controllers,
@@ -181,7 +189,7 @@ class CompositeSubject:
         return "; ".join(member.lost for member in self._members if member.lost is not None) or None
 
     def read(self, *points: str) -> tuple[Reading, ...]:
-        if len(self._members) == 1 and not self._gone:
+        if len(self._members) == 1 and not self._unknown:
             return self._members[0].read(*points)
         groups = self._by_member(points)
         found = {one.point: one for member, own in groups for one in member.read(*own)}
@@ -192,7 +200,7 @@ class CompositeSubject:
         groups: dict[int, tuple[MemberSubject, list[str]]] = {}
         for point in points:
             owner = point.partition(".")[0]
-            if point != TIME and (owner not in self._gone or owner in self._of_controller):
+            if point != TIME and (owner not in self._unknown or owner in self._of_controller):
                 member = self._member_called(owner)
                 groups.setdefault(id(member), (member, []))[1].append(point)
         return list(groups.values())

@@ -6,8 +6,10 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from steptwin.errors import Misuse
+from steptwin.files.loader import is_recording
 from steptwin.messages import NONE, Message
 from steptwin.studio.modelfiles import LARGEST, MODEL_TOO_LARGE, check_model
+from steptwin.subject.contract import Description
 from steptwin.system import reason
 
 NO_SUCH_MODEL = Message("live.no-such-model", "no body has the model {name!r}; there are {names}")
@@ -35,3 +37,9 @@ class FolderModels:
         except OSError as error:
             raise Misuse(MODEL_CANNOT_BE_READ(name=name, why=reason(error))) from None
         return str(path)
+
+
+def models_of(machine: Description, path: Path | None) -> FolderModels | None:
+    """Models that bodies have, beside their description; None for a recording, whose description is in no file."""
+    names = [body.model for body in machine.scene.bodies if body.model is not None]
+    return None if path is None or is_recording(path) else FolderModels(path.parent, names)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 from steptwin.access.roles import Role
 from steptwin.options import Option, OptionGroup
+
+_NAMED = re.compile(r"([A-Za-z_][A-Za-z0-9_-]*)=(.*)")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,8 +41,9 @@ class StudioOptions(OptionGroup):
         tuple[str, ...],
         Option(
             "A device to show, as for the other commands: /dev/ttyUSB0,unit=2, HOST:PORT, /dev/ttyUSB1,kind=m1486,chip=7. "
-            "Repeatable. Without MACHINE.toml there is no world then.",
-            metavar="DEVICE",
+            "Repeatable. Without MACHINE.toml there is no world then, nor with NAME=, a controller of MACHINE.toml: devices move "
+            "its picture.",
+            metavar="[NAME=]DEVICE",
             flags=("--device", "-d"),
             completion="devices",
         ),
@@ -48,6 +52,17 @@ class StudioOptions(OptionGroup):
     browser: Annotated[bool, Option("Open the page where there is a desktop.")] = True
     is_demo: bool = False
     """Whether no file of the user is behind it: only what reaches a device needs a token."""
+
+    @property
+    def devices(self) -> tuple[tuple[str | None, str], ...]:
+        """The name that each is given, and its address."""
+        found = (_NAMED.fullmatch(text) for text in self.device)
+        return tuple((None, text) if one is None else (one[1], one[2]) for one, text in zip(found, self.device, strict=True))
+
+    @property
+    def has_no_world(self) -> bool:
+        """Whether devices take the places of controllers that are described."""
+        return any(name is not None for name, _ in self.devices)
 
     @property
     def highest(self) -> Role:

@@ -37,7 +37,8 @@ from steptwin.live.server import EndPoint, Server
 from steptwin.live.studio.branches import BranchStart, WorldBranches
 from steptwin.live.studio.campaigns import FolderCampaigns
 from steptwin.live.studio.demo import demo_world
-from steptwin.live.studio.models import FolderModels
+from steptwin.live.studio.devicemachine import DeviceMachine, read_machine
+from steptwin.live.studio.models import models_of
 from steptwin.live.studio.openpage import DEFAULT, OpenedPage, has_desktop
 from steptwin.live.studio.options import StudioOptions
 from steptwin.live.studio.owntokens import new_tokens, own_tokens
@@ -48,7 +49,6 @@ from steptwin.live.studio.shownworld import ShownWorld
 from steptwin.live.studio.work import LineWork
 from steptwin.live.twins import find_device
 from steptwin.live.withoutworld import serve_without_world
-from steptwin.live.world import LiveWorld
 from steptwin.messages import Message
 from steptwin.simulation.describe.blueprint import Blueprint
 from steptwin.simulation.describe.description import read_world
@@ -83,6 +83,10 @@ def studio(own: StudioOptions, options: UpOptions) -> bool:
             stack.enter_context(world)
             opening = partial(page.open, beside=options, snapshots=snapshots)
             return up_with(world, replace(options, live=replace(options.live, speed="0"), is_closed=True), opening)
+        if options.world is not None and own.has_no_world:
+            opening = partial(page.open_without_world, machine=read_machine(options.world, own.devices))
+            asyncio.run(serve_without_world(options.ready_file, opening, options.log))
+            return True
         if options.world is not None:
             return up(replace(options, keeps_inputs=True, audit=audit), partial(page.open, beside=options))
         if own.device:
@@ -213,7 +217,7 @@ class _Page:
             recordings=recordings,
             services=None if beside is None else LiveServices(running.gateways),
             campaigns=campaigns,
-            models=_models(live, world),
+            models=models_of(live.subject.description, world),
         )
         await self._serve(server, shown.subject, around)
 
@@ -240,21 +244,23 @@ class _Page:
             return None
         return replace(self._own, http=str(Address(host, 0)), audit=None, browser=False, device=(), view=False)
 
-    async def open_without_world(self, server: Server) -> None:
+    async def open_without_world(self, server: Server, *, machine: DeviceMachine | None = None) -> None:
         """Serve it in the event loop of ``server``."""
         begin = time.monotonic_ns()
 
         def moment() -> PresentMoment:
             return PresentMoment(time.monotonic_ns() - begin, running=True, speed=1.0)
 
-        subject = CompositeSubject(None, lambda: moment().time, Numbering({}))
-        await self._serve(server, subject, partial(Surroundings, moment=moment, programs=_NoPrograms()))
+        subject = CompositeSubject(None, lambda: moment().time, Numbering({}), None if machine is None else machine.parts)
+        models = None if machine is None else machine.models
+        await self._serve(server, subject, partial(Surroundings, moment=moment, programs=_NoPrograms(), models=models), machine)
 
     async def _serve(
         self,
         server: Server,
         subject: CompositeSubject,
         surroundings: Callable[..., Surroundings],
+        machine: DeviceMachine | None = None,
     ) -> None:
         loop = asyncio.get_running_loop()
 
@@ -274,8 +280,10 @@ class _Page:
         )
         hub = Hub(subject, subject, around)
         try:
-            for device in self._own.device:
-                await connections.open(device)
+            for name, address in self._own.devices:
+                await connections.open(address, name)
+            if machine is not None:
+                machine.check(subject.description)
         except BaseException:
             await connections.close()
             raise
@@ -302,12 +310,6 @@ class _Page:
                     )
             except Misuse as error:
                 server.notice(str(error))
-
-
-def _models(live: LiveWorld, path: Path | None) -> FolderModels | None:
-    """Models that bodies have, beside their description."""
-    names = [body.model for body in live.subject.description.scene.bodies if body.model is not None]
-    return None if path is None or is_recording(path) else FolderModels(path.parent, names)
 
 
 def _campaigns(path: Path | None) -> FolderCampaigns | None:

@@ -1,7 +1,7 @@
 import type { Material, Solid } from "./builder";
 
-/** How a solid looks: as its material does, or as that of something that is on, interrupted or stalled. */
-export type Look = Material | "on" | "stalled" | "interrupted" | "shining";
+/** How a solid looks: as its material does, as something that is on, interrupted or stalled, or as what is somewhere else perhaps. */
+export type Look = Material | "on" | "stalled" | "interrupted" | "shining" | "unknown";
 
 /** What changes how elements look. */
 export interface Levels {
@@ -29,6 +29,7 @@ const COLOURS: Readonly<Record<Look, string>> = {
   interrupted: "danger",
   on: "good",
   stalled: "danger-fill",
+  unknown: "dim",
 };
 
 /** Of its own colour, that a lamp shows which does not shine. */
@@ -39,7 +40,8 @@ export function colourOf(look: Look, { material, color }: Solid): string {
   return (look === material || look === "shining" ? color : null) ?? `--${COLOURS[look]}`;
 }
 
-export function lookOf({ element, material, pin }: Solid, { levelOf, isStalled }: Levels): Look {
+export function lookOf({ element, material, pin }: Solid, { levelOf, isStalled }: Levels, isKnown = true): Look {
+  if (!isKnown) return "unknown";
   if (material === "moving" && isStalled(element)) return "stalled";
   if (pin === null || levelOf(pin) !== 1) return material;
   return material === "light" ? "interrupted" : material === "glass" ? "shining" : "on";

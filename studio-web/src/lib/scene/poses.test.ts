@@ -28,4 +28,5 @@ test("a value that is not known leaves a frame at its origin, and quarter turns 
   poses.values.set([NaN, 1, 1_000_000.5]);
   poses.update();
   expect(poseOf(poses, 1)).toEqual([1, 0, 0, 0, -1, 0, 0, 0, -1, 1, -8, 3]);
+  expect([...poses.isKnown]).toEqual([1, 0, 0, 0]);
 });

@@ -62,6 +62,8 @@ export class Poses {
   readonly bases: Float64Array;
   /** Of what is on it. */
   readonly carried: Float64Array;
+  /** Whether these are known: of each frame where it stands, then what is on it. */
+  readonly isKnown: Uint8Array;
   private readonly order: Int32Array;
   private readonly carriers: Int32Array;
   private readonly origins: Float64Array;
@@ -74,6 +76,7 @@ export class Poses {
     this.values = new Float64Array(this.signals.length).fill(NaN);
     this.bases = new Float64Array(frames.length * POSE);
     this.carried = new Float64Array(frames.length * POSE);
+    this.isKnown = new Uint8Array(2 * frames.length);
     this.carriers = Int32Array.from(frames, ({ on }) => (on === null ? -1 : (places.get(on) ?? -1)));
     this.origins = Float64Array.from(frames.flatMap(({ at }) => at));
     this.joints = frames.map(({ joints }) =>
@@ -109,10 +112,13 @@ export class Poses {
       const { origins } = this;
       shift(this.bases, from, origins[at] as number, origins[at + 1] as number, origins[at + 2] as number);
       copyPose(this.carried, from, this.bases, from);
+      const known = carrier < 0 ? 1 : (this.isKnown[2 * carrier + 1] as number);
+      this.isKnown[2 * frame] = this.isKnown[2 * frame + 1] = known;
       const joints = this.joints[frame] as readonly Joint[];
       for (let k = 0; k < joints.length; k++) {
         const { value, axis, per_unit, turns } = joints[k] as Joint;
         const position = (this.values[value] as number) * per_unit || 0;
+        if (Number.isNaN(this.values[value])) this.isKnown[2 * frame + 1] = 0;
         if (turns) turn(this.carried, from, axis, position);
         else shift(this.carried, from, axis === 0 ? position : 0, axis === 1 ? position : 0, axis === 2 ? position : 0);
       }

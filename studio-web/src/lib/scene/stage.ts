@@ -38,6 +38,10 @@ export class Stage {
   places = new Float64Array();
   /** 0: a solid is not there. */
   isThere = new Uint8Array();
+  /** 0: where a solid of an element is, is not known. It is drawn where it would be at 0. */
+  isKnown = new Uint8Array();
+  /** Changes with that. */
+  knowledge = 0;
   /** Ends of the least upright box about each solid: x, y, z. */
   lows = new Float64Array();
   highs = new Float64Array();
@@ -83,6 +87,7 @@ export class Stage {
     const count = this.solids.length;
     this.places = new Float64Array(count * POSE);
     this.isThere = new Uint8Array(count);
+    this.isKnown = new Uint8Array(count).fill(1);
     this.lows = new Float64Array(3 * count);
     this.highs = new Float64Array(3 * count);
     this.revision++;
@@ -119,6 +124,9 @@ export class Stage {
         const value = poses.values[this.slides[n] as number] || 0;
         shift(places, from, slide.by[0] * value, slide.by[1] * value, slide.by[2] * value);
       }
+      const known = poses.isKnown[2 * frame + Number(isCarried)] as number;
+      if (this.isKnown[n] !== known) this.knowledge++;
+      this.isKnown[n] = known;
       const shown = this.shown[n] as number;
       this.isThere[n] = shown < 0 || (poses.values[shown] as number) > 0 ? 1 : 0;
       this.bound(n);

@@ -56,6 +56,9 @@ export class Drawing {
   private readonly named = new Map<string, number[]>();
   private readonly frame: readonly number[];
   private ordered_ms = 0;
+  private marks: Marks | null = null;
+  /** Of the stage, when it was marked. */
+  private knowledge = -1;
 
   constructor(
     private readonly svg: SVGSVGElement,
@@ -100,6 +103,7 @@ export class Drawing {
   draw(now_ms: number): void {
     const { stage } = this;
     if (this.revision !== stage.revision) this.renew();
+    if (this.marks !== null && this.knowledge !== stage.knowledge) this.mark(this.marks);
     for (let n = 0; n < this.parts.length; n++) {
       const part = this.parts[n] as SVGGElement;
       const display = stage.isThere[n] ? "" : "none";
@@ -127,10 +131,13 @@ export class Drawing {
   }
 
   mark(marks: Marks): void {
+    this.marks = marks;
+    this.knowledge = this.stage.knowledge;
     const { selected, labels } = marks;
     for (let n = 0; n < this.stage.fixed; n++) {
       const solid = this.stage.solids[n] as Solid;
-      this.paint(n, lookOf(solid, marks), solid.element === selected && !isAid(solid));
+      const look = lookOf(solid, marks, this.stage.isKnown[n] === 1);
+      this.paint(n, look, solid.element === selected && !isAid(solid));
     }
     for (const [name, label] of this.labels) {
       label.classList.toggle("selected", name === selected);

@@ -42,6 +42,8 @@ const ANGLE = 20;
 /** Faces with more between their directions have an edge. [radians] */
 const EDGE = Math.PI / 5;
 
+const FAINT: ReadonlySet<Look> = new Set<Look>(["light", "ghost", "unknown"]);
+
 type SolidMesh = Mesh<BufferGeometry, MeshStandardMaterial>;
 
 /** A scene in three dimensions, of the same solids as the drawing. */
@@ -68,6 +70,9 @@ export class Space {
   private isEnded = false;
   private readonly trails: Line[] = [];
   private readonly trailLook = new LineBasicMaterial({ depthTest: false });
+  private marks: Marks | null = null;
+  /** Of the stage, when it was marked. */
+  private knowledge = -1;
   /** Something has changed since the last picture. */
   private isStale = true;
 
@@ -125,6 +130,7 @@ export class Space {
   draw(): void {
     const { places, isThere } = this.stage;
     if (this.revision !== this.stage.revision) this.renew();
+    if (this.marks !== null && this.knowledge !== this.stage.knowledge) this.mark(this.marks);
     for (let n = 0; n < this.meshes.length; n++) {
       const mesh = this.meshes[n] as SolidMesh;
       const isVisible = isThere[n] === 1;
@@ -183,6 +189,8 @@ export class Space {
   }
 
   mark(marks: Marks): void {
+    this.marks = marks;
+    this.knowledge = this.stage.knowledge;
     this.goes = this.stage.solids
       .slice(0, this.stage.fixed)
       .map((one) => one.element === marks.selected && one.isCarried)
@@ -191,7 +199,8 @@ export class Space {
     for (let n = 0; n < this.stage.fixed; n++) {
       const solid = this.stage.solids[n] as Solid;
       const isSelected = solid.element === marks.selected && !isAid(solid);
-      (this.meshes[n] as SolidMesh).material = this.materialOf(lookOf(solid, marks), solid, isSelected);
+      const look = lookOf(solid, marks, this.stage.isKnown[n] === 1);
+      (this.meshes[n] as SolidMesh).material = this.materialOf(look, solid, isSelected);
     }
   }
 
@@ -307,7 +316,7 @@ export class Space {
       // Edges lie on faces, and are seen.
       found.polygonOffset = true;
       found.polygonOffsetFactor = found.polygonOffsetUnits = 1;
-      found.opacity = look === "workspace" ? 0.1 : look === "light" || look === "ghost" ? 0.3 : 1;
+      found.opacity = look === "workspace" ? 0.1 : FAINT.has(look) ? 0.3 : 1;
       found.transparent = found.opacity < 1;
       found.depthWrite = look !== "workspace";
       this.looks.set(name, found);

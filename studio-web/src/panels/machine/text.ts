@@ -54,6 +54,9 @@ export const t = texts(
     nothingSelected: "Nothing selected",
     isStalled: "{name} is stalled",
     collides: "{name}: collision",
+    ofDevices:
+      "Axes of devices are where these count them. What is grey may be elsewhere, and there may be workpieces.",
+    uncounted: "What {names} counts in is not known: connect it with config=FILE.",
     wiring: "Wiring of {name}",
     faults: "Faults of {name}",
     on: "on",
@@ -118,6 +121,8 @@ export const t = texts(
     nothingSelected: "Nic nie wybrano",
     isStalled: "utyk: {name}",
     collides: "{name}: kolizja",
+    ofDevices: "Osie urządzeń są tam, gdzie je one liczą. To, co szare, może być gdzie indziej; mogą też być detale.",
+    uncounted: "Nie wiadomo, w czym liczy {names}: połącz z config=PLIK.",
     wiring: "Połączenia {name}",
     faults: "Usterki {name}",
     on: "na",
