@@ -1,4 +1,4 @@
-"""Readers of streams never act on what may be the middle of something: the table in docs/architecture.md.
+"""Readers of streams never act on what may be the middle of something: the table in docs/architecture/streams.md.
 
 Each row has an *outer* message that holds a whole *inner* one. Cut off anywhere, nothing of it is acted on, however long it is
 waited; whole, in one piece or in two with a pause between them, it counts and its contents do not.

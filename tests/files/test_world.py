@@ -123,13 +123,12 @@ def test_examples_run_as_their_scripts_expect(path: Path) -> None:
     assert list(world.failures) == []
 
 
-def test_the_page_about_worlds_does_what_it_says(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_pages_about_worlds_do_what_they_say(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     root = Path(__file__).parents[2]
-    page = (root / "docs" / "worlds.md").read_text()
-    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
-    (toml,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    (code,) = re.findall(r"```python\n(.*?)```", (root / "docs/worlds/python.md").read_text(), re.DOTALL)
+    (toml,) = re.findall(r"```toml\n(.*?)```", (root / "docs/worlds.md").read_text(), re.DOTALL)
     monkeypatch.chdir(root)
-    exec(compile(code, "worlds.md", "exec"), {})
+    exec(compile(code, "python.md", "exec"), {})
     *_, gentle, hasty = capsys.readouterr().out.split("\n")[:-1]
     assert gentle.endswith(" 0")
     assert int(hasty.split()[1]) < -10_000

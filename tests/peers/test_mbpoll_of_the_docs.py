@@ -37,9 +37,9 @@ def poll(command: list[str], enough: int) -> list[float]:
         return values("".join(lines))
 
 
-def test_the_pty_as_getting_started_polls_it(require_peer: Callable[[str], str], serve: Callable[..., Any]) -> None:
+def test_the_pty_as_the_page_about_serve_polls_it(require_peer: Callable[[str], str], serve: Callable[..., Any]) -> None:
     pty = str(serve("--demo").pty)
-    _, *arguments = only(commands("docs/getting-started.md", "mbpoll"), "mbpoll commands of docs/getting-started.md")
+    _, *arguments = only(commands("docs/serve.md", "mbpoll"), "mbpoll commands of docs/serve.md")
     assert poll([require_peer("mbpoll"), *arguments[:-1], pty], 2) == [0.0, 0.0]
 
 
@@ -68,8 +68,9 @@ def test_the_panel_of_the_tutorial(
     assert type_it(serial) == [40.0]
 
 
-def test_every_option_of_serve_is_in_getting_started(serve: Callable[..., Any]) -> None:
+def test_every_option_of_serve_is_in_the_reference(serve: Callable[..., Any]) -> None:
     helped = serve().command("serve", "mic488", "--help").stdout
     offered = set(re.findall(r"^  (--[a-z-]+)", helped, re.MULTILINE)) - {"--help"}
-    rows = re.findall(r"^\| (`--.*?) \|", (ROOT / "docs/getting-started.md").read_text(), re.MULTILINE)
+    controllers, _, _ = (ROOT / "docs/reference/serve.md").read_text().partition("## Chips")
+    rows = re.findall(r"^\| (`--.*?) \|", controllers, re.MULTILINE)
     assert {option for row in rows for option in re.findall(r"`(--[a-z-]+)", row)} == offered

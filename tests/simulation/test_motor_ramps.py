@@ -2,7 +2,7 @@
 
 J·θ″ = −T·sin(50·(θ − field)) − friction·sign(θ′) − load, with T = 1 N·m and J = 5·10⁻⁵ kg·m².
 
-The first table of docs/motors.md is `LIMITS`.
+The first table of docs/motors/ramps.md is `LIMITS`.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ def stalls(plan: Profile) -> bool:
 
 
 def test_a_swing_has_faded_before_the_next_ramp_and_never_fades_in_the_equation() -> None:
-    """The difference that docs/motors.md names: to 1500 rev/min and back, by chance of the phase, and from 0.537."""
+    """The difference that docs/motors/ramps.md names: to 1500 rev/min and back, by chance of the phase, and from 0.537."""
     speed, pulses = 1500 / 60 * 2 * pi, TURN_P / (2 * pi)
     for share, integrates, twin in ((0.43, False, False), (0.47, True, False), (0.52, False, False), (0.55, False, True)):
         rate = share * TORQUE / INERTIA
