@@ -58,8 +58,7 @@ def test_the_blocks_of_a_page_run(page: str, tmp_path: Path) -> None:
     wanted = [block for block in blocks(page) if block.language in RUN and block.reason is None]
     assert wanted or page in NOT_RUN
     with Reader(tmp_path) as reader:
-        for block in wanted:
-            reader.do(block)
+        reader.read(wanted)
 
 
 def test_what_is_not_run_is_known() -> None:

@@ -16,6 +16,7 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from types import TracebackType
 from typing import Self, TypeVar
@@ -33,6 +34,8 @@ _BLOCK = re.compile(
 )
 _PROMISE = re.compile(r"^ *print\(.*\)  # ((?:M|chip )\d.*)$", re.MULTILINE)
 """What a Python block says that it prints."""
+_QUOTED = re.compile(r"'[^']*'|\"[^\"$`\\]*\"|\s#.*$")
+"""Of a line what no shell looks into, and its comment."""
 LIMIT_S = 100.0
 PYTEST_OF_USERS = tuple(f"-pno:{name}" for name in ("cacheprovider", "asyncio", "hypothesispytest", "pytest-lsp", "schemathesis"))
 """Options without what only these tests have, and what takes a second to import."""
@@ -105,6 +108,15 @@ class Reader:
         for name in list(self._running):
             self._end(name)
 
+    def read(self, page: Sequence[Block]) -> None:
+        """Run the blocks of a page in their order; tests that follow each other in one run of pytest, whose start takes seconds."""
+        for are_tests, together in groupby(page, lambda block: block.language == "python" and "def test_" in block.code):
+            if are_tests:
+                self._tests(list(together))
+            else:
+                for block in together:
+                    self.do(block)
+
     def do(self, block: Block) -> None:
         """Run a block. Raises `AssertionError` with page, line and output for what fails."""
         try:
@@ -147,7 +159,7 @@ class Reader:
         else:
             if program == "steptwin" and words[1] in ("replay", "run", "export"):
                 self._end("up")  # what it has recorded is written at its end
-            is_alone = program == "steptwin" and not {*"|<>&;$*?"}.intersection(line)
+            is_alone = program == "steptwin" and not {*"|<>&;$*?"}.intersection(_QUOTED.sub("", line))
             return self._check([str(BIN / "steptwin"), *words[1:]] if is_alone else ["bash", "-c", line])
         return ""
 
@@ -163,12 +175,20 @@ class Reader:
     def _python(self, code: str) -> None:
         for documented, real in self._ports.items():
             code = code.replace(f":{documented}", f":{real}")
-        is_test = "def test_" in code
-        path = self._cwd / ("test_block.py" if is_test else "block.py")
-        path.write_text(f"import pytest\n{code}" if is_test and "import pytest" not in code else code)
-        printed = self._check([str(BIN / "python"), *(["-m", "pytest", "-q"] if is_test else []), str(path)])
+        path = self._cwd / "block.py"
+        path.write_text(code)
+        printed = self._check([str(BIN / "python"), str(path)])
         for promised in _PROMISE.findall(code):
             assert f"{promised}\n" in printed, f"the program printed\n{printed}without\n{promised}"
+
+    def _tests(self, together: Sequence[Block]) -> None:
+        """Each block is a file named by its page and line, as a failure shows it."""
+        files = []
+        for block in together:
+            file = self._cwd / f"test_{re.sub(r'[^a-z0-9]+', '_', block.page.lower())}_{block.line}.py"
+            file.write_text(block.code if "import pytest" in block.code else f"import pytest\n{block.code}")
+            files.append(str(file))
+        self._check([str(BIN / "python"), "-m", "pytest", "-q", *files])
 
     def _world(self, text: str, *, grows: bool) -> None:
         """A description, or a part of one that is added to an example, or to what the page has so far (``grows``);
