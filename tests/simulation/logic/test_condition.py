@@ -13,6 +13,7 @@ from steptwin.errors import Misuse
 from steptwin.motion import MotionState, plan_position
 from steptwin.simulation.logic.condition import Border, SignalCondition, crossing
 from steptwin.simulation.logic.expression import parse_condition
+from steptwin.simulation.logic.signal import SignalOf
 
 
 class Level:
@@ -291,6 +292,23 @@ def test_a_crossing_is_the_first_moment_on_another_side(level: int, now: Nanos, 
         assert side(found - 1) == side(now)
         earlier = range(now, found, max(1, (found - now) // 300))
         assert {side(moment) for moment in earlier} == {side(now)}
+
+
+@given(slope=st.fractions(-(10**6), 10**6), level=st.fractions(-(10**6), 10**6))
+def test_a_crossing_on_a_straight_line_takes_a_few_looks(slope: Fraction, level: Fraction) -> None:
+    looks: list[Nanos] = []
+
+    def value(now: Nanos) -> float:
+        looks.append(now)
+        return float(slope * Fraction(now, SECOND))
+
+    end = 100 * SECOND
+    signal = SignalOf((), value, turning=lambda now: iter((end,) if now < end else ()))
+    found = crossing(signal, level, 0)
+    if found is not None and found <= end:
+        assert len(looks) <= 8
+        border = Border.of(level)
+        assert border.side(value(found)) != border.side(value(found - 1)) == border.side(value(0))
 
 
 def test_a_condition_says_when_it_may_come_true() -> None:
