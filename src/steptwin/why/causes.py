@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+from functools import partial, reduce
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message, MessageText
@@ -25,6 +25,10 @@ from steptwin.why.workpieces import WorkpieceCauses
 
 BECAME = Message("why.became", "{signal} became {value:g}{how}")
 IS_SINCE = Message("why.is-since", "{signal} is {value:g} {since}{how}")
+IS_HELD = Message("why.is-held", "{signal} is {held} since {time:.6f} s")
+SINCE = Message("why.since", "since {time:.6f} s")
+DRIVEN_BY = Message("why.driven-by", ", driven by {names}")
+AND = Message("why.and", "{one} and {other}")
 IS = Message("why.is", "{signal} is {value}")
 FAULT = Message("why.fault", "fault {name}: {what}")
 IS_WIRED_TO = Message("why.is-wired-to", ", which is wired to {pin}")
@@ -57,6 +61,15 @@ class Causes:
             return self.first(signal, change.value, place, how)
         text = BECAME(signal=signal, value=change.value, how=how or "")
         return Cause(ChainLink(change.time, owner, text), place, partial(self._of_change, signal, change))
+
+    def state(self, signal: str, at: Nanos) -> MessageText:
+        """The level of a signal at a moment, since when, and what drives it."""
+        hold, drivers, since = self.log.hold(signal, at), self.drivers(signal, at), self.log.since(signal, at)
+        if hold is not None and hold.held is not None:
+            return IS_HELD(signal=signal, held=hold.held.description(), time=hold.time / SECOND)
+        when = since_before(self.log.begin) if since is None else SINCE(time=since / SECOND)
+        driven = DRIVEN_BY(names=reduce(lambda one, other: AND(one=one, other=other), drivers)) if drivers else ""
+        return IS_SINCE(signal=signal, value=self.log.level(signal, at), since=when, how=driven)
 
     def first(self, signal: str, value: float, place: Place, how: MessageText | None = None) -> Cause:
         """A signal has had a level since the log began."""
@@ -165,7 +178,7 @@ class Causes:
         if path is not None:
             where = self._world.spec.text.where(path)
             link = ChainLink(change.time, pin.controller, DRIVES(kind=path[0], where=where, pin=str(pin)))
-            name = next((name for name, spec in self.specs.items() if spec.path == path[: len(spec.path)]), "")
+            name = self.elements.driving(pin)
             before = partial(self.elements.of_followed, name, change) if self.elements.followed(name) else nothing
             return Cause(link, Place(change.time, change.order, -1), before)
         return self.controllers.in_controller(pin.controller, change, Resource(ResourceKind.PIN, pin.pin))

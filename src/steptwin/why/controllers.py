@@ -20,7 +20,7 @@ from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing
 from steptwin.why.log import LAST, MOST_LOOKED_BACK, Change
 from steptwin.why.roots import Act, Sent
-from steptwin.why.sentences import Frames, describe_input
+from steptwin.why.sentences import describe_input
 
 if TYPE_CHECKING:
     from steptwin.why.causes import Causes
@@ -38,7 +38,6 @@ class ControllerCauses:
         self._all = causes
         self._log = causes.log
         self._world = causes.log.world
-        self._frames = Frames(causes.log.world)
 
     def at_moment(self, controller: str, time: Nanos, wanted: Resource | None, point: str = "") -> FoundCause:
         """Cause of a change in a controller that no record shows; ``point``: of that point of it."""
@@ -91,7 +90,7 @@ class ControllerCauses:
                 on is not None
                 and record.kind == "frame"
                 and record.controller == on[0].name
-                and self._frames.reaches(record, on[1])
+                and on[1] in self._log.requests.get(order, ())
             ):
                 found.append(self._frame(record, order))
             elif record.controller == controller and record.kind == "input":
@@ -143,8 +142,9 @@ class ControllerCauses:
         for position in range(change.position - 1, max(-1, change.position - MOST_LOOKED_BACK), -1):
             record = records[position]
             if record.kind == "frame" and record.controller == on[0].name:
-                found = self._frame(record, self._log.order(change.group, position))
-                return covered(found, Cover.FRAME) if self._frames.reaches(record, on[1]) else None
+                order = self._log.order(change.group, position)
+                is_for_it = on[1] in self._log.requests.get(order, ())
+                return covered(self._frame(record, order), Cover.FRAME) if is_for_it else None
         return None
 
     def _earlier(self, controller: str, time: Nanos, wanted: Resource | None) -> FoundCause:
@@ -168,7 +168,7 @@ class ControllerCauses:
 
     def _frame(self, record: TraceRecord, order: int) -> Cause:
         client, place = record.subject.rpartition("/")[0], Place(record.time, order)
-        meaning = self._frames.meaning(record)
+        meaning = self._log.frames.meaning(record)
         if client == SCRIPTS:
             link = ChainLink(record.time, record.controller, REQUEST(meaning=meaning))
             return Cause(link, place, partial(self._requested, record, order))
@@ -178,7 +178,7 @@ class ControllerCauses:
     def _requested(self, record: TraceRecord, order: int) -> FoundCause:
         """The step that made a request, which a line with timing carries later."""
         members = {name for name, (line, _) in self._world.objects.line_of.items() if line.name == record.controller}
-        meaning = self._frames.meaning(record)
+        meaning = self._log.frames.meaning(record)
         acts = [act for act in self._log.acts_before(record.time, order) if _requests(act, record.controller, members)]
         act = next((act for act in acts if _names(act, meaning)), next(iter(acts), None))
         return None if act is None else covered(acted(act), Cover.FRAME)

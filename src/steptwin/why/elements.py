@@ -125,6 +125,19 @@ class ElementCauses:
         found += [f"{axis}.{POSITION}" for axis in axes if axis]
         return (*dict.fromkeys(one for one in found if one != TIME), *(self.followed(turned_by) if turned_by else ()))
 
+    def behind(self, signal: str) -> tuple[str, ...]:
+        """The signals that the element follows that has a signal, or drives a pin."""
+        owner, _, pin = signal.partition(".")
+        if owner in self._world.controllers:
+            owner = self.driving(PinName(owner, pin))
+        return self.followed(owner)
+
+    def driving(self, pin: PinName) -> str:
+        """The element without terminals that drives an input, such as a transducer; empty for none."""
+        path = self._world.objects.driven.get(pin)
+        named = (name for name, spec in self._all.specs.items() if path is not None and spec.path == path[: len(spec.path)])
+        return next(named, "")
+
     def _moved_in_space(self, name: str, spec: Any) -> tuple[str, ...]:
         """The signals that move a pusher, or the bodies that an element compares or sees, or the belt with the workpieces."""
         described = self._world.objects.described
@@ -152,6 +165,8 @@ class ElementCauses:
             before = self._all.before(signal, change, change.time)
             if before is not None:
                 cause = covered(self._all.change(signal, before[0]), Cover.ACTION)
+            elif signal in self._log.first_levels:
+                cause = covered(self._all.first(signal, self._log.first_levels[signal], Place(self._log.begin)), Cover.ACTION)
             elif owner in self._world.axes:
                 cause = covered(self._all.axes.moved(owner, change.time, change.order), Cover.MOTION)
             elif owner in self._world.controllers:

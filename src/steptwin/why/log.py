@@ -9,7 +9,7 @@ import sys
 from array import array
 from bisect import bisect_left, bisect_right
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import takewhile
 from typing import NamedTuple
@@ -30,6 +30,7 @@ from steptwin.simulation.world.snapshot import RecordedInput
 from steptwin.simulation.world.snapshotlog import SLICE_NS, replay
 from steptwin.statements import StatementHook
 from steptwin.why import points
+from steptwin.why.frames import Frames
 from steptwin.why.movers import movers
 from steptwin.why.roots import Act, SetFault
 
@@ -130,6 +131,9 @@ class CauseLog:
         """Moments at which faults began or ended, by controller or element."""
         self.mechanics: dict[str, list[Change]] = defaultdict(list)
         """Events of `OF_MECHANICS` by axis or collision, and jams of pushers."""
+        self.frames = Frames(world)
+        self.requests: dict[int, Collection[int]] = {}
+        """Addresses of the controllers that a frame may change, by its order."""
         self.events: dict[str, list[Change]] = defaultdict(list)
         """Events of workpieces: all, and by the workpiece and by the element."""
         self.movers: dict[tuple[str, Nanos], tuple[str, ...]] = {}
@@ -160,9 +164,11 @@ class CauseLog:
         world.act_subscribers.append(self._act)
         parts.faults.act_subscribers.append(self._fault_acted)
         for name, programs in world.programs.items():
-            if not self.is_whole:
-                for frame in programs.stack(self.begin)[:1]:
-                    self._executes(name, self.begin, frame.location)
+            begun = (programs.location(number) for number in programs.begun(self.begin))
+            present = (frame.location for frame in programs.stack(self.begin)[:1])
+            for location in begun if self.is_whole else present:
+                if location is not None:
+                    self._executes(name, self.begin, location)
             programs.add_hook(self._hook(name, programs))
 
     @property
@@ -207,6 +213,8 @@ class CauseLog:
             case "plan":
                 self.plans[record.controller, record.subject].append(Change(record.time, 0.0, group, len(records), order))
             case "frame":
+                if changed := self.frames.changes(record):
+                    self.requests[order] = changed
                 for name in self._timed.get(record.controller, ()):
                     self.points.executes(name, record.time, keeps=True)
             case "event" if record.subject in (*OF_MECHANICS, WORKPIECE):
@@ -427,16 +435,12 @@ class CauseLog:
         first = until if acted is None else min(until, acted.first)
         return SetFault(first, name, next((act for act in acts if isinstance(act.what, do.SetFault)), None))
 
-    def fault_time(self, name: str, until: Nanos) -> Nanos:
-        """When a fault that has acted by a moment did so last, as far as that is known."""
-        times = self._fault_times.get(name, ())
-        acts = self.world.objects.faults.acts[name]
-        return next((time for time in reversed(times) if time <= until), min(acts.last, until))
-
     def fault_record(self, name: str, until: Nanos) -> TraceRecord | None:
-        """The last record of a fault by a moment."""
+        """The last record by a moment with which a fault began; its first one, where that is not known."""
         records = (self.record(one) for changes in self.faults.values() for one in changes if one.time <= until)
-        return max((one for one in records if one.subject == name), key=lambda one: one.time, default=None)
+        its = sorted((one for one in records if one.subject == name), key=lambda one: one.time)
+        began = set(self._fault_times.get(name, ()))
+        return next((one for one in reversed(its) if one.time in began), its[0] if its else None)
 
     def fault_act(self, name: str, until: Nanos, before: int) -> Act | None:
         """The last act by a moment, before an order, that set or cleared a fault."""

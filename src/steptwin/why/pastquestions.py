@@ -117,6 +117,8 @@ class PastQuestions:
                 answer = (yield from self._then(question, answer.links[0].time))._replace(at=at, since=None)
             if found.since is None:
                 begin = found.known_from
+                if begin == 0 and known.rests(question, at):
+                    return (yield from self._further(known, question, at, answer))._replace(known_from=begin)
                 return answer._replace(known_from=begin, is_cut=begin > 0, is_complete=begin == 0)
             before = yield from self._then(question, found.since, further=True)
             if before.since == found.since:
@@ -181,6 +183,10 @@ class _Known:
         """From when on it is known."""
         return self._why.log.begin
 
+    def rests(self, question: str, at: Nanos) -> bool:
+        """See `Why.rests`."""
+        return self._why.rests(question, at)
+
     def asked(self, question: str) -> Asked | None:
         """See `Why.asked`."""
         return self._why.asked(question)
@@ -213,7 +219,7 @@ def _with(links: Sequence[ChainLink], trials: Iterable[Trial]) -> tuple[ChainLin
 def _joined(answer: Answer, before: Answer, most_links: int) -> Answer:
     """``before``: the answer for the moment of the last change, before all that is known of the later one; what has held it
     since comes first."""
-    held = [link for link in answer.links if link not in before.links]
+    held = [link for link in answer.links if link not in before.links] if answer.links and answer.links[0].root else []
     links = (*(held if held and held[0].time > (before.since or 0) else ()), *before.links)
     is_all = len(links) <= most_links
     return before._replace(

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 WAS_EXECUTED = Message("why.was-executed", "{statement} was executed")
 WAS_IN_EXECUTION = Message("why.was-in-execution", "{statement} was in execution before")
 ENDED = Message("why.ended", "{statement} ended")
+DID_NOT_WAIT = Message("why.did-not-wait", "{statement} did not wait: {levels}")
 DECIDED = Message("why.decided", "{statement} decided")
 PROGRAM_STARTED = Message("why.program-started", "the program started")
 LONGEST_REACTION_NS: Nanos = 510 * MILLISECOND
@@ -112,6 +113,11 @@ class ProgramCauses:
                 number = here.location.number
             if use.waits and ended.time - here.time > at_once:
                 return self._decided(controller, earlier, Place(ended.time, ended.order, 3 * after), ENDED)
+            if use.waits and not use.governs and any(one.kind is not ResourceKind.AXIS for one in use.reads):
+                there = Place(ended.time, ended.order, 3 * after)
+                began = Place(here.time, here.order, 3 * earlier)
+                came = any(cause.place > began for cause in self._read(controller, earlier, there))
+                return self._decided(controller, earlier, there, ENDED) if came else self._did_not_wait(controller, earlier)
             if number in use.governs or (use.is_loop and ended.location.number >= use.governs.stop):
                 return self._decided(controller, earlier, Place(here.time, here.order, 3 * earlier + 2), DECIDED)
             after = earlier
@@ -125,6 +131,21 @@ class ProgramCauses:
         link = ChainLink(place.time, controller, how(statement=statement(self._log, executed)))
         ended = self._of_wait if how is ENDED else self._of_decision
         return Cause(link, place, partial(ended, controller, index, place), Cover.PROGRAM)
+
+    def _did_not_wait(self, controller: str, index: int) -> Cause:
+        """A wait for something that was there already: for that, or for what led to the wait, whichever came later."""
+        here, use = self._log.executed[controller][index], self.use(controller, index)
+        place = Place(here.time, here.order, 3 * index + 2)
+        pins = [f"{controller}.{one.name}" for one in use.reads if one.kind is ResourceKind.PIN and one.name]
+        levels, words = [self._all.state(pin, here.time) for pin in pins], statement(self._log, here)
+        text = DID_NOT_WAIT(statement=words, levels=levels) if levels else DECIDED(statement=words)
+
+        def before() -> FoundCause:
+            there = [covered(cause, Cover.LEVEL) for cause in self._read(controller, index, place)]
+            led = self._of_statement(controller, index)
+            return max((one for one in (led, *there) if one is not None), key=lambda one: one.place, default=None)
+
+        return Cause(ChainLink(here.time, controller, text), place, before, Cover.PROGRAM)
 
     def _read(self, controller: str, index: int, place: Place) -> Iterator[Cause]:
         """The last changes of what a statement reads."""
@@ -156,6 +177,10 @@ class ProgramCauses:
             for cause in self._read(controller, index, place)
             if (passes if cause.cover is Cover.MOTION else cause.place.time >= latest)
         ]
+        pins = [f"{controller}.{one.name}" for one in reads if one.kind is ResourceKind.PIN and one.name]
+        if not came and len(pins) == 1 and self._log.since(pins[0], place.time) is None:  # such as one that a filter lets in later
+            begin = self._log.begin
+            return covered(self._all.first(pins[0], self._log.level(pins[0], begin), Place(begin)), Cover.LEVEL)
         return covered(max(came, key=lambda cause: cause.place, default=None), Cover.WAIT)
 
     def resource(self, controller: str, resource: Resource, index: int, time: Nanos, before: int = LAST) -> FoundCause:

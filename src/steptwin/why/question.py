@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial, reduce
+from functools import partial
 from typing import TypeAlias
 
 from steptwin.controller import SECOND, Nanos
@@ -21,14 +21,14 @@ from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput
 from steptwin.simulation.world.snapshotlog import outside_past
 from steptwin.why import points
-from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Cover, since_before
-from steptwin.why.causes import FAULT, IS, IS_SINCE, Causes
+from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Cover
+from steptwin.why.causes import FAULT, IS, Causes
 from steptwin.why.chain import NOT_KNOWN, Cause, Place, broken, covered, nothing
 from steptwin.why.log import LAST, MOST_NOTED, OF_MECHANICS, CauseLog, in_parts
 from steptwin.why.replayed import ReplayedSignals, TimeSeries, watch_truth, watch_value
 from steptwin.why.search import Asked
 from steptwin.why.sentences import statement
-from steptwin.why.states import Interval, StatesOnTheWay, rest_of
+from steptwin.why.states import Interval, StatesOnTheWay, is_constant, rest_of
 
 MOST_SNAPSHOTS = 5
 """Limit of the signals whose present levels are shown of what a program waits for."""
@@ -48,6 +48,7 @@ _AXIS = re.compile(r"(?:M|ENC)(\d+)[._]|moving$", re.IGNORECASE)
 Asking: TypeAlias = Generator[None, None, Answer]
 """In parts: after each of them something else can be done, or the question be given up by `close`."""
 Lacking: TypeAlias = Generator[None, None, tuple[ChainLink, ...]]
+Resting: TypeAlias = "Generator[None, None, Cause | None]"
 FoundValue: TypeAlias = Generator[None, None, tuple[float, Nanos | None]]
 
 
@@ -85,6 +86,10 @@ def _text_of(question: str) -> str:
     return question.strip().removeprefix("why ").strip()
 
 
+def _without_not(text: str) -> str:
+    return text.removeprefix(WHY_NOT).strip()
+
+
 def _note_when(world: Simulation, condition: str, found: list[Nanos]) -> do.Steps:
     yield do.Until(condition)
     found.append(world.now)
@@ -100,10 +105,6 @@ IS_NUMBER = Message("why.is-number", "{name} is {value:g}")
 IS_TRUE = Message("why.is-true", "{name} is true")
 IS_FALSE = Message("why.is-false", "{name} is false")
 IS_IN_UNIT = Message("why.is-in-unit", "{name} is {value:.6g} {unit}")
-IS_HELD = Message("why.is-held", "{signal} is {held} since {time:.6f} s")
-SINCE = Message("why.since", "since {time:.6f} s")
-DRIVEN_BY = Message("why.driven-by", ", driven by {names}")
-AND = Message("why.and", "{one} and {other}")
 WAITS = Message("why.waits", "{controller} waits at {statement}")
 DOES_NOT_WAIT = Message("why.does-not-wait", "{controller} does not wait: {statement}")
 WAITS_FOR_A_TIME = Message("why.waits-for-a-time", "it waits for a time only")
@@ -113,6 +114,10 @@ NO_AXIS_HAS_MOVED = Message("why.no-axis-has-moved", "no axis has moved until {t
 BECOMES_TRUE = Message("why.becomes-true", "it becomes true at {time:.6f} s if nothing comes from outside")
 ONLY_FROM_OUTSIDE = Message(
     "why.only-from-outside", "it does not become true within {time:g} s if nothing comes from outside: only from outside"
+)
+GOES_ON = Message("why.goes-on", "it goes on at {time:.6f} s if nothing comes from outside")
+DOES_NOT_GO_ON = Message(
+    "why.does-not-go-on", "it does not go on within {time:g} s if nothing comes from outside: only from outside"
 )
 FORM_OF_A_QUESTION = Message(
     "why.form-of-a-question", "a question is a signal, a condition, or a controller: table.OUT3, 'table.OUT3 == 0', table"
@@ -158,7 +163,8 @@ class Why:
         record, active = log.fault_record(name, until), log.world.objects.faults.find(name)
         what = record.value if record is not None else "" if active is None else str(active.fault)
         subject = "" if record is None else record.controller
-        return ChainLink(log.fault_time(name, until), subject, FAULT(name=name, what=what), log.fault_root(name, until))
+        root = log.fault_root(name, until)
+        return ChainLink(root.time if record is None else record.time, subject, FAULT(name=name, what=what), root)
 
     def ask(self, question: str, at: Nanos | None = None) -> Answer:
         """The answer for a moment (ns), the end by default. Raises `Misuse` for what is no question here."""
@@ -175,8 +181,8 @@ class Why:
             self._on_the_way.pass_by(self.log.inputs)
             yield
         self._causes = Causes(self.log)  # programs may be others by now
-        if text in self.log.world.controllers:
-            return (yield from self._wait(text, moment))
+        if _without_not(text) in self.log.world.controllers:
+            return (yield from self._wait(_without_not(text), moment))
         return (yield from self._condition(text, moment))
 
     def _only_program(self) -> str:
@@ -192,7 +198,7 @@ class Why:
         """The change that `LastChanges` searches for; None for a controller, for a bare quantity that moves all the time, and for
         `idle`. Raises `Misuse`."""
         text = _text_of(question)
-        if not text or text in self.log.world.controllers:
+        if not text or _without_not(text) in self.log.world.controllers:
             return None
         text = self._named(text)
         names = tuple(dict.fromkeys(parse_condition(text).names()))
@@ -216,6 +222,11 @@ class Why:
         moving = frozenset(signals[name] for name in moving)
         return Asked(text, frozenset(signals.values()), edges, moving, flip)
 
+    def rests(self, question: str, at: Nanos) -> bool:
+        """Whether a condition depends on where an axis is."""
+        names = parse_condition(self._named(_text_of(question))).names()
+        return bool(self._axes_of(map(self._canonical, names), at))
+
     def _has_edges(self, signal: str) -> bool:
         owner, _, pin = signal.partition(".")
         return self.log.has(signal) or (owner in self.log.world.controllers and pin in self.log.world.controllers[owner].pins())
@@ -234,16 +245,24 @@ class Why:
         state = IS_NUMBER(name=asked, value=value) if is_bare else IS_TRUE(name=asked) if value else IS_FALSE(name=asked)
         signals = tuple(canonical.values())
         first = self._causes.lasting(signals, at, None if since is None else self._changed(signals, since))
-        return (yield from self._answer(text, at, state, since, first))
+        if first is not None or since is not None:
+            return (yield from self._answer(text, at, state, since, first))
+        resting = yield from self._resting(signals, at)
+        answer = yield from self._answer(text, at, state, None, resting)
+        states = [] if resting is None else [link for name in signals if self.log.has(name) for link in self._states(name, at)]
+        return self._after(states, answer)
 
     def lacking(self, question: str, at: Nanos) -> Lacking:
         """Of a question that begins with ``not`` and is true: the present values of what would have to be otherwise, with what
-        drives it, and when it becomes so by itself, in parts; nothing for another question. `asking` comes first."""
+        drives it, and when it becomes so by itself, or when a program that waits goes on, in parts; nothing for another question.
+        `asking` comes first."""
         text = _text_of(question)
         if not text.startswith(WHY_NOT):
             return ()
-        condition = self._named(text.removeprefix(WHY_NOT).strip())
         other = yield from self._world_at(at)
+        if _without_not(text) in other.programs:
+            return (yield from self._going_on(other, _without_not(text), at))
+        condition = self._named(_without_not(text))
         node = parse_condition(condition).in_unit("", self._unit)
 
         def value(name: str) -> float:
@@ -269,6 +288,25 @@ class Why:
             ahead = BECOMES_TRUE(time=found[0] / SECOND) if found else ONLY_FROM_OUTSIDE(time=LONGEST_AHEAD_NS / SECOND)
             links.append(ChainLink(at, "", ahead))
         return tuple(dict.fromkeys(links))
+
+    def _going_on(self, other: Simulation, controller: str, at: Nanos) -> Lacking:
+        """When a program that waits goes on by itself."""
+        programs = other.programs[controller]
+        wait, depth, found = programs.wait(at), programs.depth(), list[Nanos]()
+        if wait is None:
+            return ()
+
+        def hook(now: Nanos, number: int) -> None:
+            if programs.depth() <= depth and programs.location(number) != wait.location:
+                found.append(now)
+
+        programs.add_hook(hook)
+        for _ in in_parts(other, (), at + LONGEST_AHEAD_NS):
+            if found:
+                break
+            yield
+        ahead = GOES_ON(time=found[0] / SECOND) if found else DOES_NOT_GO_ON(time=LONGEST_AHEAD_NS / SECOND)
+        return (ChainLink(at, controller, ahead),)
 
     def _world_at(self, at: Nanos) -> Generator[None, None, Simulation]:
         """Another world in the state of a moment of the past."""
@@ -473,8 +511,11 @@ class Why:
             else:
                 changed = None if since is None else self._changed((full,), since)
             return (yield from self._answer(signal, at, state, since, changed))
+        since: Nanos | None = at
+        if isinstance(standing, SignalOf) and is_constant(standing, at):
+            _, since = yield from self._from_run(f"{signal} == {value!r}", {signal: full}, at, is_bare=False)
         first = self._of_unrecorded(full, at)
-        return (yield from self._answer(signal, at, state, at, first))
+        return (yield from self._answer(signal, at, state, since, first))
 
     # ------------------------------------------------------------------ programs
 
@@ -493,17 +534,44 @@ class Why:
             first = covered(causes.programs.statement(controller, index), Cover.PROGRAM)
             return (yield from self._answer(controller, at, state, since, first))
         links = [link for resource in use.reads for link in self._awaited(controller, resource, at)]
-        is_all = self._most_links != MOST_LINKS or len(links) < MOST_SNAPSHOTS
         if not use.reads:
             links.append(ChainLink(here.time, controller, WAITS_FOR_A_TIME()))
         found = [cause for resource in use.reads if (cause := causes.programs.resource(controller, resource, index, at))]
         changed = [cause for cause in found if cause.link.time > here.time]
         last = max(changed, key=lambda cause: cause.link.time, default=None)
-        first = covered(causes.programs.statement(controller, index), Cover.WAIT) if last is None else covered(last, Cover.LEVEL)
+        pins = [f"{controller}.{resource.name}" for resource in use.reads if resource.kind is ResourceKind.PIN and resource.name]
+        resting = (yield from self._resting(pins, at)) if last is None else None
+        first = covered(last, Cover.LEVEL) or resting or covered(causes.programs.statement(controller, index), Cover.WAIT)
         answer = yield from self._answer(controller, at, WAITS(controller=controller, statement=text), since, first)
-        links = list(dict.fromkeys((*links, *answer.links)))
-        is_all = is_all and len(links) <= self._most_links
-        return answer._replace(links=tuple(links[: self._most_links]), is_complete=answer.is_complete and is_all)
+        return self._after(links, answer)
+
+    def _after(self, states: Sequence[ChainLink], answer: Answer) -> Answer:
+        """An answer after present states."""
+        links = tuple(dict.fromkeys((*states, *answer.links)))
+        is_all = len(links) <= self._most_links and (self._most_links != MOST_LINKS or len(states) < MOST_SNAPSHOTS)
+        return answer._replace(links=links[: self._most_links], is_complete=answer.is_complete and is_all)
+
+    def _axes_of(self, signals: Iterable[str], at: Nanos) -> set[str]:
+        """The axes whose position or switch is among signals, or drives one of them."""
+        waiting, seen = list(signals), set[str]()
+        while waiting:
+            name = waiting.pop()
+            if name not in seen:
+                seen.add(name)
+                waiting += (*self._causes.drivers(name, at), *self._causes.elements.behind(name))
+        return {name.partition(".")[0] for name in seen} & set(self.log.world.axes)
+
+    def _resting(self, signals: Sequence[str], at: Nanos) -> Resting:
+        """Where an axis of `_axes_of` is, and what brought it there, or left it; of several the one moved last. None if nothing
+        moved any."""
+        axes = self._axes_of(signals, at)
+        moved = [(cause.place, axis, cause) for axis in axes if (cause := self._causes.axes.moved(axis, at))]
+        if not moved:
+            return None
+        _, axis, cause = max(moved, key=lambda one: one[:2])
+        other, name = (yield from self._world_at(at)), f"{axis}.position"
+        text = IS_IN_UNIT(name=name, value=other.read(name), unit=other.signal(name).unit)
+        return Cause(ChainLink(at, axis, text), Place(at, LAST, -1), lambda: covered(cause, Cover.LEVEL))
 
     def _awaited(self, controller: str, resource: Resource, at: Nanos) -> Iterator[ChainLink]:
         """The present state of what a statement waits for, and of what that depends on."""
@@ -513,7 +581,11 @@ class Why:
             motion = self._causes.axes.motion(controller, resource.name, at)
             yield ChainLink(at, controller, NO_AXIS_HAS_MOVED(time=at / SECOND)) if motion is None else motion.link
         else:
-            yield ChainLink(at, controller, DEPENDS_ON(name=resource.name or ANY_PIN()))
+            point = self.log.world.programs[controller].point(resource.name)
+            known = f"{controller}.{point}" if point else ""
+            is_noted = self.log.points.series(known) is not None
+            text = self._causes.state(known, at) if is_noted else DEPENDS_ON(name=resource.name or ANY_PIN())
+            yield ChainLink(at, controller, text)
 
     def _states(self, signal: str, at: Nanos) -> Iterator[ChainLink]:
         """The level of a signal and, one after the other, of the signals that drive it."""
@@ -523,17 +595,8 @@ class Why:
             if name in seen:
                 continue
             seen.add(name)
-            since = self.log.since(name, at)
-            drivers = self._causes.drivers(name, at)
-            waiting += drivers
-            when = since_before(self.log.begin) if since is None else SINCE(time=since / SECOND)
-            driven = DRIVEN_BY(names=reduce(lambda one, other: AND(one=one, other=other), drivers)) if drivers else ""
-            hold = self.log.hold(name, at)
-            if hold is not None and hold.held is not None:
-                text = IS_HELD(signal=name, held=hold.held.description(), time=hold.time / SECOND)
-            else:
-                text = IS_SINCE(signal=name, value=self.log.level(name, at), since=when, how=driven)
-            yield ChainLink(at, name.partition(".")[0], text)
+            waiting += self._causes.drivers(name, at)
+            yield ChainLink(at, name.partition(".")[0], self._causes.state(name, at))
 
     # ------------------------------------------------------------------ the chain
 

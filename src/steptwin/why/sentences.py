@@ -1,4 +1,4 @@
-"""Actions, statements and frames in words."""
+"""Actions and statements in words."""
 
 from __future__ import annotations
 
@@ -7,16 +7,10 @@ from typing import Any
 
 from steptwin.diagnostics import visible
 from steptwin.messages import Message, MessageText
-from steptwin.simulation.kinds.lines import TrafficLog
-from steptwin.simulation.kinds.registry import line_kinds
-from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.control import Halt
 from steptwin.simulation.world.inputs import Bytes, Download, ExternalInput, SetVariable
-from steptwin.simulation.world.simulation import Simulation
 from steptwin.why.log import CauseLog, Executed
-from steptwin.wire.frameline import FrameLine
-from steptwin.wire.slave import FrameDirection
 
 SETS = Message("why.sets", "sets {levels}")
 PRESSES = Message("why.presses", "presses {button}")
@@ -76,28 +70,3 @@ def statement(log: CauseLog, executed: Executed) -> MessageText:
     found, source = programs.statements(location.text)[location.number], programs.texts[location.text]
     text = visible(source.text[found.start : found.end].strip())
     return LINE(line=found.line, code=text) if text else END_OF_PROGRAM()
-
-
-class Frames:
-    """The frames of the lines of a world in words."""
-
-    def __init__(self, world: Simulation) -> None:
-        self._told: list[FrameLine] = []
-        self.traffic: dict[str, TrafficLog] = {
-            spec.name: line_kinds()[spec.kind].traffic_log(world.lines[spec.name], "", self._told.append)
-            for spec in world.spec.lines
-        }
-
-    def meaning(self, record: TraceRecord) -> str:
-        """A request in words."""
-        client, _, _ = record.subject.rpartition("/")
-        self._told.clear()
-        self.traffic[record.controller].frame(record.time, client, FrameDirection.IN, record.data())
-        if self._told:
-            return self._told[-1].meaning
-        return record.data().decode("ascii", "backslashreplace")
-
-    def reaches(self, record: TraceRecord, unit: int) -> bool:
-        """Whether a record is a request that may change the controller with an address."""
-        client, _, direction = record.subject.rpartition("/")
-        return direction == FrameDirection.IN.value and unit in self.traffic[record.controller].changes(client, record.data())

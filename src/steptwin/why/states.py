@@ -98,3 +98,9 @@ def rest_of(signal: SignalOf, now: Nanos) -> Standing | None:
         return None
     value = signal.value(now)
     return Standing(value, signal.version()) if signal.value(now + FARTHEST_NS) == value else None
+
+
+def is_constant(signal: SignalOf, now: Nanos) -> bool:
+    """Whether it keeps its value up to its next turning point, such as the velocity between two ramps."""
+    end = next(signal.turning_points(now), None)
+    return end is not None and all(signal.value(moment) == signal.value(now) for moment in ((now + end) // 2, end - 1))

@@ -22,6 +22,8 @@ class ModbusTrafficLog:
         self._log = FrameLog(line.devices)
         self._log.sinks.append(sink)
         self._callbacks: dict[str, FrameCallback] = {}
+        self._kinds: dict[str, str] = {}
+        """Kinds of clients, also of those that have gone."""
 
     def frame(self, now: Nanos, client: str, direction: FrameDirection, data: bytes) -> None:
         callback = self._callbacks.get(client)
@@ -33,7 +35,9 @@ class ModbusTrafficLog:
 
     def _is_tcp(self, client: str) -> bool:
         there = self._line.clients.get(client)
-        return there is not None and there.kind == "tcp"
+        if there is not None:
+            self._kinds[client] = there.kind
+        return self._kinds.get(client) == "tcp"
 
     def changes(self, client: str, data: bytes) -> Collection[int]:
         unit, function = (data[6], data[7]) if self._is_tcp(client) else (data[0], data[1])
