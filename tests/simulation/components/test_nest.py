@@ -295,6 +295,7 @@ def test_what_lies_on_a_workpiece_falls_with_it() -> None:
     text = MACHINE.replace("cells = [3, 2]", "").replace("filled = 7", "filled = 2")
     rig = Rig(text + JAWS)
     rig.lower(hold=True)
+    assert rig.world.read("jaws.mass") == 0.5
     rig.world.mic488["c"].write("OUT2", 0)
     rig.world.run(for_=0.05)
     (_, _, low), (_, _, high) = (rig.place(f"tray.{n}") for n in (1, 2))
@@ -333,6 +334,66 @@ def test_what_falls_goes_on_where_what_it_falls_on_has_gone() -> None:
     assert (falls.value, lies.value) == ("tray.1 falls 100 mm", "tray.1 lies on the floor")
     assert (lies.time - falls.time) / SECOND == pytest.approx(fallen(161.0), abs=1e-9)
     assert rig.place("tray.1") == (200, 0, 0)
+
+
+def belt(name: str, x: float, z: float, more: str) -> str:
+    """It carries a workpiece of 40 mm by 20 mm 200 mm along x, from 0 s on at 500 mm/s."""
+    return f"""
+    [[conveyor]]
+    name = "{name}"
+    length = 200
+    speed = 500
+    at = [{x}, 0, {z}]
+    workpiece = [40, 40, 20]
+    {more}
+    """
+
+
+FALLING = (
+    '[[mic488]]\nname = "c"\n'
+    + belt("far", 2000, 0, 'run = "c.OUT8"\n')
+    + belt("away", 3000, 0, 'run = "c.OUT8"\n')
+    + belt("high", 0, 300, 'run = "c.OUT1"\nnext = "away"')
+)
+
+
+LOW = 'run = "c.OUT1"\nnext = "far"'
+
+
+@pytest.mark.parametrize(
+    ("other", "front", "height", "told"),
+    [
+        (belt("low", 0, 200, LOW), 0.0, 280.0, ["high.1 lies on low.1"]),  # which falls before it
+        (belt("low", -30, 200, LOW), 0.0, 300.0, ["high.1 and low.1 collide", "high.1 lies on the floor"]),
+        (belt("low", 60, 100, 'run = "c.OUT2"'), 44.0, 180.0, ["high.1 lies on low.1"]),  # which comes below it meanwhile
+    ],
+)
+def test_what_falls_onto_a_workpiece_lies_on_it_or_the_event_says_that_they_collide(
+    other: str, front: float, height: float, told: list[str]
+) -> None:
+    rig = Rig(FALLING + other)
+    rig.world.put("high")
+    rig.world.put("low", front=front)
+    rig.world.mic488["c"].write("OUT1", 1)
+    rig.world.run(for_=0.4)
+    rig.world.mic488["c"].write("OUT2", 1)
+    rig.world.run(for_=1.0)
+    events = [one for one in rig.world.trace.of("event") if one.subject == "workpiece" and "high.1" in str(one.value)]
+    assert [str(one.value) for one in events][3 : 3 + len(told)] == told
+    begin, end = (next(one.time for one in events if what in str(one.value)) for what in ("falls", "high.1 lies"))
+    assert (end - begin) / SECOND == pytest.approx(fallen(height), abs=2e-9)
+
+
+def test_what_lies_on_a_workpiece_weighs_in_the_mass_of_what_carries_that() -> None:
+    line = belt("line", 360, 80, 'run = "c.OUT8"\nmass = 0.5')
+    noticed = '[[event]]\nwhen = "line.mass > 0.6"\nsteps = [{ note = "heavy" }]\n'
+    rig = Rig(MACHINE.replace("filled = 7", "filled = 1") + CUP + line + noticed)
+    rig.world.put("line", front=60.0)
+    rig.take(0.0)
+    rig.put(400.0)
+    assert rig.told()[-1] == "tray.1 lies on line.1"
+    assert rig.world.read("line.mass") == 0.75
+    assert "heavy" in [str(one.value) for one in rig.world.trace.of("event")]
 
 
 def test_in_a_pit_it_lies_where_it_is_let_go() -> None:

@@ -33,6 +33,10 @@ class BeltGrip(Stateful):
         self.dropped = 0
 
     @property
+    def mass(self) -> float:
+        return 0.0 if self.workpiece is None else self.workpiece.mass
+
+    @property
     def depends_on(self) -> tuple[str, ...]:
         return (self._block.name, *(() if self._source is None else self._source.line))
 

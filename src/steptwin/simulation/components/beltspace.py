@@ -93,6 +93,10 @@ class BeltSpace:
     # ------------------------------------------------------------------ a holder
 
     @property
+    def name(self) -> str:
+        return self._conveyor.spec.name
+
+    @property
     def scheduler(self) -> Scheduler:
         return self._conveyor.block.scheduler
 
@@ -283,6 +287,6 @@ def _pieces_of_drive(drive: BeltDrive, now: Nanos) -> Iterator[Piece]:
 
 def add_belts(objects: BuiltObjects) -> None:
     """Add the conveyors that have a place to what has workpieces in space, unless they are there."""
-    holders, frames = objects.workpieces.holders, objects.frames
-    if not any(isinstance(one, BeltSpace) for one in holders):
-        holders += (BeltSpace(one, frames) for name, one in objects.built(CONVEYOR).items() if name in frames)
+    workpieces, frames = objects.workpieces, objects.frames
+    if not workpieces.of(BeltSpace):
+        workpieces.holders += (BeltSpace(one, frames) for name, one in objects.built(CONVEYOR).items() if name in frames)

@@ -84,6 +84,11 @@ class Grip(Protocol):
         ...
 
     @property
+    def mass(self) -> float:
+        """kg of that and of all that lies on it."""
+        ...
+
+    @property
     def depends_on(self) -> tuple[str, ...] | None:
         """As `TerminalComponent.depends_on`."""
         ...
@@ -140,5 +145,5 @@ def carrier_signals(carrier: Carrier) -> Mapping[str, SignalOf]:
     source, grip = (carrier.block.source,), carrier.grip
     return {
         "dropped": SignalOf(source, lambda now: float(grip.dropped)),
-        "mass": SignalOf(source, lambda now: 0.0 if grip.workpiece is None else grip.workpiece.mass, unit="kg"),
+        "mass": SignalOf(source, lambda now: grip.mass, unit="kg"),
     }

@@ -16,7 +16,7 @@ from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.frames import bodies_on, check_upright, sources_of
 from steptwin.simulation.components.grasp import Grasp
 from steptwin.simulation.components.mount import Movement
-from steptwin.simulation.components.probe import Probe, whole
+from steptwin.simulation.components.probe import Probe, unless_on, whole
 from steptwin.simulation.components.quantity import condition_of
 from steptwin.simulation.components.resting import resting_of
 from steptwin.simulation.components.touch import Contact
@@ -58,7 +58,7 @@ class Compared:
         self._described = {one.name: one for one in context.objects.described.of(BODY)}
         self._bodies = {name: body_of(one, context.frames) for name, one in self._described.items()}
         self._swept = {name: SweptBody(body) for name, body in self._bodies.items()}
-        self._grasps = {one.name: one for one in context.objects.workpieces.holders if isinstance(one, Grasp)}
+        self._grasps = {one.name: one for one in context.objects.workpieces.of(Grasp)}
         self._grasping = frozenset(grasp.frame for grasp in self._grasps.values())
         self._moved: list[Movement] = []
         names = tuple(between)
@@ -141,7 +141,7 @@ class Compared:
         """Contacts of a body with any workpiece that nothing carries."""
         body = self._bodies[name]
         check_upright(name, body.frame)
-        probe = Probe(body, {}, self._context.objects.workpieces, partial(_unless_on, self._grasping))
+        probe = Probe(body, {}, self._context.objects.workpieces, partial(unless_on, self._grasping))
         text = partial(_touching, self._block, name, probe)
         meeting = ConditionalContact(probe, self._whens(name))
         return self._contact(meeting, self._context.frames.carrying(body.frame), text, (name, WORKPIECES))
@@ -158,19 +158,14 @@ class Compared:
             meeting = CarriedContact(grasp, {}, pieces, partial(_only_on, self._grasps[other].frame))
             moved = frames.between(grasp.frame, self._grasps[other].frame)
         else:
-            meeting = CarriedContact(grasp, {}, pieces, partial(_unless_on, frozenset((grasp.frame,))))
+            meeting = CarriedContact(grasp, {}, pieces, partial(unless_on, (grasp.frame,)))
             moved = frames.carrying(grasp.frame)
         return self._contact(meeting, moved, partial(_carrying, self._block, meeting), (grasp.frame.name, other))
 
 
-def _unless_on(frames: frozenset[Frame], body: Body) -> Body | None:
-    """A workpiece that none of these frames carries."""
-    return None if any(one in frames for one in body.frame.line()) else body
-
-
 def _only_on(frame: Frame, body: Body) -> Body | None:
     """A workpiece that a frame carries."""
-    return body if any(one is frame for one in body.frame.line()) else None
+    return body if body.is_on(frame) else None
 
 
 def _touching(block: TerminalBlock, body: str, probe: Probe) -> str:

@@ -77,6 +77,7 @@ class Conveyor(TerminalComponent):
         "_turning_points",
         "drop",
         "following",
+        "mass_on",
         "preceding",
         "spec",
         "takes_along",
@@ -126,6 +127,8 @@ class Conveyor(TerminalComponent):
         """Those of which it is the following one, by name."""
         self.takes_along: Callable[[str, Nanos], None] = _nothing
         """Lets what lies on a workpiece leave with it at the end of the last belt."""
+        self.mass_on: Callable[[str], float] = lambda name: 0.0
+        """kg of all that lies on a workpiece."""
         self.fed = 0
         """How many workpieces it was fed with."""
         self.delivered = 0
@@ -280,8 +283,9 @@ class Conveyor(TerminalComponent):
         return float(self.belt.position(now) / self.belt.per_mm)
 
     def mass(self, now: Nanos) -> float:
-        """kg of the workpieces on it."""
-        return sum(placed.workpiece.mass for placed in self.belt.workpieces)
+        """kg of the workpieces on it, and of those on them."""
+        there = (placed.workpiece for placed in self.belt.workpieces)
+        return sum(workpiece.mass + self.mass_on(workpiece.name) for workpiece in there)
 
     def _report(self, message: Message, placed: Placed, what: str) -> None:
         name = placed.workpiece.name

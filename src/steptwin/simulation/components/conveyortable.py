@@ -104,13 +104,13 @@ class ConveyorSpec(TerminalComponentSpec, MoverSpec):
             yield "axis", self.axis
         if self.next is not None:
             yield "next", self.next
-        if self.leaves_what_moves(described):
+        if self.may_drop(described):
             yield from (("next", name) for name in described.holders)
 
-    def leaves_what_moves(self, described: ElementSpecs) -> bool:
-        """Whether its ``next`` begins elsewhere when something else moves: then workpieces may fall."""
+    def may_drop(self, described: ElementSpecs) -> bool:
+        """Whether its ``next`` may begin elsewhere, now or when something moves: then workpieces fall."""
         following = None if self.next is None else described.mounts.get(self.next)
-        return following is not None and self.is_mounted and following.is_mounted and following.on != self.on
+        return following is not None and self.is_mounted and following.is_mounted
 
     def check(self, text: TomlText) -> None:
         if (self.speed is None) is (self.axis is None):

@@ -118,7 +118,7 @@ NO_BODIES = Message("simulation.carries-no-bodies", "{name!r} is no [[body]], an
 
 def bodies_on(mounted: Mounted, bodies: Mapping[str, Body], name: str) -> list[str]:
     """The names of the bodies that the element ``name`` carries, and its own if it is one. Raises `Misuse` if there is none."""
-    found = [other for other, body in bodies.items() if any(one is mounted.frame for one in body.frame.line())]
+    found = [other for other, body in bodies.items() if body.is_on(mounted.frame)]
     if not found:
         raise Misuse(NO_BODIES(name=name))
     return found

@@ -131,6 +131,11 @@ class Grasp(Stateful):
     def workpiece(self) -> Workpiece | None:
         return None if self._held is None else self._held.workpiece
 
+    @property
+    def mass(self) -> float:
+        held = self.workpiece
+        return 0.0 if held is None else held.mass + self._resting.mass_on(held.name)
+
     def hold(self, now: Nanos) -> None:
         """Take what it meets, unless another one has it."""
         self._holds = True
@@ -155,7 +160,7 @@ class Grasp(Stateful):
                 self.dropped += 1
 
     def _others(self) -> Iterable[Grasp]:
-        return (one for one in self._workpieces.holders if isinstance(one, Grasp) and one is not self)
+        return (one for one in self._workpieces.of(Grasp) if one is not self)
 
     def _take(self, body: Body, lie: Lie, now: Nanos) -> None:
         self._held = Held(self._workpieces.take(body.name, now), lie)

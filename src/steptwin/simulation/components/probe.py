@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 from steptwin.controller import Nanos
 from steptwin.simulation.components.bodycontact import BodyContact
 from steptwin.simulation.components.workpieces import Workpieces
 from steptwin.simulation.space.bodies import Body
+from steptwin.simulation.space.frames import Frame
 from steptwin.simulation.space.sweeps import SweptBody, meet, versions_of
 
 
 def whole(body: Body) -> Body | None:
     """All of a workpiece."""
     return body
+
+
+def unless_on(frames: Collection[Frame], body: Body) -> Body | None:
+    """A workpiece that none of these frames carries."""
+    return None if any(map(body.is_on, frames)) else body
 
 
 class Probe:

@@ -17,13 +17,13 @@ from steptwin.simulation.components.conveyor import CONVEYOR
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.frames import check_upright, sources_of
 from steptwin.simulation.components.mount import Block, Movement
-from steptwin.simulation.components.probe import Probe
+from steptwin.simulation.components.probe import Probe, unless_on
 from steptwin.simulation.components.resting import resting_of
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.belt import Bar, Placed
 from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.space.bodies import Body, Box
-from steptwin.simulation.space.frames import NM_PER_MM, Frame
+from steptwin.simulation.space.frames import NM_PER_MM
 from steptwin.simulation.space.pieces import first_back
 from steptwin.simulation.space.sweeps import SweptBody
 from steptwin.state import Plain, Stateful
@@ -128,7 +128,7 @@ class Pusher(Stateful):
         belt, placed = self._on_belt(body.name)
         if belt is not None and placed is not None:
             return None if placed.pusher == self.name else belt.rectangle(placed)
-        return None if any(one is self._body.frame for one in body.frame.line()) else body
+        return unless_on((self._body.frame,), body)
 
     def _on_belt(self, name: str) -> tuple[BeltSpace | None, Placed | None]:
         found = ((belt, belt.placed(name)) for belt in self._belts)
@@ -179,7 +179,7 @@ class Pusher(Stateful):
         body = self._workpieces.bodies()[name]
         known = self._pushed.get(name)
         if known is None or known.placed is not placed or known.body is not body:
-            others = partial(_unless_on, body.frame)
+            others = partial(unless_on, (body.frame,))
             middle = Body(name, body.frame, Box((0, 0, 1)))
             known = self._pushed[name] = _Pushed(
                 placed,
@@ -342,11 +342,6 @@ class Pusher(Stateful):
         }
 
 
-def _unless_on(frame: Frame, body: Body) -> Body | None:
-    """A workpiece that is on another frame."""
-    return None if any(one is frame for one in body.frame.line()) else body
-
-
 def pusher_of(spec: BodySpec, context: ElementContext) -> Pusher:
     """The part that a body is that pushes. Raises `Misuse` for one that turns against a belt or cannot stand, and where there is
     none."""
@@ -359,7 +354,7 @@ def pusher_of(spec: BodySpec, context: ElementContext) -> Pusher:
     body = body_of(spec, frames)
     check_upright(spec.name, body.frame)
     around = body.shape if isinstance(body.shape, Box) else Box((body.shape.radius, body.shape.radius, body.shape.half))
-    belts = [holder for holder in workpieces.holders if isinstance(holder, BeltSpace)]
+    belts = workpieces.of(BeltSpace)
     pusher = Body(spec.name, body.frame, around, body.centre)
     for belt in belts:
         belt.add_pusher(pusher)

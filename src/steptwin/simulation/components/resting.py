@@ -16,6 +16,7 @@ from steptwin.simulation.components.conveyor import COLLIDES, CONVEYOR
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.frames import Frames, check_upright, sources_of, tilting_axis
 from steptwin.simulation.components.nesttable import NestSpec
+from steptwin.simulation.components.probe import Probe, unless_on
 from steptwin.simulation.components.workpieces import (
     REACH_NM,
     WORKPIECES,
@@ -45,6 +46,7 @@ LIES_ON = Message("simulation.workpiece-lies-on", "{workpiece} lies on {on}")
 LIES_ON_FLOOR = Message("simulation.workpiece-lies-on-floor", "{workpiece} lies on the floor")
 
 
+MEETS = Message("simulation.workpiece-meets-another", "{workpiece} and {other} collide")
 LEAVES = Message("simulation.workpiece-leaves", "{workpiece} leaves with {other}")
 LIES_CROOKED = Message("simulation.workpiece-lies-crooked", "{workpiece} lies crooked on {on}")
 
@@ -79,6 +81,8 @@ class Piles(NamedTuple):
     """By what they lie on, through others."""
     crooked: Mapping[str, int]
     """Those among them that are aligned neither to a cell nor to the one below."""
+    mass: Mapping[str, float]
+    """kg by what they lie on, through others."""
 
 
 class Resting(Stateful):
@@ -86,19 +90,22 @@ class Resting(Stateful):
 
     What lies on a workpiece goes wherever that goes, also out of the world at the end of a belt. What loses
     what it lies on otherwise, and what is let go of higher than `REACH_NM` above what is below it, falls straight down for
-    √(2 h / g), and lies on what is below it then; if that is lower, it falls on.
+    √(2 h / g), and lies on what is below it then; if that is lower, it falls on. It lies on a workpiece that comes below it
+    meanwhile; what it meets otherwise is an event.
     """
 
     FIXED: ClassVar[tuple[str, ...]] = (
         "_bodies",
         "_frames",
+        "_masses",
         "_nests",
         "_piles",
+        "_probes",
         "_scheduler",
         "_supports",
         "_workpieces",
     )
-    __slots__ = (*FIXED, "_falls", "_put", "_rests")
+    __slots__ = (*FIXED, "_due", "_falls", "_met", "_put", "_rests")
 
     def __init__(
         self,
@@ -115,13 +122,25 @@ class Resting(Stateful):
         self._nests = nests
         self._rests = tuple(rest for nest in nests.values() for rest in nest.workpieces())
         self._falls: tuple[Fall, ...] = ()
+        self._probes: dict[str, Probe] = {}
+        """Of those that fall, and of those on them."""
+        self._met: tuple[tuple[str, ...], ...] = ()
+        """Pairs of which one falls, and has met the other."""
+        self._due: Nanos | None = None
+        """When one that falls meets another one, or has come down."""
         self._put: dict[str, int] = {}
         """Numbers of the last workpieces of nests into which others than those of the beginning were put."""
         self._bodies: dict[str, tuple[Rest | Fall, Frame | None, Body]] = {}
         """As they were made: a body stays the same while nothing below it changes."""
         self._piles: Piles | None = None
+        self._masses: Mapping[str, float] = {}
+        """Those that carriers know."""
 
     # ------------------------------------------------------------------ a holder
+
+    @property
+    def name(self) -> str:
+        return WORKPIECES
 
     @property
     def scheduler(self) -> Scheduler:
@@ -178,9 +197,8 @@ class Resting(Stateful):
         self._rests = (*self._rests, Rest(workpiece, on.name, found or lie))
         is_crooked = found is None
         text = (LIES_CROOKED if is_crooked else LIES_ON)(workpiece=workpiece.name, on=on.name)
-        self._report(text, workpiece, "crooked" if is_crooked else "on")
-        for name in self._overlapping(workpiece.name, now):
-            self._report(COLLIDES(workpiece=workpiece.name, other=name, belt=on.name), workpiece, "collides")
+        self._report(text, workpiece.name, "crooked" if is_crooked else "on")
+        self._report_overlaps(workpiece, on.name, now)
         return True
 
     def next_in(self, nest: NestSpec, now: Nanos) -> Rest | None:
@@ -210,19 +228,25 @@ class Resting(Stateful):
         """Put a further workpiece into a nest, as `next_in` has found it."""
         self._put[nest.name] = self._put.get(nest.name, nest.filled) + 1
         self._rests = (*self._rests, rest)
-        self._report(LIES_ON(workpiece=rest.workpiece.name, on=rest.on), rest.workpiece, "on")
+        self._report(LIES_ON(workpiece=rest.workpiece.name, on=rest.on), rest.workpiece.name, "on")
 
     def _aligned(self, on: str, lie: Lie) -> Lie | None:
         """Where a workpiece is that is put on something; None where it lies crooked, in a nest."""
         nest = self._nests.get(self.piles().lowest.get(on, on))
         return lie if nest is None else _aligned(nest, on, lie)
 
-    def _overlapping(self, name: str, now: Nanos) -> list[str]:
-        """The workpieces that one overlaps."""
-        every = self._workpieces.bodies()
+    def _report_overlaps(self, workpiece: Workpiece, on: str, now: Nanos) -> None:
+        """Report the workpieces that one overlaps where it is put."""
+        every, name = self._workpieces.bodies(), workpiece.name
         own, around = every[name], self._workpieces.swept(name).sweep(now)
         near = [other for other in every if other != name and meet(around, self._workpieces.swept(other).sweep(now))]
-        return [other for other in near if Pair(own, every[other]).overlap(now)]
+        for other in near:
+            if _pair(name, other) not in self._met and Pair(own, every[other]).overlap(now):
+                self._report(COLLIDES(workpiece=name, other=other, belt=on), workpiece.name, "collides")
+
+    def mass_on(self, name: str) -> float:
+        """kg of all that lies on something, through others."""
+        return self.piles().mass.get(name, 0.0)
 
     def piles(self) -> Piles:
         found = self._piles
@@ -245,11 +269,14 @@ class Resting(Stateful):
                 last = on[last]
             lowest |= dict.fromkeys(through, lowest.get(last, last))
         crooked: Counter[str] = Counter()
+        mass: dict[str, float] = {}
         for rest in self._rests:
-            nest = self._nests.get(lowest[rest.workpiece.name])
+            last = lowest[rest.workpiece.name]
+            mass[last] = mass.get(last, 0.0) + rest.workpiece.mass
+            nest = self._nests.get(last)
             if nest is not None and _aligned(nest, rest.on, rest.lie) != rest.lie:
                 crooked[nest.name] += 1
-        return Piles(self._rests, lowest, Counter(lowest.values()), crooked)
+        return Piles(self._rests, lowest, Counter(lowest.values()), crooked, mass)
 
     # ------------------------------------------------------------------ letting go
 
@@ -262,7 +289,7 @@ class Resting(Stateful):
         if height <= REACH_NM:
             return self._lay(workpiece, frame, found, now)
         self._falls = (*self._falls, Fall.of(workpiece, lie, height, now))
-        self._report(FALLS(workpiece=workpiece.name, height=height / NM_PER_MM), workpiece, "falls")
+        self._report(FALLS(workpiece=workpiece.name, height=height / NM_PER_MM), workpiece.name, "falls")
         return False
 
     def drop_from(self, belt: BeltSpace, placed: Placed, now: Nanos) -> bool:
@@ -281,14 +308,16 @@ class Resting(Stateful):
                 return True
         (x, y, z), yaw_q = lie_in(frame, FLOOR, now)
         self._rests = (*self._rests, Rest(workpiece, "", Lie((x, y, z if z < -REACH_NM else 0), yaw_q)))
-        self._report(LIES_ON_FLOOR(workpiece=workpiece.name), workpiece, "on the floor")
+        self._report(LIES_ON_FLOOR(workpiece=workpiece.name), workpiece.name, "on the floor")
+        self._report_overlaps(workpiece, FLOOR.name, now)
         return found is None
 
     def take_along(self, name: str, now: Nanos) -> None:
         """All that lies on a workpiece leaves the world with it."""
         for one, below in self.piles().lowest.items():
             if below == name:
-                self._report(LEAVES(workpiece=one, other=name), self.take(one, now), "leaves")
+                self.take(one, now)
+                self._report(LEAVES(workpiece=one, other=name), one, "leaves")
 
     # ------------------------------------------------------------------ part of a scheduler
 
@@ -300,31 +329,72 @@ class Resting(Stateful):
         for fall in self._falls:
             if fall.ends <= now:
                 self._land(fall, now)
+        self._meet(now)
+        self._weigh()
+        moments = [fall.ends for fall in self._falls]
+        moments += (due for probe in self._probes.values() if (due := probe.change(now)) is not None)
+        self._due = min(moments, default=None)
 
     def _land(self, fall: Fall, now: Nanos) -> None:
         """End a fall, unless what was below it has gone lower."""
-        workpiece, begun = fall.workpiece, body_in(fall.workpiece, None, fall.lie).frame
-        frame, found = self._workpieces.bodies()[workpiece.name].frame, self._workpieces.below(workpiece.name, begun, now)
-        height = _height(fall.lie, found)
+        workpiece, frame = fall.workpiece, self._workpieces.bodies()[fall.workpiece.name].frame
+        found, lie = self._workpieces.below(workpiece.name, frame, now), lie_in(frame, FLOOR, now)
+        height = _height(lie, found)
         others = tuple(one for one in self._falls if one is not fall)
-        if height > fall.lie.at[2] - lie_in(frame, FLOOR, now).at[2] + REACH_NM:
-            self._falls = (*others, Fall.of(workpiece, fall.lie, height, fall.begins))
+        if height > REACH_NM:
+            self._falls = (*others, Fall.of(workpiece, fall.lie, fall.lie.at[2] - lie.at[2] + height, fall.begins))
             self._scheduler.notify(WORKPIECES)
         else:
             self._falls = others
             self._lay(workpiece, frame, found, now)
 
+    def _meet(self, now: Nanos) -> None:
+        """Let those that fall lie on workpieces that they come to from above, and report what they meet otherwise."""
+        there = self._workpieces.bodies()
+        lowest = self.piles().lowest
+        self._probes = {name: self._probe(there[name], there[lowest.get(name, name)]) for name in self.falling()}
+        falls, met = {fall.workpiece.name: fall for fall in self._falls}, list[tuple[str, ...]]()
+        for name, probe in self._probes.items():
+            for other in probe.met(now):
+                found = self._workpieces.below(name, there[name].frame, now) if name in falls else None
+                if found is not None and found.body.name == other:
+                    self._land(falls[name], now)
+                    break
+                met.append(_pair(name, other))
+                if met[-1] not in self._met:
+                    self._report(MEETS(workpiece=name, other=other), name, "collides")
+        self._met = tuple(dict.fromkeys(met))
+
+    def _weigh(self) -> None:
+        """Let those notice that carry more or less on a workpiece."""
+        before, after = self._masses, self.piles().mass
+        self._masses = after
+        if before is after:
+            return
+        for name in {**before, **after}:
+            holder = self._workpieces.holder_of(name) if before.get(name) != after.get(name) else None
+            if holder is not None:
+                holder.scheduler.notify(holder.name)
+
+    def _probe(self, body: Body, lowest: Body) -> Probe:
+        """Meets other workpieces than those that fall with one."""
+        known = self._probes.get(body.name)
+        if known is not None and known.body is body:
+            return known
+        return Probe(body, {}, self._workpieces, partial(unless_on, (lowest.frame,)))
+
     def deadline(self) -> Nanos | None:
-        return min((fall.ends for fall in self._falls), default=None)
+        return self._due
 
     def set_state(self, plain: Plain) -> None:
         super().set_state(plain)
         self._bodies.clear()
+        self._probes.clear()
         self._workpieces.forget()
 
-    def _report(self, text: str, workpiece: Workpiece, what: str) -> None:
+    def _report(self, text: str, name: str, what: str) -> None:
         scheduler = self._scheduler
-        facts = ("workpiece", workpiece.name), ("element", WORKPIECES), ("what", what)
+        facts = ("workpiece", name), ("element", WORKPIECES), ("what", what)
         scheduler.record(scheduler.first, "event", "workpiece", text, *facts)
         scheduler.notify(WORKPIECES)
 
@@ -332,6 +402,10 @@ class Resting(Stateful):
 def _height(lie: Lie, found: Below | None) -> int:
     """How far a workpiece may fall, nm: to what is below it, or to the floor, which ends nothing that is lower."""
     return found.gap if found is not None else max(lie.at[2], 0)
+
+
+def _pair(one: str, other: str) -> tuple[str, ...]:
+    return tuple(sorted((one, other)))
 
 
 def _aligned(nest: NestSpec, on: str, lie: Lie) -> Lie | None:
@@ -342,9 +416,8 @@ def resting_of(context: ElementContext, scheduler: Scheduler) -> Resting:
     """That of a world. With it all that has workpieces in space is made, when something first needs it; what has a place is built
     before."""
     workpieces, frames = context.objects.workpieces, context.frames
-    there = next((holder for holder in workpieces.holders if isinstance(holder, Resting)), None)
-    if there is not None:
-        return there
+    if there := workpieces.of(Resting):
+        return there[0]
     described = context.objects.described
     nests = {spec.name: spec for spec in described.mounts.values() if isinstance(spec, NestSpec)}
     specs = (spec for spec in described.mounts.values() if isinstance(spec, BodySpec) and spec.holds_workpieces)
@@ -356,10 +429,9 @@ def resting_of(context: ElementContext, scheduler: Scheduler) -> Resting:
     made = Resting(scheduler, frames, workpieces, supports, nests)
     add_belts(context.objects)
     for conveyor in context.objects.built(CONVEYOR).values():
-        conveyor.takes_along = made.take_along
-    for belt in workpieces.holders:
-        if isinstance(belt, BeltSpace):
-            belt.conveyor.drop = partial(made.drop_from, belt)
+        conveyor.takes_along, conveyor.mass_on = made.take_along, made.mass_on
+    for belt in workpieces.of(BeltSpace):
+        belt.conveyor.drop = partial(made.drop_from, belt)
     workpieces.holders.append(made)
     workpieces.falling = made.falling
     scheduler.add_part(made, None, WORKPIECES)

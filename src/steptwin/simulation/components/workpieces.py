@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
@@ -23,6 +23,9 @@ REACH_NM = 2_000_000
 """Height from which a workpiece is put down. From higher up it falls. As far may it be pressed into what it is put on."""
 
 
+H = TypeVar("H")
+
+
 class Lie(NamedTuple):
     """Where a workpiece is in a frame: the middle of its lower face, in nm, and its turn about z."""
 
@@ -40,6 +43,11 @@ class Rest(NamedTuple):
 
 class Holder(Protocol):
     """Something that workpieces are on, or in."""
+
+    @property
+    def name(self) -> str:
+        """The name by which others see its changes."""
+        ...
 
     @property
     def scheduler(self) -> Scheduler:
@@ -141,6 +149,10 @@ class Workpieces:
     def sources(self) -> tuple[str, ...]:
         return tuple(dict.fromkeys(source for holder in self.holders for source in holder.sources))
 
+    def of(self, kind: type[H]) -> list[H]:
+        """The holders of one class."""
+        return [one for one in self.holders if isinstance(one, kind)]
+
     def bodies(self) -> Mapping[str, Body]:
         """All of them by name: the same mapping while none is taken or put."""
         version = [holder.version() for holder in self.holders]
@@ -164,6 +176,11 @@ class Workpieces:
         self._version = None
         self._sweeps.clear()
 
+    def holder_of(self, name: str) -> Holder | None:
+        """What has the workpiece called ``name``, if that is there."""
+        self.bodies()
+        return self._holder_of.get(name)
+
     def take(self, name: str, now: Nanos) -> Workpiece:
         """Take one from where it is."""
         self.bodies()
@@ -174,11 +191,7 @@ class Workpieces:
         supports = {body.name: (holder, body) for holder in self.holders for body in holder.supports()}
         bodies, falling = self.bodies(), self.falling()
         there = {name: body for name, body in bodies.items() if name != workpiece and name not in falling}
-        others = {name: (None, body) for name, body in there.items() if not _is_on(body, frame)}
+        others = {name: (None, body) for name, body in there.items() if not body.is_on(frame)}
         every = {**supports, **others}
         found = top_below((body for _, body in every.values()), frame, (0, 0, REACH_NM), now)
         return None if found is None else Below(every[found.body.name][0], found.body, found.gap - REACH_NM)
-
-
-def _is_on(body: Body, frame: Frame) -> bool:
-    return any(one is frame for one in body.frame.line())

@@ -169,7 +169,7 @@ class _Builder:
             text.unless_wrong(frames.described[name].path, partial(frames.__getitem__, name))
         add_belts(self.objects)
         for spec in self.spec.elements.of(CONVEYOR):
-            if spec.leaves_what_moves(self.spec.elements) and not text.findings:
+            if spec.may_drop(self.spec.elements) and not text.findings:
                 resting_of(self.context, self.context.scheduler(spec.name))
 
     def _waits(self, element: AnyElement, spec: TableSpec) -> bool:

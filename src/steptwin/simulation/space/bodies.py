@@ -42,6 +42,10 @@ class Body:
     shape: Shape
     centre: Vector = (0, 0, 0)
 
+    def is_on(self, frame: Frame) -> bool:
+        """Whether a frame carries it, perhaps through others."""
+        return any(one is frame for one in self.frame.line())
+
 
 class Outline(NamedTuple):
     """A body as seen along an axis: a rectangle with these halves, or a disc, where they are 0; and its half along the axis."""
