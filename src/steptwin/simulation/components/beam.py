@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.simulation.components.body import BODY
-from steptwin.simulation.components.bodycontact import BodyContact
+from steptwin.simulation.components.bodycontact import BodyContact, while_there
 from steptwin.simulation.components.bodytable import body_of
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, Reference
@@ -144,7 +144,7 @@ def _make(spec: BeamSpec, context: ElementContext) -> Beam:
         for name in seen:
             when = described[name].when
             whens = () if when is None else (condition_of(when, block, context),)
-            lasting[name] = BodyContact(swept, bodies[name], whens)
+            lasting[name] = while_there(BodyContact(swept, bodies[name]), whens)
         return Probe(segment, lasting, pieces)
 
     moved = [movement for name in seen for movement in frames.between(frame, every[name].frame)]

@@ -12,24 +12,22 @@ from steptwin.simulation.space.sweeps import SweptBody, meet
 
 
 class BodyContact:
-    """A `steptwin.simulation.components.touch.Meeting`: they overlap while both are there.
+    """A `steptwin.simulation.components.touch.Meeting`: they overlap.
 
     Between two changes of the plans a moment is searched for once, and kept; not where one does not come near the other by then.
     """
 
-    __slots__ = ("_bodies", "_found", "_overlap", "_version", "_whens", "pair")
+    __slots__ = ("_bodies", "_found", "_overlap", "_version", "pair")
 
-    def __init__(self, one: SweptBody, other: SweptBody, whens: Sequence[SignalCondition] = ()) -> None:
-        """``whens``: conditions under which they are there."""
+    def __init__(self, one: SweptBody, other: SweptBody) -> None:
         self.pair = Pair(one.body, other.body)
         self._bodies = one, other
-        self._whens = tuple(whens)
         self.forget()
 
     def forget(self) -> None:
         self._version: object = None
         self._overlap, self._found = False, NEVER
-        for one in (*self._bodies, *self._whens):
+        for one in self._bodies:
             one.forget()
 
     def _search(self, now: Nanos) -> None:
@@ -44,12 +42,11 @@ class BodyContact:
 
     def holds(self, now: Nanos) -> bool:
         self._search(now)
-        return self._overlap and all(when.holds(now) for when in self._whens)
+        return self._overlap
 
     def change(self, now: Nanos) -> Nanos | None:
         self._search(now)
-        changes = (self._found.at, *(when.change(now) for when in self._whens))
-        return min((due for due in changes if due is not None), default=None)
+        return self._found.at
 
 
 class ConditionalContact:
@@ -71,3 +68,8 @@ class ConditionalContact:
     def change(self, now: Nanos) -> Nanos | None:
         changes = (one.change(now) for one in (self._meeting, *self._whens))
         return min((due for due in changes if due is not None), default=None)
+
+
+def while_there(meeting: Meeting, whens: Sequence[SignalCondition]) -> Meeting:
+    """That while the conditions hold under which what meets is there."""
+    return ConditionalContact(meeting, whens) if whens else meeting

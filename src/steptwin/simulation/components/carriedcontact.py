@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from steptwin.controller import Nanos
-from steptwin.simulation.components.bodycontact import BodyContact, SweptBody
+from steptwin.simulation.components.bodycontact import BodyContact, SweptBody, while_there
 from steptwin.simulation.components.grasp import Grasp
 from steptwin.simulation.components.probe import Probe
 from steptwin.simulation.components.workpieces import REACH_NM, Workpieces
@@ -47,7 +47,7 @@ class CarriedContact:
             if carried is not None:
                 body = _without_bottom(carried)
                 swept = SweptBody(body)
-                contacts = {name: BodyContact(swept, part, whens) for name, (part, whens) in self._parts.items()}
+                contacts = {name: while_there(BodyContact(swept, part), whens) for name, (part, whens) in self._parts.items()}
                 self._probe = Probe(body, contacts, self._workpieces, self._among)
         return self._probe
 

@@ -9,7 +9,7 @@ from itertools import combinations, product
 from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.simulation.components.body import BODY
-from steptwin.simulation.components.bodycontact import BodyContact, ConditionalContact
+from steptwin.simulation.components.bodycontact import BodyContact, while_there
 from steptwin.simulation.components.bodytable import body_of
 from steptwin.simulation.components.carriedcontact import CarriedContact
 from steptwin.simulation.components.elementcontext import ElementContext
@@ -19,7 +19,7 @@ from steptwin.simulation.components.mount import Movement
 from steptwin.simulation.components.probe import Probe, unless_on, whole
 from steptwin.simulation.components.quantity import condition_of
 from steptwin.simulation.components.resting import resting_of
-from steptwin.simulation.components.touch import Contact
+from steptwin.simulation.components.touch import Contact, Meeting
 from steptwin.simulation.components.workpieces import WORKPIECES
 from steptwin.simulation.logic.condition import SignalCondition
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
@@ -92,13 +92,13 @@ class Compared:
         for one, other in combinations(self._bodies, 2):
             if frozenset((one, other)) in self._wanted and not Pair(self._bodies[one], self._bodies[other]).is_constant:
                 conditions = [*self._whens(one), *self._whens(other)]
-                contact = BodyContact(self._swept[one], self._swept[other], conditions)
+                contact = BodyContact(self._swept[one], self._swept[other])
                 now, is_checked = self._block.scheduler.now, self._context.memo.is_checked
                 if not conditions and not is_checked and contact.pair.overlap(now):
                     raise Misuse(f"{one!r} and {other!r} overlap when the world begins")
                 moved = self._context.frames.between(self._bodies[one].frame, self._bodies[other].frame)
                 text = partial(BODIES_TOUCH, zone=self._block.name, one=one, other=other)
-                yield self._contact(contact, moved, text, (one, other))
+                yield self._contact(while_there(contact, conditions), moved, text, (one, other))
 
     def _whens(self, name: str) -> list[SignalCondition]:
         """The condition under which a body is there."""
@@ -107,7 +107,7 @@ class Compared:
 
     def _contact(
         self,
-        meeting: BodyContact | ConditionalContact | CarriedContact,
+        meeting: Meeting,
         moved: Iterable[Movement],
         text: Callable[[], str],
         parts: tuple[str, str],
@@ -143,7 +143,7 @@ class Compared:
         check_upright(name, body.frame)
         probe = Probe(body, {}, self._context.objects.workpieces, partial(unless_on, self._grasping))
         text = partial(_touching, self._block, name, probe)
-        meeting = ConditionalContact(probe, self._whens(name))
+        meeting = while_there(probe, self._whens(name))
         return self._contact(meeting, self._context.frames.carrying(body.frame), text, (name, WORKPIECES))
 
     def _carried(self, grasp: Grasp, other: str) -> Contact:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Mapping
 
 from steptwin.controller import Nanos
 from steptwin.simulation.components.bodycontact import BodyContact
+from steptwin.simulation.components.touch import Meeting
 from steptwin.simulation.components.workpieces import Workpieces
 from steptwin.simulation.space.bodies import Body
 from steptwin.simulation.space.frames import Frame
@@ -46,7 +47,7 @@ class Probe:
     def __init__(
         self,
         body: Body,
-        lasting: Mapping[str, BodyContact],
+        lasting: Mapping[str, Meeting],
         workpieces: Workpieces | None = None,
         inner: Callable[[Body], Body | None] = whole,
     ) -> None:
