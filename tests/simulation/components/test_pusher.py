@@ -319,3 +319,30 @@ def test_it_can_be_restored_at_any_moment(moment: float, tmp_path: Path) -> None
     """
     text = BELT + ROD + BLADE.replace("[60", "[200") + TRAY + script
     check_it_can_be_restored(World.from_toml(text), World.from_toml(text), moment, 7.5, tmp_path)
+
+
+def test_two_that_push_a_workpiece_against_each_other_stand_until_one_goes_back() -> None:
+    """Their faces are 80 - 5 mm beside the middle: that of the blade is at -15 mm after 150 ms, where it begins to push; that of
+    the other one, which comes 25 ms later, meets the workpiece at its other side."""
+    other = ROD.replace("rod", "arm").replace("OUT2", "OUT3").replace("-80", "80").replace("+y", "-y")
+    far = BLADE.replace("blade", "palm").replace("rod", "arm")
+    world = pushing(BELT + ROD + BLADE + other + far, 5.225)
+    world.mic488["c"].write("OUT3", 1)
+    world.run(until=5.6)
+    meets = 5.35 + (5.2 + 0.15 + 0.025 - 5.35) / 2
+    times, texts = zip(*told(world), strict=True)
+    assert texts == (
+        "blade pushes main.1 on main",
+        "blade stands: main.1 is pushed against palm",
+        "palm stands: main.1 is pushed against blade",
+    )
+    assert times[0] == pytest.approx(5.35, abs=2e-8)
+    assert times[1:] == pytest.approx((meets, meets), abs=1e-6)
+    stands = world.read("rod.position"), world.read("arm.position")
+    assert (world.read("blade.jammed"), world.read("palm.jammed")) == (1, 1)
+    assert sum(stands) == pytest.approx(160 - 10 - 30, abs=0.002)
+    world.mic488["c"].write("OUT3", 0)
+    world.run(for_=0.01)
+    assert (world.read("blade.jammed"), world.read("palm.jammed")) == (0, 0)
+    assert world.read("rod.position") > stands[0]
+    assert world.read("arm.position") < stands[1]

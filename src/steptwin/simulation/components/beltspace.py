@@ -148,6 +148,10 @@ class BeltSpace:
             if step.joint is not None and step.joint.along.axis == self._left.axis:
                 yield step.frame, self._left.sign * step.joint.along.sign * (-1 if step.is_back else 1)
 
+    @property
+    def pushers(self) -> Mapping[str, Body]:
+        return self._pushers
+
     def add_pusher(self, pusher: Body) -> None:
         """Raises `Misuse` for one that turns against the belt."""
         self.pushing(pusher.name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import partial
 from math import ceil, floor
 from typing import ClassVar, NamedTuple, TypeAlias
@@ -60,7 +60,7 @@ class _Pushed(NamedTuple):
     above: BodyContact
     """Whether its middle is above the belt."""
     against: Probe
-    """Other workpieces that it is pushed against."""
+    """Other workpieces and other pushers that it is pushed against."""
     close: Probe
     """Those within a millimetre before it."""
 
@@ -74,6 +74,7 @@ class Pusher(Stateful):
 
     Across the belt a workpiece goes where the face of the pusher goes, until that goes back or is no longer beside it; along it
     goes with the belt. It leaves the belt when its middle does. A workpiece that comes along the belt stands before a pusher.
+    It stands where that meets another workpiece, or a pusher on its other side.
     """
 
     FIXED: ClassVar[tuple[str, ...]] = (
@@ -149,12 +150,16 @@ class Pusher(Stateful):
         by_side = min(to_left, to_right)
         least = by_side if placed.pusher else min(by_side, before, behind)
         way = 1 if by_side == to_left else -1
-        if least >= TOUCH_NM or (placed.pusher and belt.way(placed.pusher, placed, now) != way):
+        if least >= TOUCH_NM:
             return True, None
         if least == by_side:
-            forward = first_back(belt.gaining(self.name, placed.pusher), now, -way)
+            is_opposite = bool(placed.pusher) and belt.way(placed.pusher, placed, now) != way
+            forward = first_back(belt.gaining(self.name, "" if is_opposite else placed.pusher), now, -way)
             if forward is None or forward > now:
                 return False, forward
+            if is_opposite:
+                self._jam(belt, name, placed.pusher, now)
+                return False, None
             # It is moved to where it only touches.
             moved, room = belt.pushing(self.name).at(now), aside + its_aside
             place = ceil(across + room - moved) if way > 0 else floor(across - room - moved)
@@ -180,14 +185,21 @@ class Pusher(Stateful):
         known = self._pushed.get(name)
         if known is None or known.placed is not placed or known.body is not body:
             others = partial(unless_on, (body.frame,))
+            its, ahead = SweptBody(body), belt.rectangle(placed, across=way * NM_PER_MM)
+            pushers = {pusher: SweptBody(other) for pusher, other in belt.pushers.items() if pusher != self.name}
             middle = Body(name, body.frame, Box((0, 0, 1)))
             known = self._pushed[name] = _Pushed(
                 placed,
                 body,
                 BodyContact(SweptBody(self._body), SweptBody(belt.lane(placed))),
                 BodyContact(SweptBody(middle), SweptBody(belt.surface)),
-                Probe(body, {}, self._workpieces, others),
-                Probe(belt.rectangle(placed, across=way * NM_PER_MM), {}, self._workpieces, others),
+                Probe(body, {one: BodyContact(its, swept) for one, swept in pushers.items()}, self._workpieces, others),
+                Probe(
+                    ahead,
+                    {one: BodyContact(SweptBody(ahead), swept) for one, swept in pushers.items()},
+                    self._workpieces,
+                    others,
+                ),
             )
         return known
 
@@ -205,13 +217,17 @@ class Pusher(Stateful):
             conveyor.belt.push(placed, belt.conveyor.belt.across_at(placed, now), "")
             self._scheduler.notify(conveyor.spec.name)
             return
-        goes_back, before = any(way * sign * one.heading(now) < 0 for one, sign in self._moving(belt)), facts.close.met(now)
+        goes_back, before = self._goes_back(belt, way, now), facts.close.met(now)
         if self._jammed == (conveyor.spec.name, name) and (goes_back or not before):
             self._free(now)
         others = [other for other in facts.against.met(now) if other in before]
         if self._jammed is None and others and not goes_back:
             self._jam(belt, name, others[0], now)
         yield from (back, facts.beside.change(now), facts.above.change(now), facts.against.change(now), facts.close.change(now))
+
+    def _goes_back(self, belt: BeltSpace, way: int, now: Nanos) -> bool:
+        """Whether it is to go back from a workpiece that it pushes that way, also while it jams."""
+        return any(way * sign * one.heading(now) < 0 for one, sign in self._moving(belt))
 
     def _waiting(self) -> Iterator[BeltSpace]:
         return (belt for belt in self._belts if belt.conveyor.spec.feed_waits)
@@ -262,6 +278,13 @@ class Pusher(Stateful):
         for block in self._blocks(belt):
             block(True, now, self.name)
 
+    def _squeezes(self, met: Collection[str], now: Nanos) -> bool:
+        """Whether it still jams before a workpiece that another one pushes against it."""
+        belt, placed = (None, None) if self._jammed is None else self._on_belt(self._jammed[1])
+        if belt is None or placed is None or not placed.pusher or placed.workpiece.name not in met:
+            return False
+        return not self._goes_back(belt, belt.way(self.name, placed, now), now)
+
     def _free(self, now: Nanos) -> None:
         """Let it move on after a jam: nothing is in its way, or it moves back."""
         if self._jammed is None:
@@ -309,7 +332,7 @@ class Pusher(Stateful):
         those = [*self._those()]
         pushed = {placed.workpiece.name: belt.conveyor.spec.name for belt, placed in those}
         self._pushed = {name: known for name, known in self._pushed.items() if name in pushed}
-        if self._jammed is not None and pushed.get(self._jammed[1]) != self._jammed[0]:
+        if self._jammed is not None and pushed.get(self._jammed[1]) != self._jammed[0] and not self._squeezes(met, now):
             self._free(now)
         for belt, placed in those:
             moments += self._push_on(belt, placed, now)
@@ -360,6 +383,9 @@ def pusher_of(spec: BodySpec, context: ElementContext) -> Pusher:
         belt.add_pusher(pusher)
     made = Pusher(scheduler, context, belts, pusher)
     made.check()
-    sources = (*workpieces.sources, *sources_of(frames.carrying(body.frame)))
+    pushers = (
+        frames[one.name].frame for one in context.objects.described.mounts.values() if isinstance(one, BodySpec) and one.pushes
+    )
+    sources = (*workpieces.sources, *sources_of(moved for frame in pushers for moved in frames.carrying(frame)))
     scheduler.add_part(made, sources, spec.name)
     return made
