@@ -221,14 +221,28 @@ def test_a_cam_that_wears_at_rest_changes_switches_at_once() -> None:
 
 
 @pytest.mark.parametrize(
-    ("share", "place"), [(1.0, 12_000_000), (0.5, 6_000_000), (0.3333332, 3_999_998), (0.3333333, 4_000_000)]
+    ("share", "place"),
+    [(1.0, 12_000_000_000), (0.5, 6_000_000_000), (0.3333333332, 3_999_999_998), (0.3333333333, 4_000_000_000)],
 )
 def test_its_place_is_the_nearest_also_where_its_cam_is_worn(share: float, place: int) -> None:
-    """It stands at 12 mm. 12 · 0.3333332 mm are 3999998.4 nm, 12 · 0.3333333 mm 3999999.6 nm."""
+    """It stands at 12 mm. 12 · 0.3333333332 mm are 3999999998.4 pm, 12 · 0.3333333333 mm 3999999999.6 pm."""
     world = World.from_toml(TEXT.replace("offset = 20.0", "offset = 120.0"))
     world.fault(f"worn-cam element=knife share={share}")
     world.run(for_=0.1)
     assert world.objects.built(FOLLOWER)["knife"].grid_position(world.now) == place
+
+
+@pytest.mark.parametrize(
+    ("unit", "above", "pulse"), [("mm", 11.5, 1000), ("mm", 11.5002, 1001), ("m", 0.0115, 1000), ("m", 0.0115002, 1001)]
+)
+def test_a_switch_is_as_exact_in_any_unit(unit: str, above: float, pulse: int) -> None:
+    """At the 1000th pulse its lift is 11.5 mm: 200 nm more are at the next one."""
+    text = TEXT.replace("above = 11.0", f"above = {above}").replace("points", f'unit = "{unit}"\npoints')
+    if unit == "m":
+        text = text.replace("12]", "0.012]").replace("position = 6\nwidth = 1", "position = 0.006\nwidth = 0.001")
+    world = start(World.from_toml(text))
+    world.run(for_=2.0)
+    assert edges(world, "knife.switch1")[1][0] == pytest.approx(moment(pulse), abs=1e-9)
 
 
 def test_where_it_may_turn_is_after_the_present_moment() -> None:

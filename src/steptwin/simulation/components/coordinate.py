@@ -15,8 +15,8 @@ from steptwin.simulation.mechanics.loadmotion import load_intervals
 from steptwin.simulation.mechanics.scale import exact_fraction
 from steptwin.simulation.space.pieces import Motion, Piece, StillPiece, gear_of, geared, pieces_of_trajectory, summed
 
-GRID_PER_UNIT = 10**6
-"""Steps of the grid in a unit: nanometres of a millimetre."""
+GRID_PER_UNIT = 10**9
+"""Steps of the grid in a unit: nanometres of a metre."""
 
 
 class Pulled(NamedTuple):

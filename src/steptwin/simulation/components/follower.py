@@ -12,6 +12,7 @@ from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.simulation.components.axis import AXIS, moved_by, moves, turning_points_of_axis
+from steptwin.simulation.components.coordinate import GRID_PER_UNIT
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
@@ -33,9 +34,6 @@ from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table, tables_in
 from steptwin.simulation.toml.values import NameOf, name_value, points, text_value
 from steptwin.state import Stateful
-
-GRID_PER_UNIT = 10**6
-"""Steps of the grid in a unit of the follower: nanometres of a millimetre."""
 
 
 @table("[[follower]]")
