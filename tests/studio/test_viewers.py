@@ -210,7 +210,7 @@ def test_a_viewer_is_sent_the_workpieces_when_one_comes_or_goes_and_not_while_th
     assert tab.newest("hello")["workpieces"] == []
     studio.run(1100)
     ((piece,),) = sent()
-    assert (piece["name"], piece["on"], piece["travel"]) == ("belt.1", "belt", "belt.travel")
+    assert (piece["name"], piece["on"], [one["signal"] for one in piece["moves"]]) == ("belt.1", "belt", ["belt.travel"])
     tab.ok("write", values={"c.OUT1": 1})
     studio.run(500)
     assert len(sent()) == 1

@@ -19,8 +19,7 @@ from steptwin.simulation.components.vacuum import VACUUM
 from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.mechanics.drawing import Drawing, SensorZone
 from steptwin.simulation.space.bodies import Box, half_height
-from steptwin.simulation.space.frames import FLOOR, NM_PER_MM, Vector, path, pose
-from steptwin.simulation.space.pieces import Motion
+from steptwin.simulation.space.frames import FLOOR, NM_PER_MM, Joint, Vector, path, pose
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.wiring import connections, terminal_name
 from steptwin.subject.commands import COMMANDS
@@ -42,6 +41,7 @@ from steptwin.subject.scene import (
     CupDescription,
     FrameDescription,
     JointDescription,
+    MoveState,
     NestDescription,
     Point,
     SceneDescription,
@@ -136,32 +136,28 @@ def _mm(vector: Vector) -> Point:
 
 
 def workpiece_states(
-    world: Simulation, now: Nanos | None = None, travel_at: Callable[[str, Motion], float] | None = None
+    world: Simulation, now: Nanos | None = None, value: Callable[[Joint], float] | None = None
 ) -> Iterator[WorkpieceState]:
-    """All workpieces in space, by default at the present moment. ``travel_at`` gives the value of a signal of a belt and takes
-    its motion, nm, too."""
+    """All workpieces in space, by default at the present moment. ``value``: that of the signal of a joint."""
     frames = world.objects.frames
     now = world.now if now is None else now
+    value = value or (lambda joint: world.read(joint.signal))
     owners = {mounted.frame: name for name, mounted in frames.items()}
     for name, body in world.objects.workpieces.bodies().items():
         carrier = next((one for one in body.frame.line() if one in owners), None)
         there = pose(body.frame, FLOOR if carrier is None else carrier, now)
         shape, height = body.shape, 2 * half_height(body.shape) / NM_PER_MM
         size = tuple(2 * one / NM_PER_MM for one in shape.half) if isinstance(shape, Box) else None
-        motions = (one.motion for one in path(carrier or FLOOR, body.frame))
-        moved = next((one for one in motions if one is not None and not one.is_still), None)
-        on = None if carrier is None else owners[carrier]
-        travel = f"{on}.travel" if moved is not None and on is not None else None
+        joints = [one.joint for one in path(carrier or FLOOR, body.frame) if one.joint is not None and one.joint.signal]
         yield WorkpieceState(
             name,
             cast("Point | None", size),
             None if isinstance(shape, Box) else 2 * shape.radius / NM_PER_MM,
             height,
-            on,
+            None if carrier is None else owners[carrier],
             _mm(there.at),
             there.angle_q * 90.0,
-            travel,
-            0.0 if travel is None or moved is None else world.read(travel) if travel_at is None else travel_at(travel, moved),
+            tuple(MoveState(one.signal, str(one.along), one.per_unit, value(one)) for one in joints),
         )
 
 

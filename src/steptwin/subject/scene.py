@@ -76,6 +76,16 @@ class BeamDescription:
 
 
 @dataclass(frozen=True, slots=True)
+class MoveState:
+    """A signal by whose changes something goes on, besides what carries it."""
+
+    signal: str
+    along: Annotated[str, "Direction in the frame of the element: +x, -z ..."]
+    per_unit: Annotated[float, "For a unit of the signal [mm]"]
+    at: Annotated[float, "The value of the signal while it is where its state says"]
+
+
+@dataclass(frozen=True, slots=True)
 class WorkpieceState:
     """A workpiece, and where the middle of its lower face is in the frame of an element."""
 
@@ -86,8 +96,7 @@ class WorkpieceState:
     on: Annotated[str | None, "The element that carries it, perhaps through other workpieces; none: the floor"]
     at: Annotated[Point, "In the frame of that element, once all its joints have moved [mm]"]
     yaw: Annotated[float, "Turn about z [degrees]"]
-    travel: Annotated[str | None, "A signal, in mm, by whose changes it moves along its conveyor; none: it stands there"]
-    travel_at: Annotated[float, "The value of that signal while it is at ``at``"]
+    moves: Annotated[tuple[MoveState, ...], "By which it goes on from there: its conveyor, and what pushes it across that"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from space_rig import BELT, BLADE, ROD, place_in
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.files.scene.recordedscene import RecordedScene
@@ -122,12 +123,8 @@ def recorded(world: World, seconds: float) -> RecordedScene:
     return scene
 
 
-def place_of(scene: RecordedScene, name: str, now: Nanos) -> tuple[WorkpieceState | None, float]:
-    """Where a workpiece is in what carries it, and how far a belt has moved it since."""
-    (*_, place) = [None, *(stint.place for stint in scene.workpieces.get(name, []) if stint.begin <= now)]
-    if place is None or place.travel is None:
-        return place, 0.0
-    return place, (scene.value(place.travel, now) or 0.0) - place.travel_at
+def state_of(scene: RecordedScene, name: str, now: Nanos) -> WorkpieceState | None:
+    return [None, *(stint.place for stint in scene.workpieces.get(name, []) if stint.begin <= now)][-1]
 
 
 def moments(seconds: float, count: int) -> Iterator[Nanos]:
@@ -164,14 +161,27 @@ def test_a_recorded_scene_is_where_the_world_is(path: str | None) -> None:
 def check_workpieces(scene: RecordedScene, world: World, now: Nanos) -> None:
     frames = world.objects.frames
     bodies = world.objects.workpieces.bodies()
-    assert {name for name in scene.workpieces if place_of(scene, name, now)[0] is not None} == set(bodies)
+    assert {name for name in scene.workpieces if state_of(scene, name, now) is not None} == set(bodies)
     for name, body in bodies.items():
-        place, moved = place_of(scene, name, now)
-        assert place is not None
-        carrier = FLOOR if place.on is None else frames[place.on].frame
-        there = pose(body.frame, carrier, now).at
-        way = sum((place.at[k] - there[k] / NM_PER_MM) ** 2 for k in range(3)) ** 0.5
-        assert way == pytest.approx(abs(moved), abs=1e-3), (name, now)
+        state = state_of(scene, name, now)
+        assert state is not None
+        there = pose(body.frame, FLOOR if state.on is None else frames[state.on].frame, now).at
+        place = place_in(state, lambda signal: scene.value(signal, now) or 0.0)
+        assert place == pytest.approx([one / NM_PER_MM for one in there], abs=1e-3), (name, now)
+
+
+def test_what_is_pushed_is_where_its_pusher_has_it() -> None:
+    script = """
+    [[script]]
+    name = "push"
+    steps = [{ write = { "c.OUT1" = 1 } }, { wait = "5.2 s" }, { write = { "c.OUT2" = 1 } }]
+    """
+    text = BELT + ROD.replace("stroke = 120", "stroke = 80") + BLADE + script
+    scene, world = recorded(World.from_toml(text), 6.0), World.from_toml(text)
+    for now in moments(6.0, 200):
+        world.run(until=now / SECOND)
+        check_workpieces(scene, world, world.now)
+    assert {len(stint.place.moves) for stint in scene.workpieces["main.1"] if stint.place is not None} >= {1, 2}
 
 
 def test_jaws_and_a_hand_that_comes_and_goes() -> None:

@@ -5,37 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from space_rig import POST, SLIDE, head
 from world_rig import check_it_can_be_restored
 
 from steptwin.controller import SECOND
 from steptwin.files.world import World
 from steptwin.simulation.toml.reader import WorldError
 
-BODIES = """
-[[mic488]]
-name = "a"
-[mic488.M1]
-unit = "mm"
-gear = 640.0
-acc = 100.0
-dec = 100.0
-vel = 50.0
-mot_resol = 3200
-[[axis]]
-name = "x"
-drive = "a.M1"
-pitch = 5.0
-at = [0, 0, 500]
-[[body]]
-name = "head"
-on = "x"
-at = [0, 0, -30]
-size = [40, 40, 30]
-[[body]]
-name = "post"
-at = [200, 0, 300]
-size = [20, 20, 140]
-"""
+BODIES = SLIDE + head("x") + POST
 BEAM = """
 [[beam]]
 name = "gate"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from space_rig import controller, place_in, told
 from world_rig import check_it_can_be_restored
 
 from steptwin.controller import SECOND
@@ -12,16 +13,9 @@ from steptwin.files.world import World
 from steptwin.simulation.space.frames import FLOOR, pose
 from steptwin.subject.world import WorldSubject
 
-CELL = """
-[[mic488]]
-name = "c"
-[mic488.M1]
-unit = "mm"
-gear = 160.0
-acc = 2000.0
-dec = 2000.0
-vel = 400.0
-mot_resol = 3200
+CELL = (
+    controller("c", 160.0, 2000.0, 400.0)
+    + """
 [[axis]]
 name = "x"
 drive = "c.M1"
@@ -64,10 +58,7 @@ run = "c.OUT4"
 at = [350, 50, 100]
 along = "-y"
 """
-
-
-def told(world: World) -> list[str]:
-    return [str(record.value) for record in world.trace.of("event") if record.subject == "workpiece"]
+)
 
 
 def picked(text: str, place: float = 300.0) -> World:
@@ -221,15 +212,15 @@ def test_a_viewer_gets_workpieces_when_they_go_elsewhere() -> None:
     states = {one.name: one for one in subject.workpieces()}
     assert subject.workpieces() is subject.workpieces()
     on_belt = states["infeed.1"]
-    assert (on_belt.on, on_belt.size, on_belt.travel) == ("outfeed", (40, 30, 20), "outfeed.travel")
+    assert (on_belt.on, on_belt.size, [one.signal for one in on_belt.moves]) == ("outfeed", (40, 30, 20), ["outfeed.travel"])
     assert on_belt.at == pytest.approx((0, -52, 0), abs=1e-4)
     assert on_belt.yaw == 90.0
     world.mic488["c"].write("OUT4", 1)
     world.run(for_=0.5)
     assert subject.workpieces() is not None
-    way = world.read("outfeed.travel") - on_belt.travel_at
+    _, way, _ = place_in(on_belt, world.read)
     body = world.objects.workpieces.bodies()["infeed.1"]
-    assert [one / 1e6 for one in pose(body.frame, FLOOR, world.now).at] == pytest.approx([350, -2 - way, 100], abs=1e-4)
+    assert [one / 1e6 for one in pose(body.frame, FLOOR, world.now).at] == pytest.approx([350, 50 + way, 100], abs=1e-4)
     world.run(for_=9.0)
     assert "infeed.1" not in {one.name for one in subject.workpieces()}
 

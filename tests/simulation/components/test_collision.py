@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from space_rig import POST, SLIDE, head
 from world_rig import check_it_can_be_restored
 
 from steptwin.controller import SECOND
@@ -210,21 +211,9 @@ def test_a_controller_with_the_name_of_a_signal_is_no_quantity() -> None:
 # ---------------------------------------------------------------------- bodies in space
 
 
-BODIES = """
-[[mic488]]
-name = "a"
-[mic488.M1]
-unit = "mm"
-gear = 640.0
-acc = 100.0
-dec = 100.0
-vel = 50.0
-mot_resol = 3200
-[[axis]]
-name = "x"
-drive = "a.M1"
-pitch = 5.0
-at = [0, 0, 500]
+BODIES = (
+    SLIDE
+    + """
 [[cylinder]]
 name = "z"
 extend = "a.OUT1"
@@ -232,20 +221,16 @@ stroke = 100.0
 extend_time = "250 ms"
 on = "x"
 along = "-z"
-[[body]]
-name = "head"
-on = "z"
-at = [0, 0, -30]
-size = [40, 40, 30]
-[[body]]
-name = "post"
-at = [200, 0, 300]
-size = [20, 20, 140]
+"""
+    + head("z")
+    + POST
+    + """
 [[body]]
 name = "bench"
 at = [0, 0, 350]
 size = [1000, 300, 20]
 """
+)
 JAMS = """
 [[collision]]
 name = "crash"

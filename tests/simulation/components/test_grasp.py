@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
+from space_rig import place, told
 
 from steptwin.controller import MILLISECOND
 from steptwin.files.world import World
-from steptwin.simulation.space.frames import FLOOR, pose
 
 LIFT = """
 [[mic488]]
@@ -49,16 +49,6 @@ def run(text: str, *steps: tuple[int, str], end: int = 2000) -> World:
             world.press(what)
     world.run(until=end / 1000)
     return world
-
-
-def told(world: World) -> list[str]:
-    return [str(record.value) for record in world.trace.of("event") if record.subject == "workpiece"]
-
-
-def place(world: World, name: str) -> tuple[float, ...]:
-    """The middle of the lower face of a workpiece, mm from the floor."""
-    body = world.objects.workpieces.bodies()[name]
-    return tuple(one / 1e6 for one in pose(body.frame, FLOOR, world.now).at)
 
 
 # ---------------------------------------------------------------------- cups

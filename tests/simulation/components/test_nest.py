@@ -5,25 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from space_rig import controller, place, told
 from world_rig import check_it_can_be_restored
 
 from steptwin.controller import SECOND
 from steptwin.files.world import World
-from steptwin.simulation.space.frames import FLOOR, pose
 from steptwin.simulation.toml.reader import WorldError
 from steptwin.subject.describe import workpiece_states
 
-MACHINE = """
-[[mic488]]
-name = "c"
-[mic488.M1]
-unit = "mm"
-gear = 160.0
-acc = 4000.0
-dec = 4000.0
-vel = 400.0
-mot_resol = 3200
-[mic488.M2]
+MACHINE = (
+    controller("c", 160.0, 4000.0, 400.0)
+    + """[mic488.M2]
 unit = "degree"
 gear = 100.0
 [[axis]]
@@ -63,6 +55,7 @@ on = "plate"
 diameter = 300.0
 height = 10.0
 """
+)
 CUP = """
 [[vacuum]]
 name = "cup"
@@ -130,12 +123,10 @@ class Rig:
         self.lower(hold=False)
 
     def told(self) -> list[str]:
-        return [str(record.value) for record in self.world.trace.of("event") if record.subject == "workpiece"]
+        return told(self.world)
 
     def place(self, name: str) -> tuple[float, ...]:
-        """The middle of the lower face of a workpiece, mm from the floor."""
-        body = self.world.objects.workpieces.bodies()[name]
-        return tuple(one / 1e6 for one in pose(body.frame, FLOOR, self.world.now).at)
+        return place(self.world, name)
 
 
 def test_a_nest_is_filled_cell_by_cell_and_layer_by_layer() -> None:
@@ -276,7 +267,7 @@ def test_what_falls_can_be_drawn_and_restored() -> None:
     rig.world.mic488["c"].write("OUT2", 0)
     rig.world.run(for_=0.1)
     (state,) = workpiece_states(rig.world)
-    assert (state.on, state.travel, state.at[:2]) == (None, None, (200.0, 0.0))
+    assert (state.on, state.moves, state.at[:2]) == (None, (), (200.0, 0.0))
     assert 0.0 < state.at[2] < 161.0
     snapshot = rig.world.snapshot()
     rig.world.run(for_=1.0)

@@ -6,42 +6,14 @@ from math import sqrt
 from pathlib import Path
 
 import pytest
+from space_rig import BELT, BLADE, ROD, place
 from world_rig import check_it_can_be_restored
 
 from steptwin.controller import SECOND
 from steptwin.errors import Refusal
 from steptwin.files.world import World
-from steptwin.simulation.space.frames import FLOOR, pose
 from steptwin.simulation.toml.reader import WorldError
 
-BELT = """
-[[mic488]]
-name = "c"
-[mic488.M1]
-unit = "mm"
-gear = 160.0
-acc = 2000.0
-dec = 2000.0
-vel = 400.0
-mot_resol = 3200
-[[conveyor]]
-name = "main"
-length = 600
-speed = 100
-run = "c.OUT1"
-feed_every = "2 s"
-workpiece = [40, 30, 20]
-at = [0, 0, 100]
-"""
-ROD = """
-[[cylinder]]
-name = "rod"
-extend = "c.OUT2"
-stroke = 120
-at = [300, -80, 110]
-along = "+y"
-"""
-"""400 mm/s."""
 AXIS = """
 [[axis]]
 name = "rod"
@@ -49,13 +21,6 @@ drive = "c.M1"
 pitch = 20.0
 at = [300, -80, 110]
 along = "+y"
-"""
-BLADE = """
-[[body]]
-name = "blade"
-on = "rod"
-size = [60, 10, 30]
-pushes = true
 """
 SIDE = """
 [[conveyor]]
@@ -92,11 +57,6 @@ def told(world: World, name: str = "main.1") -> list[tuple[float, str]]:
     return [(record.time / SECOND, str(record.value)) for record in records[1:]]
 
 
-def place_of(world: World, name: str) -> list[float]:
-    body = world.objects.workpieces.bodies()[name]
-    return [one / 1e6 for one in pose(body.frame, FLOOR, world.now).at]
-
-
 def seconds(*found: float) -> object:
     return pytest.approx(list(found), abs=2e-8)
 
@@ -108,7 +68,7 @@ def test_it_pushes_a_workpiece_onto_another_belt_and_on_there() -> None:
     assert texts == ("blade pushes main.1 on main", "main.1 is on side", "blade pushes main.1 on side")
     assert list(times) == seconds(5.35, 5.475, 5.475)
     at_side = 300.0 + 27.5
-    assert place_of(world, "main.1") == pytest.approx([at_side + 80.0 * (6.0 - 5.475), 60.0, 100.0], abs=5e-6)
+    assert place(world, "main.1") == pytest.approx((at_side + 80.0 * (6.0 - 5.475), 60.0, 100.0), abs=5e-6)
     assert world.read("blade.pushed") == 2
 
 
@@ -128,7 +88,7 @@ def test_its_face_sets_how_far_across_a_workpiece_is(along: str, unit: tuple[int
     for _ in range(20):
         travel = world.read("main.place1") - 20.0
         across = max(min(400.0 * (world.now / SECOND - 5.2), 70.0) - 80.0 + 5.0 + 15.0, 0.0) * left
-        assert place_of(world, "main.1") == pytest.approx(
+        assert place(world, "main.1") == pytest.approx(
             [travel * x + across * abs(y), travel * y + across * abs(x), 100.0], abs=5e-6
         )
         world.run(for_=0.01)
@@ -146,14 +106,14 @@ def test_what_is_pushed_off_a_belt_falls() -> None:
 def test_a_workpiece_stays_where_it_was_pushed_when_the_blade_goes_back() -> None:
     """An axis with ramps comes to 80 mm, so that the workpiece is 20 mm from the middle, and pushes the next one by 5 mm."""
     world = pushing(BELT + AXIS + BLADE, M1_EN=1, M1_POS_ABS=0)
-    for place in (80.0, 0.0):
-        world.mic488["c"].write("M1_POS_ABS", place)
+    for target in (80.0, 0.0):
+        world.mic488["c"].write("M1_POS_ABS", target)
         world.run(for_=0.5)
     world.run(until=7.2)
     world.mic488["c"].write("M1_POS_ABS", 65.0)
     world.run(for_=0.6)
-    assert place_of(world, "main.1") == pytest.approx([560.0, 20.0, 100.0], abs=5e-6)
-    assert place_of(world, "main.2")[1] == pytest.approx(5.0, abs=5e-6)
+    assert place(world, "main.1") == pytest.approx((560.0, 20.0, 100.0), abs=5e-6)
+    assert place(world, "main.2")[1] == pytest.approx(5.0, abs=5e-6)
     assert world.read("blade.pushed") == 2
 
 
@@ -176,7 +136,7 @@ def test_it_jams_where_a_workpiece_comes_against_another_one_and_is_free_when_it
     assert world.read("blade.jammed") == 1
     at = 40.0 + 60.0
     assert world.read("rod.position") == pytest.approx(at, abs=1e-5)
-    assert place_of(world, "main.1") == pytest.approx([330.0, 40.0, 100.0], abs=5e-6)
+    assert place(world, "main.1") == pytest.approx((330.0, 40.0, 100.0), abs=5e-6)
     world.mic488["c"].write("OUT2", 0)
     world.run(until=5.6)
     assert world.read("blade.jammed") == 0
@@ -221,7 +181,7 @@ def test_workpieces_pass_each_other_where_none_is_before_the_other() -> None:
         world.mic488["c"].write("OUT2", level)
         world.run(for_=1.0)
     assert [world.read(f"main.place{n}") for n in (1, 2)] == pytest.approx([330.0, 330.0], abs=1e-5)
-    assert place_of(world, "main.1")[1] == pytest.approx(35.0, abs=1e-5)
+    assert place(world, "main.1")[1] == pytest.approx(35.0, abs=1e-5)
     goes_on = next(time for time, text in told(world, "main.2") if time > 8.0 and "goes on" in text)
     assert goes_on == pytest.approx(8.0 + (95.0 - 60.0) / 190.0, abs=1e-7)
 
@@ -236,7 +196,7 @@ def test_what_it_comes_into_from_above_is_not_thrown_aside() -> None:
     down = '[[cylinder]]\nname = "rod"\nextend = "c.OUT2"\nstroke = 90\nat = [300, 3, 200]\nalong = "-z"\n'
     world = pushing(BELT + down + BLADE, 5.9)
     assert [text for _, text in told(world)] == ["blade and main.1 collide"]
-    assert place_of(world, "main.1")[1] == 0.0
+    assert place(world, "main.1")[1] == 0.0
     assert world.read("blade.pushed") == 0
 
 
@@ -255,7 +215,7 @@ def test_a_face_that_overtakes_the_one_that_pushes_takes_over() -> None:
     times, texts = zip(*told(world), strict=True)
     assert texts == ("blade pushes main.1 on main", "second pushes main.1 on main")
     assert list(times) == seconds(0.3 * 60.0 / 80.0, 6.0 + 0.3 * 80.0 / 120.0)
-    assert place_of(world, "main.1")[1] == pytest.approx(60.0, abs=5e-6)
+    assert place(world, "main.1")[1] == pytest.approx(60.0, abs=5e-6)
 
 
 def test_nothing_is_put_where_it_is() -> None:

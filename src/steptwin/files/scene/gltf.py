@@ -24,6 +24,7 @@ from steptwin.files.scene.cubics import Cubic
 from steptwin.files.scene.recordedscene import RecordedScene, Stint
 from steptwin.files.scene.scenescript import SceneScript
 from steptwin.jsonvalues import to_json
+from steptwin.subject.scene import MoveState
 
 LONGEST_NS: Nanos = 600 * SECOND
 SLACK_DEG = 0.01
@@ -142,7 +143,6 @@ class _Gltf:
             self._add_workpiece(name, solid, scene.workpieces[name])
 
     def _add_workpiece(self, name: str, solid: Mapping[str, Any], stints: Sequence[Stint]) -> None:
-        along = {frame.name: _direction(frame.along) for frame in self._scene.machine.scene.frames if frame.along is not None}
         ends = [*(one.begin for one in stints[1:]), self._until + 1]
         for (begin, place), end in zip(stints, ends, strict=True):
             if place is None or end <= self._begin or begin > self._until:
@@ -150,9 +150,13 @@ class _Gltf:
             (x, y, z), half = place.at, radians(place.yaw) / 2.0
             at, size = [x, y, z + place.height / 2.0], solid["size"]
             look = {"translation": at, "rotation": [0.0, 0.0, sin(half), cos(half)], "scale": size, "mesh": self._mesh(solid)}
-            node = self._node(self._carrying[place.on], name, **look)
-            if place.travel is not None and place.on in along:
-                self._move(node, place.travel, at, along[place.on], place.travel_at, begin, end)
+            parent = self._carrying[place.on]
+            for move in place.moves[1:]:
+                parent = self._node(parent, name)
+                self._go_on(parent, move, (0.0, 0.0, 0.0), begin, end)
+            node = self._node(parent, name, **look)
+            for move in place.moves[:1]:
+                self._go_on(node, move, at, begin, end)
             self._show(node, size, [(self._begin, False), (begin, True), (end, False)])
 
     # ------------------------------------------------------------------ motions
@@ -165,6 +169,11 @@ class _Gltf:
         chosen = spans[first:last]
         ends = [*(one.begin for one in chosen[1:]), end]
         return [(until, one) for until, one in zip(ends, chosen, strict=True) if until > max(begin, one.begin)]
+
+    def _go_on(self, node: int, move: MoveState, at: Sequence[float], begin: Nanos, end: Nanos) -> None:
+        """A node goes on with a workpiece from ``at``."""
+        by = [one * move.per_unit for one in _direction(move.along)]
+        self._move(node, move.signal, at, by, move.at, begin, end)
 
     def _move(
         self,

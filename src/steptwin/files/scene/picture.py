@@ -64,7 +64,7 @@ def picture(world: Simulation, view: View) -> str:
     script = SceneScript(machine)
     workpieces = tuple(workpiece_states(world))
     wanted = script.wanted()
-    names = (*wanted["signals"], *wanted["levels"], *(one.travel for one in workpieces if one.travel is not None))
+    names = (*wanted["signals"], *wanted["levels"], *(move.signal for one in workpieces for move in one.moves))
     values = {name: _value(world, name) for name in names}
     return script.call("picture", {"values": values, "workpieces": to_json(workpieces)}, view, WIDTH_PX)
 

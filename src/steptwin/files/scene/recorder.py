@@ -18,7 +18,7 @@ from steptwin.simulation.logic.condition import SignalCondition
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.drawing import BELT
 from steptwin.simulation.scheduler.scheduler import Scheduler
-from steptwin.simulation.space.frames import NM_PER_MM
+from steptwin.simulation.space.frames import NM_PER_MM, Joint
 from steptwin.simulation.space.pieces import Motion
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.subject.describe import describe, workpiece_states
@@ -239,7 +239,7 @@ class SceneRecorder:
                 self._place(world, now)
 
     def _place(self, world: Simulation, now: Nanos) -> None:
-        there = {state.name: state for state in workpiece_states(world, now, partial(self._travel, world, now))}
+        there = {state.name: state for state in workpiece_states(world, now, partial(self._value, world, now))}
         for name in {**self._stints, **there}:
             stints, place = self._stints.setdefault(name, []), there.get(name)
             if stints and stints[-1].begin == now:
@@ -247,11 +247,12 @@ class SceneRecorder:
             if place != (stints[-1].place if stints else None):
                 stints.append(Stint(now, place))
 
-    def _travel(self, world: Simulation, now: Nanos, signal: str, motion: Motion) -> float:
-        """The way of a belt, which is followed from when a workpiece is on it; only its changes count."""
-        if signal not in self._motions:
-            self._follow(_signal(world, signal), self._motions.setdefault(signal, _Planned(motion, NM_PER_MM, SLACK_NM)))
-        followed = self._motions[signal]
+    def _value(self, world: Simulation, now: Nanos, joint: Joint) -> float:
+        """Of a joint of a workpiece. The way of a belt is followed from when a workpiece is on it; only its changes count."""
+        name = joint.signal
+        if name not in self._motions:
+            self._follow(_signal(world, name), self._motions.setdefault(name, _Planned(joint.motion, NM_PER_MM, SLACK_NM)))
+        followed = self._motions[name]
         followed.look(now)
         return next(span for span in reversed(followed.spans) if span.begin <= now).at(now)
 

@@ -127,7 +127,8 @@ class BeltSpace:
             return frame, self._at(belt.to_nm(placed.held) + way, placed.across)
         per_step = NM_PER_MM / belt.per_mm
         motion = belt_motion(belt, per_step, float(way - placed.origin * per_step))
-        return Frame(f"{placed.workpiece.name}.belt", frame, self._at(0, placed.across), Joint(motion, self._along)), (0, 0, 0)
+        joint = Joint(motion, self._along, signal=f"{self.name}.travel")
+        return Frame(f"{placed.workpiece.name}.belt", frame, self._at(0, placed.across), joint), (0, 0, 0)
 
     # ------------------------------------------------------------------ pushing across
 
@@ -189,9 +190,12 @@ class BeltSpace:
 
     def _pushed(self, placed: Placed) -> Frame:
         """The frame across which a workpiece is as its table says."""
-        if not placed.pusher:
-            return self._frame
-        return Frame(f"{placed.workpiece.name}.push", self._frame, (0, 0, 0), Joint(self.pushing(placed.pusher), self._left))
+        frame = self._frame
+        for mover, sign in self.joints_to(placed.pusher) if placed.pusher else ():
+            if mover.joint is not None:
+                along = Direction(self._left.axis, self._left.sign * sign)
+                frame = Frame(f"{placed.workpiece.name}.push", frame, (0, 0, 0), mover.joint._replace(along=along))
+        return frame
 
     def _across_at(self, placed: Placed, now: Nanos) -> int:
         return placed.across + (floor(self.pushing(placed.pusher).at(now) + 0.5) if placed.pusher else 0)

@@ -78,7 +78,7 @@ class Frames(Mapping[str, Mounted]):
         for n, one in enumerate(movements):
             # The first joint is at the origin of its element, each further one is on the one before.
             its = "" if n + 1 == len(movements) else f".{one.signal}"
-            joint = Joint(one.motion, one.along, one.turns)
+            joint = Joint(one.motion, one.along, one.turns, f"{name}.{one.signal}", one.per_unit)
             frame = Frame(name + its, frame if n else base.on, (0, 0, 0) if n else place.origin, joint)
             self._movements[frame] = one
         return Mounted(self.described[name], place, base, frame, movements)

@@ -43,6 +43,10 @@ class Joint(NamedTuple):
     motion: Motion
     along: Direction
     turns: bool = False
+    signal: str = ""
+    """Signal of its position; empty: none has it."""
+    per_unit: float = 1.0
+    """mm, or degrees, for a unit of that."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,10 +17,13 @@ const SCENE = {
 } as unknown as Scene;
 
 const piece = (name: string, on: string | null, more: Partial<Piece> = {}): Piece => ({
-  ...{ name, on, size: [40, 30, 20], diameter: null, height: 20, at: [0, 0, 0], yaw: 0, travel: null, travel_at: 0 },
+  ...{ name, on, size: [40, 30, 20], diameter: null, height: 20, at: [0, 0, 0], yaw: 0, moves: [] },
   ...more,
 }); // prettier-ignore
-const onBelt = { travel: "belt.travel", travel_at: 500, at: [0, -40, 0] } as const;
+const onBelt: Pick<Piece, "moves" | "at"> = {
+  moves: [{ signal: "belt.travel", along: "-y", per_unit: 1, at: 500 }],
+  at: [0, -40, 0],
+};
 const middleOf = ({ places }: Stage, n: number) => [...places.subarray(n * POSE + 9, n * POSE + 12)].map((one) => Math.round(one * 1e6) / 1e6); // prettier-ignore
 
 function stageOf(...pieces: Piece[]): Stage {
@@ -53,6 +56,19 @@ test("a workpiece on a belt goes on by the change of the way of the belt, once t
   stage.take([piece("tray.1", "tray")]);
   expect(pieces.signals).toEqual([]);
   expect(stage.solids).toHaveLength(fixed + 1);
+});
+
+test("a workpiece that is pushed across a belt goes on along it, too, as what pushes it moves", () => {
+  const pushed = { signal: "table.position", along: "-x", per_unit: 0.5, at: 80 };
+  const stage = stageOf(piece("belt.1", "belt", { ...onBelt, moves: [pushed, ...onBelt.moves] }));
+  const { pieces, fixed, poses } = stage;
+  expect(pieces.signals).toEqual(["belt.travel"]);
+  pieces.values[0] = 512.5;
+  stage.update();
+  expect(middleOf(stage, fixed)).toEqual([10 - 0.5 * (90 - 80), -32.5, 40]);
+  poses.values.fill(100);
+  stage.update();
+  expect(middleOf(stage, fixed)).toEqual([0, -32.5, 40]);
 });
 
 test("workpieces have the color of what they come from, wherever they are, and their own shape", () => {

@@ -18,23 +18,35 @@ function colorOf({ name }: Piece, { frames }: Scene): string {
 export class Pieces {
   solids: readonly Solid[] = [];
   names: readonly string[] = [];
-  /** Ways of belts, by whose changes since pieces were put there they move on. */
+  /** Ways of belts, by whose changes since pieces were put there they move on; not those that move frames, too. */
   signals: readonly string[] = [];
   /** Of these; NaN where they are not known. */
   values = new Float64Array();
-  /** What moves each on, of the signals; below 0: nothing. */
+  /** Number of the first move of each, and behind the last one. */
+  private moves = new Int32Array();
+  /** Signal of each move, then those of the poses. */
   private ways = new Int32Array();
   private from = new Float64Array();
+  /** Along x, y and z for a unit of the signal. */
+  private by = new Float64Array();
   private at = new Float64Array();
-  private along = new Float64Array();
   private yaws = new Float64Array();
 
-  constructor(private readonly scene: Scene) {}
+  constructor(
+    private readonly scene: Scene,
+    private readonly poses: Poses,
+  ) {}
+
+  /** Signals by which pieces move on and that move no frame. */
+  waysOf(pieces: readonly Piece[]): readonly string[] {
+    const names = pieces.flatMap(({ moves }) => moves.map(({ signal }) => signal));
+    return [...new Set(names)].filter((signal) => !this.poses.signals.includes(signal));
+  }
 
   take(pieces: readonly Piece[]): void {
     const { frames } = this.scene;
     const known = new Map(this.signals.map((signal, k) => [signal, this.values[k] as number]));
-    this.signals = [...new Set(pieces.flatMap(({ travel }) => travel ?? []))];
+    this.signals = this.waysOf(pieces);
     this.values = Float64Array.from(this.signals, (signal) => known.get(signal) ?? NaN);
     this.names = pieces.map(({ name }) => name);
     this.solids = pieces.map((piece): Solid => ({
@@ -43,35 +55,44 @@ export class Pieces {
       ...shapeOf(piece),
       color: colorOf(piece, this.scene),
     }));
-    this.ways = Int32Array.from(pieces, ({ travel }) => (travel === null ? -1 : this.signals.indexOf(travel)));
-    this.from = Float64Array.from(pieces, ({ travel_at }) => travel_at);
+    const moves = pieces.flatMap((piece) => piece.moves);
+    const all = [...this.signals, ...this.poses.signals];
+    this.moves = new Int32Array(pieces.length + 1);
+    pieces.forEach((piece, n) => (this.moves[n + 1] = (this.moves[n] as number) + piece.moves.length));
+    this.ways = Int32Array.from(moves, ({ signal }) => all.indexOf(signal));
+    this.from = Float64Array.from(moves, ({ at }) => at);
+    this.by = Float64Array.from(
+      moves.flatMap(({ along, per_unit }) => {
+        const [axis, sign] = directionOf(along);
+        return [0, 1, 2].map((k) => (k === axis ? sign * per_unit : 0));
+      }),
+    );
     this.at = Float64Array.from(
       pieces.flatMap(({ at, height }) => [at[0] ?? 0, at[1] ?? 0, (at[2] ?? 0) + height / 2]),
     );
     this.yaws = Float64Array.from(pieces, ({ yaw }) => yaw);
-    this.along = Float64Array.from(
-      this.solids.flatMap(({ frame }) => {
-        const [axis, sign] = directionOf(frames[frame]?.along ?? "+x");
-        return [0, 1, 2].map((k) => (k === axis ? sign : 0));
-      }),
-    );
   }
 
   /** The pose of the middle of one. */
-  place(n: number, poses: Poses, to: Float64Array, at: number): void {
+  place(n: number, to: Float64Array, at: number): void {
     const { frame } = this.solids[n] as Solid;
+    const { at: its, by, poses } = this;
     if (frame < 0) copyPose(to, at, poses.floor, 0);
     else copyPose(to, at, poses.carried, frame * POSE);
-    const way = this.ways[n] as number;
-    const moved = way < 0 ? 0 : (this.values[way] as number) - (this.from[n] as number) || 0;
-    const { at: its, along } = this;
-    shift(
-      to,
-      at,
-      (its[3 * n] as number) + moved * (along[3 * n] as number),
-      (its[3 * n + 1] as number) + moved * (along[3 * n + 1] as number),
-      (its[3 * n + 2] as number) + moved * (along[3 * n + 2] as number),
-    );
+    shift(to, at, its[3 * n] as number, its[3 * n + 1] as number, its[3 * n + 2] as number);
+    for (let k = this.moves[n] as number; k < (this.moves[n + 1] as number); k++) {
+      const way = this.ways[k] as number;
+      const count = this.values.length;
+      const value = way < count ? (this.values[way] as number) : (poses.values[way - count] as number);
+      const moved = value - (this.from[k] as number) || 0;
+      shift(
+        to,
+        at,
+        moved * (by[3 * k] as number),
+        moved * (by[3 * k + 1] as number),
+        moved * (by[3 * k + 2] as number),
+      );
+    }
     const yaw = this.yaws[n] as number;
     if (yaw !== 0) turn(to, at, 2, yaw);
   }

@@ -66,9 +66,9 @@ export class Stage {
     this.solids = hasAids ? [...solids, ...aidsOf(scene, model, solids, this.tips)] : solids;
     this.fixed = this.solids.length;
     this.aids = solids.length;
-    this.pieces = new Pieces(scene);
     const more = this.solids.flatMap(({ slide, shown }) => [slide?.signal ?? [], shown ?? []].flat());
     this.poses = new Poses(scene, more);
+    this.pieces = new Pieces(scene, this.poses);
     this.aims = new Poses(scene, more);
     this.targets = new Float64Array(this.poses.signals.length).fill(NaN);
     const place = (signal: string | undefined | null) => (signal ? this.poses.signals.indexOf(signal) : -1);
@@ -105,7 +105,7 @@ export class Stage {
       aims.update();
     }
     for (let n = this.fixed; n < this.solids.length; n++) {
-      this.pieces.place(n - this.fixed, poses, places, n * POSE);
+      this.pieces.place(n - this.fixed, places, n * POSE);
       this.isThere[n] = 1;
       this.bound(n);
     }
