@@ -178,7 +178,7 @@ class ProgramCauses:
             if (passes if cause.cover is Cover.MOTION else cause.place.time >= latest)
         ]
         pins = [f"{controller}.{one.name}" for one in reads if one.kind is ResourceKind.PIN and one.name]
-        if not came and len(pins) == 1 and self._log.since(pins[0], place.time) is None:  # such as one that a filter lets in later
+        if not came and len(pins) == 1 and self._log.since(pins[0], place.time) is None:  # a filter lets it in later
             begin = self._log.begin
             return covered(self._all.first(pins[0], self._log.level(pins[0], begin), Place(begin)), Cover.LEVEL)
         return covered(max(came, key=lambda cause: cause.place, default=None), Cover.WAIT)
