@@ -134,6 +134,8 @@ class DrawingDescription:
     across: float = 0.0
     across_low: float = 0.0
     """As ``length`` and ``low``, of the other direction of a plane; the width of a belt."""
+    feeds: bool = False
+    """Whether workpieces come onto a belt by themselves; they wait before its beginning."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -170,7 +170,9 @@ def _connections(world: Simulation) -> Iterator[ConnectionDescription]:
 def _drawing(drawing: Drawing) -> DrawingDescription:
     switches = tuple(map(_switch, drawing.sensors))
     across = drawing.across, drawing.across_low
-    return DrawingDescription(drawing.shape, drawing.length, drawing.places, drawing.size, switches, drawing.low, *across)
+    return DrawingDescription(
+        drawing.shape, drawing.length, drawing.places, drawing.size, switches, drawing.low, *across, drawing.feeds
+    )
 
 
 def _switch(zone: SensorZone) -> SwitchDescription:

@@ -540,7 +540,8 @@ def _drawing(conveyor: Conveyor) -> Drawing:
     spec = conveyor.spec
     sensors = tuple(SensorZone(sensor.target, sensor.at, sensor.at) for sensor in spec.sensors)
     stops = tuple(SensorZone((spec.name, stop_terminal(n)), stop.at, stop.at) for n, stop in enumerate(spec.stops, start=1))
-    return Drawing(BELT, spec.length, _place_names(spec), spec.workpiece[0], sensors + stops, across=spec.width)
+    feeds = spec.feed_every is not None or spec.feed is not None
+    return Drawing(BELT, spec.length, _place_names(spec), spec.workpiece[0], sensors + stops, across=spec.width, feeds=feeds)
 
 
 def _refuse_place() -> None:

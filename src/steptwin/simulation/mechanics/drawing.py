@@ -45,6 +45,8 @@ class Drawing:
     across: float = 0.0
     across_low: float = 0.0
     """As ``length`` and ``low``, of the other direction of a plane; the width of a belt."""
+    feeds: bool = False
+    """Whether workpieces come onto a belt by themselves; they wait before its beginning."""
 
 
 def rail(travel: tuple[float, float] | None, sensors: tuple[SensorZone, ...] = (), beyond: float = 0.0) -> Drawing:

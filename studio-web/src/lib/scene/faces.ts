@@ -38,7 +38,7 @@ type Flat = readonly [number, number];
 const pathOf = (points: readonly Flat[]) =>
   points.length ? `M${points.map(([x, y]) => `${x.toFixed(2)} ${y.toFixed(2)}`).join("L")}Z` : "";
 
-/** Counterclockwise, by the monotone chain of Andrew. */
+/** By the monotone chain of Andrew, in the direction of faces that are seen: what is drawn in one path leaves no hole. */
 function hullOf(points: readonly Flat[]): Flat[] {
   const sorted = [...points].sort((one, other) => one[0] - other[0] || one[1] - other[1]);
   const turns = (o: Flat, a: Flat, b: Flat) => (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]);
@@ -50,7 +50,7 @@ function hullOf(points: readonly Flat[]): Flat[] {
     }
     return chain.slice(0, -1);
   };
-  return [...half(sorted), ...half(sorted.reverse())];
+  return [...half(sorted), ...half(sorted.reverse())].reverse();
 }
 
 function normalOf([a, b, c]: readonly Vector[]): Vector {

@@ -104,16 +104,15 @@ function reach(scene: Scene, { frame, axis }: Builder): number {
   return Math.max(0, ...far);
 }
 
-/** A disc on its motor; marks let one see that it turns. Switches are at the rim. */
+/** A disc on its motor, or on a bare shaft; marks let one see that it turns. Switches are at the rim. */
 function turntable(build: Builder, { scene, axis }: Known): void {
   const radius = between(30, 1.1 * reach(scene, build) || 70, 1500);
   const thick = between(5, 0.1 * radius, 25);
   // What is on it stands above.
   const down = build.axis === 2 ? -build.sign : -1;
   build.rod([down * thick * 0.5, 0, 0], 0, thick, 2 * radius, "moving", { isCarried: true });
-  const motor = [down * thick, down * 0.5 * radius, 1.1 * radius] as const;
-  if (axis === undefined) build.rod([motor[0] + motor[1] / 2, 0, 0], 0, 0.5 * radius, motor[2], "drive");
-  else drive(build, axis, ...motor);
+  if (axis === undefined) build.rod([down * (thick + 0.3 * radius), 0, 0], 0, 0.6 * radius, 0.25 * radius, "rod");
+  else drive(build, axis, down * thick, down * 0.5 * radius, 1.1 * radius);
   for (let n = 0; n < 4; n++) {
     const [length, width] = [0.35 * radius, 0.06 * radius];
     const out = (n < 2 ? 1 : -1) * 0.78 * radius;
@@ -146,7 +145,7 @@ function cylinder(build: Builder, { name, outputs, drawing }: Element): void {
 
 const BELT_MM = 100;
 
-/** A belt about two rollers between its sides. Arrows are lit while it runs. */
+/** A belt about two rollers between its sides, and a plate before it where workpieces come. Arrows are lit while it runs. */
 function conveyor(build: Builder, { name, inputs, drawing }: Element): void {
   if (drawing === null) return;
   const { length } = drawing;
@@ -161,6 +160,7 @@ function conveyor(build: Builder, { name, inputs, drawing }: Element): void {
       [length - 0.6 * thick, side, 0.8 * thick],
       "rail",
     );
+  if (drawing.feeds) build.box([-drawing.size / 2, 0, -0.2 * thick], [drawing.size, wide, 0.4 * thick], "frame");
   const arrows = between(2, Math.round(length / 150), 8);
   const run = inputs.includes("run") ? `${name}.run` : null;
   for (let n = 0; n < arrows; n++) build.arrow([((n + 0.5) / arrows) * length, 0, 0.2], 0.3 * wide, { pin: run });

@@ -2,6 +2,7 @@ import { expect, test } from "vitest";
 import type { Model } from "../state/model";
 import type { Scene } from "./poses";
 import { Stage } from "./stage";
+import type { Solid } from "./builder";
 import { facesOf } from "./faces";
 import { frameOf, Order, spotX, spotY, VIEWS, type ViewName } from "./view";
 
@@ -59,4 +60,24 @@ test("what turns is drawn turned, and stands where its carrier has it", () => {
   if (solid === undefined) throw new Error("no solid");
   expect(facesOf(solid, places, 0, VIEWS.top)).toEqual({ front: "", side: "", top: "M-5.00 -10.00L-5.00 10.00L5.00 10.00L5.00 -10.00Z" }); // prettier-ignore
   expect(frameOf(VIEWS.top, stage.extent)[2]).toBeGreaterThan(200);
+});
+
+test("the end of a cylinder that is seen fills its outline, whichever way it lies", () => {
+  const poses = new Float64Array([1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]);
+  const turns = (path: string) => {
+    const points = path
+      .slice(1, -1)
+      .split("L")
+      .map((one) => one.split(" ").map(Number) as [number, number]);
+    return Math.sign(points.reduce((sum, [x, y], k) => sum + x * points.at(k - 1)![1] - y * points.at(k - 1)![0], 0));
+  };
+  for (const axis of [0, 1, 2]) {
+    const prism = { axis, corners: 32, towards: axis === 0 ? ([0, 1, 0] as const) : ([1, 0, 0] as const) };
+    const { front, side, top } = facesOf({ size: [40, 40, 40], prism } as unknown as Solid, poses, 0, VIEWS.oblique);
+    const [outline, ...others] = (front + side + top)
+      .split("Z")
+      .slice(0, -1)
+      .map((one) => turns(`${one}Z`));
+    expect(others).toEqual([outline]);
+  }
 });

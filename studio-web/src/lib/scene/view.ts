@@ -36,20 +36,12 @@ export function frameOf({ right, up }: View, { low, high }: Extent): [number, nu
 const FLAT = 0.01;
 const TOUCHING_MM = 0.01;
 
-interface Ends {
-  low: number;
-  high: number;
-  from: number;
-  to: number;
-}
-
 /** In what order solids are drawn, those behind first, and aids above all. */
 export class Order {
   drawn = new Int32Array();
   private state = new Uint8Array();
   /** Ends of each along right and up, in the picture. */
   private spans = new Float64Array();
-  private readonly both: Ends = { low: 0, high: 0, from: 0, to: 0 };
   private count = 0;
 
   constructor(
@@ -112,19 +104,10 @@ export class Order {
     this.spans[to + 1] = middle + half;
   }
 
-  /** Of both along an axis. */
-  private ends(one: number, other: number, axis: number): Ends {
-    const { lows, highs } = this.stage;
-    this.both.low = lows[3 * one + axis] as number;
-    this.both.high = highs[3 * one + axis] as number;
-    this.both.from = lows[3 * other + axis] as number;
-    this.both.to = highs[3 * other + axis] as number;
-    return this.both;
-  }
-
   /** Where a plane between two has one of them on the side of who looks, that one is covered by nothing of the other. Where they
    * overlap, the plane is across the axis along which they do least. */
   private isBehind(one: number, other: number): boolean {
+    const { lows, highs } = this.stage;
     let isFree = false;
     let isOtherFree = false;
     let least = Infinity;
@@ -132,7 +115,10 @@ export class Order {
     for (let k = 0; k < 3; k++) {
       const towards = this.view.near[k] as number;
       if (Math.abs(towards) < FLAT) continue;
-      const { low, high, from, to } = this.ends(one, other, k);
+      const low = lows[3 * one + k] as number;
+      const high = highs[3 * one + k] as number;
+      const from = lows[3 * other + k] as number;
+      const to = highs[3 * other + k] as number;
       isFree ||= towards > 0 ? low >= to - TOUCHING_MM : high <= from + TOUCHING_MM;
       isOtherFree ||= towards > 0 ? high <= from + TOUCHING_MM : low >= to - TOUCHING_MM;
       const apart = (low + high - from - to) * towards;

@@ -12,6 +12,8 @@ const LIGHTS = ["front", "side", "top"] as const;
 /** Of the picture, around what is in it. */
 const ROOM = 0.06;
 const ORDER_MS = 120;
+/** It is not known whether a part is seen. */
+const NEITHER = 2;
 /** A turn that is seen. */
 const TURN = 1e-6;
 
@@ -44,6 +46,9 @@ export class Drawing {
   /** How each of them looks. */
   private readonly painted: string[] = [];
   private solids: readonly Solid[] = [];
+  /** Of each, without a text for a picture. */
+  private readonly moves: SVGTransform[] = [];
+  private isSeen = new Uint8Array();
   private turns = new Float64Array();
   private spots = new Float64Array();
   /** Of the stage, the workpieces of which have parts. */
@@ -105,17 +110,17 @@ export class Drawing {
     if (this.revision !== stage.revision) this.renew();
     if (this.marks !== null && this.knowledge !== stage.knowledge) this.mark(this.marks);
     for (let n = 0; n < this.parts.length; n++) {
-      const part = this.parts[n] as SVGGElement;
-      const display = stage.isThere[n] ? "" : "none";
-      if (part.style.display !== display) part.style.display = display;
-      if (!stage.isThere[n]) continue;
-      if (this.hasTurned(n)) this.outline(n, part);
+      const isThere = stage.isThere[n] as number;
+      if (this.isSeen[n] !== isThere) (this.parts[n] as SVGGElement).style.display = isThere ? "" : "none";
+      this.isSeen[n] = isThere;
+      if (!isThere) continue;
+      if (this.hasTurned(n)) this.outline(n, this.parts[n] as SVGGElement);
       const x = spotX(this.view, stage.places, n * POSE + 9);
       const y = spotY(this.view, stage.places, n * POSE + 9);
       if (this.spots[2 * n] === x && this.spots[2 * n + 1] === y) continue;
       this.spots[2 * n] = x;
       this.spots[2 * n + 1] = y;
-      part.setAttribute("transform", `translate(${x.toFixed(2)} ${y.toFixed(2)})`);
+      (this.moves[n] as SVGTransform).setTranslate(x, y);
     }
     if (now_ms - this.ordered_ms < ORDER_MS) return;
     this.ordered_ms = now_ms;
@@ -150,11 +155,13 @@ export class Drawing {
     const { stage, parts } = this;
     const { solids } = stage;
     while (parts.length > solids.length) parts.pop()?.remove();
+    this.moves.length = parts.length;
+    this.isSeen = new Uint8Array(solids.length).fill(NEITHER);
     this.turns = grown(this.turns, 9 * solids.length);
     this.spots = grown(this.spots, 2 * solids.length);
     for (let n = this.revision < 0 ? 0 : stage.fixed; n < solids.length; n++) {
       const solid = solids[n] as Solid;
-      const part = (parts[n] ??= this.part(solid));
+      const part = (parts[n] ??= this.part(solid, n));
       part.dataset["element"] = solid.element;
       this.paint(n, solid.material, false);
       if (n >= stage.fixed) (part.lastChild as Element).textContent = stage.pieces.names[n - stage.fixed] ?? "";
@@ -177,8 +184,10 @@ export class Drawing {
     part.style.setProperty("--fill", valueOf(color));
   }
 
-  private part({ material }: Solid): SVGGElement {
+  private part({ material }: Solid, n: number): SVGGElement {
     const part = create("g", this.all);
+    this.moves[n] = part.transform.baseVal.appendItem(this.svg.createSVGTransform());
+    this.spots.fill(NaN, 2 * n, 2 * n + 2);
     for (const light of LIGHTS) create("path", part, light);
     if (material === "piece") create("title", part);
     return part;
@@ -215,6 +224,7 @@ export class Drawing {
 
   /** Above what is drawn of it. */
   private label(name: string, solids: readonly number[]): void {
+    if (!this.marks?.labels && name !== this.marks?.selected) return;
     let [left, right, top] = [Infinity, -Infinity, Infinity];
     for (const n of solids) {
       const x = this.spots[2 * n] as number;
