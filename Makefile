@@ -19,6 +19,9 @@ PAGE := src/steptwin/studio/page/index.html
 PAGE_SOURCES := docs/studio.schema.json $(shell find studio-web -type f -not -path '*/node_modules/*' -not -path '*/__pycache__/*' \
   -not -name types.ts)
 
+# The page with the studio inside it; the last file that is written for it.
+SITE := build/site/try/world/demo.json
+
 # Tools that its tests need beside what it is built with.
 WEB_STAMP := .venv/.ready-web
 
@@ -40,7 +43,7 @@ PEER_PACKAGES := chromium curl mbpoll libmodbus-dev gcc libc6-dev pkg-config mak
   prometheus ser2net tshark
 
 .DEFAULT_GOAL := help
-.PHONY: help run test lowest golden soak extras page vsix release lint format types imports bench docs peers lock clean
+.PHONY: help run test lowest golden soak extras page site vsix release lint format types imports bench docs peers lock clean
 
 help:  ## Show the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -49,7 +52,7 @@ run: $(RUN_STAMP)  ## Show a demo machine in the browser (ARGS="MACHINE.toml --s
 	@$(MAKE) --no-print-directory page || echo "the page of the studio could not be built; the service runs without it" >&2
 	@exec $(BIN)/steptwin studio $(ARGS)
 
-test: $(DEV_STAMP) $(WEB_STAMP) $(PAGE) $(EXTENSION_STAMP) $(CLIENTS_STAMP)  ## Run the tests (ARGS="-k mic_7 ..."); peers that are missing are skipped
+test: $(DEV_STAMP) $(WEB_STAMP) $(PAGE) $(SITE) $(EXTENSION_STAMP) $(CLIENTS_STAMP)  ## Run the tests (ARGS="-k mic_7 ..."); peers that are missing are skipped
 	$(BIN)/pytest -n auto --dist worksteal $(ARGS)
 
 # Each bound of pyproject.toml as the version that is installed: one file for each extra, and the import of every module.
@@ -122,6 +125,10 @@ docs: $(DEV_STAMP)  ## Build the documentation into build/docs
 	$(BIN)/sphinx-build -W --keep-going --quiet -b html -d build/doctrees docs build/docs
 	@echo "build/docs/index.html"
 
+site: docs $(SITE)  ## Build a folder for any web server: the documentation, and try/, a studio with its twin inside the page
+	@find build/site -mindepth 1 -maxdepth 1 -not -name try -exec rm -rf {} + && cp -r build/docs/. build/site/
+	@echo "build/site: $(PYTHON) -m http.server --bind 127.0.0.1 -d build/site, then http://127.0.0.1:8000/try/"
+
 peers:  ## Install the system packages the tests talk to (Debian)
 	@missing=""; \
 	for package in $(PEER_PACKAGES); do \
@@ -184,6 +191,10 @@ $(PAGE): $(PAGE_SOURCES)
 	@echo "building the page of the studio"
 	@$(WEB) build
 	@touch $@
+
+$(SITE): $(PAGE_SOURCES) $(shell find src -name '*.py' -o -path '*/demo_machine/*.*') | $(DEV_STAMP) $(WEB_STAMP)
+	@echo "building the studio inside a page"
+	@$(WEB) site
 
 $(WEB_STAMP): $(NODE_STAMP) studio-web/package-lock.json
 	@echo "installing what the tests of the page need"

@@ -1,5 +1,6 @@
 """Builds the page of the studio into src/steptwin/studio/page: ``python studio-web/build.py build``.
 
+``site`` builds the page with the studio inside it into build/site/try.
 ``lint``, ``format``, ``types`` and ``test`` are the scripts of package.json, which call no npm; ``sbom`` prints what the page is
 made of (CycloneDX); ``node`` says whether the machine's node will do.
 A second argument names another folder with a package.json, whose scripts are run: ``build.py lint editors/vscode``; ``install``
@@ -103,6 +104,15 @@ def build() -> None:
     npm(HERE, "run", "--silent", "build")
 
 
+def site() -> None:
+    """The page with the studio inside it, into build/site/try."""
+    install(HERE, tests=True)
+    modules = HERE.parent / "build" / "modules.json"
+    modules.parent.mkdir(exist_ok=True)
+    subprocess.run([sys.executable, str(HERE / "modules.py"), str(modules)], check=True)
+    npm(HERE, "run", "--silent", "site")
+
+
 def script(name: str, project: Path = HERE) -> None:
     install(project, tests=True)
     if name != "install":
@@ -118,6 +128,8 @@ def main(what: str, folder: str = str(HERE)) -> int:
             build()
         elif what == "sbom":
             npm(project, "sbom", "--sbom-format", "cyclonedx", "--package-lock-only", "--omit", "dev")
+        elif what == "site":
+            site()
         else:
             script(what, project)
     except NoNode as error:

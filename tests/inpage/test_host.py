@@ -14,7 +14,7 @@ from virtual_loop import VirtualLoop, run_virtually
 
 from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.inpage.editor import page_editor
+from steptwin.inpage.editor import PageEditor
 from steptwin.inpage.host import PageTwin
 from steptwin.studio.viewers import MOST_UNSENT
 from steptwin.subject.commands import VERSION
@@ -29,7 +29,7 @@ class Page:
         self.messages: list[dict[str, Any]] = []
         self.unread = 0
         self.events: list[tuple[str, int]] = []
-        self.errors: list[Exception] = []
+        self.errors: list[str] = []
         self._id = 0
 
     def opened(self, number: int) -> None:
@@ -39,22 +39,25 @@ class Page:
         self.messages.append(json.loads(text))
         check_message(self.messages[-1])
         if self.reads and self.twin is not None:
-            self.twin.viewers.taken(number, len(text))
+            self.twin.connections.taken(number, len(text))
         else:
             self.unread += len(text)
 
     def closed(self, number: int, code: int) -> None:
         self.events.append(("closed", code))
 
+    def failed(self, text: str) -> None:
+        self.errors.append(text)
+
     async def enter(self, number: int = 1) -> None:
         assert self.twin is not None
-        self.twin.viewers.open(number)
+        self.twin.connections.open(number)
         await self.ask("hello", number, version=VERSION, kinds=["plan", "status"])
 
     async def ask(self, name: str, number: int = 1, **fields: object) -> Any:
         assert self.twin is not None
         self._id += 1
-        self.twin.viewers.receive(number, json.dumps({"do": name, "id": self._id, **fields}))
+        self.twin.connections.receive(number, json.dumps({"do": name, "id": self._id, **fields}))
         for _ in range(100):
             await asyncio.sleep(0.01)
             for one in self.messages:
@@ -67,7 +70,7 @@ class Page:
 def make(page: Page, clock: Callable[[], Nanos] | None = None) -> PageTwin:
     loop = asyncio.get_running_loop()
     assert isinstance(loop, VirtualLoop)
-    page.twin = PageTwin(page, dedent(WORLD), {}, "hall", page.errors.append, clock or (lambda: loop.now_ns))
+    page.twin = PageTwin(page, "hall", dedent(WORLD), {}, clock or (lambda: loop.now_ns))
     page.twin.begin()
     return page.twin
 
@@ -88,7 +91,7 @@ def test_a_viewer_enters_moves_an_axis_and_leaves_while_the_world_goes_on() -> N
         await page.ask("move", controller="table", axis=1, to=20.0)
         await asyncio.sleep(2)
         assert [one["plan"] for one in page.messages if "events" in one for one in one["events"] if one["kind"] == "plan"]
-        twin.viewers.close(1)
+        twin.connections.close(1)
         await asyncio.sleep(0.1)
         assert page.events == [("opened", 1), ("closed", 1000)]
         before = twin.hub.around.moment().time
@@ -106,12 +109,12 @@ def test_a_page_that_takes_nothing_is_sent_no_more_than_may_be_unread() -> None:
         await page.enter()
         page.reads = False
         for _ in range(200):
-            twin.viewers.receive(1, json.dumps({"do": "describe"}))
+            twin.connections.receive(1, json.dumps({"do": "describe"}))
         await asyncio.sleep(1)
         assert MOST_UNSENT < page.unread < 2 * MOST_UNSENT
         was = page.unread
         page.reads = True
-        twin.viewers.taken(1, was)
+        twin.connections.taken(1, was)
         await page.ask("time")
 
     run_virtually(visit())
@@ -152,7 +155,7 @@ def test_a_world_that_cannot_keep_up_is_delayed_and_a_stop_is_answered_between_t
 def test_a_wrong_description_is_refused_with_its_place() -> None:
     async def visit() -> None:
         with pytest.raises(Misuse, match="hall"):
-            PageTwin(Page(), '[world]\nname = "hall"\n[[nonsense]]\n', {}, "hall", lambda _: None)
+            PageTwin(Page(), "hall", '[world]\nname = "hall"\n[[nonsense]]\n', {})
 
     run_virtually(visit())
 
@@ -164,7 +167,7 @@ def test_the_editor_server_answers_in_its_worker() -> None:
 
     async def visit() -> None:
         page = Editor()
-        editor = page_editor(page, {"steptwin:///table/P1.prg": b"a = 1\n"}, page.errors.append)
+        editor = PageEditor(page, {"steptwin:///table/P1.prg": b"a = 1\n"}).connections
         editor.open(1)
         editor.receive(1, json.dumps({"do": "hello", "token": None}))
         await asyncio.sleep(0.1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+import traceback
 from typing import Any, Protocol
 
 from steptwin.studio.guard import ServeSocket
@@ -22,15 +22,21 @@ class Page(Protocol):
         ...
 
     def closed(self, number: int, code: int) -> None: ...
+    def failed(self, text: str) -> None:
+        """An error in steptwin, which nobody asked for."""
+        ...
+
+
+def report(page: Page, error: Exception) -> None:
+    page.failed("".join(traceback.format_exception(error)))
 
 
 class Connections:
     """All connections of one page. ``serve`` serves one of them from its beginning to its end, in the running event loop."""
 
-    def __init__(self, serve: ServeSocket, page: Page, on_internal: Callable[[Exception], object]) -> None:
+    def __init__(self, serve: ServeSocket, page: Page) -> None:
         self._serve = serve
         self._page = page
-        self._on_internal = on_internal
         self._open: dict[int, _Connection] = {}
 
     def open(self, number: int) -> None:
@@ -42,7 +48,7 @@ class Connections:
             await self._serve({"type": "websocket"}, connection.receive, connection.send)
         except Exception as error:  # noqa: BLE001  it ends one connection, and is reported here only
             connection.code = INTERNAL
-            self._on_internal(error)
+            report(self._page, error)
         finally:
             del self._open[connection.number]
             self._page.closed(connection.number, connection.code)

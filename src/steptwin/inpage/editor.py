@@ -15,15 +15,15 @@ from steptwin.studio.editors import Editors
 T = TypeVar("T")
 
 
-def page_editor(
-    page: Page,
-    files: Mapping[str, bytes],
-    on_internal: Callable[[Exception], object],
-    clock: Callable[[], Nanos] = time.monotonic_ns,
-) -> Connections:
+class PageEditor:
     """Editor servers for ``files``: texts of a twin by address."""
-    editing = Editors(AccessGate(open_to=Role.ENGINEER), lambda: files, clock, _here)
-    return Connections(editing.serve, page, on_internal)
+
+    def __init__(
+        self, page: Page, files: Mapping[str, bytes | memoryview], clock: Callable[[], Nanos] = time.monotonic_ns
+    ) -> None:
+        given = {address: bytes(content) for address, content in files.items()}
+        editing = Editors(AccessGate(open_to=Role.ENGINEER), lambda: given, clock, _here)
+        self.connections = Connections(editing.serve, page)
 
 
 async def _here(call: Callable[[], T]) -> T:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 
 from steptwin import __version__
 from steptwin.access.audit import Audit
@@ -12,7 +14,7 @@ from steptwin.access.tokens import AccessGate
 from steptwin.controller import MILLISECOND, Nanos
 from steptwin.files.auditfile import wall_clock
 from steptwin.files.world import World
-from steptwin.inpage.connections import Connections, Page
+from steptwin.inpage.connections import Connections, Page, report
 from steptwin.live.clock import Clock
 from steptwin.live.pace import Pace
 from steptwin.live.realtimedriver import RealTimeDriver
@@ -32,27 +34,30 @@ class PageTwin:
     def __init__(
         self,
         page: Page,
-        text: str,
-        files: Mapping[str, bytes],
         name: str,
-        on_internal: Callable[[Exception], object],
+        text: str,
+        files: Mapping[str, bytes | memoryview],
         clock: Callable[[], Nanos] = time.monotonic_ns,
     ) -> None:
         """``text``: a description; ``files``: those that it names. Raises `WorldError` for a wrong description."""
-        self.world = world = World.from_toml(text, files, name=name)
+        self.world = world = World.from_toml(text, {file: bytes(content) for file, content in files.items()}, name=name)
         world.trace.let_go()
         live = LiveWorld(world)
         realtime = RealTimeDriver(live, Clock(wall_ns=clock, begin=world.now), SLICE_NS)
         self.pace = Pace(live, realtime, live.show, has_clients=False)
         shown = ShownWorld(live, realtime, self.pace, WorldControl(realtime, live, self.pace, None))
         around = shown.surroundings(
-            gate=AccessGate(open_to=Role.ENGINEER), audit=Audit(wall_clock), program=__version__, on_internal=on_internal
+            gate=AccessGate(open_to=Role.ENGINEER),
+            audit=Audit(wall_clock),
+            program=__version__,
+            on_internal=partial(report, page),
         )
         self.hub = Hub(shown.subject, shown.subject, around)
-        self.viewers = Connections(Viewers(self.hub, clock).serve, page, on_internal)
+        self.connections = Connections(Viewers(self.hub, clock).serve, page)
         self.texts: Callable[[], Mapping[str, bytes]] = around.programs.files
         """Texts of the programs at present, by address, for an editor server."""
 
     def begin(self) -> None:
         """Time goes from now on."""
+        gc.freeze()  # what is there from the start stays
         self.pace.begin(1.0)

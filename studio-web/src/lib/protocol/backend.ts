@@ -1,3 +1,5 @@
+import type { HelloMessage } from "./types";
+
 /** One connection to a studio, wherever that is. What it hands over is already read from JSON. */
 export interface Link {
   send(text: string): void;
@@ -16,9 +18,15 @@ export type OpenLink = (path: "/ws" | "/editor", events: LinkEvents) => Link;
 
 export type FileKind = "recordings" | "models" | "campaigns";
 
+/** Of a studio that is not there yet: its state at the beginning, as far as that is known; what is being loaded; why it cannot be. */
+export type Loading =
+  { foreseen: HelloMessage["hello"] } | { phase: "python" | "modules" | "world" } | { failed: string };
+
 /** The studio behind the page: a service, or a worker of the page. What it can do is in its hello, not here. */
 export interface Backend {
   open: OpenLink;
+  /** Tells how it is loaded, where that takes time. */
+  follow(listener: (loading: Loading) => void): void;
   /** Rejects with the words of the studio. */
   file(kind: FileKind, name: string): Promise<Blob>;
   /** An address at which the browser shows a file; null where it has to be fetched. */

@@ -37,6 +37,7 @@ const addressOf = (kind: FileKind, name: string) => `/api/${kind}/${name.split("
 /** The service that has sent the page. */
 export const served: Backend = {
   open,
+  follow: () => undefined,
   async file(kind, name) {
     const response = await fetch(addressOf(kind, name), { headers: tokenHeaders() });
     if (response.ok) return response.blob();

@@ -1,5 +1,6 @@
 import {
   Connection,
+  RequestError,
   saidOf,
   browserTimers,
   type ConnectionState,
@@ -8,7 +9,7 @@ import {
   type RequestName,
 } from "../protocol/connection";
 import type { Said } from "../../text";
-import type { Backend } from "../protocol/backend";
+import type { Backend, Loading } from "../protocol/backend";
 import type { Pushed, Requests, SubjectEvent } from "../protocol/types";
 import { AxisState } from "./axis.svelte";
 import { WorldClock, type Pace } from "./clock";
@@ -75,6 +76,8 @@ const NOTICE_MS = 8000;
 /** What the page knows of the studio, and what it asks of it. */
 export class Studio {
   link = $state<ConnectionState>("connecting");
+  /** Of a studio that is not there yet; null with the first state that comes from it. */
+  loading = $state.raw<Exclude<Loading, { foreseen: unknown }> | null>(null);
   /** Why the studio did not accept this page. */
   refusal = $state.raw<Said>({ text: "" });
   hello = $state.raw<Hello | null>(null);
@@ -125,7 +128,10 @@ export class Studio {
     greeting: () => Fields<"hello">,
   ) {
     const events = {
-      hello: (hello: Hello, isNewConnection: boolean) => this.greeted(hello, isNewConnection),
+      hello: (hello: Hello, isNewConnection: boolean) => {
+        this.loading = null;
+        this.greeted(hello, isNewConnection);
+      },
       pushed: (messages: readonly Pushed[]) => messages.forEach((message) => this.pushed(message)),
       state: (state: ConnectionState, why: Said) => {
         this.link = state;
@@ -133,6 +139,10 @@ export class Studio {
       },
     };
     const first = () => ({ ...greeting(), kinds: [...SUBSCRIBED] });
+    backend.follow((loading) => {
+      if (!("foreseen" in loading)) this.loading = loading;
+      else if (this.hello === null) this.greeted(loading.foreseen, false);
+    });
     this.connection = new Connection(first, events, backend.open, browserTimers);
   }
 
@@ -175,7 +185,7 @@ export class Studio {
 
   /** Whether the role of this viewer permits a request, and the studio can do it here and now. */
   may(name: RequestName): boolean {
-    return (this.timeTravel.past ?? this.hello)?.may.includes(name) ?? false;
+    return this.loading === null && ((this.timeTravel.past ?? this.hello)?.may.includes(name) ?? false);
   }
 
   /** Whether a request is possible only after a token has been given. */
@@ -210,7 +220,12 @@ export class Studio {
     }
   }
 
+  /** What is asked while the studio is being loaded is asked again when it is there. */
   report(error: unknown): void {
+    if (this.loading === null || !(error instanceof RequestError && error.code === "closed")) this.complain(error);
+  }
+
+  private complain(error: unknown): void {
     this.show({ ...saidOf(error), kind: "error", lang: "en" });
   }
 
@@ -225,7 +240,7 @@ export class Studio {
     this.stops++;
     const asked = this.link === "refused" ? this.backend.stopAll() : this.ask("stop_all", {});
     asked.catch((error: unknown) => {
-      this.report(error);
+      this.complain(error);
       clearTimeout(this.noticeTimer); // something still moves: it stays until it is closed
     });
   }

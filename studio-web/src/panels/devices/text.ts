@@ -3,6 +3,7 @@ import { texts } from "../../text";
 export const t = texts(
   {
     title: "Devices",
+    notHere: "No devices here: they need the studio on a computer, steptwin studio.",
     explained:
       "A device is connected by its address. Nothing moves by it. Before the first write its settings are kept in a file.",
     needToken:
@@ -74,6 +75,7 @@ export const t = texts(
   },
   {
     title: "Urządzenia",
+    notHere: "Nie ma tu urządzeń: potrzebne jest studio na komputerze, steptwin studio.",
     explained:
       "Urządzenie łączy się przez adres. Nic się przy tym nie rusza. Przed pierwszym zapisem ustawienia trafiają do pliku.",
     needToken:

@@ -3,6 +3,7 @@ import { texts } from "../../text";
 export const t = texts(
   {
     title: "Recordings",
+    notHere: "No recordings here: they are files of a computer, and need steptwin studio there.",
     now: "What is recorded now",
     recording: "Recording",
     recordingMeaning:
@@ -42,6 +43,7 @@ export const t = texts(
   },
   {
     title: "Nagrania",
+    notHere: "Nie ma tu nagrań: są plikami komputera i wymagają tam steptwin studio.",
     now: "Co jest teraz nagrywane",
     recording: "Nagranie",
     recordingMeaning: "Co przyszło z zewnątrz od początku. Powtórzone daje w każdej chwili tę samą maszynę.",

@@ -1,0 +1,64 @@
+"""Lists the modules that the studio inside a page can reach, and its world, in a file: ``python studio-web/modules.py FILE``."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+from importlib.metadata import files, packages_distributions, version
+from pathlib import Path
+
+import grimp
+
+ROOT = Path(__file__).resolve().parents[1]
+SOURCE = ROOT / "src"
+HOSTS = ("steptwin.inpage.host", "steptwin.inpage.editor")
+OF_EDITOR = ("pygls", "lsprotocol", "attr", "attrs", "cattr", "cattrs", "typing_extensions")
+"""Libraries of the editor server; they are in Python alone."""
+PYODIDE = """Pyodide, under the Mozilla Public License 2.0, https://www.mozilla.org/MPL/2.0/, as it was published; its source is
+at https://github.com/pyodide/pyodide. It has CPython in it, under the PSF License Agreement, https://docs.python.org/3/license.html"""
+DEMO = SOURCE / "steptwin" / "live" / "studio" / "demo_machine"
+
+
+def own() -> dict[str, str]:
+    """Path of each module in the archive, and on the disk."""
+    graph = grimp.build_graph("steptwin")
+    found = {name for host in HOSTS for name in (host, *graph.find_upstream_modules(host))}
+    found |= {name.rpartition(".")[0] for name in found} - {""}
+    paths = [SOURCE / name.replace(".", "/") for name in found]
+    files = [path / "__init__.py" if path.is_dir() else path.with_suffix(".py") for path in paths]
+    return {path.relative_to(SOURCE).as_posix(): str(path) for path in sorted(files)}
+
+
+def libraries() -> dict[str, str]:
+    found: dict[str, str] = {}
+    for name in OF_EDITOR:
+        spec = importlib.util.find_spec(name)
+        if spec is None or spec.origin is None:
+            raise SystemExit(f"{name} is not installed: make extras")
+        origin = Path(spec.origin)
+        files = origin.parent.rglob("*.py") if origin.name == "__init__.py" else [origin]
+        root = origin.parent.parent if origin.name == "__init__.py" else origin.parent
+        found |= {path.relative_to(root).as_posix(): str(path) for path in sorted(files)}
+    return found
+
+
+def licences() -> str:
+    """Texts of the libraries' licences, and where those of Pyodide and its parts are."""
+    named = sorted({dist for name in OF_EDITOR for dist in packages_distributions()[name]})
+    texts = [
+        f"{name} {version(name)}\n\n{path.read_text()}" for name in named for path in files(name) or () if "LICEN" in path.name
+    ]
+    return "\n\n----\n\n".join([PYODIDE, *texts])
+
+
+def main(target: str) -> None:
+    programs = {path.name: str(path) for path in DEMO.glob("*.prg")}
+    world = {"name": "demo", "path": str(DEMO / "demo.toml"), "files": programs}
+    archives = {"steptwin.zip": own(), "editor.zip": libraries()}
+    text = json.dumps({"archives": archives, "world": world, "licences": licences()})
+    Path(target).write_text(text, "utf-8")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

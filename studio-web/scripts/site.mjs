@@ -1,0 +1,75 @@
+// Makes what the studio inside a page needs beside its page: `node scripts/site.mjs MODULES.json FOLDER`. Pyodide, whose own Python
+// compiles the modules, and the whole state at the beginning, which the page shows before Python is there.
+import { copyFileSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
+import { loadPyodide } from "pyodide";
+
+const [modules, folder] = process.argv.slice(2);
+const { archives, world, licences } = JSON.parse(readFileSync(modules, "utf-8"));
+const installed = new URL("../node_modules/pyodide/", import.meta.url);
+
+mkdirSync(`${folder}/python`, { recursive: true });
+for (const name of ["pyodide.mjs", "pyodide.asm.mjs", "pyodide.asm.wasm", "python_stdlib.zip"])
+  copyFileSync(new URL(name, installed), `${folder}/python/${name}`);
+writeFileSync(`${folder}/python/licences.txt`, licences);
+// Of the packages that Pyodide has besides none is used.
+const lock = JSON.parse(readFileSync(new URL("pyodide-lock.json", installed), "utf-8"));
+writeFileSync(`${folder}/python/pyodide-lock.json`, JSON.stringify({ ...lock, packages: {} }));
+
+const python = await loadPyodide();
+python.FS.mkdirTree("/sources");
+const pack = python.runPython(`
+import io, os, py_compile, zipfile
+
+def pack(files):
+    """An archive of compiled modules, whose times are always the same."""
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+        for name, source in files.to_py().items():
+            with open("/sources/module.py", "w", encoding="utf-8") as file:
+                file.write(source)
+            py_compile.compile("/sources/module.py", "/sources/module.pyc", dfile=name, doraise=True, optimize=2,
+                               invalidation_mode=py_compile.PycInvalidationMode.UNCHECKED_HASH)
+            with open("/sources/module.pyc", "rb") as file:
+                archive.writestr(zipfile.ZipInfo(name + "c", (1980, 1, 1, 0, 0, 0)), file.read(), zipfile.ZIP_DEFLATED)
+    return made.getvalue()
+
+pack`);
+for (const [archive, files] of Object.entries(archives)) {
+  const sources = Object.fromEntries(Object.entries(files).map(([name, path]) => [name, readFileSync(path, "utf-8")]));
+  const packed = pack(sources);
+  const bytes = packed.toJs();
+  writeFileSync(`${folder}/python/${archive}`, bytes);
+  python.FS.writeFile(`/${archive}`, bytes);
+  python.runPython(`import sys; sys.path.append("/${archive}")`);
+}
+
+// The same way as in the page (src/site/python.worker.ts), with one request.
+const messages = [];
+const page = {
+  opened: () => undefined,
+  send: (_number, text) => messages.push(JSON.parse(text)),
+  closed: () => undefined,
+  failed: (text) => {
+    throw new Error(text);
+  },
+};
+const files = Object.fromEntries(
+  Object.entries(world.files).map(([name, path]) => [name, new Uint8Array(readFileSync(path))]),
+);
+const text = readFileSync(world.path, "utf-8");
+const { PageTwin } = python.pyimport("steptwin.inpage.host");
+const twin = PageTwin(page, world.name, text, python.toPy(files));
+twin.connections.open(1);
+twin.connections.receive(
+  1,
+  JSON.stringify({ do: "hello", version: python.pyimport("steptwin.subject.commands").VERSION, id: 1 }),
+);
+while (!messages.some((message) => "hello" in message)) await new Promise((done) => setTimeout(done, 20));
+const { hello } = messages.find((message) => "hello" in message);
+mkdirSync(`${folder}/world`, { recursive: true });
+writeFileSync(`${folder}/world/${world.name}.hello.json`, JSON.stringify(hello));
+writeFileSync(`${folder}/world/${world.name}.toml`, text);
+for (const [name, bytes] of Object.entries(files)) writeFileSync(`${folder}/world/${name}`, bytes);
+// Last: it says that all is there.
+writeFileSync(`${folder}/world/${world.name}.json`, JSON.stringify({ files: Object.keys(files) }));
+process.exit(0);

@@ -1,0 +1,130 @@
+import type { Backend, FileKind, Link, LinkEvents, Loading, OpenLink } from "../lib/protocol/backend";
+import { errorOf, type Hello } from "../lib/protocol/connection";
+import type { Answer } from "../lib/protocol/types";
+import type { FromWorker, Task, Texts, ToWorker } from "./messages";
+
+/** A worker with Python in it. It goes on when a connection to it ends. */
+class PythonWorker {
+  private readonly worker = new Worker(new URL("./python.worker.ts", import.meta.url), { type: "module" });
+  private readonly links = new Map<number, LinkEvents>();
+  private readonly asked: ((texts: Texts) => void)[] = [];
+  private next = 1;
+
+  constructor(
+    root: URL,
+    task: Promise<Task>,
+    private readonly loading: (loading: Loading) => void,
+  ) {
+    this.worker.onmessage = ({ data }: MessageEvent<FromWorker>) => this.take(data);
+    this.worker.onerror = ({ message }) => this.fail(message);
+    task.then(
+      (start) => this.tell({ start, root: root.href }),
+      (error: unknown) => this.fail(error instanceof Error ? error.message : String(error)),
+    );
+  }
+
+  open(events: LinkEvents): Link {
+    const number = this.next++;
+    this.links.set(number, events);
+    this.tell({ open: number });
+    return { send: (send) => this.tell({ send, on: number }), close: () => this.tell({ close: number }) };
+  }
+
+  texts(): Promise<Texts> {
+    this.tell({ texts: true });
+    return new Promise((done) => this.asked.push(done));
+  }
+
+  private tell(message: ToWorker): void {
+    this.worker.postMessage(message);
+  }
+
+  private fail(failed: string): void {
+    this.loading({ failed });
+  }
+
+  private take(message: FromWorker): void {
+    if ("messages" in message) {
+      this.links.get(message.on)?.messages(message.messages);
+      this.tell({ taken: message.on });
+    } else if ("opened" in message) this.links.get(message.opened)?.opened();
+    else if ("closed" in message) {
+      const events = this.links.get(message.closed);
+      this.links.delete(message.closed);
+      events?.closed(message.code);
+    } else if ("texts" in message) this.asked.shift()?.(message.texts);
+    else if ("progress" in message) this.loading({ phase: message.progress });
+    else this.fail(message.failed);
+  }
+}
+
+/** The studio inside the page: a twin in one worker, and the editor server in another one when it is asked for. */
+export class InPage implements Backend {
+  private readonly twin: PythonWorker;
+  private editor: PythonWorker | null = null;
+  private tellLoading: (loading: Loading) => void = () => undefined;
+
+  /** `root`: where the page is; `name`: of its world. */
+  constructor(
+    private readonly root: URL,
+    private readonly name: string,
+  ) {
+    this.twin = new PythonWorker(root, this.task(), (loading) => this.tellLoading(loading));
+  }
+
+  follow(listener: (loading: Loading) => void): void {
+    this.tellLoading = listener;
+    this.get(`${this.name}.hello.json`).then(
+      async (response) => this.tellLoading({ foreseen: (await response.json()) as Hello }),
+      () => undefined, // it will come from the twin
+    );
+  }
+
+  open: OpenLink = (path, events) => {
+    if (path === "/ws") return this.twin.open(events);
+    this.editor ??= new PythonWorker(
+      this.root,
+      this.twin.texts().then((editor): Task => ({ editor })),
+      (loading) => "failed" in loading && this.tellLoading(loading),
+    );
+    return this.editor.open(events);
+  };
+
+  file(kind: FileKind, name: string): Promise<Blob> {
+    return Promise.reject(new Error(`${kind}: no file ${name} in a page`));
+  }
+
+  address(): null {
+    return null;
+  }
+
+  stopAll(): Promise<void> {
+    return new Promise((done, failed) => {
+      const link = this.twin.open({
+        opened: () => link.send('{"do":"stop_all"}'),
+        messages: ([answer]) => {
+          link.close();
+          const { error } = answer as Answer;
+          if (error) failed(errorOf(error));
+          else done();
+        },
+        closed: () => failed(new Error("the worker of the twin has ended")),
+      });
+    });
+  }
+
+  private async task(): Promise<Task> {
+    const { files } = (await (await this.get(`${this.name}.json`)).json()) as { files: string[] };
+    const text = await (await this.get(`${this.name}.toml`)).text();
+    const contents = files.map(
+      async (file) => [file, new Uint8Array(await (await this.get(file)).arrayBuffer())] as const,
+    );
+    return { twin: { name: this.name, text, files: Object.fromEntries(await Promise.all(contents)) } };
+  }
+
+  private async get(file: string): Promise<Response> {
+    const response = await fetch(new URL(`world/${file}`, this.root));
+    if (!response.ok) throw new Error(`${response.url}: ${response.status} ${response.statusText}`);
+    return response;
+  }
+}

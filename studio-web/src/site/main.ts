@@ -1,0 +1,4 @@
+import { start } from "../start";
+import { InPage } from "./inpage";
+
+start(new InPage(new URL(".", document.baseURI), "demo"));

@@ -1,0 +1,126 @@
+import type { PyodideInterface } from "pyodide";
+import type { PyProxy } from "pyodide/ffi";
+import { Batches } from "../lib/protocol/batches";
+import type { FromWorker, Phase, Task, Texts, ToWorker } from "./messages";
+
+/** `steptwin.inpage.connections.Connections`. */
+interface Connections {
+  open(number: number): void;
+  receive(number: number, text: string): void;
+  taken(number: number, size: number): void;
+  close(number: number): void;
+}
+
+/** `steptwin.inpage.editor.PageEditor`. */
+interface Editor {
+  connections: Connections;
+}
+
+/** `steptwin.inpage.host.PageTwin`. */
+interface Twin extends Editor {
+  begin(): void;
+  texts(): PyProxy;
+}
+
+const BOUND = 5000;
+const tell = (message: FromWorker) => self.postMessage(message);
+const during = (progress: Phase) => tell({ progress });
+
+/** What waits for the page to take it, by connection. */
+class Outgoing {
+  private size = 0;
+  private handed = 0;
+  private readonly batches: Batches<unknown>;
+
+  constructor(private readonly on: number) {
+    this.batches = new Batches((messages) => {
+      [this.handed, this.size] = [this.size, 0];
+      tell({ messages, on: this.on });
+    }, BOUND);
+  }
+
+  add(text: string): void {
+    this.size += text.length;
+    this.batches.add(JSON.parse(text));
+  }
+
+  /** Gives how many characters that were. */
+  taken(): number {
+    const size = this.handed;
+    this.batches.taken();
+    return size;
+  }
+}
+
+const outgoing = new Map<number, Outgoing>();
+
+/** `steptwin.inpage.connections.Page`. */
+const page = {
+  opened: (number: number) => tell({ opened: number }),
+  send: (number: number, text: string) => outgoing.get(number)?.add(text),
+  closed: (number: number, code: number) => {
+    outgoing.delete(number);
+    tell({ closed: number, code });
+  },
+  failed: (text: string) => console.error(text),
+};
+
+let host: Twin | Editor | null = null;
+let waiting: ToWorker[] = [];
+
+async function start(task: Task, root: string): Promise<void> {
+  during("python");
+  const python = `${root}python/`;
+  const { loadPyodide } = (await import(/* @vite-ignore */ `${python}pyodide.mjs`)) as typeof import("pyodide");
+  const archives = "twin" in task ? ["steptwin.zip"] : ["steptwin.zip", "editor.zip"];
+  const [pyodide, ...files] = await Promise.all([
+    loadPyodide({ indexURL: python }) as Promise<PyodideInterface>,
+    ...archives.map((name) => bytesOf(python + name)),
+  ]);
+  during("modules");
+  archives.forEach((name, i) => {
+    pyodide.FS.writeFile(`/${name}`, files[i] as Uint8Array);
+    pyodide.runPython(`import sys; sys.path.append("/${name}")`);
+  });
+  const room = pyodide.pyimport("twin" in task ? "steptwin.inpage.host" : "steptwin.inpage.editor");
+  during("world");
+  if ("twin" in task) {
+    const { name, text, files } = task.twin;
+    const twin: Twin = room.PageTwin(page, name, text, pyodide.toPy(files));
+    twin.begin();
+    host = twin;
+  } else {
+    host = room.PageEditor(page, pyodide.toPy(task.editor)) as Editor;
+  }
+  for (const message of waiting) take(host, message);
+  waiting = [];
+}
+
+async function bytesOf(address: string): Promise<Uint8Array> {
+  const response = await fetch(address);
+  if (!response.ok) throw new Error(`${address}: ${response.status} ${response.statusText}`);
+  return new Uint8Array(await response.arrayBuffer());
+}
+
+function take(host: Twin | Editor, message: ToWorker): void {
+  const { connections } = host;
+  if ("open" in message) {
+    outgoing.set(message.open, new Outgoing(message.open));
+    connections.open(message.open);
+  } else if ("send" in message) connections.receive(message.on, message.send);
+  else if ("taken" in message) {
+    const size = outgoing.get(message.taken)?.taken();
+    if (size !== undefined) connections.taken(message.taken, size);
+  } else if ("close" in message) connections.close(message.close);
+  else if ("texts" in message && "texts" in host)
+    tell({ texts: host.texts().toJs({ dict_converter: Object.fromEntries }) as Texts });
+}
+
+self.onmessage = ({ data }: MessageEvent<ToWorker>) => {
+  if ("start" in data) {
+    start(data.start, data.root).catch((error: unknown) => {
+      tell({ failed: error instanceof Error ? error.message : String(error) });
+    });
+  } else if (host === null) waiting.push(data);
+  else take(host, data);
+};

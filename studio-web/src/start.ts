@@ -1,0 +1,14 @@
+import { mount } from "svelte";
+import App from "./App.svelte";
+import "./app.css";
+import "./fonts.css";
+import type { Backend } from "./lib/protocol/backend";
+import { restoreTheme } from "./lib/state/theme.svelte";
+import { restoreLanguage } from "./text";
+
+/** The page, with the studio behind it. */
+export function start(backend: Backend): void {
+  restoreLanguage();
+  restoreTheme();
+  mount(App, { target: document.getElementById("app") as HTMLElement, props: { backend } });
+}

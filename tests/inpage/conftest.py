@@ -1,0 +1,54 @@
+"""The site as `make site` builds it, at a static web server below a path, with the policy in each answer."""
+
+from __future__ import annotations
+
+import functools
+import os
+import threading
+from collections.abc import Iterator
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import pytest
+
+from steptwin.studio.guard import POLICY
+
+ROOT = Path(__file__).parents[2]
+TRY = ROOT / "build/site/try"
+SITE_POLICY = POLICY.replace("script-src 'self'", "script-src 'self' 'wasm-unsafe-eval'")
+
+
+class _Handler(SimpleHTTPRequestHandler):
+    def end_headers(self) -> None:
+        self.send_header("content-security-policy", SITE_POLICY)
+        self.send_header("x-content-type-options", "nosniff")
+        super().end_headers()
+
+    def log_message(self, format: str, *arguments: object) -> None:  # noqa: A002  that of the library
+        """Nobody reads it."""
+
+
+@pytest.fixture(scope="session")
+def built() -> Path:
+    """The folder with the page; skipped where it has not been built, an error where a source of it is newer."""
+    made = TRY / "world/demo.json"
+    if not made.exists():
+        if os.environ.get("STEPTWIN_REQUIRE_PEERS") == "1":
+            pytest.fail("build/site has not been built: run 'make site'", pytrace=False)
+        pytest.skip("build/site has not been built: run 'make site'")
+    sources = [*(ROOT / "src/steptwin/inpage").glob("*.py"), *(ROOT / "studio-web/src/site").iterdir()]
+    for source in sources:
+        if source.stat().st_mtime > made.stat().st_mtime:
+            pytest.fail(f"{source.relative_to(ROOT)} is newer than build/site: run 'make site'", pytrace=False)
+    return TRY
+
+
+@pytest.fixture(scope="module")
+def address(built: Path) -> Iterator[str]:
+    serving = ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(_Handler, directory=built.parents[1]))
+    thread = threading.Thread(target=serving.serve_forever)
+    thread.start()
+    yield f"http://127.0.0.1:{serving.server_port}/{built.parent.name}/{built.name}/"
+    serving.shutdown()
+    thread.join()
+    serving.server_close()
