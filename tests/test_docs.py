@@ -12,6 +12,9 @@ import pytest
 ROOT = Path(__file__).parent.parent
 ROW = re.compile(r"^\| ((?:MIC|WBC|M)-\d+) \|", re.MULTILINE)
 PREFIXES = ("MIC", "WBC", "M")
+LOOKED_UP = ("reference/", "elements/", "adr/", "assumptions.md", "control.md", "studio-protocol.md")
+"""Pages and folders in which one looks something up; all others are read."""
+MOST_WORDS = 1200
 
 
 def rows(prefix: str) -> list[str]:
@@ -64,3 +67,9 @@ def test_names_in_docstrings_exist() -> None:
     assert {name: file for name, file in cited.items() if not exists(name)} == {}
     assert not exists("steptwin.controller.WirePort")
     assert not exists("steptwin.room.Port")
+
+
+def test_pages_that_are_read_are_short() -> None:
+    pages = {path.relative_to(ROOT / "docs").as_posix(): path for path in (ROOT / "docs").rglob("*.md")}
+    words = {name: len(path.read_text().split()) for name, path in pages.items() if not name.startswith(LOOKED_UP)}
+    assert {name: count for name, count in words.items() if count > MOST_WORDS} == {}
