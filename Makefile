@@ -49,7 +49,7 @@ help:  ## Show the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-8s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
 run: $(RUN_STAMP)  ## Show a demo machine in the browser (ARGS="MACHINE.toml --speed 0.5 ...": options of steptwin studio)
-	@$(MAKE) --no-print-directory page || echo "the page of the studio could not be built; the service runs without it" >&2
+	@$(MAKE) --silent --no-print-directory page || echo "the page of the studio could not be built; the service runs without it" >&2
 	@exec $(BIN)/steptwin studio $(ARGS)
 
 test: $(DEV_STAMP) $(WEB_STAMP) $(PAGE) $(SITE) $(EXTENSION_STAMP) $(CLIENTS_STAMP)  ## Run the tests (ARGS="-k mic_7 ..."); peers that are missing are skipped

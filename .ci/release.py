@@ -27,12 +27,13 @@ def problems() -> list[str]:
     """Why this tree is no release."""
     own = version()
     found = []
-    newest = re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.MULTILINE)
-    if newest is None or newest[1] != own:
-        found.append(f"the newest version in CHANGELOG.md is {newest and newest[1]}, that of the package {own}")
-    extension = json.loads((ROOT / "editors/vscode/package.json").read_text("utf-8"))["version"]
-    if extension != own:
-        found.append(f"the version in editors/vscode/package.json is {extension}, that of the package {own}")
+    newest = re.search(r"^## (.*)", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.MULTILINE)
+    if newest is None or not re.fullmatch(rf"{re.escape(own)} - \d{{4}}-\d\d-\d\d", newest[1]):
+        found.append(f"the newest chapter of CHANGELOG.md is '{newest and newest[1]}', expected '{own} - YYYY-MM-DD'")
+    for name in ("package.json", "package-lock.json"):
+        extension = json.loads((ROOT / "editors/vscode" / name).read_text("utf-8"))["version"]
+        if extension != own:
+            found.append(f"the version in editors/vscode/{name} is {extension}, that of the package {own}")
     if (ROOT / ".git").exists():
         changed = subprocess.run(["git", "status", "--porcelain"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
         if changed:
@@ -41,8 +42,14 @@ def problems() -> list[str]:
 
 
 def finish(folder: Path) -> None:
-    """Try the wheel in an environment of its own with the examples of the source archive, and write SHA256SUMS."""
+    """Try the wheel in an environment of its own with the examples of the source archive, name the release in the lists of
+    components, and write SHA256SUMS."""
     own = version()
+    for part in ("python", "page"):
+        path = folder / f"steptwin-{own}-{part}.cdx.json"
+        listed = json.loads(path.read_text("utf-8"))
+        listed["metadata"]["component"] |= {"name": "steptwin" if part == "python" else "steptwin-studio", "version": own}
+        path.write_text(json.dumps(listed, indent=2) + "\n", "utf-8")
     wheel, archive = folder / f"steptwin-{own}-py3-none-any.whl", folder / f"steptwin-{own}.tar.gz"
     with tempfile.TemporaryDirectory() as name:
         venv.create(Path(name, "env"), with_pip=True)
