@@ -23,7 +23,7 @@ from steptwin.live.studio.demo import FOLDER, describe_demo
 from steptwin.studio.page import find_page
 
 ALONG, ACROSS = 20, 15
-PICTURES = 300
+PICTURES = 1000
 RUNS = 5
 UPDATE_GOAL_MS = 4.0
 DRAWING_GOAL_S = 1.0

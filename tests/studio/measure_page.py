@@ -92,77 +92,6 @@ def studio(text: str) -> Generator[str]:
                 process.terminate()
 
 
-WORKPIECES = 20, 15
-PICTURES = 300
-KEEP = """window.ask = window.requestAnimationFrame.bind(window);
-window.requestAnimationFrame = (draw) => { window.draw = draw; return window.isMeasured ? 1 : window.ask(draw); };"""
-DRAW = """async (count) => {
-  const spent = [];
-  window.isMeasured = true;
-  for (let n = 0; n < count; n++) {
-    await new Promise((done) => setTimeout(done, 33));
-    const begin = performance.now();
-    window.draw(begin);
-    spent.push(performance.now() - begin);
-  }
-  window.isMeasured = false;
-  window.ask(window.draw);
-  return spent;
-}"""
-
-
-def magazine() -> str:
-    """Workpieces that an axis moves, all at once."""
-    along, across = WORKPIECES
-    return f"""[world]
-name = "magazine"
-[[line]]
-name = "bus"
-kind = "modbus"
-tcp = "127.0.0.1:0"
-[[mic488]]
-name = "table"
-line = "bus"
-[mic488.M1]
-unit = "mm"
-gear = 100.0
-vel = 200.0
-[[axis]]
-name = "x"
-drive = "table.M1"
-unit = "mm"
-pulses_per_unit = 100
-travel = [0.0, 10000.0]
-at = [0, 0, 100]
-[[nest]]
-name = "tray"
-on = "x"
-at = [0, 0, 50]
-cells = [{along}, {across}]
-pitch = [50, 50]
-workpiece = [40, 30, 20]
-filled = {along * across}
-[[script]]
-name = "go"
-at = "0 s"
-steps = [{{ write = {{ "table.M1_EN" = 1 }} }}, {{ write = {{ "table.M1_POS_ABS" = 9900 }} }}]
-"""
-
-
-def workpieces(page: Page, url: str) -> None:
-    """What the code of the page takes for a picture in which all of them move; in three dimensions with the calls of WebGL."""
-    page.add_init_script(KEEP)
-    page.goto(url)
-    show(page, "Machine")
-    page.wait_for_timeout(3000)
-    for what in ("drawing", "three dimensions"):
-        spent = sorted(page.evaluate(DRAW, PICTURES))
-        count, most = page.locator("svg .piece").count(), spent[int(0.95 * PICTURES)]
-        print(f"{what} of {count} workpieces: median {statistics.median(spent):.1f} ms, p95 {most:.1f} ms")
-        page.get_by_role("button", name="3D", exact=True).click()
-        page.wait_for_timeout(5000)
-
-
 def show(page: Page, panel: str) -> None:
     page.get_by_role("navigation").get_by_role("button", name=panel, exact=True).click()
 
@@ -249,8 +178,6 @@ def main() -> None:
             page.wait_for_timeout(2000)
             pictures(page, f"{CONTROLLERS} controllers, scope with {CURVES} curves")
             page.close()
-        with studio(magazine()) as url:
-            workpieces(browser.new_page(viewport={"width": 1920, "height": 1080}, locale="en-US"), url)
         browser.close()
 
 
