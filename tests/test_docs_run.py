@@ -36,6 +36,7 @@ NOT_RUN = {
     "docs/studio.md": ["it goes on until Ctrl-C"],
     "docs/studio/devices.md": ["needs devices"],
     "docs/studio/rest.md": ["needs a running studio; tests/studio/test_examples.py does it"] * 2,
+    "docs/studio/site.md": ["it builds for half a minute"],
     "docs/studio/time.md": ["it goes on until Ctrl-C"],
     "docs/testing.md": ["needs devices"],
     "docs/tutorials/device.md": ["needs a device"],
