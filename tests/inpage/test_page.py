@@ -89,3 +89,12 @@ def test_all_examples_have_the_digests_of_cpython(built: Path, require_node: Non
     )
     assert ran.returncode == 0, ran.stderr
     assert json.loads(ran.stdout) == expected
+
+
+def test_a_part_that_the_server_does_not_give_is_named(address: str, browser: Browser) -> None:  # noqa: F811
+    context = browser.new_context(locale="en-US")
+    context.route("**/steptwin.zip", lambda route: route.fulfill(status=404))
+    page = context.new_page()
+    page.goto(address)
+    expect(page.get_by_role("status").first).to_contain_text(re.compile(r"could not be loaded: .*/python/steptwin\.zip: 404"))
+    context.close()

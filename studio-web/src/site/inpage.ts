@@ -9,6 +9,7 @@ class PythonWorker {
   private readonly links = new Map<number, LinkEvents>();
   private readonly asked: ((texts: Texts) => void)[] = [];
   private next = 1;
+  private hasFailed = false;
 
   constructor(
     root: URL,
@@ -25,7 +26,8 @@ class PythonWorker {
 
   open(events: LinkEvents): Link {
     const number = this.next++;
-    this.links.set(number, events);
+    if (this.hasFailed) queueMicrotask(() => events.closed(0));
+    else this.links.set(number, events);
     this.tell({ open: number });
     return { send: (send) => this.tell({ send, on: number }), close: () => this.tell({ close: number }) };
   }
@@ -39,8 +41,13 @@ class PythonWorker {
     this.worker.postMessage(message);
   }
 
+  /** All that is connected to it has lost its connection, and gets no other one. */
   private fail(failed: string): void {
+    this.hasFailed = true;
+    this.worker.terminate();
     this.loading({ failed });
+    for (const events of this.links.values()) events.closed(0);
+    this.links.clear();
   }
 
   private take(message: FromWorker): void {
@@ -85,7 +92,7 @@ export class InPage implements Backend {
     this.editor ??= new PythonWorker(
       this.root,
       this.twin.texts().then((editor): Task => ({ editor })),
-      (loading) => "failed" in loading && this.tellLoading(loading),
+      () => undefined, // the twin goes on without it, and the panel says that there is no help
     );
     return this.editor.open(events);
   };
