@@ -93,7 +93,7 @@ def test_answers_are_those_of_what_is_noted_from_the_beginning() -> None:
             assert (found.state, found.since) == (expected.state, expected.since), (question, at)
             assert found.links[:2] == expected.links[:2], (question, at)
             if expected.since is None:
-                assert (found.known_from, found.is_cut, found.is_complete) == (0, False, True), question
+                assert (found.known_from, found.is_cut, found.is_complete) == (0, False, expected.is_complete), question
 
 
 def test_flags_of_a_chip_are_set_without_an_event() -> None:
@@ -125,9 +125,10 @@ def test_an_unchanged_part_of_the_past_is_not_run_again(monkeypatch: pytest.Monk
     assert finish(past.asking("m.IN1")).since == 1_100 * MILLISECOND
     assert len(runs) <= 1
     assert finish(past.asking("m.M2_DEC")).since is None
-    assert len(runs) == 3, "near inputs it might"
+    assert len(runs) <= 3, "near inputs it might"
+    runs.clear()
     assert finish(past.asking("m.M2_DEC")).since is None
-    assert len(runs) == 3
+    assert runs == []
 
 
 def test_a_search_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:

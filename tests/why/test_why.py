@@ -96,7 +96,7 @@ def test_names_of_registers_in_the_program() -> None:
     with pytest.raises(Misuse, match="no signal '\\$R11'"):
         world.why("$R11")
     for name in ("n", "m.n"):
-        with pytest.raises(Misuse, match=f"^{name} is a variable of the program of m: a question is about a signal or register"):
+        with pytest.raises(Misuse, match=f"^{name} is a variable of the program of m: ask about it alone"):
             world.why(f"{name} > 1")
 
 

@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from steptwin.controller import SECOND, Nanos
-from steptwin.messages import Message, MessageText, text_of
+from steptwin.messages import Message, MessageText
 from steptwin.motion.divisions import profile_of
 from steptwin.simulation.components.touch import JAM
 from steptwin.simulation.faults.kinds_physics import IS_BLOCKED, LOSES_PULSES
@@ -19,7 +19,7 @@ from steptwin.simulation.script import steps as do
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, covered, unknown
 from steptwin.why.controllers import acted
-from steptwin.why.log import JAMS, LAST, OF_MECHANICS, Change
+from steptwin.why.log import JAMS, LAST, OF_MECHANICS, Change, words_of
 
 if TYPE_CHECKING:
     from steptwin.why.causes import Causes
@@ -92,6 +92,8 @@ class AxisCauses:
         if is_unpowered:
             return power
         lost = self._lost_by_fault(axis, until, before, LOSES_PULSES)
+        if motion is None and lost is None:
+            return self._ignored(axis, until, before)
         is_last = lost is not None and (motion is None or (motion.cover is None and lost.place > motion.place))
         return lost if is_last else motion
 
@@ -100,6 +102,14 @@ class AxisCauses:
         power = self._world.axes[axis].spec.power
         found = None if power is None else self._all.last((self._all.name(PinName(*power)),), until, GIVES_POWER(axis=axis))
         return covered(found, Cover.MOTION)
+
+    def _ignored(self, axis: str, until: Nanos, before: int) -> FoundCause:
+        """The last event about an axis that never moved: a command that its controller ignored."""
+        controller, name = self._world.axes[axis].spec.drive
+        event = self._log.last_axis_event(controller, name.removeprefix("M"), until, before)
+        if event is None:
+            return None
+        return covered(self._all.controllers.axis_event(controller, event, Place(event.time, event.order)), Cover.LEVEL)
 
     def slipped(self, axis: str, until: Nanos, subjects: Collection[str] = OF_MECHANICS) -> FoundCause:
         """The last event by a moment after which the rotor of an axis is elsewhere than counted; its motion, if there is none."""
@@ -148,7 +158,7 @@ class AxisCauses:
         """An event of a rotor, whose cause is what led to it."""
         record = self._log.record(event)
         owner = str(dict(record.facts)["element"])
-        text = text_of(record.value if isinstance(record.value, str) else str(record.value))
+        text = words_of(record)
         if owner == axis:
             before = partial(self._of_rotor_event, axis, event, begins=_begins(record))
         else:

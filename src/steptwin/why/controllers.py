@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from steptwin.controller import Nanos
-from steptwin.messages import Message, text_of
+from steptwin.messages import Message
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.kinds.programs import Resource, ResourceKind
 from steptwin.simulation.scheduler.trace import TraceRecord
@@ -18,7 +18,7 @@ from steptwin.simulation.script.control import Halt
 from steptwin.simulation.world.inputs import Download, See, SetVariable
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing
-from steptwin.why.log import LAST, MOST_LOOKED_BACK, Change
+from steptwin.why.log import LAST, MOST_LOOKED_BACK, Change, words_of
 from steptwin.why.roots import Act, Sent
 from steptwin.why.sentences import describe_input
 
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 CLIENT = Message("why.client", "client {client}: {meaning}")
 SCRIPT = Message("why.script", "script {name}: {what}")
 FROM_OUTSIDE = Message("why.from-outside", "from outside: {what}")
+STOPPED_WHERE = Message("why.stopped-where", "{event}: {level}")
 REQUEST = Message("why.request", "request: {meaning}")
 
 
@@ -49,10 +50,43 @@ class ControllerCauses:
 
     def in_controller(self, controller: str, change: Change, wanted: Resource | None, point: str = "") -> FoundCause:
         """Cause of a change in a controller at a moment; ``wanted``: the resource, if it is known; ``point``: that changed."""
-        commanded = self.commanded(controller, change, wanted, point)
-        if commanded is not None:
-            return commanded
+        found = self._limit(controller, change, wanted) or self.commanded(controller, change, wanted, point)
+        if found is not None:
+            return found
         return self._asked_before(controller, change) or self._inside(controller, change, wanted)
+
+    def _limit(self, controller: str, change: Change, wanted: Resource | None) -> FoundCause:
+        """The limit switch that stopped an axis at the moment of a change."""
+        if wanted is None or wanted.kind is not ResourceKind.AXIS:
+            return None
+        event = self._log.last_axis_event(controller, wanted.name, change.time)
+        if event is None or event.time < change.time or self._pin_of(controller, event) is None:
+            return None
+        return self.axis_event(controller, event, Place(event.time, min(event.order, change.order), -1))
+
+    def _pin_of(self, controller: str, event: Change) -> str | None:
+        """The input of the limit switch that an event names."""
+        values = words_of(self._log.record(event)).values
+        axes: Any = getattr(getattr(self._world.controllers[controller], "config", None), "axes", ())
+        if not axes or "limit" not in values:
+            return None
+        number = getattr(axes[int(values["axis"]) - 1], f"in_{values['limit']}".lower(), -1)
+        pin = f"{controller}.IN{number + 1}"
+        return pin if self._log.has(pin) else None
+
+    def axis_event(self, controller: str, event: Change, place: Place) -> Cause:
+        """An event about an axis, such as a stop by a limit switch that came or was there already, or an ignored command."""
+        record, pin = self._log.record(event), self._pin_of(controller, event)
+        said, wanted = words_of(record), Resource(ResourceKind.AXIS, str(dict(record.facts)["axis"]))
+
+        def before() -> FoundCause:
+            led = self.commanded(controller, event, wanted) or self._asked_before(controller, event)
+            led = led or self._earlier(controller, event.time, wanted)
+            came = None if pin is None else covered(self._all.last((pin,), place.time, before=place.order), Cover.LEVEL)
+            return max((one for one in (came, led) if one is not None), key=lambda one: one.place, default=None)
+
+        text = said if pin is None else STOPPED_WHERE(event=said, level=self._all.state(pin, event.time))
+        return Cause(ChainLink(event.time, controller, text), place, before)
 
     def commanded(self, controller: str, change: Change, wanted: Resource | None, point: str = "") -> FoundCause:
         """A statement, request or action at the moment of a change in a controller."""
@@ -65,6 +99,13 @@ class ControllerCauses:
             return self._all.programs.statement(controller, index)
         act = next((act for act in self._log.acts_at(change.time, change.order) if _changes(act, controller)), None)
         return None if act is None else acted(act)
+
+    def variable_set(self, controller: str, name: str, until: Nanos) -> FoundCause:
+        """The last action by a moment that set a variable of a program."""
+        for act in self._log.acts_before(until, LAST):
+            if isinstance(act.what, SetVariable) and (act.what.controller, act.what.name) == (controller, name):
+                return acted(act)
+        return None
 
     def _statement_at(self, controller: str, change: Change, wanted: Resource | None) -> int | None:
         """The number of the statement that was executed at the moment of a change, before it, and changes what is wanted."""
@@ -123,7 +164,7 @@ class ControllerCauses:
         element = str(dict(record.facts).get("element"))
         if element in self._all.parts:  # such as a supply that is off
             before = partial(self._all.elements.at_element, element, change._replace(order=order))
-        text = text_of(record.value if isinstance(record.value, str) else str(record.value))
+        text = words_of(record)
         return Cause(ChainLink(change.time, controller, text), Place(change.time, order), before)
 
     def _ended(self, controller: str, time: Nanos, wanted: Resource | None) -> FoundCause:

@@ -105,9 +105,10 @@ class ElementCauses:
             record = self._log.record(fault)
             link = self._all.fault_link(record)
             return Cause(link, Place(fault.time, fault.order), self._all.of_fault(record, fault.order), acts)
-        if latest is None and len(sources) == 1 and self._log.level(sources[0], change.time):
-            level, place, how = self._log.level(sources[0], change.time), Place(self._log.begin), HAS_ACTED_SINCE(name=name)
-            return covered(self._all.first(sources[0], level, place, how), acts)
+        on = [source for source in sources if self._log.level(source, change.time)] if latest is None else []
+        if len(on) == 1:
+            level, place, how = self._log.level(on[0], change.time), Place(self._log.begin), HAS_ACTED_SINCE(name=name)
+            return covered(self._all.first(on[0], level, place, how), acts)
         return None if latest is None else covered(self._all.change(source, latest, HAS_ACTED_SINCE(name=name)), acts)
 
     def followed(self, name: str) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
-from steptwin.messages import Message
+from steptwin.messages import Message, MessageText, text_of
 from steptwin.simulation.components.beam import BEAM, SEEN
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.faults.active import ActiveFault, HeldLevel
@@ -131,6 +131,8 @@ class CauseLog:
         """Moments at which faults began or ended, by controller or element."""
         self.mechanics: dict[str, list[Change]] = defaultdict(list)
         """Events of `OF_MECHANICS` by axis or collision, and jams of pushers."""
+        self.axis_events: dict[tuple[str, str], list[Change]] = defaultdict(list)
+        """Events of controllers about an axis, by its number."""
         self.frames = Frames(world)
         self.requests: dict[int, Collection[int]] = {}
         """Addresses of the controllers that a frame may change, by its order."""
@@ -219,6 +221,8 @@ class CauseLog:
                     self.points.executes(name, record.time, keeps=True)
             case "event" if record.subject in (*OF_MECHANICS, WORKPIECE):
                 self._note_event(record, Change(record.time, 0.0, group, len(records), order))
+            case "event" if (axis := dict(record.facts).get("axis")) is not None:
+                self.axis_events[record.controller, str(axis)].append(Change(record.time, 0.0, group, len(records), order))
             case "fault":
                 self.faults[record.controller].append(Change(record.time, 0.0, group, len(records), order))
                 self._note_holds(record.controller, record.time)
@@ -355,6 +359,10 @@ class CauseLog:
         found = (one for one in reversed(self.events.get(name, ())) if (one.time, one.order) < (until, before))
         return next((one for one in found if not what or ("what", what) in self.record(one).facts), None)
 
+    def last_axis_event(self, controller: str, axis: str, until: Nanos, before: int = LAST) -> Change | None:
+        """The last event of a controller about an axis by a moment, before an order."""
+        return _last(self.axis_events.get((controller, axis), ()), until, before)
+
     def last_change(self, signal: str, until: Nanos, before: int = LAST) -> Change | None:
         """The last change of a signal by a moment, before an order."""
         return _last(self.changes.get(signal, []), until, before)
@@ -459,6 +467,11 @@ class CauseLog:
     def last_executed(self, controller: str, until: Nanos) -> int:
         """The number of the last statement of a controller by a moment; -1 if there is none."""
         return self.executed[controller].last(until)
+
+
+def words_of(event: TraceRecord) -> MessageText:
+    """The text of an event."""
+    return text_of(event.value if isinstance(event.value, str) else str(event.value))
 
 
 def on_timed_lines(world: Simulation) -> Mapping[str, Sequence[str]]:

@@ -114,15 +114,26 @@ class ProgramCauses:
             if use.waits and ended.time - here.time > at_once:
                 return self._decided(controller, earlier, Place(ended.time, ended.order, 3 * after), ENDED)
             if use.waits and not use.governs and any(one.kind is not ResourceKind.AXIS for one in use.reads):
-                there = Place(ended.time, ended.order, 3 * after)
-                began = Place(here.time, here.order, 3 * earlier)
-                came = any(cause.place > began for cause in self._read(controller, earlier, there))
-                return self._decided(controller, earlier, there, ENDED) if came else self._did_not_wait(controller, earlier)
+                first, there = self._begin_of_wait(controller, earlier, handlers), Place(ended.time, ended.order, 3 * after)
+                began = Place(executed[first].time, executed[first].order, 3 * first)
+                came = any(cause.place > began for cause in self._read(controller, first, there))
+                return self._decided(controller, first, there, ENDED) if came else self._did_not_wait(controller, earlier)
             if number in use.governs or (use.is_loop and ended.location.number >= use.governs.stop):
                 return self._decided(controller, earlier, Place(here.time, here.order, 3 * earlier + 2), DECIDED)
             after = earlier
         self.is_far = index >= MOST_UNDECIDED
         return None if self.is_far else self._started(controller)
+
+    def _begin_of_wait(self, controller: str, index: int, handlers: Sequence[range]) -> int:
+        """The number of the statement at which a wait began, which goes on after each interrupt."""
+        locations = self._log.executed[controller].locations
+        first, earlier = index, index - 1
+        while earlier >= 0 and (
+            locations[earlier] == locations[index] or any(locations[earlier].number in handler for handler in handlers)
+        ):
+            first = earlier if locations[earlier] == locations[index] else first
+            earlier -= 1
+        return first
 
     def _decided(self, controller: str, index: int, place: Place, how: Message) -> Cause:
         executed, use = self._log.executed[controller][index], self.use(controller, index)
@@ -150,7 +161,7 @@ class ProgramCauses:
     def _read(self, controller: str, index: int, place: Place) -> Iterator[Cause]:
         """The last changes of what a statement reads."""
         for resource in self.use(controller, index).reads:
-            cause = self.resource(controller, resource, index, place.time, place.order)
+            cause = self.resource(controller, resource, place.number // 3, place.time, place.order)
             if cause is not None:
                 yield cause
 
@@ -169,7 +180,7 @@ class ProgramCauses:
                 cause for cause in self._read(controller, index, place) if cause.place > Place(began.time, began.order, 3 * index)
             ]
             last = max(came, key=lambda cause: cause.place, default=None)
-            return covered(last or self._of_statement(controller, index), Cover.WAIT)
+            return covered(last if reads else self._of_statement(controller, index), Cover.WAIT)
         latest = place.time - LONGEST_REACTION_NS
         passes = any(resource.kind is ResourceKind.AXIS and resource.name for resource in reads)  # a place, not the end
         came = [

@@ -124,7 +124,7 @@ FORM_OF_A_QUESTION = Message(
 )
 AMBIGUOUS_NAME = Message("why.ambiguous-name", "{name} is of {controllers}: ask with the controller, such as {example}")
 VARIABLE_OF_A_PROGRAM = Message(
-    "why.variable-of-a-program", "{name} is a variable of the program of {controller}: a question is about a signal or register"
+    "why.variable-of-a-program", "{name} is a variable of the program of {controller}: ask about it alone, not in a condition"
 )
 NOTHING_EXECUTED_YET = Message(
     "why.nothing-executed-yet", "{controller} has executed no statement until {at:g} s: ask about one of its signals"
@@ -183,6 +183,9 @@ class Why:
         self._causes = Causes(self.log)  # programs may be others by now
         if _without_not(text) in self.log.world.controllers:
             return (yield from self._wait(_without_not(text), moment))
+        variable = self._variable(text)
+        if variable is not None:
+            return (yield from self._of_variable(text, *variable, moment))
         return (yield from self._condition(text, moment))
 
     def _only_program(self) -> str:
@@ -198,7 +201,7 @@ class Why:
         """The change that `LastChanges` searches for; None for a controller, for a bare quantity that moves all the time, and for
         `idle`. Raises `Misuse`."""
         text = _text_of(question)
-        if not text or _without_not(text) in self.log.world.controllers:
+        if not text or _without_not(text) in self.log.world.controllers or self._variable(text) is not None:
             return None
         text = self._named(text)
         names = tuple(dict.fromkeys(parse_condition(text).names()))
@@ -353,10 +356,32 @@ class Why:
         return text
 
     def _refuse_variable(self, name: str) -> None:
-        """Raises `Misuse` for a variable of a program, whose values are not noted."""
-        for controller, programs in self.log.world.programs.items():
-            if name.removeprefix(f"{controller}.") in programs.variables(self.log.world.now):
-                raise Misuse(VARIABLE_OF_A_PROGRAM(name=name, controller=controller))
+        """Raises `Misuse` for a variable of a program in a condition: its values are not noted."""
+        variable = self._variable(name)
+        if variable is not None:
+            raise Misuse(VARIABLE_OF_A_PROGRAM(name=name, controller=variable[0]))
+
+    def _variable(self, text: str) -> tuple[str, str] | None:
+        """The controller and the name of a variable of its program; None for what is none. Raises `Misuse` for one of several."""
+        world = self.log.world
+        found = [(name, text.removeprefix(f"{name}.")) for name in world.programs]
+        found = [one for one in found if one[1] in world.programs[one[0]].variables(world.now)]
+        if not found or self._has(text):
+            return None
+        if len(found) > 1:
+            owners = " and ".join(name for name, _ in found)
+            raise Misuse(AMBIGUOUS_NAME(name=text, controllers=owners, example=".".join(found[0])))
+        return found[0]
+
+    def _of_variable(self, text: str, controller: str, name: str, at: Nanos) -> Asking:
+        """The statement, or somebody, that wrote a variable last."""
+        other = yield from self._world_at(at)
+        number = self.log.last_executed(controller, at) + 1
+        written = self._causes.programs.resource(controller, Resource(ResourceKind.VALUE, name), number, at)
+        by_hand = self._causes.controllers.variable_set(controller, name, at)
+        last = max((one for one in (written, by_hand) if one is not None), key=lambda one: one.place, default=None)
+        state = IS_NUMBER(name=text, value=other.programs[controller].variables(at).get(name, 0.0))
+        return (yield from self._answer(text, at, state, None if last is None else last.place.time, last))
 
     def _registers(self, name: str) -> Iterator[str]:
         """Meanings of a name of a program language for each controller with a program: ``table.USER_REGISTER[10]:real`` for

@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from steptwin.controller import Nanos
-from steptwin.messages import Message, text_of
+from steptwin.messages import Message
 from steptwin.simulation.components.conveyortable import RUN
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
@@ -14,7 +14,7 @@ from steptwin.simulation.script import steps as do
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing
 from steptwin.why.controllers import acted
-from steptwin.why.log import Change
+from steptwin.why.log import Change, words_of
 from steptwin.why.movers import FALLS, GOES_ON, PUSHED
 from steptwin.why.roots import Act
 
@@ -52,7 +52,7 @@ class WorkpieceCauses:
         """An event of a workpiece."""
         record = self._log.record(event)
         facts = dict(record.facts)
-        text = text_of(record.value if isinstance(record.value, str) else str(record.value))
+        text = words_of(record)
         act = next((act for act in self._log.acts_at(event.time, event.order) if _moves(act, record)), None)
         if act is not None:
             before = partial(acted, act)
