@@ -53,7 +53,7 @@ class AxisCauses:
             return Cause(
                 ChainLink(profile.start, controller, BEGAN_TO_MOVE(axis=shown)), Place(profile.start), unknown, Cover.MOTION
             )
-        if is_before and not profile.segments:
+        if plan.time == self._log.begin and not profile.segments:  # it has not moved yet
             return None
         place = Place(plan.time, plan.order)
         cover: Cover | None = None
