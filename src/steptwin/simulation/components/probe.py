@@ -10,7 +10,7 @@ from steptwin.simulation.components.touch import Meeting
 from steptwin.simulation.components.workpieces import Workpieces
 from steptwin.simulation.space.bodies import Body
 from steptwin.simulation.space.frames import Frame
-from steptwin.simulation.space.sweeps import SweptBody, meet, versions_of
+from steptwin.simulation.space.sweeps import SweptBody
 
 
 def whole(body: Body) -> Body | None:
@@ -31,7 +31,6 @@ class Probe:
     """
 
     __slots__ = (
-        "_bodies",
         "_contacts",
         "_due",
         "_inner",
@@ -39,7 +38,6 @@ class Probe:
         "_met",
         "_state",
         "_swept",
-        "_versions",
         "_workpieces",
         "body",
     )
@@ -60,10 +58,8 @@ class Probe:
         self.forget()
 
     def forget(self) -> None:
-        self._bodies: Mapping[str, Body] = {}
         self._contacts: dict[str, tuple[Body, BodyContact | None]] = {}
         """With workpieces: the body it is with, None where there is nothing to meet."""
-        self._versions: tuple[Callable[[], object], ...] = ()
         self._state: object = None
         self._met: tuple[str, ...] = ()
         self._due: Nanos | None = None
@@ -75,25 +71,18 @@ class Probe:
 
     def _search(self, workpieces: Workpieces, now: Nanos) -> None:
         """Find which workpieces it meets, and when that changes, unless it is known."""
-        bodies = workpieces.bodies()
-        if bodies is not self._bodies:
-            self._bodies, self._state = bodies, None
-            own = versions_of(self.body)
-            self._versions = tuple(dict.fromkeys((*own, *(one for body in bodies.values() for one in versions_of(body)))))
-        state = [version() for version in self._versions]
+        state = workpieces.follow(now), [version() for version in self._swept.versions]
         if state == self._state and (self._due is None or self._due > now):
             return
         self._state = state
-        around, known, self._contacts = self._swept.sweep(now), self._contacts, {}
+        bodies, known, self._contacts = workpieces.bodies(), self._contacts, {}
         met: list[str] = []
         self._due = None
-        for name, body in bodies.items():
-            swept = workpieces.swept(name)
-            if not meet(around, swept.sweep(now)):
-                continue
+        for name in workpieces.near(self._swept.sweep(now)):
+            body = bodies[name]
             its, contact = known.get(name, (None, None))
             if its is not body:
-                inner = self._inner(body)
+                inner, swept = self._inner(body), workpieces.swept(name)
                 contact = None if inner is None else BodyContact(self._swept, swept if inner is body else SweptBody(inner))
             self._contacts[name] = body, contact
             if contact is None:

@@ -13,7 +13,7 @@ from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.space.bodies import Body, Box, Cylinder, Shape, half_height
 from steptwin.simulation.space.frames import Frame, Joint, Vector, Z, pose
 from steptwin.simulation.space.pieces import standing
-from steptwin.simulation.space.sweeps import SweptBody
+from steptwin.simulation.space.sweeps import Sweep, Sweeps, SweptBody
 from steptwin.simulation.space.tops import top_below
 from steptwin.simulation.toml.values import number, permitting
 
@@ -134,7 +134,19 @@ class Below(NamedTuple):
 class Workpieces:
     """The workpieces of all holders, in the order in which these were built."""
 
-    __slots__ = ("_bodies", "_holder_of", "_sweeps", "_version", "falling", "holders")
+    __slots__ = (
+        "_bodies",
+        "_holder_of",
+        "_motions",
+        "_order",
+        "_plans",
+        "_sweeps",
+        "_swept",
+        "_version",
+        "falling",
+        "holders",
+        "moves",
+    )
 
     def __init__(self) -> None:
         self.holders: list[Holder] = []
@@ -143,7 +155,14 @@ class Workpieces:
         self._version: object = None
         self._bodies: Mapping[str, Body] = {}
         self._holder_of: Mapping[str, Holder] = {}
-        self._sweeps: dict[str, SweptBody] = {}
+        self._swept: dict[str, SweptBody] = {}
+        self._sweeps = Sweeps()
+        self._order: Mapping[str, int] = {}
+        self._motions: tuple[Callable[[], object], ...] = ()
+        """The versions of all that moves them."""
+        self._plans: list[object] | None = None
+        self.moves = 0
+        """Count that `follow` raises whenever one came or went, or moves in another way."""
 
     @property
     def sources(self) -> tuple[str, ...]:
@@ -160,21 +179,42 @@ class Workpieces:
             found = [(holder, holder.bodies()) for holder in self.holders]
             self._bodies = {name: body for _, bodies in found for name, body in bodies.items()}
             self._holder_of = {name: holder for holder, bodies in found for name in bodies}
-            self._sweeps = {name: one for name, one in self._sweeps.items() if self._bodies.get(name) is one.body}
+            for name in [name for name, one in self._swept.items() if self._bodies.get(name) is not one.body]:
+                del self._swept[name]
+                self._sweeps.discard(name)
+            self._order = {name: place for place, name in enumerate(self._bodies)}
+            self._motions = tuple(dict.fromkeys(one for name in self._bodies for one in self.swept(name).versions))
+            self._plans = None
             self._version = version
         return self._bodies
 
     def swept(self, name: str) -> SweptBody:
         """A workpiece, with where it may come before its plan changes."""
-        known = self._sweeps.get(name)
+        known = self._swept.get(name)
         if known is None:
-            known = self._sweeps[name] = SweptBody(self._bodies[name])
+            known = self._swept[name] = SweptBody(self._bodies[name])
         return known
+
+    def follow(self, now: Nanos) -> int:
+        """Renew where they may come, and count in how many ways they have moved until now."""
+        bodies = self.bodies()
+        plans = [version() for version in self._motions]
+        if plans != self._plans:
+            self._plans = plans
+            self.moves += 1
+            for name in bodies:
+                self._sweeps.put(name, self.swept(name).sweep(now))
+        return self.moves
+
+    def near(self, its: Sweep) -> list[str]:
+        """Those that may come there before the plan of one changes, in their order, as `follow` has found them."""
+        return sorted(self._sweeps.near(its), key=self._order.__getitem__)
 
     def forget(self) -> None:
         """Find them and where they may come anew: a snapshot was restored, and holders make other bodies."""
         self._version = None
-        self._sweeps.clear()
+        self._swept.clear()
+        self._sweeps = Sweeps()
 
     def holder_of(self, name: str) -> Holder | None:
         """What has the workpiece called ``name``, if that is there."""

@@ -59,11 +59,11 @@ def versions_of(body: Body) -> tuple[Callable[[], object], ...]:
 class SweptBody:
     """A body with its sweep, which is computed once for each plan of its motion."""
 
-    __slots__ = ("_state", "_sweep", "_versions", "body")
+    __slots__ = ("_state", "_sweep", "body", "versions")
 
     def __init__(self, body: Body) -> None:
         self.body = body
-        self._versions = versions_of(body)
+        self.versions = versions_of(body)
         self.forget()
 
     def forget(self) -> None:
@@ -73,7 +73,7 @@ class SweptBody:
 
     def sweep(self, now: Nanos) -> Sweep:
         """Where it may come before its plan changes."""
-        state = [version() for version in self._versions]
+        state = [version() for version in self.versions]
         if self._sweep is None or state != self._state:
             self._state, self._sweep = state, sweep(self.body, now)
         return self._sweep
@@ -102,7 +102,7 @@ def _carry(joint: Joint, low: list[float], high: list[float], ends: Range) -> No
 
 
 class Sweeps:
-    """The sweeps of bodies by name.
+    """The sweeps of bodies by name, for those that meet another sweep.
 
     Along each axis those whose width has the same next power of two are in the order of their lower ends: those that may meet
     another one begin within that width before it, or in it.
@@ -117,25 +117,28 @@ class Sweeps:
     def put(self, name: str, its: Sweep) -> None:
         """In place of an earlier one of the same name."""
         if name in self._by_name:
-            self.remove(name)
+            if self._by_name[name] == its:
+                return
+            self.discard(name)
         self._by_name[name] = its
         for axis, by_width in enumerate(self._lows):
             insort(by_width.setdefault(_width(its, axis), []), (its.low[axis], name))
 
-    def remove(self, name: str) -> None:
-        its = self._by_name.pop(name)
+    def discard(self, name: str) -> None:
+        """Forget one, if there is one of this name."""
+        its = self._by_name.pop(name, None)
+        if its is None:
+            return
         for axis, by_width in enumerate(self._lows):
             ordered = by_width[width := _width(its, axis)]
             del ordered[bisect_left(ordered, (its.low[axis], name))]
             if not ordered:
                 del by_width[width]
 
-    def near(self, name: str) -> list[str]:
-        """The others that it may meet, in order: whose sweep has a part in common with its own."""
-        its = self._by_name[name]
+    def near(self, its: Sweep) -> list[str]:
+        """Those whose sweep has a part in common with this one, in no order."""
         fewest = min((self._along(its, axis) for axis in range(len(AXES))), key=lambda found: sum(len(one) for one in found))
-        others = (other for ordered in fewest for other in ordered)
-        return sorted(other for other in others if other != name and meet(its, self._by_name[other]))
+        return [name for ordered in fewest for name in ordered if meet(its, self._by_name[name])]
 
     def _along(self, its: Sweep, axis: int) -> list[list[str]]:
         """Those that may meet it as far as one axis tells."""
