@@ -19,8 +19,10 @@ PAGE := src/steptwin/studio/page/index.html
 PAGE_SOURCES := docs/studio.schema.json $(shell find studio-web -type f -not -path '*/node_modules/*' -not -path '*/__pycache__/*' \
   -not -name types.ts)
 
-# The page with the studio inside it; the last file that is written for it.
+# The page with the studio inside it; the last file that is written for it. What Python it has in it is known when it has been built.
 SITE := build/site/try/world/demo.json
+SITE_SOURCES := $(filter-out %.test.ts, $(PAGE_SOURCES))
+-include build/modules.d
 
 # Tools that its tests need beside what it is built with.
 WEB_STAMP := .venv/.ready-web
@@ -192,7 +194,7 @@ $(PAGE): $(PAGE_SOURCES)
 	@$(WEB) build
 	@touch $@
 
-$(SITE): $(PAGE_SOURCES) $(shell find src -name '*.py' -o -path '*/demo_machine/*.*') | $(DEV_STAMP) $(WEB_STAMP)
+$(SITE): $(SITE_SOURCES) | $(DEV_STAMP) $(WEB_STAMP)
 	@echo "building the studio inside a page"
 	@$(WEB) site
 

@@ -1,4 +1,7 @@
-"""Lists the modules that the studio inside a page can reach, and its world, in a file: ``python studio-web/modules.py FILE``."""
+"""Lists the modules that the studio inside a page can reach, and its world, in a file: ``python studio-web/modules.py FILE``.
+
+Beside it, with the suffix ``.d``, is a rule for make: the site is older than a file that is in it.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +20,8 @@ OF_EDITOR = ("pygls", "lsprotocol", "attr", "attrs", "cattr", "cattrs", "typing_
 """Libraries of the editor server; they are in Python alone."""
 PYODIDE = """Pyodide, under the Mozilla Public License 2.0, https://www.mozilla.org/MPL/2.0/, as it was published; its source is
 at https://github.com/pyodide/pyodide. It has CPython in it, under the PSF License Agreement, https://docs.python.org/3/license.html"""
+SITE = "build/site/try/world/demo.json"
+"""The file that is written last."""
 DEMO = SOURCE / "steptwin" / "live" / "studio" / "demo_machine"
 
 
@@ -58,6 +63,11 @@ def main(target: str) -> None:
     archives = {"steptwin.zip": own(), "editor.zip": libraries()}
     text = json.dumps({"archives": archives, "world": world, "licences": licences()})
     Path(target).write_text(text, "utf-8")
+    own_files = [*archives["steptwin.zip"].values(), world["path"], *programs.values()]
+    names = [Path(path).relative_to(ROOT).as_posix() for path in own_files]
+    # A rule without a recipe for each of them: a file that has been removed makes the site anew too, and no error.
+    rules = [f"{SITE}: {' '.join(names)}", *(f"{name}:" for name in names)]
+    Path(target).with_suffix(".d").write_text("\n".join([*rules, ""]), "utf-8")
 
 
 if __name__ == "__main__":

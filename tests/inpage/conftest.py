@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import json
 import os
 import threading
 from collections.abc import Iterator
@@ -30,16 +31,16 @@ class _Handler(SimpleHTTPRequestHandler):
 
 @pytest.fixture(scope="session")
 def built() -> Path:
-    """The folder with the page; skipped where it has not been built, an error where a source of it is newer."""
+    """The folder with the page; skipped where it has not been built, an error where a source of it has changed since."""
     made = TRY / "world/demo.json"
     if not made.exists():
         if os.environ.get("STEPTWIN_REQUIRE_PEERS") == "1":
             pytest.fail("build/site has not been built: run 'make site'", pytrace=False)
         pytest.skip("build/site has not been built: run 'make site'")
-    sources = [*(ROOT / "src/steptwin/inpage").glob("*.py"), *(ROOT / "studio-web/src/site").iterdir()]
-    for source in sources:
-        if source.stat().st_mtime > made.stat().st_mtime:
-            pytest.fail(f"{source.relative_to(ROOT)} is newer than build/site: run 'make site'", pytrace=False)
+    modules = json.loads((ROOT / "build/modules.json").read_text("utf-8"))["archives"]["steptwin.zip"].values()
+    for source in [*map(Path, modules), *(ROOT / "studio-web/src/site").iterdir()]:
+        if not source.exists() or source.stat().st_mtime > made.stat().st_mtime:
+            pytest.fail(f"{source.relative_to(ROOT)} is not what build/site has in it: run 'make site'", pytrace=False)
     return TRY
 
 
