@@ -83,9 +83,10 @@ class AxisCauses:
         events = list(self._of_rotor(axis, until, before))
         lasting = [one for one in events if one.time >= began or (is_held and self.holds_rotor(one, events))]
         event = max(lasting, key=lambda one: (one.time, one.order), default=None)
-        is_unpowered = power is not None and (motion is None or motion.link.time < power.link.time)
+        is_off = power is not None and not self._log.level(self._power_of(axis), until)
+        is_unpowered = power is not None and (is_off or motion is None or motion.link.time < power.link.time)
         if power is not None and is_unpowered:
-            plans = self._log.plans_in_force(controller, number, power.link.time)
+            plans = self._log.plans_in_force(controller, number, until if is_off else power.link.time)
             is_unpowered = built.mechanism.build.coasts_unpowered or any(self._end(one)[0] > power.link.time for one in plans)
         if event is not None and not (is_unpowered and power is not None and power.place > Place(event.time, event.order)):
             return self.rotor_event(axis, event)
@@ -99,9 +100,16 @@ class AxisCauses:
 
     def power(self, axis: str, until: Nanos) -> FoundCause:
         """The last change by a moment of the output that gives the motor of an axis power; None for one that always has some."""
-        power = self._world.axes[axis].spec.power
-        found = None if power is None else self._all.last((self._all.name(PinName(*power)),), until, GIVES_POWER(axis=axis))
+        signal = self._power_of(axis)
+        found = self._all.last((signal,), until, GIVES_POWER(axis=axis)) if signal else None
+        if signal and found is None and not self._log.level(signal, until):  # it has never had any
+            found = self._all.first(signal, 0.0, Place(self._log.begin), GIVES_POWER(axis=axis))
         return covered(found, Cover.MOTION)
+
+    def _power_of(self, axis: str) -> str:
+        """The output that gives the motor of an axis power; empty for one that always has some."""
+        power = self._world.axes[axis].spec.power
+        return "" if power is None else self._all.name(PinName(*power))
 
     def _ignored(self, axis: str, until: Nanos, before: int) -> FoundCause:
         """The last event about an axis that never moved: a command that its controller ignored."""

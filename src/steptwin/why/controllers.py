@@ -8,7 +8,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from steptwin.controller import Nanos
-from steptwin.messages import Message
+from steptwin.messages import Message, MessageText
+from steptwin.simulation.faults.kinds_physics import NO_SUPPLY
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.kinds.programs import Resource, ResourceKind
 from steptwin.simulation.scheduler.trace import TraceRecord
@@ -99,6 +100,27 @@ class ControllerCauses:
             return self._all.programs.statement(controller, index)
         act = next((act for act in self._log.acts_at(change.time, change.order) if _changes(act, controller)), None)
         return None if act is None else acted(act)
+
+    def power_on(self, controller: str, event: Change) -> Cause:
+        """A controller that began anew: who switched it, or what had switched it off."""
+        supply = self._world.objects.supplied.get(controller)
+        act = next((act for act in self._log.acts_at(event.time, event.order) if _changes(act, controller)), None)
+        found = acted(act) if act is not None else self._no_supply(controller, event)
+        if found is None and supply is not None:
+            found = self._all.elements.at_element(supply, event)
+        is_first = self._log.is_whole and event is self._log.power_ons[controller][0]
+        link = ChainLink(event.time, controller, words_of(self._log.record(event)))
+        before = nothing if found is None and is_first else lambda: found
+        return Cause(link, Place(event.time, event.order), before, Cover.PROGRAM)
+
+    def _no_supply(self, controller: str, event: Change) -> FoundCause:
+        """The last fault before an event that took the supply of a controller."""
+        for fault in reversed(self._log.faults.get(controller, ())):
+            record = self._log.record(fault)
+            if fault.order < event.order and isinstance(record.value, MessageText) and record.value.id == NO_SUPPLY.id:
+                older = self._all.of_fault(record, fault.order)
+                return Cause(self._all.fault_link(record), Place(fault.time, fault.order), older, Cover.FAULT)
+        return None
 
     def variable_set(self, controller: str, name: str, until: Nanos) -> FoundCause:
         """The last action by a moment that set a variable of a program."""

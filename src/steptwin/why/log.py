@@ -133,6 +133,8 @@ class CauseLog:
         """Events of `OF_MECHANICS` by axis or collision, and jams of pushers."""
         self.axis_events: dict[tuple[str, str], list[Change]] = defaultdict(list)
         """Events of controllers about an axis, by its number."""
+        self.power_ons: dict[str, list[Change]] = defaultdict(list)
+        """Moments at which a controller began anew, and its program with it."""
         self.frames = Frames(world)
         self.requests: dict[int, Collection[int]] = {}
         """Addresses of the controllers that a frame may change, by its order."""
@@ -221,6 +223,8 @@ class CauseLog:
                     self.points.executes(name, record.time, keeps=True)
             case "event" if record.subject in (*OF_MECHANICS, WORKPIECE):
                 self._note_event(record, Change(record.time, 0.0, group, len(records), order))
+            case "event" if record.subject == "power-on":
+                self.power_ons[record.controller].append(Change(record.time, 0.0, group, len(records), order))
             case "event" if (axis := dict(record.facts).get("axis")) is not None:
                 self.axis_events[record.controller, str(axis)].append(Change(record.time, 0.0, group, len(records), order))
             case "fault":
@@ -362,6 +366,10 @@ class CauseLog:
     def last_axis_event(self, controller: str, axis: str, until: Nanos, before: int = LAST) -> Change | None:
         """The last event of a controller about an axis by a moment, before an order."""
         return _last(self.axis_events.get((controller, axis), ()), until, before)
+
+    def last_power_on(self, controller: str, until: Nanos, before: int = LAST) -> Change | None:
+        """When a controller last began anew by a moment, before an order."""
+        return _last(self.power_ons.get(controller, ()), until, before)
 
     def last_change(self, signal: str, until: Nanos, before: int = LAST) -> Change | None:
         """The last change of a signal by a moment, before an order."""

@@ -105,7 +105,10 @@ class ProgramCauses:
         at_once, after = self._world.programs[controller].statement_time, index
         is_present = self._log.is_of_present_text(executed[index])
         handlers = self._handlers(controller, executed[index].location.text) if is_present else ()
+        begun = self._log.last_power_on(controller, executed[index].time, executed[index].order)
         for earlier in range(index - 1, max(-1, index - MOST_UNDECIDED), -1):
+            if begun is not None and executed[earlier].order < begun.order:
+                return self._began(controller, after, begun)
             use, here, ended = self.use(controller, earlier), executed[earlier], executed[after]
             if any(here.location.number in handler and number not in handler for handler in handlers):
                 continue  # an interrupt that came and returned
@@ -122,13 +125,18 @@ class ProgramCauses:
                 return self._decided(controller, earlier, Place(here.time, here.order, 3 * earlier + 2), DECIDED)
             after = earlier
         self.is_far = index >= MOST_UNDECIDED
+        if begun is not None and not self.is_far:
+            return self._began(controller, after, begun)
         return None if self.is_far else self._started(controller)
 
     def _begin_of_wait(self, controller: str, index: int, handlers: Sequence[range]) -> int:
         """The number of the statement at which a wait began, which goes on after each interrupt."""
         locations = self._log.executed[controller].locations
         first, earlier = index, index - 1
-        while earlier >= 0 and (
+        here = self._log.executed[controller][index]
+        begun = self._log.last_power_on(controller, here.time, here.order)
+        orders = self._log.executed[controller].orders
+        while (earlier >= 0 and (begun is None or orders[earlier] > begun.order)) and (
             locations[earlier] == locations[index] or any(locations[earlier].number in handler for handler in handlers)
         ):
             first = earlier if locations[earlier] == locations[index] else first
@@ -222,6 +230,13 @@ class ProgramCauses:
         group = self._log.group(controller)
         change = Change(since, 0.0, group, self._log.position(group, since), before if since == time else LAST)
         return covered(self._all.controllers.in_controller(controller, change, resource, point), Cover.LEVEL)
+
+    def _began(self, controller: str, index: int, power_on: Change) -> Cause:
+        """The first statement of a program since its controller was switched on again."""
+        first = self._log.executed[controller][index]
+        place = Place(first.time, first.order, 3 * index)
+        begun = self._all.controllers.power_on(controller, power_on)
+        return Cause(ChainLink(first.time, controller, PROGRAM_STARTED()), place, lambda: begun, Cover.PROGRAM)
 
     def _started(self, controller: str) -> FoundCause:
         """The statement that was executed first."""
