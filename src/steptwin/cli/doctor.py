@@ -21,8 +21,7 @@ def command(json: Json = False) -> None:
         print_json([asdict(each) for each in findings])
     else:
         typer.echo(table([("!" if each.todo else " ", each.what, each.found) for each in findings]))
-        for each in findings:
-            if each.todo:
-                typer.echo(f"! {each.what}: {each.todo}")
+        for todo in dict.fromkeys(each.todo for each in findings if each.todo):
+            typer.echo(f"! {', '.join(each.what for each in findings if each.todo == todo)}: {todo}")
     if any(each.todo and each.is_vital for each in findings):
         raise typer.Exit(1)

@@ -67,8 +67,11 @@ def _extra(extra: str) -> Finding:
     names = lacking(extra)
     if not names:
         return Finding(f"extra {extra}", "installed")
-    todo = f"pip install 'steptwin[{extra}]', in a clone make extras"
-    return Finding(f"extra {extra}", f"without {', '.join(names)}", todo, is_vital=extra == "studio")
+    if extra == "studio":
+        todo = "pip install 'steptwin[studio]', in a clone make extras"
+        return Finding("extra studio", f"without {', '.join(names)}", todo, is_vital=True)
+    todo = "pip install 'steptwin[NAME]' adds one that you need, 'steptwin[all]' each; in a clone make extras"
+    return Finding(f"extra {extra}", f"without {', '.join(names)}", todo)
 
 
 def _port(address: Address) -> Finding:
