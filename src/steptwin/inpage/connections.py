@@ -14,7 +14,7 @@ NORMAL, INTERNAL = 1000, 1011
 
 
 class Page(Protocol):
-    """What a page is told, by the numbers that it has given its connections."""
+    """Messages to a page, with the numbers that it has given its connections."""
 
     def opened(self, number: int) -> None: ...
     def send(self, number: int, text: str) -> None:

@@ -81,6 +81,7 @@ export class InPage implements Backend {
 
   follow(listener: (loading: Loading) => void): void {
     this.tellLoading = listener;
+    listener({ phase: "python" }); // before the worker says so: until then nothing can be asked
     this.get(`${this.name}.hello.json`).then(
       async (response) => this.tellLoading({ foreseen: (await response.json()) as Hello }),
       () => undefined, // it will come from the twin
