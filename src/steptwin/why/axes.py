@@ -111,6 +111,14 @@ class AxisCauses:
         power = self._world.axes[axis].spec.power
         return "" if power is None else self._all.name(PinName(*power))
 
+    def kept(self, axis: str, begun: Nanos, error: Change) -> FoundCause:
+        """What keeps the rotor of an axis from the motion that began at a moment: its power, a stall, a stop, a fault."""
+        found = self.moved(axis, error.time, error.order)
+        is_motion = found is not None and found.link.subject == self._world.axes[axis].spec.drive[0] and found.link.root is None
+        blocked = self._lost_by_fault(axis, error.time, error.order, IS_BLOCKED, LOSES_PULSES, since=begun)
+        held = [one for one in (None if is_motion else found, blocked) if one is not None]
+        return covered(max(held, key=lambda one: one.place, default=None), Cover.MOTION)
+
     def _ignored(self, axis: str, until: Nanos, before: int) -> FoundCause:
         """The last event about an axis that never moved: a command that its controller ignored."""
         controller, name = self._world.axes[axis].spec.drive
@@ -183,13 +191,17 @@ class AxisCauses:
         command = None if begins else self._all.controllers.commanded(controller, event, wanted)
         return command or self.moved(axis, event.time, event.order, is_held=begins)
 
-    def _lost_by_fault(self, axis: str, until: Nanos, before: int, *kinds: Message) -> FoundCause:
-        """The last fault by a moment, before an order, that was reported as one of ``kinds`` at an axis."""
+    def _lost_by_fault(self, axis: str, until: Nanos, before: int, *kinds: Message, since: Nanos = 0) -> FoundCause:
+        """The last fault by a moment, before an order, that was reported as one of ``kinds`` at an axis and was not over before
+        ``since``."""
         controller, name = self._world.axes[axis].spec.drive
         for change in reversed(self._log.faults.get(controller, ())):
             record = self._log.record(change)
             text = record.value
             if not isinstance(text, MessageText) or text.id not in {kind.id for kind in kinds}:
+                continue
+            lasts = text.values.get("time", 0.0)
+            if isinstance(lasts, float) and change.time + round(lasts * SECOND) < since:
                 continue
             if name == f"M{text.values['axis']}" and (change.time, change.order) < (until, before):
                 older = self._all.of_fault(record, change.order)

@@ -30,6 +30,8 @@ CLIENT = Message("why.client", "client {client}: {meaning}")
 SCRIPT = Message("why.script", "script {name}: {what}")
 FROM_OUTSIDE = Message("why.from-outside", "from outside: {what}")
 STOPPED_WHERE = Message("why.stopped-where", "{event}: {level}")
+POSITION_ERROR = "position-error"
+"""Event of an axis that did not reach its position."""
 REQUEST = Message("why.request", "request: {meaning}")
 
 
@@ -184,10 +186,20 @@ class ControllerCauses:
             return self._all.fault(controller, change) or self._ended(controller, change.time, wanted) or before()
         order, record = event
         element = str(dict(record.facts).get("element"))
-        if element in self._all.parts:  # such as a supply that is off
+        if record.subject == POSITION_ERROR and wanted is not None:
+            before = partial(self._not_followed, controller, change._replace(order=order), wanted)
+        elif element in self._all.parts:  # such as a supply that is off
             before = partial(self._all.elements.at_element, element, change._replace(order=order))
         text = words_of(record)
         return Cause(ChainLink(change.time, controller, text), Place(change.time, order), before)
+
+    def _not_followed(self, controller: str, error: Change, wanted: Resource) -> FoundCause:
+        """What kept an axis from its position since its motion began, or the command of that."""
+        commanded = self._earlier(controller, error.time, wanted)
+        driven = [name for name, axis in self._world.axes.items() if axis.spec.drive == (controller, f"M{wanted.name}")]
+        begun = -1 if commanded is None else commanded.place.time
+        found = [kept for name in driven if (kept := self._all.axes.kept(name, begun, error)) is not None]
+        return max(found, key=lambda one: one.place, default=commanded)
 
     def _ended(self, controller: str, time: Nanos, wanted: Resource | None) -> FoundCause:
         """The motion of an axis that ended at a moment."""

@@ -452,10 +452,11 @@ class CauseLog:
         return SetFault(first, name, next((act for act in acts if isinstance(act.what, do.SetFault)), None))
 
     def fault_record(self, name: str, until: Nanos) -> TraceRecord | None:
-        """The last record by a moment with which a fault began; its first one, where that is not known."""
-        records = (self.record(one) for changes in self.faults.values() for one in changes if one.time <= until)
+        """The last record by a moment with which a fault began, never that of its end; its first one, where that is not known."""
+        began = [time for time in self._fault_times.get(name, ()) if time <= until]
+        latest = began[-1] if began else until
+        records = (self.record(one) for changes in self.faults.values() for one in changes if one.time <= latest)
         its = sorted((one for one in records if one.subject == name), key=lambda one: one.time)
-        began = set(self._fault_times.get(name, ()))
         return next((one for one in reversed(its) if one.time in began), its[0] if its else None)
 
     def fault_act(self, name: str, until: Nanos, before: int) -> Act | None:

@@ -30,7 +30,7 @@ FIRST_STATEMENTS = 5500
 """Most statements of a program at first: some more than the last ones, among which the one that decided is looked for."""
 FURTHER = 8
 STANDS_NS: Nanos = SECOND
-"""Time after which a state may be because of any fault that has acted before."""
+"""Time after which a state may be because of any fault that has acted before, whatever it would be a moment earlier or later."""
 MOST_SUSPECTS = 4
 """Limit of the faults that are tried for one question, the last ones first."""
 WITHOUT_IT = Message("why.without-it", "{what}; without it: {state}")
@@ -77,28 +77,36 @@ class PastQuestions:
         return answer._replace(trials=tuple(trials))
 
     def _suspects(self, answer: Answer) -> Sequence[str]:
-        """The faults that may be why something lasts, as far as the chain does not have them: those that do something at the
-        moment, or did it since it is so, and where that is for `STANDS_NS` all that have acted."""
+        """The faults that may be why something is so, as far as the chain does not have them, the last ones first."""
         if self._known is None:
             return ()
         faults, at = self._known.faults, answer.at
-        since = answer.known_from if answer.since is None else answer.since
         there = {link.root.name for link in answer.links if isinstance(link.root, SetFault)}
         acted = [
             (acts.last, name)
             for name, acts in faults.acts.items()
             if name not in there
             and acts.first <= at
-            and (at - since >= STANDS_NS or acts.last >= since or ((one := faults.find(name)) is not None and one.doing))
+            and (self._is_near(name, answer) or self._known.changes_at_once(answer.question))
         ]
         return [name for _, name in sorted(acted, reverse=True)][:MOST_SUSPECTS]
 
+    def _is_near(self, name: str, answer: Answer) -> bool:
+        """Whether something has been so for `STANDS_NS`, or a fault does something at the moment, or has since it is so."""
+        if self._known is None:
+            return False
+        faults, since = self._known.faults, answer.known_from if answer.since is None else answer.since
+        one = faults.find(name)
+        return answer.at - since >= STANDS_NS or faults.acts[name].last >= since or bool(one is not None and one.doing)
+
     def _without_fault(self, name: str, answer: Answer) -> Generator[None, None, Trial | None]:
-        """The run without a fault, if what was asked for is otherwise then."""
+        """The run without a fault, if what was asked for is otherwise then; where the fault was long before, also for
+        `STANDS_NS` before and after: it may be later or earlier without it."""
         if self._known is None:
             return None
         link = self._known.fault_link(name, answer.at)
-        trial = yield from trying_without(self._snapshots, link, answer, self._most)
+        around = 0 if self._is_near(name, answer) else STANDS_NS
+        trial = yield from trying_without(self._snapshots, link, answer, self._most, around=around)
         return trial if trial.effect is Effect.OTHERWISE else None
 
     def _asking(self, question: str, at: Nanos | None) -> Asking:
@@ -169,6 +177,10 @@ class _Known:
     def faults(self) -> Faults:
         """Those of the world at the end of what is known."""
         return self._why.log.world.objects.faults
+
+    def changes_at_once(self, question: str) -> bool:
+        """Whether a question is about a level or condition, not about a program or a quantity that moves."""
+        return self._why.asked(question) is not None
 
     def lacking(self, question: str, at: Nanos) -> Lacking:
         """See `Why.lacking`."""

@@ -40,15 +40,16 @@ class SnapshotsWithInputs(Snapshots, Protocol):
     def inputs_from(self, number: int) -> Sequence[RecordedInput]: ...
 
 
-def trying_without(snapshots: SnapshotsWithInputs, link: ChainLink, answer: Answer, most: int) -> Trying:
-    """Whether what was asked for would be otherwise without the root of a link, in parts. ``most``: limit of what is noted."""
+def trying_without(snapshots: SnapshotsWithInputs, link: ChainLink, answer: Answer, most: int, *, around: Nanos = 0) -> Trying:
+    """Whether what was asked for would be otherwise without the root of a link, in parts. ``most``: limit of what is noted;
+    ``around``: how long before and after the moment it must be otherwise."""
     try:
-        return (yield from _trying(snapshots, link, answer, most))
+        return (yield from _trying(snapshots, link, answer, most, around))
     except SteptwinError as error:
         return Trial(link, Effect.UNKNOWN, NOT_TRIED(problem=text_of(error)))
 
 
-def _trying(snapshots: SnapshotsWithInputs, link: ChainLink, answer: Answer, most: int) -> Trying:
+def _trying(snapshots: SnapshotsWithInputs, link: ChainLink, answer: Answer, most: int, around: Nanos) -> Trying:
     root = link.root
     if root is None:
         raise Misuse(NOT_FOUND_AGAIN())
@@ -57,11 +58,12 @@ def _trying(snapshots: SnapshotsWithInputs, link: ChainLink, answer: Answer, mos
     if begin > root.time:
         raise Misuse(PAST_BEFORE_IT_IS_NOT_KEPT())
     run = _RunWithout(snapshots.world, state.snapshot, root)
-    inputs = run.inputs([one for one in snapshots.inputs_from(state.inputs) if one.time <= answer.at])
-    other = yield from Why(run.make, inputs, answer.at, most).asking(answer.question, answer.at)
+    at = answer.at + around
+    inputs = run.inputs([one for one in snapshots.inputs_from(state.inputs) if one.time <= at])
+    other = yield from Why(run.make, inputs, at, most).asking(answer.question, at)
     if not run.is_without:
         raise Misuse(NOT_FOUND_AGAIN())
-    if other.state != answer.state:
+    if other.state != answer.state and (other.since is None or not around or other.since <= answer.at - around):
         return Trial(link, Effect.OTHERWISE, other.state)
     since = answer.since if answer.since is not None and answer.since > begin else None
     if other.since == since:

@@ -274,8 +274,9 @@ def turning_points_of_axis(fitted: BuiltAxis, now: Nanos) -> Iterator[Nanos]:
 
 
 def moves(fitted: BuiltAxis, now: Nanos) -> bool:
-    """Whether its load moves."""
-    return next(turning_points_of_axis(fitted, now), None) is not None
+    """Whether its load moves, or will: one that goes on for ever at one velocity has no turning point."""
+    trajectory = fitted.mechanism.trajectory(now)
+    return bool(trajectory.turning_points(now)) or (trajectory.carries(now) and trajectory.moves(now))
 
 
 def _signals(fitted: BuiltAxis) -> Mapping[str, SignalOf]:
