@@ -127,8 +127,9 @@ docs: $(DEV_STAMP)  ## Build the documentation into build/docs
 	$(BIN)/sphinx-build -W --keep-going --quiet -b html -d build/doctrees docs build/docs
 	@echo "build/docs/index.html"
 
-site: docs $(SITE)  ## Build a folder for any web server: the documentation, and try/, a studio with its twin inside the page
-	@find build/site -mindepth 1 -maxdepth 1 -not -name try -exec rm -rf {} + && cp -r build/docs/. build/site/
+site: $(DEV_STAMP) $(SITE)  ## Build a folder for any web server: the documentation, and try/, a studio with its twin inside the page
+	$(BIN)/sphinx-build -W --keep-going --quiet -b html -D studio_links=1 -d build/doctrees docs build/site-docs
+	@find build/site -mindepth 1 -maxdepth 1 -not -name try -exec rm -rf {} + && cp -r build/site-docs/. build/site/
 	@echo "build/site: $(PYTHON) -m http.server --bind 127.0.0.1 -d build/site, then http://127.0.0.1:8000/try/"
 
 peers:  ## Install the system packages the tests talk to (Debian)

@@ -13,7 +13,7 @@ project = "steptwin"
 copyright = "the steptwin authors"  # noqa: A001 - Sphinx wants this name
 release = __version__
 
-extensions = ["myst_parser", "sphinx_copybutton", "command_output", "control_commands", "sphinx.ext.autodoc"]
+extensions = ["myst_parser", "sphinx_copybutton", "command_output", "control_commands", "studio_links", "sphinx.ext.autodoc"]
 default_role = "py:obj"  # docstrings name things in single backticks
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"

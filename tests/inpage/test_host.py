@@ -5,19 +5,20 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Callable
+from pathlib import Path
 from textwrap import dedent
 from typing import Any
 
-import pytest
 from studio_rig import WORLD, check_message
 from virtual_loop import VirtualLoop, run_virtually
 
 from steptwin.controller import MILLISECOND, SECOND, Nanos
-from steptwin.errors import Misuse
 from steptwin.inpage.editor import PageEditor
-from steptwin.inpage.host import PageTwin
+from steptwin.inpage.host import PageTwin, open_twin
 from steptwin.studio.viewers import MOST_UNSENT
 from steptwin.subject.commands import VERSION
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 class Page:
@@ -30,6 +31,7 @@ class Page:
         self.unread = 0
         self.events: list[tuple[str, int]] = []
         self.errors: list[str] = []
+        self.refusals: list[str] = []
         self._id = 0
 
     def opened(self, number: int) -> None:
@@ -45,6 +47,9 @@ class Page:
 
     def closed(self, number: int, code: int) -> None:
         self.events.append(("closed", code))
+
+    def refused(self, text: str) -> None:
+        self.refusals.append(text)
 
     def failed(self, text: str) -> None:
         self.errors.append(text)
@@ -153,9 +158,42 @@ def test_a_world_that_cannot_keep_up_is_delayed_and_a_stop_is_answered_between_t
 
 
 def test_a_wrong_description_is_refused_with_its_place() -> None:
+    page = Page()
+    assert open_twin(page, "hall", '[world]\nname = "hall"\n[[nonsense]]\n', {}) is None
+    (refusal,) = page.refusals
+    assert refusal.startswith("hall:3:")
+    assert "Traceback" not in refusal
+
+
+PROGRAMMED = """
+[[mic488]]
+name = "table"
+programs = { 0 = "a.prg", 1 = "a.prg" }
+"""
+
+
+def test_a_link_has_the_programs_as_they_are_now_or_says_why_it_cannot() -> None:
     async def visit() -> None:
-        with pytest.raises(Misuse, match="hall"):
-            PageTwin(Page(), "hall", '[world]\nname = "hall"\n[[nonsense]]\n', {})
+        page = Page()
+        page.twin = twin = PageTwin(page, "hall", PROGRAMMED, {"a.prg": b"n = 1\n"}, lambda: 0)
+        twin.begin()
+        await page.enter()
+        assert json.loads(twin.link()) == {"description": PROGRAMMED, "programs": {"a.prg": "n = 1\n"}}
+        await page.ask("download", controller="table", place="program 0", text="n = 2\n")
+        assert "a.prg" in json.loads(twin.link())["refused"]
+        await page.ask("download", controller="table", place="program 1", text="n = 2\n")
+        assert json.loads(twin.link())["programs"] == {"a.prg": "n = 2\n"}
+        await page.ask("download", controller="table", place="program 2", text="n = 3\n")
+        assert "program 2" in json.loads(twin.link())["refused"]
+
+    run_virtually(visit())
+
+
+def test_a_link_has_no_file_that_is_no_program() -> None:
+    async def visit() -> None:
+        text = '[[mic488]]\nname = "table"\nconfig = "a.cfg"\n'
+        config = (EXAMPLES / "mic488/feeder.cfg").read_bytes()
+        assert "a.cfg" in json.loads(PageTwin(Page(), "hall", text, {"a.cfg": config}).link())["refused"]
 
     run_virtually(visit())
 

@@ -5,68 +5,112 @@ from __future__ import annotations
 import base64
 import json
 import re
+import runpy
 import subprocess
+import zlib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Locator, Page, expect
 from studio_page import WAIT_MS, button, show
 from tests.studio.conftest import browser, require_node, web_builder  # noqa: F401  fixtures
 
 from steptwin import Misuse, World
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
+ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "examples"
 SECONDS = 1.0
 LOADING_MS = 120_000
 
 
-@pytest.mark.timeout(300)
-def test_the_demo_moves_in_a_page_without_a_service(address: str, browser: Browser) -> None:  # noqa: F811
-    complaints: list[str] = []
-    elsewhere: list[str] = []
-    context = browser.new_context(viewport={"width": 1280, "height": 720}, locale="en-US")
+class Demo:
+    """The demo in its page, loaded once for all tests, and what the browser complains about or asks elsewhere."""
+
+    def __init__(self, started: Browser, address: str) -> None:
+        self.complaints: list[str] = []
+        self.elsewhere: list[str] = []
+        self.context = started.new_context(viewport={"width": 1280, "height": 720}, locale="en-US")
+        self.context.on(
+            "request", lambda asked: None if asked.url.startswith((address, "blob:")) else self.elsewhere.append(asked.url)
+        )
+        self.page = self.tab()
+        self.page.goto(address)
+
+    def tab(self) -> Page:
+        page = self.context.new_page()
+        page.set_default_timeout(WAIT_MS)
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("console", lambda said: self.complaints.append(said.text) if said.type in ("error", "warning") else None)
+        return page
+
+
+@pytest.fixture(scope="module")
+def demo(address: str, browser: Browser) -> Iterator[Demo]:  # noqa: F811
+    made = Demo(browser, address)
+    yield made
+    assert made.complaints == []
+    assert made.elsewhere == []
+    made.context.close()
+
+
+@pytest.fixture(scope="module")
+def of_docs() -> dict[str, Any]:
+    """The extension of the documentation that makes links."""
+    return runpy.run_path(str(ROOT / "docs/_ext/studio_links.py"))
+
+
+def time_of(page: Page) -> Locator:
+    return page.get_by_role("group", name="Virtual time")
+
+
+def fragment(text: bytes) -> str:
+    change = zlib.compressobj(9, zlib.DEFLATED, -15)
+    return "#world=" + base64.urlsafe_b64encode(change.compress(text) + change.flush()).decode().rstrip("=")
+
+
+def linked(**fields: object) -> str:
+    return fragment(json.dumps({"description": "", "programs": {}, **fields}).encode())
+
+
+WRONG = {
+    "#world=%%%": "damaged",
+    fragment(b"[]"): "damaged",
+    fragment(b"\xff"): "damaged",
+    "#world=" + "A" * 8200: "6150 bytes packed; at most 6144",
+    fragment(b'{"description": "' + b" " * (1 << 18) + b'"}'): "more than the 262144 bytes",
+    linked(model="m.gltf"): "it has model;",
+    linked(description=1): "it has no description",
+    linked(programs=[]): "it has no programs",
+    linked(programs={"a.py": ""}): "a.py is no program",
+    linked(programs={"a.html": ""}): "a.html is no program",
+    linked(programs={"../a.prg": ""}): "../a.prg is no program",
+    linked(programs={"a.prg": 1}): "a.prg is no program",
+}
+
+
+def test_a_wrong_link_is_refused_with_what_is_wrong_in_it(address: str, browser: Browser, of_docs: dict[str, Any]) -> None:  # noqa: F811
+    context = browser.new_context(locale="en-US")
     page = context.new_page()
-    page.set_default_timeout(WAIT_MS)
-    page.on("pageerror", lambda error: complaints.append(str(error)))
-    page.on("console", lambda message: complaints.append(message.text) if message.type in ("error", "warning") else None)
-    context.on("request", lambda asked: None if asked.url.startswith((address, "blob:")) else elsewhere.append(asked.url))
-    page.goto(address)
+    for wrong, words in WRONG.items():
+        page.goto("about:blank")
+        page.goto(address + wrong)
+        expect(page.get_by_role("alert")).to_contain_text(words)
+        assert page.workers == []
 
-    # The machine at its beginning is there before Python, and nothing can be done with it yet.
-    expect(page.get_by_role("status").first).to_contain_text("Python")
-    expect(page.get_by_label("M1 position", exact=True)).to_have_text("0.00")
-    expect(button(page, "Enable M1")).to_be_disabled()
-    expect(page.get_by_role("group", name="Virtual time")).to_contain_text("live", timeout=LOADING_MS)
-    expect(page.get_by_label("M1 position", exact=True)).not_to_have_text("0.00")
-
-    # What needs a service is named, and what it needs.
-    for panel, words in {"Devices": "on a computer", "Recordings": "files of a computer", "Gateways": "with ports"}.items():
-        show(page, panel)
-        expect(page.get_by_text(words)).to_be_visible()
-
-    # A wrong program is found while it is typed.
-    show(page, "Program")
-    text = page.get_by_role("textbox", name="Text of demo.prg")
-    text.click()
-    expect(text.locator("span[class^=tok-]").first).to_be_visible(timeout=LOADING_MS)
-    page.keyboard.press("Control+Home")
-    page.keyboard.insert_text("NONSENSE\n")
-    expect(page.get_by_role("button", name=re.compile("NONSENSE"))).to_be_visible()
-
-    show(page, "Faults")
-    page.get_by_label("Kind of fault").select_option("crc")
-    button(page, "Set fault").click()
-    expect(page.get_by_role("row", name=re.compile("^crc "))).to_be_visible()
-
-    # Its cause, out of the past; and a click on that shows its moment.
-    show(page, "Axes")
-    page.get_by_role("button", name=re.compile("^Why")).first.click()
-    causes = page.get_by_role("status", name="Causes")
-    causes.get_by_role("listitem").first.get_by_role("button").click()
-    expect(page.get_by_role("group", name="The past")).to_be_visible()
-    assert complaints == []
-    assert elsewhere == []
+    # That of the documentation is read; another one in the same tab takes its place.
+    page.goto(address + of_docs["link"]('[[mic488]]\nname = "zażółć"\n'))
+    expect(page.locator("pre")).to_have_text('[[mic488]]\nname = "zażółć"\n')
     context.close()
+
+
+def test_descriptions_of_the_documentation_that_are_whole_have_links(of_docs: dict[str, Any]) -> None:
+    is_whole = of_docs["is_whole"]
+    assert is_whole('[[mic488]]\nname = "table"\n')
+    assert not is_whole('[[mic488]]\nname = "table"\nprogram = "a.prg"\n')  # a file is missing
+    assert not is_whole('[[mic488]]\nname = "table"\n[gateway.mqtt]\n')  # needs a service
+    assert not is_whole('[world]\nname = "empty"\n')
 
 
 def test_all_examples_have_the_digests_of_cpython(built: Path, require_node: None) -> None:  # noqa: F811
@@ -98,3 +142,64 @@ def test_a_part_that_the_server_does_not_give_is_named(address: str, browser: Br
     page.goto(address)
     expect(page.get_by_role("status").first).to_contain_text(re.compile(r"could not be loaded: .*/python/steptwin\.zip: 404"))
     context.close()
+
+
+@pytest.mark.timeout(300)
+def test_the_demo_moves_in_a_page_without_a_service(demo: Demo) -> None:
+    page = demo.page
+    # The machine at its beginning is there before Python, and nothing can be done with it yet.
+    expect(page.get_by_role("status").first).to_contain_text("Python")
+    expect(page.get_by_label("M1 position", exact=True)).to_have_text("0.00")
+    expect(button(page, "Enable M1")).to_be_disabled()
+    expect(time_of(page)).to_contain_text("live", timeout=LOADING_MS)
+    expect(page.get_by_label("M1 position", exact=True)).not_to_have_text("0.00")
+
+    # What needs a service is named, and what it needs.
+    for panel, words in {"Devices": "on a computer", "Recordings": "files of a computer", "Gateways": "with ports"}.items():
+        show(page, panel)
+        expect(page.get_by_text(words)).to_be_visible()
+
+    # A wrong program is found while it is typed.
+    show(page, "Program")
+    text = page.get_by_role("textbox", name="Text of demo.prg")
+    text.click()
+    expect(text.locator("span[class^=tok-]").first).to_be_visible(timeout=LOADING_MS)
+    page.keyboard.press("Control+Home")
+    page.keyboard.insert_text("NONSENSE\n")
+    expect(page.get_by_role("button", name=re.compile("NONSENSE"))).to_be_visible()
+
+    show(page, "Faults")
+    page.get_by_label("Kind of fault").select_option("crc")
+    button(page, "Set fault").click()
+    expect(page.get_by_role("row", name=re.compile("^crc "))).to_be_visible()
+
+    # Its cause, out of the past; and a click on that shows its moment.
+    show(page, "Axes")
+    page.get_by_role("button", name=re.compile("^Why")).first.click()
+    causes = page.get_by_role("status", name="Causes")
+    causes.get_by_role("listitem").first.get_by_role("button").click()
+    expect(page.get_by_role("group", name="The past")).to_be_visible()
+    button(page, "To the present").click()
+
+
+@pytest.mark.timeout(300)
+def test_a_link_to_the_machine_opens_another_twin_in_another_tab(demo: Demo) -> None:
+    expect(time_of(demo.page)).to_contain_text("live", timeout=LOADING_MS)
+    button(demo.page, "Share").click()
+    expect(demo.page).to_have_url(re.compile("#world="))
+    other = demo.tab()
+    other.goto(demo.page.url)
+
+    # Nothing of it runs before a click. What was typed and not downloaded is not in it.
+    expect(other.get_by_role("heading", name="demo.prg")).to_be_visible()
+    assert other.workers == []
+    shown = "".join(other.locator("pre").all_inner_texts())
+    assert 'name = "demo"' in shown
+    assert "NONSENSE" not in shown
+    button(other, "Open in the studio").click()
+    expect(time_of(other)).to_contain_text("live", timeout=LOADING_MS)
+    expect(other.get_by_label("M1 position", exact=True)).not_to_have_text("0.00")
+    button(other, "Pause time").click()
+    expect(time_of(other)).to_contain_text("paused")
+    expect(time_of(demo.page)).to_contain_text("live")
+    other.close()

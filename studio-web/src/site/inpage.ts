@@ -1,6 +1,7 @@
 import type { Backend, FileKind, Link, LinkEvents, Loading, OpenLink } from "../lib/protocol/backend";
 import { errorOf, type Hello } from "../lib/protocol/connection";
 import type { Answer } from "../lib/protocol/types";
+import { pack, type Linked } from "./links";
 import type { FromWorker, Task, Texts, ToWorker } from "./messages";
 
 /** A worker with Python in it. It goes on when a connection to it ends. */
@@ -8,6 +9,7 @@ class PythonWorker {
   private readonly worker = new Worker(new URL("./python.worker.ts", import.meta.url), { type: "module" });
   private readonly links = new Map<number, LinkEvents>();
   private readonly asked: ((texts: Texts) => void)[] = [];
+  private readonly askedForLink: ((link: string) => void)[] = [];
   private next = 1;
   private hasFailed = false;
 
@@ -37,6 +39,11 @@ class PythonWorker {
     return new Promise((done) => this.asked.push(done));
   }
 
+  link(): Promise<string> {
+    this.tell({ link: true });
+    return new Promise((done) => this.askedForLink.push(done));
+  }
+
   private tell(message: ToWorker): void {
     this.worker.postMessage(message);
   }
@@ -60,6 +67,7 @@ class PythonWorker {
       this.links.delete(message.closed);
       events?.closed(message.code);
     } else if ("texts" in message) this.asked.shift()?.(message.texts);
+    else if ("link" in message) this.askedForLink.shift()?.(message.link);
     else if ("progress" in message) this.loading({ phase: message.progress });
     else this.fail(message.failed);
   }
@@ -71,10 +79,11 @@ export class InPage implements Backend {
   private editor: PythonWorker | null = null;
   private tellLoading: (loading: Loading) => void = () => undefined;
 
-  /** `root`: where the page is; `name`: of its world. */
+  /** `root`: where the page is; `name`: of its world, where no link gives another one. */
   constructor(
     private readonly root: URL,
     private readonly name: string,
+    private readonly linked: Linked | null,
   ) {
     this.twin = new PythonWorker(root, this.task(), (loading) => this.tellLoading(loading));
   }
@@ -82,6 +91,7 @@ export class InPage implements Backend {
   follow(listener: (loading: Loading) => void): void {
     this.tellLoading = listener;
     listener({ phase: "python" }); // before the worker says so: until then nothing can be asked
+    if (this.linked !== null) return; // its state comes from the twin
     this.get(`${this.name}.hello.json`).then(
       async (response) => this.tellLoading({ foreseen: (await response.json()) as Hello }),
       () => undefined, // it will come from the twin
@@ -106,6 +116,12 @@ export class InPage implements Backend {
     return null;
   }
 
+  async share(): Promise<string> {
+    const found = JSON.parse(await this.twin.link()) as Linked | { refused: string };
+    if ("refused" in found) throw new Error(found.refused);
+    return new URL(await pack(found), this.root).href;
+  }
+
   stopAll(): Promise<void> {
     return new Promise((done, failed) => {
       const link = this.twin.open({
@@ -122,6 +138,11 @@ export class InPage implements Backend {
   }
 
   private async task(): Promise<Task> {
+    if (this.linked !== null) {
+      const programs = Object.entries(this.linked.programs);
+      const files = programs.map(([name, text]) => [name, new TextEncoder().encode(text)] as const);
+      return { twin: { name: "link", text: this.linked.description, files: Object.fromEntries(files) } };
+    }
     const { files } = (await (await this.get(`${this.name}.json`)).json()) as { files: string[] };
     const text = await (await this.get(`${this.name}.toml`)).text();
     const contents = files.map(

@@ -14,7 +14,8 @@ export type ToWorker =
   | { send: string; on: number }
   | { taken: number }
   | { close: number }
-  | { texts: true };
+  | { texts: true }
+  | { link: true };
 
 export type FromWorker =
   | { progress: Phase }
@@ -23,6 +24,8 @@ export type FromWorker =
   | { closed: number; code: number }
   /** The present texts of the twin by address. */
   | { texts: Texts }
+  /** JSON of `PageTwin.link`. */
+  | { link: string }
   /** Nothing will come any more. */
   | { failed: string };
 

@@ -18,8 +18,8 @@ interface Editor {
 
 /** `steptwin.inpage.host.PageTwin`. */
 interface Twin extends Editor {
-  begin(): void;
   texts(): PyProxy;
+  link(): string;
 }
 
 const BOUND = 5000;
@@ -62,6 +62,7 @@ const page = {
     outgoing.delete(number);
     tell({ closed: number, code });
   },
+  refused: (text: string) => tell({ failed: text }),
   failed: (text: string) => console.error(text),
 };
 
@@ -86,8 +87,8 @@ async function start(task: Task, root: string): Promise<void> {
   during("world");
   if ("twin" in task) {
     const { name, text, files } = task.twin;
-    const twin: Twin = room.PageTwin(page, name, text, pyodide.toPy(files));
-    twin.begin();
+    const twin: Twin | undefined = room.open_twin(page, name, text, pyodide.toPy(files));
+    if (twin === undefined) return;
     host = twin;
   } else {
     host = room.PageEditor(page, pyodide.toPy(task.editor)) as Editor;
@@ -112,6 +113,7 @@ function take(host: Twin | Editor, message: ToWorker): void {
     const size = outgoing.get(message.taken)?.taken();
     if (size !== undefined) connections.taken(message.taken, size);
   } else if ("close" in message) connections.close(message.close);
+  else if ("link" in message && "link" in host) tell({ link: host.link() });
   else if ("texts" in message && "texts" in host)
     tell({ texts: host.texts().toJs({ dict_converter: Object.fromEntries }) as Texts });
 }

@@ -144,4 +144,21 @@ export const en = {
   guideDone: "Done",
   guideSkip: "Skip",
   notPermitted: "Your role ({role}) does not permit this",
+  loadingUnseen: "The twin runs inside this page and is being loaded: {what}.",
+  share: "Share",
+  shareHelp:
+    "Makes a link to the description and the programs as they are in the twin now. The state of the machine and texts that were not downloaded are not in it.",
+  shared: "The address of this page is a link to this machine now: its description and its programs.",
+  linkOffer:
+    "This link brings a machine: a description, and the programs that it names. Nothing of it runs before you open it.",
+  linkOpen: "Open in the studio",
+  linkDemo: "Show the demo machine",
+  linkDescription: "Description",
+  linkBad: "this link cannot be opened: {why}",
+  linkLong: "it has {size} bytes packed; at most {most} are permitted",
+  linkMuch: "unpacked it has more than the {most} bytes that are permitted",
+  linkDamaged: "it is damaged: what stands behind #world= cannot be unpacked",
+  linkOther: "it has {name}; a link can have description and programs only",
+  linkWithout: "it has no {name}",
+  linkProgram: "{name} is no program: names end in .prg, .csv or .m1486, without a folder, and contents are text",
 } as const;

@@ -149,4 +149,21 @@ export const pl: Record<keyof typeof en, string> = {
   guideDone: "Gotowe",
   guideSkip: "Pomiń",
   notPermitted: "Twoja rola ({role}) na to nie pozwala",
+  loadingUnseen: "Bliźniak działa w tej stronie i jest wczytywany: {what}.",
+  share: "Udostępnij",
+  shareHelp:
+    "Tworzy link do opisu i programów takich, jakie są teraz w bliźniaku. Nie ma w nim stanu maszyny ani niewgranych tekstów.",
+  shared: "Adres tej strony jest teraz linkiem do tej maszyny: jej opisu i programów.",
+  linkOffer:
+    "Ten link zawiera maszynę: opis i programy, które on wymienia. Nic z niego nie działa, zanim go nie otworzysz.",
+  linkOpen: "Otwórz w studiu",
+  linkDemo: "Pokaż maszynę demonstracyjną",
+  linkDescription: "Opis",
+  linkBad: "nie można otworzyć tego linku: {why}",
+  linkLong: "ma {size} bajtów po spakowaniu; dozwolone jest najwyżej {most}",
+  linkMuch: "po rozpakowaniu ma więcej niż dozwolone {most} bajtów",
+  linkDamaged: "jest uszkodzony: tego, co stoi po #world=, nie można rozpakować",
+  linkOther: "zawiera {name}; link może mieć tylko opis i programy",
+  linkWithout: "brak w nim {name}",
+  linkProgram: "{name} nie jest programem: nazwy kończą się na .prg, .csv lub .m1486, bez folderu, a treść to tekst",
 };

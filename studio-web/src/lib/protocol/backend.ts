@@ -31,6 +31,8 @@ export interface Backend {
   file(kind: FileKind, name: string): Promise<Blob>;
   /** An address at which the browser shows a file; null where it has to be fetched. */
   address(kind: FileKind, name: string): string | null;
+  /** An address that opens description and programs of the twin again; null where others do not reach it. Rejects with why there is none. */
+  share: (() => Promise<string>) | null;
   /** Stop all where the studio does not accept this page: a stop needs no token. Rejects with the words of the studio. */
   stopAll(): Promise<void>;
 }
