@@ -202,4 +202,12 @@ def test_a_link_to_the_machine_opens_another_twin_in_another_tab(demo: Demo) -> 
     button(other, "Pause time").click()
     expect(time_of(other)).to_contain_text("paused")
     expect(time_of(demo.page)).to_contain_text("live")
+
+    # Its workers do not answer any more: they are ended, and what the link brings is not opened by itself.
+    for worker in other.workers:
+        worker.evaluate("() => void setTimeout(() => { for (;;); })")
+    expect(other.get_by_role("status").first).to_contain_text("does not answer")
+    button(other, "Restart").click()
+    expect(button(other, "Open in the studio")).to_be_visible()
+    assert other.workers == []
     other.close()

@@ -44,6 +44,10 @@ class PythonWorker {
     return new Promise((done) => this.askedForLink.push(done));
   }
 
+  end(): void {
+    this.worker.terminate();
+  }
+
   private tell(message: ToWorker): void {
     this.worker.postMessage(message);
   }
@@ -120,6 +124,11 @@ export class InPage implements Backend {
     const found = JSON.parse(await this.twin.link()) as Linked | { refused: string };
     if ("refused" in found) throw new Error(found.refused);
     return new URL(await pack(found), this.root).href;
+  }
+
+  restart(): void {
+    this.twin.end();
+    location.reload();
   }
 
   stopAll(): Promise<void> {

@@ -161,4 +161,7 @@ export const en = {
   linkOther: "it has {name}; a link can have description and programs only",
   linkWithout: "it has no {name}",
   linkProgram: "{name} is no program: names end in .prg, .csv or .m1486, without a folder, and contents are text",
+  restart: "Restart",
+  restartHelp:
+    "Ends the twin and begins anew, with the description and programs that it began with. Texts that were typed and not downloaded are kept; downloaded ones and the past are lost.",
 } as const;

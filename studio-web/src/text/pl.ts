@@ -166,4 +166,7 @@ export const pl: Record<keyof typeof en, string> = {
   linkOther: "zawiera {name}; link może mieć tylko opis i programy",
   linkWithout: "brak w nim {name}",
   linkProgram: "{name} nie jest programem: nazwy kończą się na .prg, .csv lub .m1486, bez folderu, a treść to tekst",
+  restart: "Uruchom ponownie",
+  restartHelp:
+    "Kończy bliźniaka i zaczyna od nowa, z opisem i programami, od których zaczął. Wpisane i niewgrane teksty zostają; wgrane teksty i przeszłość przepadają.",
 };
