@@ -31,6 +31,7 @@ from = "k.no"
 to = "c.IN2"
 """
 PROGRAM = b"DELAY 0.5\nOUT1 = ON\nDELAY 2\nOUT3 = ON\nWAIT IN1 = ON\nOUT4 = ON\n"
+BEFORE = "c waits at line 3 `DELAY 2`"
 ALONE = "it becomes true at {} s if nothing comes from outside"
 OUTSIDE = "it does not become true within 60 s if nothing comes from outside: only from outside"
 
@@ -46,8 +47,8 @@ def lacks(condition: str, at: float) -> Sequence[str]:
 @pytest.mark.parametrize(
     ("condition", "at", "links"),
     [
-        ("c.OUT3", 1.0, ["c.OUT3 is 0 from the beginning", ALONE.format("2.502000")]),
-        ("c.OUT4", 1.0, ["c.OUT4 is 0 from the beginning", OUTSIDE]),
+        ("c.OUT3", 1.0, ["c.OUT3 is 0 from the beginning", BEFORE, ALONE.format("2.502000")]),
+        ("c.OUT4", 1.0, ["c.OUT4 is 0 from the beginning", BEFORE, OUTSIDE]),
         (
             "(c.IN2 and c.OUT3)",
             0.1,
@@ -55,17 +56,18 @@ def lacks(condition: str, at: float) -> Sequence[str]:
                 "c.IN2 is 0 from the beginning, driven by k.no",
                 "k.no is 0 from the beginning, driven by c.OUT1",
                 "c.OUT1 is 0 from the beginning",
+                "c waits at line 1 `DELAY 0.5`",
                 "c.OUT3 is 0 from the beginning",
                 ALONE.format("2.502000"),
             ],
         ),
-        ("(c.IN2 and c.OUT3)", 1.0, ["c.OUT3 is 0 from the beginning", ALONE.format("2.502000")]),
+        ("(c.IN2 and c.OUT3)", 1.0, ["c.OUT3 is 0 from the beginning", BEFORE, ALONE.format("2.502000")]),
         ("(c.OUT1 and not c.OUT3)", 3.0, ["c.OUT3 is 1 since 2.502000 s", OUTSIDE]),
         ("(x.position > 3 cm and c.OUT1)", 1.0, ["x.position is 0 mm", OUTSIDE]),
         (
             "(c.OUT3 or c.OUT4)",
             1.0,
-            ["c.OUT3 is 0 from the beginning", "c.OUT4 is 0 from the beginning", ALONE.format("2.502000")],
+            ["c.OUT3 is 0 from the beginning", BEFORE, "c.OUT4 is 0 from the beginning", ALONE.format("2.502000")],
         ),
         ("go", 1.0, ["go is 0 from the beginning"]),
     ],

@@ -66,7 +66,7 @@ class PastQuestions:
             if trial is not None:
                 tried[name] = trial
         lacking = () if self._known is None else (yield from self._known.lacking(question, answer.at))
-        answer = answer._replace(links=(*lacking, *_with(answer.links, tried.values())))
+        answer = answer._replace(links=tuple(dict.fromkeys((*lacking, *_with(answer.links, tried.values())))))
         if not try_without:
             return answer
         trials: list[Trial] = []

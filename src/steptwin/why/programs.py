@@ -53,6 +53,14 @@ class ProgramCauses:
             found = self._uses[key] = self._world.programs[controller].use(key[1])
         return found
 
+    def leads_to(self, controller: str, index: int, wanted: Resource) -> bool:
+        """Whether the program can still come from an executed statement to one that changes something."""
+        location, programs = self._log.executed[controller][index].location, self._world.programs[controller]
+        if not self._log.is_of_present_text(self._log.executed[controller][index]):
+            return False
+        numbers = programs.reached(location.text, (location.number,))
+        return any(wanted in programs.use(StatementLocation(location.text, number)).writes for number in numbers)
+
     def statement(self, controller: str, index: int) -> Cause:
         """A statement was executed."""
         executed = self._log.executed[controller][index]

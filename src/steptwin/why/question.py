@@ -252,8 +252,9 @@ class Why:
             return (yield from self._answer(text, at, state, since, first))
         resting = yield from self._resting(signals, at)
         answer = yield from self._answer(text, at, state, None, resting)
-        states = [] if resting is None else [link for name in signals if self.log.has(name) for link in self._states(name, at)]
-        return self._after(states, answer)
+        states = [link for name in signals if self.log.has(name) for link in self._states(name, at)]
+        says_more = resting is not None or len(states) > len(signals) or any(self._causes.drivers(name, at) for name in signals)
+        return self._after(states if says_more else [], answer)
 
     def lacking(self, question: str, at: Nanos) -> Lacking:
         """Of a question that begins with ``not`` and is true: the present values of what would have to be otherwise, with what
@@ -601,7 +602,7 @@ class Why:
     def _awaited(self, controller: str, resource: Resource, at: Nanos) -> Iterator[ChainLink]:
         """The present state of what a statement waits for, and of what that depends on."""
         if resource.kind is ResourceKind.PIN and resource.name:
-            yield from self._states(f"{controller}.{resource.name}", at)
+            yield from self._states(f"{controller}.{resource.name}", at, controller)
         elif resource.kind is ResourceKind.AXIS:
             motion = self._causes.axes.motion(controller, resource.name, at)
             yield ChainLink(at, controller, NO_AXIS_HAS_MOVED(time=at / SECOND)) if motion is None else motion.link
@@ -612,8 +613,9 @@ class Why:
             text = self._causes.state(known, at) if is_noted else DEPENDS_ON(name=resource.name or ANY_PIN())
             yield ChainLink(at, controller, text)
 
-    def _states(self, signal: str, at: Nanos) -> Iterator[ChainLink]:
-        """The level of a signal and, one after the other, of the signals that drive it."""
+    def _states(self, signal: str, at: Nanos, waits: str = "") -> Iterator[ChainLink]:
+        """The level of a signal and, one after the other, of the signals that drive it. ``waits``: the controller that waits for
+        it, of which that is known."""
         waiting, seen = [signal], set[str]()
         while waiting and len(seen) < (MOST_SNAPSHOTS if self._most_links == MOST_LINKS else ALL_LINKS):
             name = waiting.pop(0)
@@ -622,6 +624,27 @@ class Why:
             seen.add(name)
             waiting += self._causes.drivers(name, at)
             yield ChainLink(at, name.partition(".")[0], self._causes.state(name, at))
+            if name.partition(".")[0] != waits:
+                waiting += yield from self._not_written(name, at)
+
+    def _not_written(self, signal: str, at: Nanos) -> Generator[ChainLink, None, list[str]]:
+        """What stands between a program and an output that it writes and never has: where it waits. Returns the signals that
+        it waits for, or the supply that its controller lacks."""
+        owner, _, pin = signal.partition(".")
+        world, log, programs = self.log.world, self.log, self._causes.programs
+        if owner not in world.controllers or self._causes.drivers(signal, at) or log.since(signal, at) is not None:
+            return []
+        supply = f"{world.objects.supplied.get(owner, '')}.good"
+        if log.has(supply) and not log.level(supply, at):
+            return [supply]
+        index = log.last_executed(owner, at)
+        if index < 0 or not programs.leads_to(owner, index, Resource(ResourceKind.PIN, pin)):
+            return []
+        here, use = log.executed[owner][index], programs.use(owner, index)
+        if not use.waits or at - here.time <= world.programs[owner].statement_time:
+            return []
+        yield ChainLink(at, owner, WAITS(controller=owner, statement=statement(log, here)))
+        return [f"{owner}.{one.name}" for one in use.reads if one.kind is ResourceKind.PIN and one.name]
 
     # ------------------------------------------------------------------ the chain
 
