@@ -117,8 +117,7 @@ feed = "c.OUT2"
 ?feed_every = "⟨150..400⟩ ms"
 ?workpiece = ⟨20..60⟩
 ?mass = ⟨0.1..2.0⟩
-?marks = [⟨3..6⟩, ⟨10..15⟩]
-?mark_width = ⟨1.0..3.0⟩
+?marks = [⟨3..6⟩, ⟨10..15⟩]; mark_width = ⟨1.0..3.0⟩
 next = "q"
 {sensor("⟨40..120⟩", "c.IN1")}
 ?contact = "NC"
@@ -222,8 +221,7 @@ speed = ⟨50..500⟩
 
 {table("vacuum", "cup", ejector="c.OUT1", pick="c.OUT2", place="c.OUT3")}
 ?from = "p"
-?onto = "q"
-?place_at = ⟨10..90⟩
+?onto = "q"; place_at = ⟨10..90⟩
 ?vacuum = ⟨60..90⟩
 ?threshold = ⟨20..55⟩
 ?build_up = "⟨10..90⟩ ms"
@@ -232,8 +230,7 @@ speed = ⟨50..500⟩
 {table("gripper", "jaws", close="c.OUT4", pick="⟨c.OUT2|cup.held⟩", place="c.OUT3")}
 from = "⟨p|q⟩"
 pick_at = ⟨60..120⟩
-?onto = "q"
-?place_at = ⟨60..120⟩
+?onto = "q"; place_at = ⟨60..120⟩
 ?stroke = ⟨15..30⟩
 ?width = ⟨5..12⟩
 ?close_time = "⟨20..120⟩ ms"

@@ -20,6 +20,7 @@ from steptwin.controller import SECOND, Nanos
 from steptwin.debug.debugger import Debugger
 from steptwin.debug.lookahead import Goal
 from steptwin.files.world import World
+from steptwin.simulation.components.workpieces import Workpieces
 from steptwin.simulation.kinds.mic488.build import _loaded
 from steptwin.simulation.mechanics.trajectory import Trajectory
 from steptwin.simulation.scheduler.scheduler import Scheduler
@@ -470,8 +471,8 @@ def general_way() -> Generator[Callable[[World], World]]:
         stack.enter_context(patch.object(Trajectory, "_keeps_distance", lambda trajectory, profile: False))
         stack.enter_context(patch("steptwin.wbc.compile.straight_of", lambda codes, steps, cell: [None] * len(steps)))
         stack.enter_context(patch("steptwin.simulation.kinds.mic488.build._loaded", _loaded.__wrapped__))
-        for room in ("bodycontact", "probe"):
-            stack.enter_context(patch(f"steptwin.simulation.components.{room}.meet", lambda one, other: True))
+        stack.enter_context(patch("steptwin.simulation.components.bodycontact.meet", lambda one, other: True))
+        stack.enter_context(patch.object(Workpieces, "near", lambda workpieces, its: list(workpieces.bodies())))
         yield general
 
 
