@@ -81,11 +81,11 @@ def test_modules_above_the_kinds_that_know_a_device_have_a_reason() -> None:
     assert found == {*TOOLS}
 
 
-NAMED = re.compile(rf"\b({'|'.join(DEVICES)})\b|[\"'`](?i:{'|'.join(DEVICES)})[\"'`]")
+NAMED = re.compile(rf"(?<!\.)\b({'|'.join(DEVICES)})\b|[\"'`](?i:{'|'.join(DEVICES)})[\"'`]")
 
 
 def test_no_module_of_the_page_knows_a_device() -> None:
-    """Names in sentences for people, such as M1486 in a help text, are none."""
+    """Names in sentences for people, such as M1486 in a help text, and suffixes of files are none."""
     modules = {path.relative_to(PAGE).as_posix(): path for path in PAGE.rglob("*") if path.suffix in (".ts", ".svelte")}
     modules.pop("lib/protocol/types.ts", None)  # generated
     found = {name for name, path in modules.items() if not name.endswith(".test.ts") and NAMED.search(path.read_text("utf-8"))}

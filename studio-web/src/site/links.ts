@@ -10,7 +10,10 @@ export const START = "#world=";
 const PACKED = 6 * 1024;
 const UNPACKED = 256 * 1024;
 /** `steptwin.inpage.linked.SUFFIXES`. */
-const PROGRAM = /^[^/\\]+\.(prg|csv|m1486)$/;
+const SUFFIXES = [".prg", ".csv", ".m1486"];
+
+const isProgram = (name: string) =>
+  !/[/\\]/.test(name) && SUFFIXES.some((suffix) => name.length > suffix.length && name.endsWith(suffix));
 
 /** The fragment of a link. Rejects with the words for a user. */
 export async function pack(linked: Linked): Promise<string> {
@@ -48,7 +51,7 @@ function checked(value: unknown): Linked {
   if (typeof description !== "string") throw new Error(t("linkWithout", { name: "description" }));
   if (!isObject(programs)) throw new Error(t("linkWithout", { name: "programs" }));
   for (const [name, content] of Object.entries(programs))
-    if (!PROGRAM.test(name) || typeof content !== "string") throw new Error(t("linkProgram", { name }));
+    if (!isProgram(name) || typeof content !== "string") throw new Error(t("linkProgram", { name }));
   return { description, programs: programs as Record<string, string> };
 }
 

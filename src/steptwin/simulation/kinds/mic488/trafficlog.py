@@ -22,25 +22,24 @@ class ModbusTrafficLog:
         self._log = FrameLog(line.devices)
         self._log.sinks.append(sink)
         self._callbacks: dict[str, FrameCallback] = {}
-        self._kinds: dict[str, str] = {}
-        """Kinds of clients, also of those that have gone."""
 
     def frame(self, now: Nanos, client: str, direction: FrameDirection, data: bytes) -> None:
         callback = self._callbacks.get(client)
         if callback is None:
             for gone in [name for name in self._callbacks if name not in self._line.clients]:
                 del self._callbacks[gone]
-            callback = self._callbacks[client] = self._log.callback(self._prefix + client, tcp=self._is_tcp(client))
+            callback = self._callbacks[client] = self._log.callback(self._prefix + client, tcp=self._is_tcp(client, data))
         callback(now, direction, data)
 
-    def _is_tcp(self, client: str) -> bool:
+    def _is_tcp(self, client: str, data: bytes) -> bool:
+        """Whether a frame has the header of Modbus TCP; where the client has gone, the frame tells by protocol and length."""
         there = self._line.clients.get(client)
         if there is not None:
-            self._kinds[client] = there.kind
-        return self._kinds.get(client) == "tcp"
+            return there.kind == "tcp"
+        return data[2:4] == b"\0\0" and int.from_bytes(data[4:6], "big") == len(data) - 6
 
     def changes(self, client: str, data: bytes) -> Collection[int]:
-        unit, function = (data[6], data[7]) if self._is_tcp(client) else (data[0], data[1])
+        unit, function = (data[6], data[7]) if self._is_tcp(client, data) else (data[0], data[1])
         if function not in WRITES:
             return ()
         return (unit,) if unit in self._line.units else self._line.units
