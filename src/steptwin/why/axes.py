@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import Any
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message, MessageText
@@ -21,9 +21,6 @@ from steptwin.why.chain import Cause, FoundCause, Place, covered, unknown
 from steptwin.why.controllers import acted
 from steptwin.why.log import JAMS, LAST, OF_MECHANICS, Change, words_of
 
-if TYPE_CHECKING:
-    from steptwin.why.causes import Causes
-
 GIVES_POWER = Message("why.gives-power", ", which gives {axis} its power")
 BEGAN_TO_MOVE = Message("why.began-to-move", "{axis} began to move")
 STOPPED = Message("why.stopped", "{axis} stopped")
@@ -34,7 +31,7 @@ POSITION = "position"
 class AxisCauses:
     """Finds the causes of where the loads of axes are. ``causes`` has those of everything else."""
 
-    def __init__(self, causes: Causes) -> None:
+    def __init__(self, causes: Any) -> None:  # Causes, which imports this module
         self._all = causes
         self._log = causes.log
         self._world = causes.log.world

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from steptwin.controller import Nanos
 from steptwin.messages import Message, MessageText
@@ -23,9 +23,6 @@ from steptwin.why.log import LAST, MOST_LOOKED_BACK, Change, words_of
 from steptwin.why.roots import Act, Sent
 from steptwin.why.sentences import describe_input
 
-if TYPE_CHECKING:
-    from steptwin.why.causes import Causes
-
 CLIENT = Message("why.client", "client {client}: {meaning}")
 SCRIPT = Message("why.script", "script {name}: {what}")
 FROM_OUTSIDE = Message("why.from-outside", "from outside: {what}")
@@ -38,7 +35,7 @@ REQUEST = Message("why.request", "request: {meaning}")
 class ControllerCauses:
     """Finds the causes of changes in controllers. ``causes`` has those of everything else."""
 
-    def __init__(self, causes: Causes) -> None:
+    def __init__(self, causes: Any) -> None:  # Causes, which imports this module
         self._all = causes
         self._log = causes.log
         self._world = causes.log.world

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message
@@ -19,9 +19,6 @@ from steptwin.why.log import LAST, Change
 from steptwin.why.movers import FALLS, GOES_ON, PUSHED, TRAVEL
 from steptwin.why.workpieces import HAS_ACTED_SINCE
 
-if TYPE_CHECKING:
-    from steptwin.why.causes import Causes
-
 FOLLOWS_AFTER = Message("why.follows-after", ", {name} follows after {delay_ms:g} ms")
 TIME = "time"
 """States of an element that are over at a moment and are no signal."""
@@ -32,7 +29,7 @@ OF_WORKPIECES = ("count", "crooked", "mass")
 class ElementCauses:
     """Finds the causes of changes of elements. ``causes`` has those of everything else."""
 
-    def __init__(self, causes: Causes) -> None:
+    def __init__(self, causes: Any) -> None:  # Causes, which imports this module
         self._all = causes
         self._log = causes.log
         self._world = causes.log.world

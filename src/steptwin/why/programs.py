@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import Any
 
 from steptwin.controller import MILLISECOND, Nanos
 from steptwin.messages import Message
@@ -14,9 +14,6 @@ from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing, unknown
 from steptwin.why.log import LAST, MOST_LOOKED_BACK, Change
 from steptwin.why.sentences import statement
-
-if TYPE_CHECKING:
-    from steptwin.why.causes import Causes
 
 WAS_EXECUTED = Message("why.was-executed", "{statement} was executed")
 WAS_IN_EXECUTION = Message("why.was-in-execution", "{statement} was in execution before")
@@ -33,7 +30,7 @@ MOST_UNDECIDED = 5000
 class ProgramCauses:
     """Finds what let statements be executed. ``causes`` has the causes of everything else."""
 
-    def __init__(self, causes: Causes) -> None:
+    def __init__(self, causes: Any) -> None:  # Causes, which imports this module
         self._all = causes
         self._log = causes.log
         self._world = causes.log.world

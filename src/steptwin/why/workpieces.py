@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import Any
 
 from steptwin.controller import Nanos
 from steptwin.messages import Message
@@ -18,9 +18,6 @@ from steptwin.why.log import Change, words_of
 from steptwin.why.movers import FALLS, GOES_ON, PUSHED
 from steptwin.why.roots import Act
 
-if TYPE_CHECKING:
-    from steptwin.why.causes import Causes
-
 HAS_ACTED_SINCE = Message("why.has-acted-since", ", on which {name} has acted since")
 COMES = ("on", "crooked", "on the floor")
 STAYS = ("stands", GOES_ON, "goes back", "collides", "jams", "free again")
@@ -30,7 +27,7 @@ STAYS = ("stands", GOES_ON, "goes back", "collides", "jams", "free again")
 class WorkpieceCauses:
     """Finds the causes of events of workpieces. ``causes`` has those of everything else."""
 
-    def __init__(self, causes: Causes) -> None:
+    def __init__(self, causes: Any) -> None:  # Causes, which imports this module
         self._all = causes
         self._log = causes.log
         self._world = causes.log.world
