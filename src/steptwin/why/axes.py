@@ -211,7 +211,7 @@ class AxisCauses:
             if axis.spec.drive != (controller, f"M{number}"):
                 continue
             follows = getattr(axis.spec.encoder, "follows", None)
-            if follows in self._world.axes:
+            if follows is not None and follows in self._world.axes:
                 return self.moved(follows, plan.time, plan.order)
             if follows in self._all.parts:
                 return self._all.elements.of_element(follows, "", plan.time)

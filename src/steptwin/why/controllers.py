@@ -195,7 +195,7 @@ class ControllerCauses:
         commanded = self._earlier(controller, error.time, wanted)
         driven = [name for name, axis in self._world.axes.items() if axis.spec.drive == (controller, f"M{wanted.name}")]
         begun = -1 if commanded is None else commanded.place.time
-        found = [kept for name in driven if (kept := self._all.axes.kept(name, begun, error)) is not None]
+        found: list[Cause] = [kept for name in driven if (kept := self._all.axes.kept(name, begun, error)) is not None]
         return max(found, key=lambda one: one.place, default=commanded)
 
     def _ended(self, controller: str, time: Nanos, wanted: Resource | None) -> FoundCause:
