@@ -11,7 +11,7 @@ from steptwin.simulation.kinds.registry import KINDS
 from steptwin.studio.programs import ProgramTexts
 
 SUFFIXES = frozenset(language.suffix for kind in KINDS.values() for language in kind.languages)
-"""Of files with programs and positions."""
+"""Suffixes of files with programs and positions."""
 NO_PROGRAM = Message("inpage.no-program", "{name}: a link can have files with programs only, which end in {suffixes}")
 NOT_NAMED = Message("inpage.not-named", "{controller}: the description names no file for {place}, so a link cannot have its text")
 TWO_TEXTS = Message(

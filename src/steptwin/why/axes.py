@@ -109,7 +109,7 @@ class AxisCauses:
         return "" if power is None else self._all.name(PinName(*power))
 
     def kept(self, axis: str, begun: Nanos, error: Change) -> FoundCause:
-        """What keeps the rotor of an axis from the motion that began at a moment: its power, a stall, a stop, a fault."""
+        """Cause that keeps the rotor of an axis from the motion that began at a moment: its power, a stall, a stop, a fault."""
         found = self.moved(axis, error.time, error.order)
         is_motion = found is not None and found.link.subject == self._world.axes[axis].spec.drive[0] and found.link.root is None
         blocked = self._lost_by_fault(axis, error.time, error.order, IS_BLOCKED, LOSES_PULSES, since=begun)

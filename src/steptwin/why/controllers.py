@@ -191,7 +191,7 @@ class ControllerCauses:
         return Cause(ChainLink(change.time, controller, text), Place(change.time, order), before)
 
     def _not_followed(self, controller: str, error: Change, wanted: Resource) -> FoundCause:
-        """What kept an axis from its position since its motion began, or the command of that."""
+        """Cause that kept an axis from its position since its motion began, or the command of that."""
         commanded = self._earlier(controller, error.time, wanted)
         driven = [name for name, axis in self._world.axes.items() if axis.spec.drive == (controller, f"M{wanted.name}")]
         begun = -1 if commanded is None else commanded.place.time

@@ -1,4 +1,4 @@
-"""What moves parts of a machine against each other at a moment: found while a world runs, because no record says it."""
+"""Things that move parts of a machine against each other at a moment: found while a world runs, because no record says it."""
 
 from __future__ import annotations
 

@@ -257,8 +257,8 @@ class Why:
         return self._after(states if says_more else [], answer)
 
     def lacking(self, question: str, at: Nanos) -> Lacking:
-        """Of a question that begins with ``not`` and is true: the present values of what would have to be otherwise, with what
-        drives it, and when it becomes so by itself, or when a program that waits goes on, in parts; nothing for another question.
+        """Lines of a question that begins with ``not`` and is true: the present values of what would have to be otherwise, with
+        what drives it, and when it becomes so by itself, or when a program that waits goes on, in parts; none for another one.
         `asking` comes first."""
         text = _text_of(question)
         if not text.startswith(WHY_NOT):
@@ -628,8 +628,8 @@ class Why:
                 waiting += yield from self._not_written(name, at)
 
     def _not_written(self, signal: str, at: Nanos) -> Generator[ChainLink, None, list[str]]:
-        """What stands between a program and an output that it writes and never has: where it waits. Returns the signals that
-        it waits for, or the supply that its controller lacks."""
+        """Wait that stands between a program and an output that it writes and never has. Returns the signals that it waits for,
+        or the supply that its controller lacks."""
         owner, _, pin = signal.partition(".")
         world, log, programs = self.log.world, self.log, self._causes.programs
         if owner not in world.controllers or self._causes.drivers(signal, at) or log.since(signal, at) is not None:

@@ -248,7 +248,7 @@ class SceneRecorder:
                 stints.append(Stint(now, place))
 
     def _value(self, world: Simulation, now: Nanos, joint: Joint) -> float:
-        """Of a joint of a workpiece. The way of a belt is followed from when a workpiece is on it; only its changes count."""
+        """Value of a joint of a workpiece. A belt counts from when it carries one; only its changes do."""
         name = joint.signal
         if name not in self._motions:
             self._follow(_signal(world, name), self._motions.setdefault(name, _Planned(joint.motion, NM_PER_MM, SLACK_NM)))

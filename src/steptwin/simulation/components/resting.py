@@ -123,7 +123,7 @@ class Resting(Stateful):
         self._rests = tuple(rest for nest in nests.values() for rest in nest.workpieces())
         self._falls: tuple[Fall, ...] = ()
         self._probes: dict[str, Probe] = {}
-        """Of those that fall, and of those on them."""
+        """Probes of those that fall, and of those on them."""
         self._met: tuple[tuple[str, ...], ...] = ()
         """Pairs of which one falls, and has met the other."""
         self._due: Nanos | None = None

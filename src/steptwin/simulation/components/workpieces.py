@@ -217,7 +217,7 @@ class Workpieces:
         self._sweeps = Sweeps()
 
     def holder_of(self, name: str) -> Holder | None:
-        """What has the workpiece called ``name``, if that is there."""
+        """Holder of the workpiece called ``name``, if that is there."""
         self.bodies()
         return self._holder_of.get(name)
 

@@ -18,7 +18,7 @@ export type OpenLink = (path: "/ws" | "/editor", events: LinkEvents) => Link;
 
 export type FileKind = "recordings" | "models" | "campaigns";
 
-/** Of a studio that is not there yet: its state at the beginning, as far as that is known; what is being loaded; why it cannot be. */
+/** News of a studio that is not there yet: its state at the beginning, as far as that is known; what is being loaded; why it cannot be. */
 export type Loading =
   { foreseen: HelloMessage["hello"] } | { phase: "python" | "modules" | "world" } | { failed: string };
 

@@ -76,7 +76,7 @@ const NOTICE_MS = 8000;
 /** What the page knows of the studio, and what it asks of it. */
 export class Studio {
   link = $state<ConnectionState>("connecting");
-  /** Of a studio that is not there yet; null with the first state that comes from it. */
+  /** News of a studio that is not there yet; null with the first state that comes from it. */
   loading = $state.raw<Exclude<Loading, { foreseen: unknown }> | null>(null);
   /** Why the studio did not accept this page. */
   refusal = $state.raw<Said>({ text: "" });

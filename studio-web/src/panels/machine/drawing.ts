@@ -46,7 +46,7 @@ export class Drawing {
   /** How each of them looks. */
   private readonly painted: string[] = [];
   private solids: readonly Solid[] = [];
-  /** Of each, without a text for a picture. */
+  /** Placing of each, without a text for a picture. */
   private readonly moves: SVGTransform[] = [];
   private isSeen = new Uint8Array();
   private turns = new Float64Array();
@@ -62,7 +62,7 @@ export class Drawing {
   private readonly frame: readonly number[];
   private ordered_ms = 0;
   private marks: Marks | null = null;
-  /** Of the stage, when it was marked. */
+  /** Version of the stage when it was marked. */
   private knowledge = -1;
 
   constructor(

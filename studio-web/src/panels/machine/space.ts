@@ -71,7 +71,7 @@ export class Space {
   private readonly trails: Line[] = [];
   private readonly trailLook = new LineBasicMaterial({ depthTest: false });
   private marks: Marks | null = null;
-  /** Of the stage, when it was marked. */
+  /** Version of the stage when it was marked. */
   private knowledge = -1;
   /** Something has changed since the last picture. */
   private isStale = true;
