@@ -16,19 +16,19 @@ class Frames:
     """The frames of the lines of a world in words."""
 
     def __init__(self, world: Simulation) -> None:
-        self._told: list[FrameLine] = []
+        self._read: list[FrameLine] = []
         self.traffic: dict[str, TrafficLog] = {
-            spec.name: line_kinds()[spec.kind].traffic_log(world.lines[spec.name], "", self._told.append)
+            spec.name: line_kinds()[spec.kind].traffic_log(world.lines[spec.name], "", self._read.append)
             for spec in world.spec.lines
         }
 
     def meaning(self, record: TraceRecord) -> str:
         """A request in words."""
         client, _, _ = record.subject.rpartition("/")
-        self._told.clear()
+        self._read.clear()
         self.traffic[record.controller].frame(record.time, client, FrameDirection.IN, record.data())
-        if self._told:
-            return self._told[-1].meaning
+        if self._read:
+            return self._read[-1].meaning
         return record.data().decode("ascii", "backslashreplace")
 
     def changes(self, record: TraceRecord) -> Collection[int]:

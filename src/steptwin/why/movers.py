@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from steptwin.controller import SECOND, Nanos
+from steptwin.controller import Nanos
 from steptwin.simulation.space.frames import FLOOR, Frame, path
 from steptwin.simulation.world.simulation import Simulation
 
@@ -34,7 +34,7 @@ def _frame(world: Simulation, name: str) -> Frame:
 
 def _moves(frame: Frame, now: Nanos) -> bool:
     piece = None if frame.joint is None else next(frame.joint.motion.pieces(now), None)
-    return piece is not None and piece.speed(now, now + 1) * SECOND > 0.0
+    return piece is not None and piece.speed(now, now + 1) > 0.0
 
 
 def _signals(world: Simulation, frame: Frame) -> Iterator[str]:
