@@ -30,6 +30,9 @@ def problems() -> list[str]:
     newest = re.search(r"^## (.*)", (ROOT / "CHANGELOG.md").read_text("utf-8"), re.MULTILINE)
     if newest is None or not re.fullmatch(rf"{re.escape(own)} - \d{{4}}-\d\d-\d\d", newest[1]):
         found.append(f"the newest chapter of CHANGELOG.md is '{newest and newest[1]}', expected '{own} - YYYY-MM-DD'")
+    named = set(re.findall(r"steptwin-(\d[^ /]*?)(?:-py3|\.tar)", (ROOT / "docs/install.md").read_text("utf-8")))
+    if named != {own}:
+        found.append(f"docs/install.md names files of {', '.join(sorted(named))}, the version of the package is {own}")
     for name in ("package.json", "package-lock.json"):
         extension = json.loads((ROOT / "editors/vscode" / name).read_text("utf-8"))["version"]
         if extension != own:

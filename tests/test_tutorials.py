@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 import subprocess
 from collections.abc import Callable
@@ -9,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import serial
-from pages import BIN, blocks
+from pages import BIN, ROOT, blocks
 
 
 def steptwin(line: str, directory: Path) -> str:
@@ -36,7 +37,7 @@ def test_the_machine_grows_and_fails_as_its_page_says(tmp_path: Path) -> None:
 
 
 def test_what_is_typed_to_the_chip_proves_itself(serve_m1486: Callable[..., Any]) -> None:
-    (typed,) = (block.code.split() for block in blocks("docs/tutorials/m1486.md") if block.language == "text")
+    typed = next(block.code.split() for block in blocks("docs/tutorials/m1486.md") if block.language == "text")
     twin = serve_m1486("--variant", "B", "--speed", "20")
     answers = b""
     with serial.Serial(str(twin.pty), 4800, timeout=20) as line:
@@ -50,4 +51,9 @@ def test_the_polish_page_has_the_blocks_and_numbers_of_the_english_one() -> None
     def typed(page: str) -> list[str]:
         return [line.partition("  # ")[0].rstrip() for block in blocks(page) for line in block.code.splitlines()]
 
+    def named(page: str) -> list[str]:
+        """Options, tags, addresses, texts of steptwin."""
+        return sorted(re.findall(r"`[^`\n]+`|\b\d[\d.e-]*\d\b|\b[A-Z]+\d?(?:_[A-Z]+)+\b", (ROOT / page).read_text()))
+
     assert typed("docs/tutorials/panel.pl.md") == typed("docs/tutorials/panel.md")
+    assert named("docs/tutorials/panel.pl.md") == named("docs/tutorials/panel.md")

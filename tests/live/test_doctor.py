@@ -26,11 +26,12 @@ def test_a_port_that_somebody_else_has_is_taken(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_what_the_studio_cannot_run_without_is_vital(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doctor, "lacking", lambda extra: ["fastapi"] if extra == "studio" else [])
+    monkeypatch.setattr(doctor, "lacking", lambda extra: ["fastapi"] if extra in {"studio", "plots"} else [])
     assert found("extra studio") == Finding(
         "extra studio", "without fastapi", "pip install 'steptwin[studio]', in a clone make extras", is_vital=True
     )
-    assert not found("extra plots").todo
+    assert found("extra plots") == Finding("extra plots", "not installed")
+    assert found("extra scene") == Finding("extra scene", "installed")
 
     def not_built() -> Path:
         raise Refusal("'make page' builds it")

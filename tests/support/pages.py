@@ -32,6 +32,8 @@ RUN = ("sh", "console", "python", "toml", "json")
 _BLOCK = re.compile(
     r"(?:^<!-- not run: (?P<reason>.*?) -->\n)?^```(?P<language>[^\n]*)\n(?P<code>.*?)^```$", re.MULTILINE | re.DOTALL
 )
+_SAVED = re.compile(r"\b[Ss]ave this (?:one )?as `([^`]+)`(?:[^\n]|\n(?!\n))*\n\n\Z")
+"""The paragraph before a block that is a file."""
 _PROMISE = re.compile(r"^ *print\(.*\)  # ((?:M|chip )\d.*)$", re.MULTILINE)
 """What a Python block says that it prints."""
 _QUOTED = re.compile(r"'[^']*'|\"[^\"$`\\]*\"|\s#.*$")
@@ -49,6 +51,13 @@ class Block:
     code: str
     reason: str | None
     """Why it is not run."""
+    saved: str | None = None
+    """The file that a reader makes of it."""
+
+    @property
+    def is_done(self) -> bool:
+        """Whether a reader does something with it."""
+        return self.reason is None and (self.language in RUN or self.saved is not None)
 
     def commands(self) -> list[str]:
         return [line for line in self.code.splitlines() if shlex.split(line, comments=True)]
@@ -56,10 +65,12 @@ class Block:
 
 def blocks(page: str) -> list[Block]:
     text = (ROOT / page).read_text()
-    return [
-        Block(page, text.count("\n", 0, found.start("code")), found["language"], found["code"], found["reason"])
-        for found in _BLOCK.finditer(text)
-    ]
+    found_blocks = []
+    for found in _BLOCK.finditer(text):
+        saved = _SAVED.search(text, max(0, found.start() - 400), found.start())
+        line = text.count("\n", 0, found.start("code"))
+        found_blocks.append(Block(page, line, found["language"], found["code"], found["reason"], saved and saved[1]))
+    return found_blocks
 
 
 def only(found: Sequence[T], what: str) -> T:
@@ -120,6 +131,8 @@ class Reader:
     def do(self, block: Block) -> None:
         """Run a block. Raises `AssertionError` with page, line and output for what fails."""
         try:
+            if block.saved is not None:
+                (self._cwd / block.saved).write_text(block.code)
             if block.language == "sh":
                 for line in block.commands():
                     self.command(line)
@@ -129,7 +142,7 @@ class Reader:
                 self._python(block.code)
             elif block.language == "toml":
                 self._world(block.code, grows="/tutorials/" in block.page)
-            else:
+            elif block.language == "json":
                 for line in block.code.splitlines():
                     json.loads(line)
         except (AssertionError, ValueError) as error:

@@ -23,7 +23,10 @@ from steptwin.system import HAS_OWNERS, reason
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that was examined, what was found, and what to do where it is not as it should be."""
+    """One thing that was examined, what was found, and what to do where it is not as it should be.
+
+    An extra that is not installed is as it should be: the command that needs it names it.
+    """
 
     what: str
     found: str
@@ -70,8 +73,7 @@ def _extra(extra: str) -> Finding:
     if extra == "studio":
         todo = "pip install 'steptwin[studio]', in a clone make extras"
         return Finding("extra studio", f"without {', '.join(names)}", todo, is_vital=True)
-    todo = "pip install 'steptwin[NAME]' adds one that you need, 'steptwin[all]' each; in a clone make extras"
-    return Finding(f"extra {extra}", f"without {', '.join(names)}", todo)
+    return Finding(f"extra {extra}", "not installed")
 
 
 def _port(address: Address) -> Finding:
