@@ -8,40 +8,32 @@ const { archives, world, licences } = JSON.parse(readFileSync(modules, "utf-8"))
 const installed = new URL("../node_modules/pyodide/", import.meta.url);
 
 mkdirSync(`${folder}/python`, { recursive: true });
-for (const name of ["pyodide.mjs", "pyodide.asm.mjs", "pyodide.asm.wasm", "python_stdlib.zip"])
+for (const name of ["pyodide.mjs", "pyodide.asm.mjs", "pyodide.asm.wasm"])
   copyFileSync(new URL(name, installed), `${folder}/python/${name}`);
 writeFileSync(`${folder}/python/licences.txt`, licences);
 // Of the packages that Pyodide has besides none is used.
 const lock = JSON.parse(readFileSync(new URL("pyodide-lock.json", installed), "utf-8"));
 writeFileSync(`${folder}/python/pyodide-lock.json`, JSON.stringify({ ...lock, packages: {} }));
 
-const python = await loadPyodide();
-python.FS.mkdirTree("/sources");
-const pack = python.runPython(`
-import io, os, py_compile, zipfile
+// Without the columns of each instruction the archives are a quarter smaller; tracebacks still have the lines.
+const python = await loadPyodide({ args: ["-X", "no_debug_ranges"] });
+python.FS.writeFile("/home/pyodide/archives.py", readFileSync(new URL("archives.py", import.meta.url)));
+const { pack, library } = python.pyimport("archives");
+const own = {};
 
-def pack(files):
-    """An archive of compiled modules, whose times are always the same."""
-    made = io.BytesIO()
-    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
-        for name, source in files.to_py().items():
-            with open("/sources/module.py", "w", encoding="utf-8") as file:
-                file.write(source)
-            py_compile.compile("/sources/module.py", "/sources/module.pyc", dfile=name, doraise=True, optimize=2,
-                               invalidation_mode=py_compile.PycInvalidationMode.UNCHECKED_HASH)
-            with open("/sources/module.pyc", "rb") as file:
-                archive.writestr(zipfile.ZipInfo(name + "c", (1980, 1, 1, 0, 0, 0)), file.read(), zipfile.ZIP_DEFLATED)
-    return made.getvalue()
+function write(name, archive) {
+  const bytes = archive.toJs();
+  writeFileSync(`${folder}/python/${name}`, bytes);
+  python.FS.writeFile(`/home/pyodide/${name}`, bytes);
+}
 
-pack`);
 for (const [archive, files] of Object.entries(archives)) {
   const sources = Object.fromEntries(Object.entries(files).map(([name, path]) => [name, readFileSync(path, "utf-8")]));
-  const packed = pack(sources);
-  const bytes = packed.toJs();
-  writeFileSync(`${folder}/python/${archive}`, bytes);
-  python.FS.writeFile(`/${archive}`, bytes);
-  python.runPython(`import sys; sys.path.append("/${archive}")`);
+  Object.assign(own, sources);
+  write(archive, pack(python.toPy(sources)));
+  python.runPython(`import sys; sys.path.append("/home/pyodide/${archive}")`);
 }
+write("python_stdlib.zip", pack(library(python.toPy(own))));
 
 // The same way as in the page (src/site/python.worker.ts), with one request.
 const messages = [];

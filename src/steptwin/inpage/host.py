@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import json
 import time
 from collections.abc import Callable, Mapping
@@ -71,7 +70,6 @@ class PageTwin:
 
     def begin(self) -> None:
         """Time goes from now on."""
-        gc.freeze()  # what is there from the start stays
         self.pace.begin(1.0)
 
 

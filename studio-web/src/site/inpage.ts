@@ -89,7 +89,10 @@ export class InPage implements Backend {
     private readonly name: string,
     private readonly linked: Linked | null,
   ) {
-    this.twin = new PythonWorker(root, this.task(), (loading) => this.tellLoading(loading));
+    this.twin = new PythonWorker(root, this.task(), (loading) => {
+      if ("phase" in loading) performance.mark(loading.phase);
+      this.tellLoading(loading);
+    });
   }
 
   follow(listener: (loading: Loading) => void): void {
