@@ -10,7 +10,7 @@ from compositions import composed, finish
 from steptwin.errors import Misuse
 from steptwin.messages import MessageText
 from steptwin.why.answer import ChainLink, ChainRule, Cover
-from steptwin.why.chain import BrokenRule, Cause, Place, broken, nothing
+from steptwin.why.chain import NOT_KNOWN, Cause, Chain, Place, broken, nothing
 
 
 def cause(time: int, order: int = 0, number: int = 0, *, is_root: bool = False) -> Cause:
@@ -19,34 +19,50 @@ def cause(time: int, order: int = 0, number: int = 0, *, is_root: bool = False) 
 
 
 @pytest.mark.parametrize(
-    ("chain", "found"),
+    ("one", "found"),
     [
-        ([cause(9, 4), cause(9, 3), cause(7, 5, is_root=True)], None),
-        ([cause(9, 4), cause(9, 4, -1), cause(3, is_root=True)], None),
-        ([cause(11, 1)], BrokenRule(0, ChainRule.ORDER)),
-        ([cause(9, 4), cause(9, 4)], BrokenRule(1, ChainRule.ORDER)),
-        ([cause(9, 4), cause(8), cause(9, 4)], BrokenRule(2, ChainRule.ORDER)),
-        ([cause(9, 4), cause(7)], BrokenRule(2, ChainRule.ROOT)),
-        ([], BrokenRule(0, ChainRule.ROOT)),
+        (cause(9, 4), None),
+        (cause(10, 0), None),
+        (cause(10, 1, -1), None),
+        (cause(10, 1), ChainRule.ORDER),
+        (cause(11), ChainRule.ORDER),
+        (cause(9)._replace(place=Place(8)), ChainRule.ORDER),  # a link has the moment of its place
+        (cause(10, 0)._replace(cover=None), None),
+        (cause(9)._replace(cover=None), ChainRule.COVER),
     ],
 )
-def test_rules(chain: list[Cause], found: BrokenRule | None) -> None:
-    assert broken(chain, Place(10, 1), is_followed=True) == found
+def test_rules(one: Cause, found: ChainRule | None) -> None:
+    assert broken(one, Place(10, 1)) is found
 
 
-def test_a_link_has_the_moment_of_its_place() -> None:
-    other = cause(9)._replace(place=Place(8))
-    assert broken([other], Place(10), is_followed=False) == BrokenRule(0, ChainRule.ORDER)
+def chain(first: Cause | None, *, is_whole: bool = True) -> Chain:
+    found = Chain(cause(10).link, Place(10, 1), first, is_whole=is_whole, is_owed=first is None)
+    while not found.is_followed:
+        found.go_on()
+    return found
 
 
-def test_what_comes_later_is_covered() -> None:
-    at_once, later = (cause(time, 1, is_root=True)._replace(cover=None) for time in (10, 9))
-    assert broken([at_once], Place(10, 2), is_followed=True) is None
-    assert broken([later], Place(10, 2), is_followed=True) == BrokenRule(0, ChainRule.COVER)
+def test_causes_come_once_and_the_latest_ones_first() -> None:
+    root = cause(1, is_root=True)
+    other = cause(3)._replace(before=lambda: root)
+    first = cause(5)._replace(before=lambda: root, besides=lambda: [other])
+    found = chain(first)
+    assert [link.time for link in found.links] == [5, 3, 1]
+    assert (found.broken, found.is_cut) == (None, False)
 
 
-def test_a_chain_that_goes_on_needs_no_root() -> None:
-    assert broken([cause(9)], Place(10), is_followed=False) is None
+def test_a_cause_that_breaks_a_rule_is_left_out_and_the_others_are_followed() -> None:
+    first = cause(5)._replace(before=lambda: cause(7), besides=lambda: [cause(2, is_root=True)])
+    found = chain(first)
+    assert [str(link.text) for link in found.links] == ["something", str(NOT_KNOWN()), "something"]
+    assert found.broken is ChainRule.ORDER
+
+
+@pytest.mark.parametrize("first", [None, cause(9)])
+def test_a_chain_ends_with_a_root_or_where_nothing_is_known(first: Cause | None) -> None:
+    assert chain(first).broken is ChainRule.ROOT
+    cut = chain(first, is_whole=False)
+    assert (cut.broken, cut.is_cut) == (None, True)
 
 
 @pytest.mark.parametrize("seed", [4, 1])

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
 from steptwin.controller import Nanos
@@ -22,12 +23,14 @@ class Place(NamedTuple):
 
 
 class Cause(NamedTuple):
-    """A link with its place, and what finds the cause of it. ``cover``: what lasts until its effect, if anything does."""
+    """A link with its place, and what finds the causes of it: ``before``, and ``besides`` what else had to be so. ``cover``: what
+    lasts until its effect, if anything does."""
 
     link: ChainLink
     place: Place
     before: Callable[[], Cause | None]
     cover: Cover | None = None
+    besides: Callable[[], Iterable[Cause]] = tuple
 
 
 FoundCause: TypeAlias = "Cause | None"
@@ -48,22 +51,49 @@ def unknown() -> FoundCause:
     return None
 
 
-class BrokenRule(NamedTuple):
-    """``number``: of the causes that hold."""
+def broken(cause: Cause, effect: Place) -> ChainRule | None:
+    """The rule that a cause breaks; None for one that breaks none."""
+    if cause.link.time != cause.place.time or cause.place >= effect:
+        return ChainRule.ORDER
+    return ChainRule.COVER if cause.place.time < effect.time and cause.cover is None else None
 
-    number: int
-    rule: ChainRule
 
+class Chain:
+    """The causes of what is so at a place, each before what it leads to, the latest ones first. ``is_whole``: whether nothing was
+    before what is known. One that breaks a rule is left out, and a link says so in its place."""
 
-def broken(chain: Sequence[Cause], effect: Place, *, is_followed: bool) -> BrokenRule | None:
-    """The first rule that a chain of causes of ``effect`` breaks; None for one that breaks none. ``is_followed``: whether nothing
-    was found before the last one."""
-    for number, cause in enumerate(chain):
-        if cause.link.time != cause.place.time or cause.place >= effect:
-            return BrokenRule(number, ChainRule.ORDER)
-        if cause.place.time < effect.time and cause.cover is None:
-            return BrokenRule(number, ChainRule.COVER)
-        effect = cause.place
-    if is_followed and (not chain or chain[-1].before is not nothing):
-        return BrokenRule(len(chain), ChainRule.ROOT)
-    return None
+    def __init__(self, effect: ChainLink, place: Place, first: FoundCause, *, is_whole: bool, is_owed: bool) -> None:
+        self._is_whole = is_whole
+        self._waiting: list[Cause] = []
+        self._taken = set[tuple[Place, ChainLink]]()
+        self.links: list[ChainLink] = []
+        self.is_cut = False
+        """Whether something is because of what was before."""
+        self.broken: ChainRule | None = None
+        self._lead(effect, place, () if first is None else (first,), is_owed=is_owed)
+
+    @property
+    def is_followed(self) -> bool:
+        """Whether there are no more."""
+        return not self._waiting
+
+    def go_on(self) -> None:
+        """Take the latest one that waits."""
+        cause = max(self._waiting, key=lambda one: one.place)
+        self._waiting.remove(cause)
+        if (cause.place, cause.link) not in self._taken:
+            self._taken.add((cause.place, cause.link))
+            self.links.append(cause.link)
+            before = cause.before()
+            found = (*(() if before is None else (before,)), *cause.besides())
+            self._lead(cause.link, cause.place, found, is_owed=before is None and cause.before is not nothing)
+
+    def _lead(self, effect: ChainLink, place: Place, causes: Sequence[Cause], *, is_owed: bool) -> None:
+        """Let causes wait that lead to something. ``is_owed``: one more should have been found."""
+        rules = [broken(one, place) for one in causes]
+        self._waiting += [one for one, rule in zip(causes, rules, strict=True) if rule is None]
+        self.is_cut |= is_owed and not self._is_whole
+        rule = next((rule for rule in rules if rule), ChainRule.ROOT if is_owed and self._is_whole else None)
+        if rule is not None:
+            self.broken = self.broken or rule
+            self.links.append(replace(effect, text=NOT_KNOWN(), root=None))

@@ -11,7 +11,7 @@ from steptwin.controller import Nanos
 from steptwin.messages import Message, MessageText
 from steptwin.simulation.faults.kinds_physics import NO_SUPPLY
 from steptwin.simulation.kinds.lines import SCRIPTS
-from steptwin.simulation.kinds.programs import Resource, ResourceKind
+from steptwin.simulation.kinds.programs import ProgramState, Resource, ResourceKind
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
@@ -20,6 +20,7 @@ from steptwin.simulation.world.inputs import Download, See, SetVariable
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing
 from steptwin.why.log import LAST, MOST_LOOKED_BACK, Change, words_of
+from steptwin.why.programstates import StateChange
 from steptwin.why.roots import Act, Sent
 from steptwin.why.sentences import describe_input
 
@@ -100,14 +101,23 @@ class ControllerCauses:
         act = next((act for act in self._log.acts_at(change.time, change.order) if _changes(act, controller)), None)
         return None if act is None else acted(act)
 
-    def power_on(self, controller: str, event: Change) -> Cause:
-        """A controller that began anew: who switched it, or what had switched it off."""
+    def of_program(self, controller: str, change: StateChange) -> FoundCause:
+        """Cause of a change of the state of a program."""
+        group = self._log.group(controller)
+        moment = Change(change.time, 0.0, group, self._log.position(group, change.time), change.order)
+        found = self.in_controller(controller, moment, Resource(ResourceKind.PROGRAM, ""))
+        return found if found is None or found.cover is not None else covered(found, Cover.PROGRAM)
+
+    def begun(self, controller: str, event: Change) -> FoundCause:
+        """Start of a program, or what began its controller anew: who switched that, or what had switched it off."""
+        if event.position < 0:
+            return self.of_program(controller, StateChange(event.time, ProgramState.RUNS, event.order))
         supply = self._world.objects.supplied.get(controller)
         act = next((act for act in self._log.acts_at(event.time, event.order) if _changes(act, controller)), None)
         found = acted(act) if act is not None else self._no_supply(controller, event)
         if found is None and supply is not None:
             found = self._all.elements.at_element(supply, event)
-        is_first = self._log.is_whole and event is self._log.power_ons[controller][0]
+        is_first = self._log.is_whole and event is self._log.begins[controller][0]
         link = ChainLink(event.time, controller, words_of(self._log.record(event)))
         before = nothing if found is None and is_first else lambda: found
         return Cause(link, Place(event.time, event.order), before, Cover.PROGRAM)
@@ -155,7 +165,7 @@ class ControllerCauses:
                 and on[1] in self._log.requests.get(order, ())
             ):
                 found.append(self._frame(record, order))
-            elif record.controller == controller and record.kind == "input":
+            elif record.controller == controller and record.kind == "input" and not self._is_of_pin(record, order):
                 found.append(self._input(record, order))
         return next((one for one in found if point and _name_of(point).search(one.link.text)), next(iter(found), None))
 
@@ -172,19 +182,25 @@ class ControllerCauses:
                 event = order, record
         limit = change.order if event is None else event[0]
         last = max((one for one in inputs if one[0] < limit), default=None)
+        facts = {} if event is None else dict(event[1].facts)
+        of = Resource(ResourceKind.AXIS, str(facts["axis"])) if "axis" in facts else wanted
 
         def before() -> FoundCause:
+            if last is None and event is not None:
+                found = self.commanded(controller, change._replace(order=event[0]), None)
+                found = found or self._ended(controller, change.time, of)
+                return found or self._earlier(controller, change.time, of)
             if last is None:
-                return self._earlier(controller, change.time, wanted)
+                return self._earlier(controller, change.time, of)
             edge = next(one for one in self._log.changes[last[1]] if one.order == last[0])
             return self._all.change(last[1], edge)
 
         if event is None:
             return self._all.fault(controller, change) or self._ended(controller, change.time, wanted) or before()
         order, record = event
-        element = str(dict(record.facts).get("element"))
-        if record.subject == POSITION_ERROR and wanted is not None:
-            before = partial(self._not_followed, controller, change._replace(order=order), wanted)
+        element = str(facts.get("element"))
+        if record.subject == POSITION_ERROR and of is not None:
+            before = partial(self._not_followed, controller, change._replace(order=order), of)
         elif element in self._all.parts:  # such as a supply that is off
             before = partial(self._all.elements.at_element, element, change._replace(order=order))
         text = words_of(record)
@@ -234,6 +250,11 @@ class ControllerCauses:
                     programs.statement(controller, index), Cover.WAIT if use.lasts or is_waiting or is_of_axis else None
                 )
         return None
+
+    def _is_of_pin(self, record: TraceRecord, order: int) -> bool:
+        """Whether an input acts by the level of a pin only."""
+        act = next(self._log.acts_at(record.time, order), None)
+        return act is not None and isinstance(act.what, do.Press | do.Release | do.Set)
 
     def _is_input(self, pin: PinName) -> bool:
         return pin in self._world.objects.driven or pin in self._world.objects.circuits

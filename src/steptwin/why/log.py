@@ -20,7 +20,7 @@ from steptwin.messages import Message, MessageText, text_of
 from steptwin.simulation.components.beam import BEAM, SEEN
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.faults.active import ActiveFault, HeldLevel
-from steptwin.simulation.kinds.programs import Programs, StatementLocation
+from steptwin.simulation.kinds.programs import Programs, ProgramState, StatementLocation
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
@@ -32,6 +32,7 @@ from steptwin.statements import StatementHook
 from steptwin.why import points
 from steptwin.why.frames import Frames
 from steptwin.why.movers import movers
+from steptwin.why.programstates import ProgramStates
 from steptwin.why.roots import Act, SetFault
 
 MOST_NOTED = 20_000_000
@@ -45,6 +46,8 @@ OF_MECHANICS = ("stall", "hard-stop", "collision")
 WORKPIECE = "workpiece"
 JAMS = ("jams", "free again")
 """Events of a pusher after which what moves it stands, or moves again."""
+BEGINS = ("power-on", "restart", "reset", "file")
+"""Events after which the program of a controller begins anew."""
 STATEMENTS_AT_ONCE = 2000
 """Most statements of one program between two parts of a run."""
 
@@ -133,8 +136,8 @@ class CauseLog:
         """Events of `OF_MECHANICS` by axis or collision, and jams of pushers."""
         self.axis_events: dict[tuple[str, str], list[Change]] = defaultdict(list)
         """Events of controllers about an axis, by its number."""
-        self.power_ons: dict[str, list[Change]] = defaultdict(list)
-        """Moments at which a controller began anew, and its program with it."""
+        self.begins: dict[str, list[Change]] = defaultdict(list)
+        """Events of `BEGINS` by controller, whose program began anew."""
         self.frames = Frames(world)
         self.requests: dict[int, Collection[int]] = {}
         """Addresses of the controllers that a frame may change, by its order."""
@@ -167,7 +170,11 @@ class CauseLog:
         world.trace.subscribers.append(self._take)
         world.act_subscribers.append(self._act)
         parts.faults.act_subscribers.append(self._fault_acted)
-        for name, programs in world.programs.items():
+        self.states = ProgramStates(world, self._order_of)
+        self._note_statements()
+
+    def _note_statements(self) -> None:
+        for name, programs in self.world.programs.items():
             begun = (programs.location(number) for number in programs.begun(self.begin))
             present = (frame.location for frame in programs.stack(self.begin)[:1])
             for location in begun if self.is_whole else present:
@@ -223,8 +230,8 @@ class CauseLog:
                     self.points.executes(name, record.time, keeps=True)
             case "event" if record.subject in (*OF_MECHANICS, WORKPIECE):
                 self._note_event(record, Change(record.time, 0.0, group, len(records), order))
-            case "event" if record.subject == "power-on":
-                self.power_ons[record.controller].append(Change(record.time, 0.0, group, len(records), order))
+            case "event" if record.subject in BEGINS:
+                self.begins[record.controller].append(Change(record.time, 0.0, group, len(records), order))
             case "event" if (axis := dict(record.facts).get("axis")) is not None:
                 self.axis_events[record.controller, str(axis)].append(Change(record.time, 0.0, group, len(records), order))
             case "fault":
@@ -245,10 +252,17 @@ class CauseLog:
         if record.subject == "collision" and one and other:
             self.movers[element, record.time] = movers(self.world, str(one), str(other).partition(",")[0], record.time)
 
+    def _order_of(self, controller: str, now: Nanos, state: ProgramState) -> int:
+        """The order of a change of a program: before the first statement that it lets be executed, after the one that ends it."""
+        executed = self.executed[controller]
+        first = bisect_left(executed.times, now)
+        goes_on = state is ProgramState.RUNS and first < len(executed)
+        return executed.orders[first] - 2 if goes_on else self._order + 6
+
     @property
     def _order(self) -> int:
         """The order of what was noted last."""
-        return 4 * self._events
+        return 8 * self._events
 
     def _is_input(self, record: TraceRecord, signal: str) -> bool:
         """Whether an edge of a pin came from outside its controller."""
@@ -263,10 +277,10 @@ class CauseLog:
         """The order of an edge of an input, recorded after the statements and events that it led to."""
         group, events = self._group_of[record.controller], self._events - 1
         for order, earlier in self.at(group, record.time):
-            if order != 4 * events or earlier.kind != "event" or earlier.controller != record.controller:
+            if order != 8 * events or earlier.kind != "event" or earlier.controller != record.controller:
                 break
             events -= 1
-        return 4 * events + 1
+        return 8 * events + 1
 
     def _note_holds(self, owner: str, now: Nanos) -> None:
         held = self.world.objects.faults.held(owner)
@@ -300,7 +314,7 @@ class CauseLog:
         executed = self.executed[name]
         executed.times.append(now)
         executed.locations.append(location)
-        executed.orders.append(self._order + 2)
+        executed.orders.append(self._order + 4)
 
     def _hook(self, name: str, programs: Programs) -> StatementHook:
         executed = self.executed[name]
@@ -316,7 +330,7 @@ class CauseLog:
                 return
             add_time(now)
             add_location(location)
-            add_order(4 * self._events + 2)
+            add_order(8 * self._events + 4)
             keeps = keeping.get(location)
             if keeps is None:
                 keeps = keeping[location] = programs.use(location).keeps
@@ -367,9 +381,12 @@ class CauseLog:
         """The last event of a controller about an axis by a moment, before an order."""
         return _last(self.axis_events.get((controller, axis), ()), until, before)
 
-    def last_power_on(self, controller: str, until: Nanos, before: int = LAST) -> Change | None:
-        """When a controller last began anew by a moment, before an order."""
-        return _last(self.power_ons.get(controller, ()), until, before)
+    def last_begin(self, controller: str, until: Nanos, before: int) -> Change | None:
+        """When a program last began anew by a moment, before an order, if it was not there from the beginning: an event of
+        `BEGINS`, or a start without one, which has no position."""
+        starts = [Change(one.time, 0.0, self.group(controller), -1, one.order) for one in self.states.starts(controller)]
+        found = (_last(starts, until, before), _last(self.begins.get(controller, ()), until, before))
+        return max((one for one in found if one is not None), key=lambda one: (one.time, one.position >= 0), default=None)
 
     def last_change(self, signal: str, until: Nanos, before: int = LAST) -> Change | None:
         """The last change of a signal by a moment, before an order."""

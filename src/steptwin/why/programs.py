@@ -8,11 +8,12 @@ from typing import Any
 
 from steptwin.controller import MILLISECOND, Nanos
 from steptwin.messages import Message
-from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementLocation, StatementUse
+from steptwin.simulation.kinds.programs import ProgramState, Resource, ResourceKind, StatementLocation, StatementUse
 from steptwin.why import points
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing, unknown
-from steptwin.why.log import LAST, MOST_LOOKED_BACK, Change
+from steptwin.why.log import LAST, MOST_LOOKED_BACK, Change, Executed
+from steptwin.why.programstates import OVER
 from steptwin.why.sentences import statement
 
 WAS_EXECUTED = Message("why.was-executed", "{statement} was executed")
@@ -20,6 +21,17 @@ WAS_IN_EXECUTION = Message("why.was-in-execution", "{statement} was in execution
 ENDED = Message("why.ended", "{statement} ended")
 DID_NOT_WAIT = Message("why.did-not-wait", "{statement} did not wait: {levels}")
 DECIDED = Message("why.decided", "{statement} decided")
+FARTHER = Message("why.farther", "the last {most} statements did not decide it: those before were not searched")
+NOT_STARTED = Message("why.not-started", "nothing has started the program")
+HELD = {
+    ProgramState.STOPPED: Message("why.program-is-stopped", "the program is stopped{where}"),
+    ProgramState.PAUSED: Message("why.program-is-paused", "the program is paused{where}"),
+    ProgramState.KILLED: Message("why.program-is-killed", "the program is stopped by Kill{where}"),
+    ProgramState.LIMITED: Message("why.program-is-limited", "the program is stopped by LIMIT{where}"),
+    ProgramState.SHUT_DOWN: Message("why.program-is-shut-down", "the controller is off or shut down{where}"),
+}
+WHERE = Message("why.where", " at {statement}")
+GOES_ON = Message("why.program-goes-on", "the program goes on")
 PROGRAM_STARTED = Message("why.program-started", "the program started")
 LONGEST_REACTION_NS: Nanos = 510 * MILLISECOND
 """Limit of the time after which a statement goes on when what it waits for has come: inputs may be filtered for 500 ms."""
@@ -36,8 +48,6 @@ class ProgramCauses:
         self._world = causes.log.world
         self._interrupts: dict[tuple[str, str], Sequence[range]] = {}
         self._uses: dict[tuple[str, StatementLocation], StatementUse] = {}
-        self.is_far = False
-        """Whether the chain that was followed last ends because nothing older was searched (`MOST_UNDECIDED`)."""
 
     def use(self, controller: str, index: int) -> StatementUse:
         """Reads and changes of an executed statement; none if its text was replaced since."""
@@ -65,7 +75,16 @@ class ProgramCauses:
         if self._log.is_in_progress(executed):
             return Cause(ChainLink(executed.time, controller, WAS_IN_EXECUTION(statement=text)), place, unknown)
         link = ChainLink(executed.time, controller, WAS_EXECUTED(statement=text))
-        return Cause(link, place, partial(self._of_executed, controller, index))
+        return Cause(link, place, partial(self._of_executed, controller, index), besides=partial(self._values, controller, index))
+
+    def _values(self, controller: str, index: int) -> Iterator[Cause]:
+        """Values that an executed statement makes others of, or acts by."""
+        use, here = self.use(controller, index), self._log.executed[controller][index]
+        for one in use.reads if use.writes and not use.waits else ():
+            if one not in use.writes:
+                value = self.resource(controller, one, index, here.time, here.order)
+                if value is not None:
+                    yield covered(value, Cover.LEVEL) or value
 
     def _of_executed(self, controller: str, index: int) -> FoundCause:
         """Value that a statement reads, if it has changed since the last execution, so that another one was written, or of the
@@ -110,7 +129,7 @@ class ProgramCauses:
         at_once, after = self._world.programs[controller].statement_time, index
         is_present = self._log.is_of_present_text(executed[index])
         handlers = self._handlers(controller, executed[index].location.text) if is_present else ()
-        begun = self._log.last_power_on(controller, executed[index].time, executed[index].order)
+        begun = self._log.last_begin(controller, executed[index].time, executed[index].order)
         for earlier in range(index - 1, max(-1, index - MOST_UNDECIDED), -1):
             if begun is not None and executed[earlier].order < begun.order:
                 return self._began(controller, after, begun)
@@ -121,6 +140,9 @@ class ProgramCauses:
                 number = here.location.number
             if use.waits and ended.time - here.time > at_once:
                 return self._decided(controller, earlier, Place(ended.time, ended.order, 3 * after), ENDED)
+            resumed = self._resumed(controller, here.order, ended)
+            if resumed is not None:
+                return resumed
             if use.waits and not use.governs and any(one.kind is not ResourceKind.AXIS for one in use.reads):
                 first, there = self._begin_of_wait(controller, earlier, handlers), Place(ended.time, ended.order, 3 * after)
                 began = Place(executed[first].time, executed[first].order, 3 * first)
@@ -129,17 +151,18 @@ class ProgramCauses:
             if number in use.governs or (use.is_loop and ended.location.number >= use.governs.stop):
                 return self._decided(controller, earlier, Place(here.time, here.order, 3 * earlier + 2), DECIDED)
             after = earlier
-        self.is_far = index >= MOST_UNDECIDED
-        if begun is not None and not self.is_far:
-            return self._began(controller, after, begun)
-        return None if self.is_far else self._started(controller)
+        if index >= MOST_UNDECIDED:
+            here, text = executed[after], FARTHER(most=MOST_UNDECIDED)
+            place = Place(here.time, here.order, 3 * after)
+            return Cause(ChainLink(here.time, controller, text), place, nothing, Cover.PROGRAM)
+        return self._began(controller, after, begun) if begun is not None else self._started(controller)
 
     def _begin_of_wait(self, controller: str, index: int, handlers: Sequence[range]) -> int:
         """The number of the statement at which a wait began, which goes on after each interrupt."""
         locations = self._log.executed[controller].locations
         first, earlier = index, index - 1
         here = self._log.executed[controller][index]
-        begun = self._log.last_power_on(controller, here.time, here.order)
+        begun = self._log.last_begin(controller, here.time, here.order)
         orders = self._log.executed[controller].orders
         while (earlier >= 0 and (begun is None or orders[earlier] > begun.order)) and (
             locations[earlier] == locations[index] or any(locations[earlier].number in handler for handler in handlers)
@@ -186,14 +209,15 @@ class ProgramCauses:
     def _of_wait(self, controller: str, index: int, place: Place) -> FoundCause:
         """Change that a statement waited for, which came while it did, at most `LONGEST_REACTION_NS` before its end. A wait for a
         time depends on what led to it."""
-        reads = self.use(controller, index).reads
+        reads, began = self.use(controller, index).reads, self._log.executed[controller][index]
+        resumed = self._resumed(controller, began.order, began._replace(time=place.time, order=place.order))
+        others = () if resumed is None else (resumed,)
         if all(resource.kind is ResourceKind.VALUE for resource in reads):
-            began = self._log.executed[controller][index]
             came = [
                 cause for cause in self._read(controller, index, place) if cause.place > Place(began.time, began.order, 3 * index)
             ]
-            last = max(came, key=lambda cause: cause.place, default=None)
-            return covered(last if reads else self._of_statement(controller, index), Cover.WAIT)
+            last = max((*came, *others), key=lambda cause: cause.place, default=None)
+            return covered(last if reads or last else self._of_statement(controller, index), Cover.WAIT)
         latest = place.time - LONGEST_REACTION_NS
         passes = any(resource.kind is ResourceKind.AXIS and resource.name for resource in reads)  # a place, not the end
         came = [
@@ -202,6 +226,7 @@ class ProgramCauses:
             if (passes if cause.cover is Cover.MOTION else cause.place.time >= latest)
         ]
         pins = [f"{controller}.{one.name}" for one in reads if one.kind is ResourceKind.PIN and one.name]
+        came += others
         if not came and len(pins) == 1 and self._log.since(pins[0], place.time) is None:  # a filter lets it in later
             begin = self._log.begin
             return covered(self._all.first(pins[0], self._log.level(pins[0], begin), Place(begin)), Cover.LEVEL)
@@ -236,11 +261,39 @@ class ProgramCauses:
         change = Change(since, 0.0, group, self._log.position(group, since), before if since == time else LAST)
         return covered(self._all.controllers.in_controller(controller, change, resource, point), Cover.LEVEL)
 
-    def _began(self, controller: str, index: int, power_on: Change) -> Cause:
-        """The first statement of a program since its controller was switched on again."""
+    def held(self, controller: str, at: Nanos, before: int = LAST) -> FoundCause:
+        """Since when, and by what, the program of a controller is not executed at a moment, before an order; None if it is."""
+        change = self._log.states.last(controller, at, before)
+        if change is None or change.state is ProgramState.RUNS:
+            return None
+        if change.order < 0:
+            return Cause(ChainLink(change.time, controller, NOT_STARTED()), Place(change.time), self._all.at_begin, Cover.LEVEL)
+        where = ""
+        index = self._log.last_executed(controller, change.time)
+        if change.state is not ProgramState.STOPPED and index >= 0:
+            where = WHERE(statement=statement(self._log, self._log.executed[controller][index]))
+        text = HELD[change.state](where=where)
+        link = ChainLink(change.time, controller, text)
+        by = partial(self._all.controllers.of_program, controller, change)
+        return Cause(link, Place(change.time, change.order), by, Cover.LEVEL)
+
+    def _resumed(self, controller: str, since: int, until: Executed) -> FoundCause:
+        """The end of a pause in a program after an order, before a statement."""
+        change = self._log.states.last(controller, until.time, until.order)
+        if change is None or change.state is not ProgramState.RUNS or change.order < since:
+            return None
+        before = self._log.states.last(controller, change.time, change.order)
+        held = None if before is None or before.state in OVER else self.held(controller, change.time, change.order)
+        if held is None:
+            return None
+        by, place = partial(self._all.controllers.of_program, controller, change), Place(change.time, change.order)
+        return Cause(ChainLink(change.time, controller, GOES_ON()), place, by, Cover.PROGRAM, lambda: [held])
+
+    def _began(self, controller: str, index: int, begin: Change) -> Cause:
+        """The first statement of a program since that began anew."""
         first = self._log.executed[controller][index]
         place = Place(first.time, first.order, 3 * index)
-        begun = self._all.controllers.power_on(controller, power_on)
+        begun = self._all.controllers.begun(controller, begin)
         return Cause(ChainLink(first.time, controller, PROGRAM_STARTED()), place, lambda: begun, Cover.PROGRAM)
 
     def _started(self, controller: str) -> FoundCause:

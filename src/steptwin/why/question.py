@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import TypeAlias
 
@@ -23,7 +23,7 @@ from steptwin.simulation.world.snapshotlog import outside_past
 from steptwin.why import points
 from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Cover
 from steptwin.why.causes import FAULT, IS, Causes
-from steptwin.why.chain import NOT_KNOWN, Cause, Place, broken, covered, nothing
+from steptwin.why.chain import Cause, Chain, Place, covered
 from steptwin.why.log import LAST, MOST_NOTED, OF_MECHANICS, CauseLog, in_parts
 from steptwin.why.replayed import ReplayedSignals, TimeSeries, watch_truth, watch_value
 from steptwin.why.search import Asked
@@ -107,6 +107,7 @@ IS_FALSE = Message("why.is-false", "{name} is false")
 IS_IN_UNIT = Message("why.is-in-unit", "{name} is {value:.6g} {unit}")
 WAITS = Message("why.waits", "{controller} waits at {statement}")
 DOES_NOT_WAIT = Message("why.does-not-wait", "{controller} does not wait: {statement}")
+PROGRAM_IS = Message("why.program-is", "{controller}: {held}")
 WAITS_FOR_A_TIME = Message("why.waits-for-a-time", "it waits for a time only")
 DEPENDS_ON = Message("why.depends-on", "it depends on {name}")
 ANY_PIN = Message("why.any-pin", "any pin")
@@ -226,9 +227,9 @@ class Why:
         return Asked(text, frozenset(signals.values()), edges, moving, flip)
 
     def rests(self, question: str, at: Nanos) -> bool:
-        """Whether a condition depends on where an axis is."""
-        names = parse_condition(self._named(_text_of(question))).names()
-        return bool(self._axes_of(map(self._canonical, names), at))
+        """Whether a condition depends on where an axis is, or on a program that is not executed."""
+        names = [self._canonical(name) for name in parse_condition(self._named(_text_of(question))).names()]
+        return bool(self._axes_of(names, at)) or self._held(names, at) is not None
 
     def _has_edges(self, signal: str) -> bool:
         owner, _, pin = signal.partition(".")
@@ -250,7 +251,7 @@ class Why:
         first = self._causes.lasting(signals, at, None if since is None else self._changed(signals, since))
         if first is not None or since is not None:
             return (yield from self._answer(text, at, state, since, first))
-        resting = yield from self._resting(signals, at)
+        resting = (yield from self._resting(signals, at)) or self._held(signals, at)
         answer = yield from self._answer(text, at, state, None, resting)
         states = [link for name in signals if self.log.has(name) for link in self._states(name, at)]
         says_more = resting is not None or len(states) > len(signals) or any(self._causes.drivers(name, at) for name in signals)
@@ -548,7 +549,11 @@ class Why:
     def _wait(self, controller: str, at: Nanos) -> Asking:
         """Cause for which the program of a controller waits."""
         log, causes = self.log, self._causes
-        index = log.last_executed(controller, at)
+        index, held = log.last_executed(controller, at), causes.programs.held(controller, at)
+        if held is not None:
+            since = held.link.time if held.place.order >= 0 else None
+            first = held if since is None else covered(held.before(), Cover.LEVEL)
+            return (yield from self._answer(controller, at, PROGRAM_IS(controller=controller, held=held.link.text), since, first))
         if index < 0:
             raise Misuse(NOTHING_EXECUTED_YET(controller=controller, at=at / SECOND))
         executed = log.executed[controller]
@@ -566,7 +571,7 @@ class Why:
         changed = [cause for cause in found if cause.link.time > here.time]
         last = max(changed, key=lambda cause: cause.link.time, default=None)
         pins = [f"{controller}.{resource.name}" for resource in use.reads if resource.kind is ResourceKind.PIN and resource.name]
-        resting = (yield from self._resting(pins, at)) if last is None else None
+        resting = ((yield from self._resting(pins, at)) or self._held(pins, at)) if last is None else None
         first = covered(last, Cover.LEVEL) or resting or covered(causes.programs.statement(controller, index), Cover.WAIT)
         answer = yield from self._answer(controller, at, WAITS(controller=controller, statement=text), since, first)
         return self._after(links, answer)
@@ -577,15 +582,25 @@ class Why:
         is_all = len(links) <= self._most_links and (self._most_links != MOST_LINKS or len(states) < MOST_SNAPSHOTS)
         return answer._replace(links=links[: self._most_links], is_complete=answer.is_complete and is_all)
 
-    def _axes_of(self, signals: Iterable[str], at: Nanos) -> set[str]:
-        """The axes whose position or switch is among signals, or drives one of them."""
+    def _owners(self, signals: Iterable[str], at: Nanos) -> set[str]:
+        """Owners of signals, and of those that drive one of them."""
         waiting, seen = list(signals), set[str]()
         while waiting:
             name = waiting.pop()
             if name not in seen:
                 seen.add(name)
                 waiting += (*self._causes.drivers(name, at), *self._causes.elements.behind(name))
-        return {name.partition(".")[0] for name in seen} & set(self.log.world.axes)
+        return {name.partition(".")[0] for name in seen}
+
+    def _axes_of(self, signals: Iterable[str], at: Nanos) -> set[str]:
+        """The axes whose position or switch is among signals, or drives one of them."""
+        return self._owners(signals, at) & set(self.log.world.axes)
+
+    def _held(self, signals: Iterable[str], at: Nanos) -> Cause | None:
+        """Cause that holds a program on which signals depend."""
+        programs = self._owners(signals, at) & set(self.log.world.programs)
+        held = [found for one in programs if (found := self._causes.programs.held(one, at)) is not None]
+        return max(held, key=lambda one: one.place, default=None)
 
     def _resting(self, signals: Sequence[str], at: Nanos) -> Resting:
         """Where an axis of `_axes_of` is, and what brought it there, or left it; of several the one moved last. None if nothing
@@ -641,7 +656,7 @@ class Why:
         if index < 0 or not programs.leads_to(owner, index, Resource(ResourceKind.PIN, pin)):
             return []
         here, use = log.executed[owner][index], programs.use(owner, index)
-        if not use.waits or at - here.time <= world.programs[owner].statement_time:
+        if not use.waits or programs.held(owner, at) is not None or at - here.time <= world.programs[owner].statement_time:
             return []
         yield ChainLink(at, owner, WAITS(controller=owner, statement=statement(log, here)))
         return [f"{owner}.{one.name}" for one in use.reads if one.kind is ResourceKind.PIN and one.name]
@@ -649,21 +664,14 @@ class Why:
     # ------------------------------------------------------------------ the chain
 
     def _answer(self, question: str, at: Nanos, state: MessageText, since: Nanos | None, first: Cause | None) -> Asking:
-        chain: list[Cause] = []
         # What it is lasts since then.
-        cause, effect = covered(first, Cover.LEVEL if first is not None and first.link.time == since else None), Place(at, LAST)
-        while cause is not None and len(chain) < self._most_links:
-            chain.append(cause)
-            if broken(chain, effect, is_followed=False):
-                break
-            cause = cause.before()
+        first = covered(first, Cover.LEVEL if first is not None and first.link.time == since else None)
+        log, effect = self.log, ChainLink(at if since is None else since, question.partition(".")[0], state)
+        chain = Chain(
+            effect, Place(at, LAST), first, is_whole=log.is_whole, is_owed=first is None and not (since is None and log.is_whole)
+        )
+        while not chain.is_followed and len(chain.links) < self._most_links:
+            chain.go_on()
             yield
-        is_followed = cause is None and not self._causes.programs.is_far
-        is_cut = is_followed and not self.log.is_whole and (not chain or chain[-1].before is not nothing)
-        is_owed = is_followed and not is_cut and (since is not None or bool(chain))
-        links, found = [one.link for one in chain], broken(chain, effect, is_followed=is_owed)
-        if found is None:
-            return Answer(question, at, state, since, tuple(links), is_followed and not is_cut, self.log.begin, is_cut)
-        first_link = ChainLink(at if since is None else since, question.partition(".")[0], state)
-        links[found.number :] = [replace(links[found.number - 1] if found.number else first_link, text=NOT_KNOWN(), root=None)]
-        return Answer(question, at, state, since, tuple(links), True, self.log.begin, broken=found.rule)
+        is_complete = chain.is_followed and not chain.is_cut
+        return Answer(question, at, state, since, tuple(chain.links), is_complete, log.begin, chain.is_cut, broken=chain.broken)

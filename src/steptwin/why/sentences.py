@@ -27,6 +27,9 @@ CLEARS_A_FAULT = Message("why.clears-a-fault", "clears the fault {name}")
 SETS_A_VARIABLE = Message("why.sets-a-variable", "sets the variable {name} = {value:g}")
 PUTS_A_TEXT = Message("why.puts-a-text", "puts a text into {place}")
 SENDS = Message("why.sends", "sends {data} from {place}")
+SENDS_TO = Message("why.sends-to", "sends {data} to {line}")
+REQUESTS = Message("why.requests", "requests {data} of {unit} on {line}")
+COUPLES = Message("why.couples", "lets the encoder of {axis} be turned by: {to}")
 REPLACED_STATEMENT = Message("why.replaced-statement", "a statement of a program that was replaced since")
 LINE = Message("why.line", "line {line} `{code}`")
 END_OF_PROGRAM = Message("why.end-of-program", "the end of the program")
@@ -45,6 +48,9 @@ _WORDS: Mapping[type, Callable[[Any], MessageText]] = {
     do.Put: lambda step: PUTS_A_WORKPIECE(on=step.on),
     do.Remove: lambda step: REMOVES_A_WORKPIECE(workpiece=step.workpiece),
     do.Write: lambda step: WRITES(values=[f"{controller}.{name} = {value:g}" for controller, name, value in step.values]),
+    do.Send: lambda step: SENDS_TO(data=visible(step.data.decode("ascii", "backslashreplace").strip()), line=step.line),
+    do.Request: lambda step: REQUESTS(data=step.pdu.hex(" "), unit=step.unit, line=step.line),
+    do.Couple: lambda step: COUPLES(axis=f"{step.controller}.M{step.axis}", to=step.coupling),
     do.PowerCycle: lambda step: SWITCHES_OFF_AND_ON(controller=step.controller),
     Halt: _halted,
     do.Turn: lambda step: TURNS(axis=f"{step.controller}.M{step.axis}", counts=step.counts),

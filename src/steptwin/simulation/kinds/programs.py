@@ -48,6 +48,8 @@ class ResourceKind(enum.Enum):
     """By its number; empty: any axis."""
     VALUE = "value"
     """A variable or register of the program."""
+    PROGRAM = "program"
+    """The program itself: whether it is executed."""
 
 
 class Resource(NamedTuple):
@@ -72,6 +74,17 @@ class StatementUse(NamedTuple):
     """Where the program goes on, if that depends on nothing."""
     keeps: bool = False
     """Whether it may change a point of the controller without an event of that (`steptwin.points.LivePoint.is_kept`)."""
+
+
+class ProgramState(enum.Enum):
+    """States of a program, of which one lasts until something from outside the program, or its end."""
+
+    RUNS = "runs"
+    STOPPED = "stopped"
+    PAUSED = "paused"
+    KILLED = "stopped by Kill"
+    LIMITED = "stopped by LIMIT"
+    SHUT_DOWN = "shut down"
 
 
 class Wait(NamedTuple):
@@ -128,6 +141,9 @@ class Programs(Protocol):
     def location(self, number: int) -> StatementLocation | None:
         """Location of a statement for which a hook was called, at that moment; None where it comes from no text."""
         ...
+
+    @property
+    def state(self) -> ProgramState: ...
 
     def depth(self) -> int:
         """How many calls and interrupts have not returned yet."""

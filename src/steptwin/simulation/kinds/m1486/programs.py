@@ -22,7 +22,7 @@ from steptwin.m1486.unit import MASK
 from steptwin.messages import Message
 from steptwin.simulation.kinds.m1486.memory import PLACE as TEXT
 from steptwin.simulation.kinds.m1486.statement_use import use_of
-from steptwin.simulation.kinds.programs import Frame, Statement, StatementLocation, StatementUse, Wait
+from steptwin.simulation.kinds.programs import Frame, ProgramState, Statement, StatementLocation, StatementUse, Wait
 from steptwin.statements import StatementHook
 
 BEGIN = "program"
@@ -168,6 +168,16 @@ class ChipPrograms:
         has_begun = now == 0 and program.statement_ns > 0 and (program.ready > 0 or program.waiting is not WaitReason.NOTHING)
         begin = self._chip.memory.begin
         return (begin,) if has_begun and begin is not None and self._chip.memory.end != begin else ()
+
+    @property
+    def state(self) -> ProgramState:
+        """A chip executes what comes: at the end of its program, too."""
+        program = self._chip.program
+        if self._chip.is_shut_down:
+            return ProgramState.SHUT_DOWN
+        if program.is_killed:
+            return ProgramState.KILLED
+        return ProgramState.LIMITED if program.is_limited else ProgramState.RUNS
 
     def depth(self) -> int:
         return 0 if self._chip.program.back is None else 1

@@ -37,7 +37,7 @@ class ChipTrafficLog:
         """Every character is one of the line."""
 
     def changes(self, client: str, data: bytes) -> Collection[int]:
-        return self._line.units
+        return self._line.chain.chips
 
     def recorded(self, record: TraceRecord) -> None:
         """A chip announces the byte that it sends."""

@@ -12,8 +12,9 @@ from steptwin.diagnostics import SourceText
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.program_banks import LoadedProgram
 from steptwin.mic488.program_registers import ACCESS
+from steptwin.mic488.status import ProgramState as Control
 from steptwin.simulation.kinds.mic488.statement_use import use_of
-from steptwin.simulation.kinds.programs import Frame, Statement, StatementLocation, StatementUse, Wait
+from steptwin.simulation.kinds.programs import Frame, ProgramState, Statement, StatementLocation, StatementUse, Wait
 from steptwin.simulation.kinds.programtexts import bank_text
 from steptwin.statements import StatementHook
 from steptwin.wbc.dialect import Dialect
@@ -86,6 +87,10 @@ class WbcPrograms:
             found = self._locations[bank, number] = StatementLocation(bank_text(bank), number)
         return found
 
+    @property
+    def state(self) -> ProgramState:
+        return _STATES[self._device.program.state]
+
     def depth(self) -> int:
         return len(self._device.program.interpreter.stack)
 
@@ -151,6 +156,7 @@ class WbcPrograms:
         self._device.command(lambda now: self._device.program.rest_in_loops(not on, now), now)
 
 
+_STATES = {Control.STOPPED: ProgramState.STOPPED, Control.RUNNING: ProgramState.RUNS, Control.PAUSED: ProgramState.PAUSED}
 _POINTS = {
     "$I": "USER_REGISTER[{}]:int",
     "$D": "USER_REGISTER[{}]:dint",

@@ -12,12 +12,13 @@ _PINS = frozenset({"OUT", "IN", "AIN"})
 _OF_AXIS = frozenset({"M", "STATM", "VACTM", "POSM", "ACCM", "DECM", "VMAXM", "LIMLM", "LIMRM", "ENC", "XENC", "CFGINT_M"})
 _ANY_AXIS = Resource(ResourceKind.AXIS, "")
 _ANY_PIN = Resource(ResourceKind.PIN, "")
+_PROGRAM = Resource(ResourceKind.PROGRAM, "")
 
 
 def use_of(steps: Sequence[s.ProgramStep], number: int) -> StatementUse:
     """Use of a step by its number; the one after the last is the end of the program, which ends as with END."""
     if number >= len(steps):
-        return StatementUse(writes=(_ANY_AXIS, _ANY_PIN))
+        return StatementUse(writes=(_ANY_AXIS, _ANY_PIN, _PROGRAM))
     step = steps[number]
     writes, keeps = _set_by(step) if isinstance(step, s.SetStep) else (tuple(_acted_on(step.effect())), False)
     return StatementUse(
@@ -41,6 +42,7 @@ def _acted_on(effect: s.StepEffect) -> Iterable[Resource]:
         yield _ANY_AXIS
     if effect.everything:
         yield _ANY_PIN
+        yield _PROGRAM
 
 
 def _awaited(step: s.ProgramStep) -> Iterable[Resource]:
