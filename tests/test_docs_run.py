@@ -33,6 +33,7 @@ NOT_RUN = {
     "docs/serve.md": ["needs mbpoll; tests/peers/test_mbpoll_of_the_docs.py does it"],
     "docs/index.md": ["it goes on until Ctrl-C"],
     "docs/install.md": ["needs a package index", "needs a package index", "a clone is what these pages are run in"],
+    "docs/space/palletizer.md": ["it goes on until Ctrl-C"],
     "docs/studio.md": ["it goes on until Ctrl-C"],
     "docs/studio/devices.md": ["needs devices"],
     "docs/studio/rest.md": ["needs a running studio; tests/studio/test_examples.py does it"] * 2,
