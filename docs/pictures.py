@@ -13,6 +13,7 @@ from resvg_py import svg_to_bytes
 
 from steptwin.controller import SECOND
 from steptwin.files.scene.picture import View, picture, write_picture
+from steptwin.files.scene.recorder import SceneRecorder
 from steptwin.files.world import World
 from steptwin.live.studio.demo import FOLDER, describe_demo
 from steptwin.simulation.world.simulation import Simulation
@@ -454,9 +455,12 @@ def main() -> None:
     demo = World.from_toml(describe_demo(free_ports=True), {"demo.prg": (FOLDER / "demo.prg").read_bytes()})
     draw_moving("demo", demo, 6, 10)
 
-    with World.load(IMAGES.parents[1] / "examples/worlds/palletizer/palletizer.toml") as palletizer:
-        palletizer.run(for_=35.0)
-        write_picture(palletizer, IMAGES / "palletizer.svg")
+    for name, seconds, example in (("palletizer", 35.0, "palletizer"), ("plotter-drawn", 10.3, "plotter")):
+        recorder = SceneRecorder()
+        with World.load(IMAGES.parents[1] / f"examples/worlds/{example}/{example}.toml") as world:
+            recorder.follow(world)
+            world.run(for_=seconds)
+            write_picture(world, IMAGES / f"{name}.svg", recorder=recorder)
 
 
 if __name__ == "__main__":

@@ -32,6 +32,7 @@ def command(
     from steptwin.controller import SECOND
     from steptwin.files.loader import is_recording, load_world
     from steptwin.files.scene.picture import check_picture, write_picture
+    from steptwin.files.scene.recorder import SceneRecorder
     from steptwin.files.timedinputs import parse_duration
 
     moment = parse_duration(at, "--at")
@@ -40,9 +41,10 @@ def command(
     def warn(text: str) -> None:
         typer.echo(text, err=True)
 
-    with load_world(file, warn, moment=moment if is_recording(file) else None, keep_trace=False, keep_inputs=False) as world:
+    recorder, until = SceneRecorder(), moment if is_recording(file) else None
+    with load_world(file, warn, moment=until, keep_trace=False, keep_inputs=False, begun=recorder.follow) as world:
         reason = world.run_to(moment) if world.now < moment else None
         if world.now < moment:
             raise Misuse(f"{file} ends at {world.now / SECOND:g} s ({reason}), before {moment / SECOND:g} s")
-        write_picture(world, output, view.value)
+        write_picture(world, output, view.value, recorder)
     typer.echo(f"{output}: {world.spec.name} at {moment / SECOND:g} s")

@@ -104,6 +104,8 @@ class MechanicsDescription:
     """Pulses per unit of its drive; negative if positive pulses move it in the negative direction."""
     brake: str | None = None
     """The brake on its motor."""
+    pitch: float | None = None
+    """mm in a revolution of the motor, of a screw or a belt."""
 
 
 @dataclass(frozen=True, slots=True)

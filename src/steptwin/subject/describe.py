@@ -11,6 +11,7 @@ from steptwin.simulation.components.beam import BEAM
 from steptwin.simulation.components.body import BODY
 from steptwin.simulation.components.brake import BRAKE
 from steptwin.simulation.components.button import BUTTON
+from steptwin.simulation.components.conveyor import CONVEYOR
 from steptwin.simulation.components.frames import Mounted
 from steptwin.simulation.components.mount import MoverSpec
 from steptwin.simulation.components.nest import NEST
@@ -43,6 +44,7 @@ from steptwin.subject.scene import (
     JointDescription,
     MoveState,
     NestDescription,
+    OriginDescription,
     Point,
     SceneDescription,
     WorkpieceState,
@@ -81,7 +83,9 @@ def _mechanics(world: Simulation, name: str) -> MechanicsDescription:
     switches = tuple(_switch(one.zone) for one in spec.switches)
     scale = fitted.mechanism.build.sign * float(fitted.scale.pulses_per_unit)
     brake = next((one.name for one in world.spec.elements.of(BRAKE) if one.axis == name), None)
-    return MechanicsDescription(name, *place, fitted.scale.unit, points, spec.kind, spec.travel, switches, scale, brake)
+    return MechanicsDescription(
+        name, *place, fitted.scale.unit, points, spec.kind, spec.travel, switches, scale, brake, spec.pitch
+    )
 
 
 def _elements(world: Simulation) -> Iterator[ElementDescription]:
@@ -109,7 +113,10 @@ def _scene(world: Simulation) -> SceneDescription:
     return SceneDescription(
         tuple(_frame(world, name, one) for name, one in frames.items()),
         tuple(
-            BodyDescription(one.name, one.size, one.diameter, one.height, one.color, one.when, one.lit, one.model)
+            BodyDescription(
+                *(one.name, one.size, one.diameter, one.height, one.color, one.when, one.lit, one.model),
+                *(one.shape, one.draws, one.draws_on, one.line_to),
+            )
             for one in elements.of(BODY)
         ),
         tuple(CupDescription(one.name, one.diameter) for one in elements.of(VACUUM) if one.name in frames),
@@ -117,6 +124,11 @@ def _scene(world: Simulation) -> SceneDescription:
         tuple(
             BeamDescription(one.name, one.length, one.count, one.pitch, str(one.across))
             for one in elements.of(BEAM)
+            if one.name in frames
+        ),
+        tuple(
+            OriginDescription(one.name, one.workpiece_shape, one.workpiece_color)
+            for one in (*elements.of(CONVEYOR), *elements.of(NEST))
             if one.name in frames
         ),
     )

@@ -44,6 +44,19 @@ class BodyDescription:
     when: Annotated[str | None, "The condition under which it is there"]
     lit: Annotated[str | None, "The condition under which it shines"]
     model: Annotated[str | None, "A file that is seen in its place: .stl in mm with z up, .glb in m with y up"]
+    shape: Annotated[str | None, "What it looks like within its size: bottle, wheel ..."] = None
+    draws: Annotated[str | None, "The condition under which it leaves a line, at its origin"] = None
+    draws_on: Annotated[str | None, "The element with which the line goes on; none: the floor"] = None
+    line_to: Annotated[str | None, "An element to which a line goes from its middle"] = None
+
+
+@dataclass(frozen=True, slots=True)
+class OriginDescription:
+    """What the workpieces look like that come from an element, whose names begin with its name and a point."""
+
+    name: str
+    shape: Annotated[str | None, "Within their size: bottle, wheel ..."]
+    color: Annotated[str | None, "#RRGGBB"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +121,7 @@ class SceneDescription:
     cups: tuple[CupDescription, ...] = ()
     nests: tuple[NestDescription, ...] = ()
     beams: tuple[BeamDescription, ...] = ()
+    origins: tuple[OriginDescription, ...] = ()
 
 
 NO_SCENE = SceneDescription()

@@ -3,6 +3,7 @@ import type { Piece } from "../lib/scene/pieces";
 import { colourOf } from "../lib/scene/looks";
 import { palettesOf, pictureOf } from "../lib/scene/picture";
 import { Stage } from "../lib/scene/stage";
+import { STEP_NS, Trace } from "../lib/scene/trace";
 import { VIEWS } from "../lib/scene/view";
 import type { Model } from "../lib/state/model";
 import { levelAt, valueAt, Workpieces, type Machine, type Recorded } from "./recorded";
@@ -39,19 +40,6 @@ function wanted(machine: Machine): { signals: readonly string[]; levels: readonl
   return { signals: stage.poses.signals, levels: [...new Set([...pins, ...stalls])] };
 }
 
-interface Moment {
-  values: Readonly<Record<string, number | null>>;
-  workpieces: readonly Piece[];
-}
-
-/** A machine at one moment, as the text of an SVG. */
-function picture(machine: Machine, { values, workpieces }: Moment, view: ViewName, width: number): string {
-  const stage = stageOf(machine, workpieces);
-  const valueOf = (name: string) => values[name] ?? null;
-  show(stage, (name) => valueOf(name) ?? NaN);
-  return pictureOf(stage, SHOWN[view], levelsOf(machine, valueOf), PALETTES.light, width, machine.name);
-}
-
 function show(stage: Stage, valueOf: (name: string) => number): void {
   const { poses, pieces } = stage;
   poses.signals.forEach((name, k) => (poses.values[k] = valueOf(name)));
@@ -59,14 +47,24 @@ function show(stage: Stage, valueOf: (name: string) => number): void {
   stage.update();
 }
 
-/** Solids of the elements of a machine, then of workpieces, with their colours, for other formats. */
+/** Solids of the elements of a machine, and of workpieces with the names of these, with their colours, for other formats. */
 function solids(machine: Machine, pieces: readonly Piece[]) {
   const { light } = PALETTES;
-  return stageOf(machine, pieces).solids.map((solid) => {
+  const stage = stageOf(machine, pieces);
+  return stage.solids.flatMap((solid, n) => {
     const own = colourOf(solid.material, solid);
-    return { ...solid, color: light.get(own) ?? own };
+    const piece = n < stage.fixed ? null : stage.pieces.names[n - stage.fixed];
+    return solid.line === undefined ? [{ ...solid, color: light.get(own) ?? own, piece }] : [];
   });
 }
+
+/** The last moment of a machine in a recorded run, as the text of an SVG with its name. */
+function picture(recorded: Recorded, at: number, view: ViewName, width: number): string {
+  return new Replay(recorded).picture(at, view, "light", width, recorded.machine.name);
+}
+
+/** So far back what bodies have drawn is looked for. [ns] */
+const DRAWN_NS = 300e9;
 
 /** A machine in a recorded run. */
 class Replay {
@@ -79,17 +77,32 @@ class Replay {
   }
 
   /** The text of an SVG; `at`: ns from the begin of the run. */
-  picture(at: number, view: ViewName, theme: Theme, width: number): string {
+  picture(at: number, view: ViewName, theme: Theme, width: number, title: string | null = null): string {
     const { machine, motions, levels } = this.recorded;
+    this.write(at);
     const pieces = this.workpieces.at(at);
     if (this.taken !== pieces) this.stage.take((this.taken = pieces));
     show(this.stage, (name) => valueAt(motions[name] ?? [], at));
     const level = (name: string) =>
       name in motions ? valueAt(motions[name] ?? [], at) : levelAt(levels[name] ?? [], at);
     const known = levelsOf(machine, level);
-    return pictureOf(this.stage, SHOWN[view], known, PALETTES[theme], width);
+    return pictureOf(this.stage, SHOWN[view], known, PALETTES[theme], width, title);
   }
   private taken: readonly Piece[] = [];
+
+  /** Bodies draw up to a moment, from where they were at the last picture if that was before. */
+  private write(at: number): void {
+    const { stage, recorded } = this;
+    if (![...stage.lines.values()].some((line) => line instanceof Trace)) return;
+    if (!(at >= this.written)) this.written = -STEP_NS;
+    for (let now = Math.max(this.written + STEP_NS, at - DRAWN_NS); now <= at; now += STEP_NS) {
+      stage.poses.signals.forEach((name, k) => (stage.poses.values[k] = valueAt(recorded.motions[name] ?? [], now)));
+      stage.poses.update();
+      stage.trace(now);
+      this.written = now;
+    }
+  }
+  private written = NaN;
 }
 
 Object.assign(globalThis, { steptwinScene: { wanted, picture, solids, Replay } });

@@ -136,7 +136,7 @@ def test_a_recorded_scene_is_where_the_world_is(path: str | None) -> None:
     """Everything that moves, every level and every workpiece, at moments that nothing else knows of."""
     file = DEMO if path is None else EXAMPLES / f"{path}.toml"
     scene = recorded(World.load(file), 16.0)
-    wanted = SceneScript(scene.machine).wanted()
+    wanted = SceneScript().wanted(scene.machine)
     assert set(wanted["signals"]) <= scene.motions.keys()
     assert set(wanted["levels"]) <= scene.levels.keys() | scene.motions.keys()
     lamps = [f"{body.name}.lit" for body in scene.machine.scene.bodies if body.lit is not None]

@@ -129,8 +129,11 @@ class _Gltf:
     def _add_solids(self, frames: Sequence[str]) -> None:
         scene = self._scene
         pieces = {name: place for name, stints in scene.workpieces.items() for _, place in stints[::-1] if place is not None}
-        solids = SceneScript(scene.machine).call("solids", to_json(tuple(pieces.values())))
-        for solid in solids[: len(solids) - len(pieces)]:
+        solids = SceneScript().call("solids", to_json(scene.machine), to_json(tuple(pieces.values())))
+        for solid in solids:
+            if solid["piece"] is not None:
+                self._add_workpiece(solid["piece"], solid, scene.workpieces[solid["piece"]])
+                continue
             carrying = self._carrying if solid["isCarried"] else self._standing
             name, size, slide = solid["element"], solid["size"], solid["slide"]
             node = self._node(carrying[frames[solid["frame"]]], name, translation=solid["at"], scale=size, mesh=self._mesh(solid))
@@ -139,16 +142,15 @@ class _Gltf:
             if solid["shown"] is not None:
                 shown = [(cubic.begin, cubic.c0 > 0.0) for cubic in scene.motions.get(solid["shown"], [])]
                 self._show(node, size, shown)
-        for name, solid in zip(pieces, solids[len(solids) - len(pieces) :], strict=True):
-            self._add_workpiece(name, solid, scene.workpieces[name])
 
     def _add_workpiece(self, name: str, solid: Mapping[str, Any], stints: Sequence[Stint]) -> None:
         ends = [*(one.begin for one in stints[1:]), self._until + 1]
         for (begin, place), end in zip(stints, ends, strict=True):
             if place is None or end <= self._begin or begin > self._until:
                 continue
-            (x, y, z), half = place.at, radians(place.yaw) / 2.0
-            at, size = [x, y, z + place.height / 2.0], solid["size"]
+            (x, y, z), (dx, dy, dz), half = place.at, solid["at"], radians(place.yaw) / 2.0
+            c, s = cos(2.0 * half), sin(2.0 * half)
+            at, size = [x + c * dx - s * dy, y + s * dx + c * dy, z + dz + place.height / 2.0], solid["size"]
             look = {"translation": at, "rotation": [0.0, 0.0, sin(half), cos(half)], "scale": size, "mesh": self._mesh(solid)}
             parent = self._carrying[place.on]
             for move in place.moves[1:]:
@@ -283,7 +285,7 @@ class _Gltf:
 
     def _mesh(self, solid: Mapping[str, Any]) -> int:
         prism = solid["prism"]
-        shape = None if prism is None else (prism["axis"], prism["corners"], tuple(prism["towards"]))
+        shape = None if prism is None else (prism["axis"], prism["corners"], tuple(prism["towards"]), tuple(prism["ends"]))
         look = solid["color"], solid["material"] == "light"
         if (shape, look) not in self._meshes:
             if shape not in self._shapes:
@@ -374,7 +376,8 @@ def _prism(prism: Mapping[str, Any]) -> tuple[list[float], list[float], list[int
     def add(angle: float, height: float, normal: float | None) -> int:
         """A corner; ``normal``: the angle of its normal, or None for that of an end."""
         place, its = [0.0] * 3, [0.0] * 3
-        place[axis], place[a], place[b] = height, 0.5 * cos(angle), 0.5 * sin(angle)
+        wide = 0.5 * prism["ends"][height > 0.0]
+        place[axis], place[a], place[b] = height, wide * cos(angle), wide * sin(angle)
         if normal is None:
             its[axis] = 1.0 if height > 0.0 else -1.0
         else:

@@ -193,7 +193,7 @@ class SceneRecorder:
         machine, placed = machine_of(describe(world)), set(world.objects.frames)
         placed |= {axis.brake for axis in machine.axes if axis.name in placed and axis.brake is not None}
         for body in machine.scene.bodies:
-            for what, text in (("present", body.when), ("lit", body.lit)):
+            for what, text in (("present", body.when), ("lit", body.lit), ("draws", body.draws)):
                 if text is not None:
                     holds = self._motions[f"{body.name}.{what}"] = _Condition(world, text)
                     self._followed.setdefault(holds.scheduler or world.schedulers[0], []).append(holds)

@@ -24,7 +24,7 @@ def scene_script() -> str | None:
 class SceneScript:
     """The script in an engine for JavaScript, which has neither files nor a network. Raises `Misuse` where either is missing."""
 
-    def __init__(self, machine: Machine) -> None:
+    def __init__(self) -> None:
         try:
             import quickjs
         except ImportError:
@@ -34,13 +34,12 @@ class SceneScript:
             raise Misuse(NO_SCRIPT)
         self._context = quickjs.Context()
         self._context.eval(text)
-        self._machine = to_json(machine)
 
     def call(self, function: str, *arguments: object) -> Any:
-        """A function of the script (``studio-web/src/outside/main.ts``), with the machine before these arguments."""
-        self._context.set("given", json.dumps([self._machine, *arguments]))
+        """A function of the script (``studio-web/src/outside/main.ts``)."""
+        self._context.set("given", json.dumps(arguments))
         return json.loads(cast("str", self._context.eval(f"JSON.stringify(steptwinScene.{function}(...JSON.parse(given)))")))
 
-    def wanted(self) -> Mapping[str, list[str]]:
+    def wanted(self, machine: Machine) -> Mapping[str, list[str]]:
         """Names of the ``signals`` and ``levels`` that a picture shows."""
-        return self.call("wanted")
+        return self.call("wanted", to_json(machine))

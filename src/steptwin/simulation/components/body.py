@@ -7,19 +7,25 @@ from typing import NamedTuple
 
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.simulation.components.bodytable import BodySpec
+from steptwin.simulation.components.bodytable import BodySpec, condition_owners
 from steptwin.simulation.components.builtobjects import BuiltObjects
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, Reference
+from steptwin.simulation.components.frames import HAS_NO_PLACE
 from steptwin.simulation.components.pusher import Pusher, pusher_of
 from steptwin.simulation.components.signals import Idle, find_signal
 from steptwin.simulation.logic.condition import SignalCondition
 from steptwin.simulation.logic.signal import SignalOf
+from steptwin.simulation.toml.names import Unknown
 
 CAN_ONLY_BE_WATCHED = Message(
-    "simulation.presence-can-only-be-watched", "whether a body is there or lit can be watched; conditions say themselves when"
+    "simulation.presence-can-only-be-watched",
+    "whether a body is there, is lit or draws can be watched; conditions say themselves when",
 )
+
+SIGNALS = {"when": "present", "lit": "lit", "draws": "draws"}
+"""By the keys that say when they are 1."""
 
 
 class BuiltBody(NamedTuple):
@@ -28,9 +34,8 @@ class BuiltBody(NamedTuple):
     pusher: Pusher | None
 
     def signals(self) -> Mapping[str, SignalOf]:
-        """Whether it is there and whether it shines, where that depends on anything; what it pushes."""
-        conditions = {"present": self.spec.when, "lit": self.spec.lit}
-        watched = {name: self._signal(condition) for name, condition in conditions.items() if condition is not None}
+        """Whether it is there, shines and draws, where that depends on anything; what it pushes."""
+        watched = {SIGNALS[key]: self._signal(condition) for key, condition in self.spec.conditions.items()}
         return watched if self.pusher is None else {**watched, **self.pusher.signals()}
 
     def _signal(self, text: str) -> SignalOf:
@@ -53,7 +58,7 @@ def _refers(spec: BodySpec, described: ElementSpecs) -> Iterator[Reference]:
     """Nothing for one that stands on the floor, and is always there."""
     if spec.on is not None:
         yield Reference(spec.on, spec.on, (*spec.path, "on"))
-    owners = [*((owner, "when") for owner in spec.owners), *((owner, "lit") for owner in spec.lit_by)]
+    owners = [(owner, name) for name, text in spec.conditions.items() for owner in condition_owners(text)]
     for owner, name in owners:
         yield Reference(spec.on or owners[0][0], owner, (*spec.path, name))
     if spec.pushes and spec.on is not None:
@@ -62,6 +67,9 @@ def _refers(spec: BodySpec, described: ElementSpecs) -> Iterator[Reference]:
 
 
 def _build(spec: BodySpec, context: ElementContext) -> BuiltBody:
+    for name in (spec.draws_on, spec.line_to):
+        if name is not None and name not in context.objects.frames:
+            raise Unknown(name, HAS_NO_PLACE(name=name))
     return BuiltBody(spec, context.objects, pusher_of(spec, context) if spec.pushes else None)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import Any
 
 from steptwin.errors import Misuse
@@ -14,7 +15,7 @@ from steptwin.simulation.space.bodies import Body, Box, Cylinder, Shape, half_he
 from steptwin.simulation.space.frames import AXES
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
-from steptwin.simulation.toml.values import flag, name_value, number, permitting, text_value
+from steptwin.simulation.toml.values import flag, frame_name, name_value, number, permitting, text_value, word
 
 LARGEST_MM = 100_000.0
 _LENGTH = number(0.0, LARGEST_MM, above=True)
@@ -45,6 +46,10 @@ def color_value(value: Any) -> str:
     return value
 
 
+SHAPES = ("cylinder", "bottle", "cone", "funnel", "wheel")
+"""Of pictures, within a box or an upright cylinder: `studio-web/src/lib/scene/shapes.ts` knows what they look like."""
+
+
 @table("[[body]]")
 class BodySpec(NamedSpec, MountSpec):
     """Its origin is the middle of its lower face."""
@@ -60,11 +65,27 @@ class BodySpec(NamedSpec, MountSpec):
         flag, "whether it pushes workpieces across belts that it moves across", default=False, needs="on", excludes=("when",)
     )
     color: str | None = key(color_value, "of its picture: #RRGGBB", default=None)
+    shape: str | None = key(
+        word(*SHAPES),
+        "what it looks like within its size, about the side beside two equal ones; default a box, or a cylinder",
+        default=None,
+    )
     model: str | None = key(
         model_value, "a file .stl (mm, z up) or .glb (m, y up) that is seen in three dimensions instead of it", default=None
     )
     lit: str | None = key(
         text_value, "the condition under which it shines, such as the output of a lamp, 'table.OUT3'", default=None
+    )
+    draws: str | None = key(
+        text_value,
+        "the condition under which it leaves a line in pictures, at the middle of its lower face: a pen, a nozzle",
+        default=None,
+    )
+    draws_on: str | None = key(
+        frame_name, "the element with which the line goes on; without it, it stays where it is", default=None, needs="draws"
+    )
+    line_to: str | None = key(
+        frame_name, "an element to which a line goes from its middle in pictures: a wire, a rope, a hose", default=None
     )
 
     @property
@@ -78,32 +99,33 @@ class BodySpec(NamedSpec, MountSpec):
         return self.when is None
 
     @property
-    def shape(self) -> Shape:
-        return shape_of(self.size, self.diameter, self.height)
-
-    @property
     def owners(self) -> tuple[str, ...]:
         """Controllers and elements whose signals say whether it is there."""
-        return _owners(self.when)
+        return () if self.when is None else tuple(condition_owners(self.when))
 
     @property
-    def lit_by(self) -> tuple[str, ...]:
-        """Controllers and elements whose signals say whether it shines."""
-        return _owners(self.lit)
+    def extent(self) -> Shape:
+        return extent_of(self.size, self.diameter, self.height)
+
+    @property
+    def conditions(self) -> dict[str, str]:
+        """By the keys that have one."""
+        keys = {"when": self.when, "lit": self.lit, "draws": self.draws}
+        return {name: text for name, text in keys.items() if text is not None}
 
     def check(self, text: TomlText) -> None:
         if self.size is None and self.diameter is None:
             text.wrong(self.path, "D007", "a body needs size, or diameter and height")
-        for name, condition in (("when", self.when), ("lit", self.lit)):
-            if condition is not None:
-                check_condition(text, self.path, self.name, condition, name)
+        for name, condition in self.conditions.items():
+            check_condition(text, self.path, self.name, condition, name)
 
 
-def _owners(condition: str | None) -> tuple[str, ...]:
-    return () if condition is None else tuple(owner for owner in owners_of(condition) if owner != TIME)
+def condition_owners(condition: str) -> Iterator[str]:
+    """Controllers and elements whose signals a condition has."""
+    return (owner for owner in owners_of(condition) if owner != TIME)
 
 
-def shape_of(size: tuple[float, float, float] | None, diameter: float | None, height: float | None) -> Shape:
+def extent_of(size: tuple[float, float, float] | None, diameter: float | None, height: float | None) -> Shape:
     """Lengths, in mm, whose halves are whole nm."""
     if size is not None:
         x, y, z = (to_nm(one) // 2 for one in size)
@@ -113,5 +135,5 @@ def shape_of(size: tuple[float, float, float] | None, diameter: float | None, he
 
 def body_of(spec: BodySpec, frames: Frames) -> Body:
     """The body in its frame."""
-    shape = spec.shape
-    return Body(spec.name, frames[spec.name].frame, shape, (0, 0, half_height(shape)))
+    extent = spec.extent
+    return Body(spec.name, frames[spec.name].frame, extent, (0, 0, half_height(extent)))

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.simulation.components.beltsensor import SensorSpec
+from steptwin.simulation.components.bodytable import SHAPES, color_value
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.components.logic import Joint, TerminalComponentSpec
 from steptwin.simulation.components.mount import MoverSpec
@@ -16,7 +17,17 @@ from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.mechanics.belt import nanometres
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import TableSpec, key, table, tables_in
-from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, flag, number, permitting, positive_time, time_value
+from steptwin.simulation.toml.values import (
+    OUTPUT_PIN,
+    NameOf,
+    Terminal,
+    flag,
+    number,
+    permitting,
+    positive_time,
+    time_value,
+    word,
+)
 
 RUN, FEED = "RUN", "FEED"
 
@@ -61,6 +72,10 @@ class ConveyorSpec(TerminalComponentSpec, MoverSpec):
         "mm: its length; in space [length, width, height] or [diameter, height]",
         default=(50.0, 50.0, 50.0),
     )
+    workpiece_shape: str | None = key(
+        word(*SHAPES), "what a workpiece looks like within its size; default a box, or a cylinder", default=None
+    )
+    workpiece_color: str | None = key(color_value, "of its picture: #RRGGBB", default=None)
     mass: float = key(number(0.0), "kg of a workpiece", default=0.0)
     marks: tuple[float, ...] = key(
         _mark_places, "mm from the front of a workpiece to each of its marks, such as [10, 35]", default=()

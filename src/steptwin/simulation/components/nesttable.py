@@ -7,6 +7,7 @@ from math import floor
 from typing import Any
 
 from steptwin.errors import Misuse
+from steptwin.simulation.components.bodytable import SHAPES, color_value
 from steptwin.simulation.components.logic import Joint, TerminalComponentSpec
 from steptwin.simulation.components.mount import MountSpec, to_nm
 from steptwin.simulation.components.workpieces import Lie, Rest, size_of_workpiece, workpiece_of
@@ -14,7 +15,7 @@ from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.space.bodies import Body, Box
 from steptwin.simulation.space.frames import TURN_Q, Frame
 from steptwin.simulation.toml.table import key, table
-from steptwin.simulation.toml.values import number, permitting, whole
+from steptwin.simulation.toml.values import number, permitting, whole, word
 
 _COUNT = whole(1, 1000)
 _LENGTH = number(0.001, 100_000.0)
@@ -49,6 +50,13 @@ class NestSpec(TerminalComponentSpec, MountSpec):
         whole(0, 10_000), "workpieces in it when the world begins, cell by cell and layer by layer", default=0, needs="workpiece"
     )
     workpiece: tuple[float, ...] | None = key(size_of_workpiece, "size of these workpieces", default=None)
+    workpiece_shape: str | None = key(
+        word(*SHAPES),
+        "what each of them looks like within its size; default a box, or a cylinder",
+        default=None,
+        needs="workpiece",
+    )
+    workpiece_color: str | None = key(color_value, "of its picture: #RRGGBB", default=None, needs="workpiece")
     mass: float = key(number(0.0), "kg of each of them", default=0.0, needs="workpiece")
 
     @property

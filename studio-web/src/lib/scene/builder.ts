@@ -4,7 +4,7 @@ export type Vector = readonly [x: number, y: number, z: number];
 
 /** What a solid is made of; how that looks is said by who draws it. */
 export type Material =
-  "frame" | "rail" | "drive" | "moving" | "rod" | "belt" | "piece" | "mark" | "lamp" | "light" | "glass" | Aid;
+  "frame" | "rail" | "drive" | "moving" | "rod" | "belt" | "piece" | "mark" | "lamp" | "light" | "glass" | "line" | Aid;
 /** Shown besides the machine, at will: where something will be, how far an axis goes, and where what works may be. */
 export type Aid = "ghost" | "travel" | "workspace";
 
@@ -17,8 +17,9 @@ export interface Solid {
   /** Its middle, in that frame, and its extent along x, y and z. [mm] */
   at: Vector;
   size: Vector;
-  /** Of a prism: the axis it is upright on, its corners, and the direction of the first of them. Null: a box. */
-  prism: { axis: number; corners: number; towards: Vector } | null;
+  /** Of a prism: the axis it is upright on, its corners, the direction of the first of them, and how wide its lower and its upper
+   * end are, as shares. Null: a box. */
+  prism: { axis: number; corners: number; towards: Vector; ends: readonly [number, number] } | null;
   material: Material;
   /** #RRGGBB, or a property of app.css such as `--trace-2`. */
   color: string | null;
@@ -28,24 +29,15 @@ export interface Solid {
   shown: string | null;
   /** It is lit while this is on. */
   pin: string | null;
-}
-
-/** A box, or an upright cylinder. [mm] */
-export interface Size {
-  size: readonly number[] | null;
-  diameter: number | null;
-  height: number | null;
-}
-
-export function shapeOf({ size, diameter, height }: Size): Pick<Solid, "size" | "prism"> {
-  if (size !== null) return { size: size as unknown as Vector, prism: null };
-  const wide = diameter ?? 0;
-  return { size: [wide, wide, height ?? 0], prism: { axis: 2, corners: ROUND, towards: [1, 0, 0] } };
+  /** Instead of a solid: the line that its place leaves on a frame (below 0: the floor) while a signal is above 0, or the one to
+   * the middle of another element. */
+  line?: { signal: string | null; on: number; end: Vector };
 }
 
 /** Whether a solid has the shape of another one. */
 export function isLike({ size, prism }: Solid, other: Solid | undefined): boolean {
   if (other === undefined || (prism === null) !== (other.prism === null)) return false;
+  if (prism?.ends.some((end, k) => end !== other.prism?.ends[k])) return false;
   return size.every((one, k) => one === other.size[k]) && prism?.axis === other.prism?.axis;
 }
 
@@ -54,6 +46,7 @@ type Look = Partial<Omit<Solid, "frame" | "at" | "size">>;
 
 /** Corners of what is round. */
 export const ROUND = 32;
+const EVEN = [1, 1] as const;
 export const unit = (axis: number, length: number): Vector => [+(axis === 0) * length, +(axis === 1) * length, +(axis === 2) * length]; // prettier-ignore
 export const plus = (...vectors: readonly Vector[]): Vector =>
   vectors.reduce((one, other) => [one[0] + other[0], one[1] + other[1], one[2] + other[2]]);
@@ -96,13 +89,16 @@ export class Builder {
     ];
     const about = this.vector(unit(axis, 1)).findIndex((one) => one !== 0);
     const towards: Vector = about === 0 ? [0, 1, 0] : [1, 0, 0];
-    this.box(at, size, material, { prism: { axis: about, corners: ROUND, towards }, ...look });
+    this.box(at, size, material, { prism: { axis: about, corners: ROUND, towards, ends: EVEN }, ...look });
   }
 
   /** An arrow that lies, and shows along. */
   arrow(at: Vector, size: number, look: Look): void {
     const about = this.vector([0, 0, 1]).findIndex((one) => one !== 0);
-    this.box(at, [size, size, 1], "lamp", { prism: { axis: about, corners: 3, towards: this.along }, ...look });
+    this.box(at, [size, size, 1], "lamp", {
+      prism: { axis: about, corners: 3, towards: this.along, ends: EVEN },
+      ...look,
+    });
   }
 
   vector([along, across, up]: Vector): Vector {

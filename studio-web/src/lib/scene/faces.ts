@@ -1,4 +1,5 @@
 import { dot, type Solid, type Vector } from "./builder";
+import type { Drawn } from "./strand";
 import type { View } from "./view";
 
 /** The faces of a solid about its middle: those around it, then its lower and its upper end. Corners are counterclockwise, seen from outside. */
@@ -12,10 +13,11 @@ export function facetsOf({ size, prism }: Pick<Solid, "size" | "prism">): Vector
   const end = (side: number) =>
     Array.from({ length: count }, (_, k): Vector => {
       const angle = first + (2 * Math.PI * k) / count;
+      const wide = reach * (prism?.ends[side < 0 ? 0 : 1] ?? 1);
       const corner = [0, 0, 0];
       corner[axis] = (side * (size[axis] as number)) / 2;
-      corner[a] = Math.cos(angle) * reach * (size[a] as number);
-      corner[b] = Math.sin(angle) * reach * (size[b] as number);
+      corner[a] = Math.cos(angle) * wide * (size[a] as number);
+      corner[b] = Math.sin(angle) * wide * (size[b] as number);
       return corner as unknown as Vector;
     });
   const [lower, upper] = [end(-1), end(1)];
@@ -63,12 +65,30 @@ function normalOf([a, b, c]: readonly Vector[]): Vector {
 
 const SEEN = 1e-6;
 
-/** A solid in a view, turned by the pose at `from`. What is round is its outline and the end that is seen. */
-export function facesOf(solid: Solid, poses: Float64Array, from: number, { right, up, near }: View): Faces {
+/** A solid in a view, turned by the pose at `from`. What is round is its outline and the end that is seen. `line`: its points. */
+export function facesOf(
+  solid: Solid,
+  poses: Float64Array,
+  from: number,
+  { right, up, near }: View,
+  line?: Drawn,
+): Faces {
   const rows = [0, 3, 6].map((row) => poses.subarray(from + row, from + row + 3) as unknown as Vector) as [Vector, Vector, Vector]; // prettier-ignore
   const turned = (corner: Vector): Vector => [dot(rows[0], corner), dot(rows[1], corner), dot(rows[2], corner)];
   const flat = (corner: Vector): Flat => [dot(right, corner), -dot(up, corner)];
   const faces: Faces = { front: "", side: "", top: "" };
+  if (line !== undefined) {
+    const { points, count } = line;
+    let next = "M";
+    for (let k = 0; k < 3 * count; k += 3) {
+      const point = points.subarray(k, k + 3) as unknown as Vector;
+      const isBreak = Number.isNaN(point[0]);
+      const [right, down] = flat(turned(point));
+      if (!isBreak) faces.front += `${next}${right.toFixed(2)} ${down.toFixed(2)}`;
+      next = isBreak ? "M" : "L";
+    }
+    return faces;
+  }
   const facets = facetsOf(solid).map((one) => one.map(turned));
   const ends = facets.slice(-2);
   if (solid.prism !== null) faces.front = pathOf(hullOf(ends.flat().map(flat)));

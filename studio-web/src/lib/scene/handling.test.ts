@@ -8,7 +8,7 @@ const frame = (name: string, kind: string, along: string | null = null) => ({ na
 const element = (name: string, length = 0) => ({ name, inputs: [], outputs: [], drawing: { length, places: [], switches: [] } }); // prettier-ignore
 
 function solidsWith(frames: object[], lists: object, elements: object[] = []): Solid[] {
-  const scene = { frames, bodies: [], cups: [], nests: [], beams: [], ...lists } as unknown as Scene;
+  const scene = { frames, bodies: [], cups: [], nests: [], beams: [], origins: [], ...lists } as unknown as Scene;
   const named = frames.map((one) => element((one as { name: string }).name));
   return solidsOf(scene, { mechanics: [], elements: [...elements, ...named] } as unknown as Model);
 }

@@ -26,6 +26,7 @@ const COLOURS: Readonly<Record<Look, string>> = {
   ghost: "accent",
   travel: "dim",
   workspace: "trace-6",
+  line: "ink",
   interrupted: "danger",
   on: "good",
   stalled: "danger-fill",

@@ -54,17 +54,20 @@ export function pictureOf(
     const own = colourOf(look, solid);
     const whole = own.startsWith("--") ? colour(own) : own;
     const fill = look === "glass" ? mixed(whole, DARK, colour("--rubber")) : whole;
-    const isLight = solid.material === "light";
-    const faces = facesOf(solid, stage.places, n * POSE, view);
+    const isLine = solid.line !== undefined;
+    const isLight = solid.material === "light" || isLine;
+    const faces = facesOf(solid, stage.places, n * POSE, view, stage.lines.get(n));
     const lights = [
       [faces.front, fill],
       [faces.side, mixed(fill, 0.84, "#000000")],
       [faces.top, mixed(fill, 0.8, "#ffffff")],
     ] as const;
-    const paths = lights.filter(([data]) => data).map(([data, one]) => `<path d="${data}" fill="${one}"/>`);
+    const paths = lights
+      .filter(([data]) => data)
+      .map(([data, one]) => `<path d="${data}" fill="${isLine ? "none" : one}"/>`);
     const place = `translate(${spotX(view, stage.places, n * POSE + 9).toFixed(2)} ${spotY(view, stage.places, n * POSE + 9).toFixed(2)})`;
-    const thick = look === "interrupted" ? ` stroke-width="${(2.5 * pixel).toFixed(3)}"` : "";
-    const faint = isLight && look !== "interrupted" ? ' opacity="0.3"' : "";
+    const thick = look === "interrupted" || isLine ? ` stroke-width="${(2.5 * pixel).toFixed(3)}"` : "";
+    const faint = look === "light" ? ' opacity="0.3"' : "";
     const name = n < stage.fixed ? solid.element : (stage.pieces.names[n - stage.fixed] ?? "");
     return `<g transform="${place}"${isLight ? ` stroke="${fill}"` : ""}${thick}${faint}><title>${escaped(name)}</title>${paths.join("")}</g>`; // prettier-ignore
   });

@@ -13,7 +13,17 @@ const SCENE = {
     frame("belt", "conveyor", { at: [10, 20, 30], along: "-y" }),
     frame("tray", "nest", {}),
   ],
-  ...{ bodies: [], nests: [], beams: [], cups: [{ name: "cup", diameter: 24 }] },
+  ...{
+    bodies: [],
+    nests: [],
+    beams: [],
+    origins: [
+      { name: "belt", shape: null, color: null },
+      { name: "tray", shape: null, color: null },
+      { name: "press", shape: "bottle", color: "#3f9a63" },
+    ],
+    cups: [{ name: "cup", diameter: 24 }],
+  },
 } as unknown as Scene;
 
 const piece = (name: string, on: string | null, more: Partial<Piece> = {}): Piece => ({
@@ -84,4 +94,16 @@ test("workpieces have the color of what they come from, wherever they are, and t
   expect(other?.size).toEqual([30, 30, 25]);
   expect(other?.prism?.axis).toBe(2);
   expect([one?.element, other?.element]).toEqual(["cup", "belt"]);
+});
+
+test("a workpiece with a shape is several solids, which turn and go with it", () => {
+  const bottle = piece("press.4", "belt", { ...onBelt, size: null, diameter: 60, height: 120, yaw: 90 });
+  const stage = stageOf(bottle, piece("belt.1", "tray"));
+  const { solids, fixed, pieces } = stage;
+  expect(pieces.names.slice(0, -1)).toEqual(pieces.names.slice(0, -1).map(() => "press.4"));
+  const [body, ...others] = solids.slice(fixed, -1);
+  expect(body?.color).toBe("#3f9a63");
+  expect(others.map(({ size }) => size[0]).every((wide) => wide <= 60)).toBe(true);
+  const heights = solids.slice(fixed, -1).map((_, n) => middleOf(stage, fixed + n)[2] as number);
+  expect(heights).toEqual([...heights].sort((one, other) => one - other));
 });

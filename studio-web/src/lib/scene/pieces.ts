@@ -1,23 +1,27 @@
 import type { Hello } from "../protocol/connection";
-import { shapeOf, type Solid } from "./builder";
+import type { Solid } from "./builder";
 import { copyPose, directionOf, POSE, shift, turn, type Poses, type Scene } from "./poses";
+import { partsOf } from "./shapes";
 
 export type Piece = Hello["workpieces"][number];
 
 /** Those of the palette that no axis and no mark has. */
 const COLORS = [2, 3, 4, 5, 7, 8] as const;
 
-/** All pieces from one element have one color, the same on every page. */
-function colorOf({ name }: Piece, { frames }: Scene): string {
-  const origins = frames.filter(({ kind }) => kind === "conveyor" || kind === "nest");
+/** What pieces look like that come from one element: on every page alike. */
+function lookOf({ name }: Piece, { origins }: Scene): { shape: string | null; color: string } {
   const place = origins.findIndex((origin) => origin.name === name.slice(0, name.lastIndexOf(".")));
-  return `--trace-${COLORS[Math.max(0, place) % COLORS.length]}`;
+  const { shape = null, color = null } = origins[place] ?? {};
+  return { shape, color: color ?? `--trace-${COLORS[Math.max(0, place) % COLORS.length]}` };
 }
 
 /** Workpieces on what carries them. Only `take` allocates. */
 export class Pieces {
   solids: readonly Solid[] = [];
+  /** Of the workpieces that the solids belong to. */
   names: readonly string[] = [];
+  /** Their numbers. */
+  private of: readonly number[] = [];
   /** Ways of belts, by whose changes since pieces were put there they move on; not those that move frames, too. */
   signals: readonly string[] = [];
   /** Of these; NaN where they are not known. */
@@ -48,13 +52,29 @@ export class Pieces {
     const known = new Map(this.signals.map((signal, k) => [signal, this.values[k] as number]));
     this.signals = this.waysOf(pieces);
     this.values = Float64Array.from(this.signals, (signal) => known.get(signal) ?? NaN);
-    this.names = pieces.map(({ name }) => name);
-    this.solids = pieces.map((piece): Solid => ({
-      ...{ element: piece.on ?? "", frame: frames.findIndex(({ name }) => name === piece.on), isCarried: true },
-      ...{ at: [0, 0, 0], slide: null, shown: null, pin: null, material: "piece" },
-      ...shapeOf(piece),
-      color: colorOf(piece, this.scene),
-    }));
+    const parts = pieces.flatMap((piece, n) => {
+      const { shape, color } = lookOf(piece, this.scene);
+      const frame = frames.findIndex(({ name }) => name === piece.on);
+      return partsOf({ ...piece, shape }).map((part): [number, Solid] => [
+        n,
+        {
+          ...{
+            element: piece.on ?? "",
+            frame,
+            isCarried: true,
+            slide: null,
+            shown: null,
+            pin: null,
+            material: "piece",
+          },
+          ...part,
+          color: part.color ?? color,
+        },
+      ]);
+    });
+    this.of = parts.map(([n]) => n);
+    this.solids = parts.map(([, solid]) => solid);
+    this.names = this.of.map((n) => pieces[n]?.name ?? "");
     const moves = pieces.flatMap((piece) => piece.moves);
     const all = [...this.signals, ...this.poses.signals];
     this.moves = new Int32Array(pieces.length + 1);
@@ -73,9 +93,10 @@ export class Pieces {
     this.yaws = Float64Array.from(pieces, ({ yaw }) => yaw);
   }
 
-  /** The pose of the middle of one. */
-  place(n: number, to: Float64Array, at: number): void {
-    const { frame } = this.solids[n] as Solid;
+  /** The pose of the middle of a solid. */
+  place(solid: number, to: Float64Array, at: number): void {
+    const { frame, at: beside } = this.solids[solid] as Solid;
+    const n = this.of[solid] as number;
     const { at: its, by, poses } = this;
     if (frame < 0) copyPose(to, at, poses.floor, 0);
     else copyPose(to, at, poses.carried, frame * POSE);
@@ -95,5 +116,6 @@ export class Pieces {
     }
     const yaw = this.yaws[n] as number;
     if (yaw !== 0) turn(to, at, 2, yaw);
+    shift(to, at, beside[0], beside[1], beside[2]);
   }
 }

@@ -1,7 +1,8 @@
 import type { Element, Mechanics, Model } from "../state/model";
-import { between, Builder, plus, shapeOf, times, unit, type Solid, type Vector } from "./builder";
+import { between, Builder, plus, times, unit, type Solid, type Vector } from "./builder";
 import { beam, gripper, nest, vacuum } from "./handling";
-import type { Scene } from "./poses";
+import { directionOf, type Scene } from "./poses";
+import { axisOf, partsOf } from "./shapes";
 
 /** What there is besides an element, and what it is besides its frame. */
 interface Known {
@@ -45,11 +46,26 @@ export function travelOf({ travel, switches }: Mechanics, per_unit: number): [nu
   return [Math.min(-room, ...ends), Math.max(room, ...ends)];
 }
 
-/** A profile with stops at its ends and the drive behind one of them; on it a carriage that is as wide as the rail and a half. */
+/** More in a revolution is a belt about pulleys, less is a screw. [mm] */
+const SCREW_MM = 30;
+
+/** A profile with stops at its ends and the drive behind one of them; on it a carriage that is as wide as the rail and a half. Its
+ * groove shows the screw, or the belt with its pulley. */
 function linear(build: Builder, axis: Mechanics): void {
   const { low, high, width, carriage } = railOf(build, axis);
   const [from, to] = [low - carriage / 2, high + carriage / 2];
-  build.box([(from + to) / 2, 0, 0], [to - from + 0.6 * width, width, 0.8 * width], "rail");
+  const [middle, long] = [(from + to) / 2, to - from + 0.6 * width];
+  if (!axis.pitch) build.box([middle, 0, 0], [long, width, 0.8 * width], "rail");
+  else {
+    build.box([middle, 0, -0.15 * width], [long, width, 0.5 * width], "rail");
+    for (const side of [0.39, -0.39])
+      build.box([middle, side * width, 0.25 * width], [long, 0.22 * width, 0.3 * width], "rail");
+    if (axis.pitch <= SCREW_MM) build.rod([middle, 0, 0.25 * width], 0, long, 0.28 * width, "drive");
+    else {
+      build.box([middle, 0, 0.2 * width], [long, 0.4 * width, 0.1 * width], "belt");
+      build.rod([to + 0.9 * width, 0, 0.1 * width], 1, 0.7 * width, 0.8 * width, "belt");
+    }
+  }
   for (const end of [from - 0.25 * width, to + 0.25 * width])
     build.box([end, 0, 0], [0.5 * width, 1.9 * width, 1.7 * width], "frame");
   drive(build, axis, from, -1.6 * width, 1.5 * width);
@@ -60,9 +76,15 @@ function linear(build: Builder, axis: Mechanics): void {
   });
 }
 
-/** A motor from a place on, with its brake behind it: a disc between two shoes, which are lit while they let go. */
+/** A motor from a place on: its body, and a round lid behind it. */
+function motor(build: Builder, from: number, length: number, wide: number): void {
+  build.box([from + 0.42 * length, 0, 0], [0.84 * Math.abs(length), 0.9 * wide, 0.9 * wide], "drive");
+  build.rod([from + 0.92 * length, 0, 0], 0, 0.16 * Math.abs(length), 0.75 * wide, "drive");
+}
+
+/** A motor with its brake behind it: a disc between two shoes, which are lit while they let go. */
 function drive(build: Builder, { brake }: Mechanics, from: number, length: number, wide: number): void {
-  build.rod([from + length / 2, 0, 0], 0, Math.abs(length), wide, "drive");
+  motor(build, from, length, wide);
   if (brake === null) return;
   const [at, thick] = [from + 1.1 * length, Math.max(4, 0.1 * Math.abs(length))];
   build.rod([at, 0, 0], 0, thick, 0.9 * wide, "rod", { element: brake });
@@ -95,7 +117,7 @@ function reach(scene: Scene, { frame, axis }: Builder): number {
   const far = scene.frames.flatMap(({ name, on, at }) => {
     if (on !== frame.name) return [];
     const body = scene.bodies.find((one) => one.name === name);
-    const { size } = shapeOf(body ?? { size: [0, 0, 0], diameter: null, height: null });
+    const size = extentOf(body);
     const middle = plus(at as unknown as Vector, [0, 0, size[2] / 2]);
     return [
       Math.hypot(...across.map((k) => middle[k] as number)) + Math.max(...across.map((k) => size[k] as number)) / 2,
@@ -104,15 +126,21 @@ function reach(scene: Scene, { frame, axis }: Builder): number {
   return Math.max(0, ...far);
 }
 
-/** A disc on its motor, or on a bare shaft; marks let one see that it turns. Switches are at the rim. */
-function turntable(build: Builder, { scene, axis }: Known): void {
-  const radius = between(30, 1.1 * reach(scene, build) || 70, 1500);
+/** A disc on its motor, or on a bare shaft; what turns about a line that lies has a hub. Marks let one see that it turns. Switches are
+ * at the rim. */
+function turntable(build: Builder, { scene, axis, element }: Known): void {
+  const far = reach(scene, build);
+  const isTable = build.axis === 2;
+  const isDriven = axis !== undefined || element?.kind === "dcmotor";
+  const radius = isTable ? between(30, 1.1 * far || 70, 1500) : between(12, (isDriven ? 1 : 0.3) * far || 30, 300);
   const thick = between(5, 0.1 * radius, 25);
   // What is on it stands above.
-  const down = build.axis === 2 ? -build.sign : -1;
+  const down = isTable ? -build.sign : -1;
   build.rod([down * thick * 0.5, 0, 0], 0, thick, 2 * radius, "moving", { isCarried: true });
-  if (axis === undefined) build.rod([down * (thick + 0.3 * radius), 0, 0], 0, 0.6 * radius, 0.25 * radius, "rod");
-  else drive(build, axis, down * thick, down * 0.5 * radius, 1.1 * radius);
+  const [from, long, wide] = [down * thick, down * (isTable ? 0.5 : 1.6) * radius, (isTable ? 0.8 : 1.5) * radius];
+  if (axis !== undefined) drive(build, axis, from, long, wide);
+  else if (element?.kind === "dcmotor") motor(build, from, long, wide);
+  else build.rod([from + down * 0.3 * radius, 0, 0], 0, 0.6 * radius, 0.25 * radius, "rod");
   for (let n = 0; n < 4; n++) {
     const [length, width] = [0.35 * radius, 0.06 * radius];
     const out = (n < 2 ? 1 : -1) * 0.78 * radius;
@@ -194,7 +222,8 @@ function gantry(build: Builder, { scene, element }: Known): void {
   build.add(plus(times(way, 0.5), [0, 0, 1.2 * width]), size, "moving", { isCarried: true });
 }
 
-/** Two rails beside a plane, a beam between them that goes with y, and a head on the beam. */
+/** Two rails beside a plane, a beam between them that goes with y, and a head on the beam. Its two motors are at corners; their belts go
+ * along the rails and the beam. */
 function tool(build: Builder, { drawing }: Element): void {
   const [x, y] = build.frame.joints;
   if (x === undefined || y === undefined || drawing === null) return;
@@ -213,6 +242,15 @@ function tool(build: Builder, { drawing }: Element): void {
   const beam = plus(times(build.along, left + wide / 2), lift);
   build.add(beam, sized(wide + 3 * rail, 1.2 * rail, 0.8 * rail), "frame", { slide });
   build.add(lift, [2.4 * rail, 2.4 * rail, 2.4 * rail], "moving", { isCarried: true });
+  const belt = plus(beam, unit(flat, 0.5 * rail));
+  for (const hand of [1, -1]) {
+    const beside = times(other.along, 0.35 * hand * rail);
+    build.add(plus(belt, beside), sized(wide + 2 * rail, 0.15 * rail, 0.3 * rail), "belt", { slide });
+    const side = times(build.along, left + wide / 2 + hand * (wide / 2 + rail));
+    build.add(plus(middle, side, unit(flat, 0.6 * rail)), sized(0.3 * rail, high + 2 * rail, 0.15 * rail), "belt");
+    const corner = plus(side, times(other.along, bottom + high + 2.4 * rail));
+    build.add(corner, sized(1.8 * rail, 1.8 * rail, 2 * rail), "drive");
+  }
 }
 
 /** A rod in its guide, with a roller on what lifts it. */
@@ -238,16 +276,39 @@ function carriage(build: Builder, { element }: Known): void {
   build.box([0, 0, 0.9 * width], [0.8 * long, 2 * width, 0.5 * width], "moving", { isCarried: true });
 }
 
+type Body = Scene["bodies"][number];
+
+function extentOf(body: Body | undefined): Vector {
+  if (body === undefined) return [0, 0, 0];
+  const { size, diameter, height } = body;
+  return (size as Vector | null) ?? [diameter ?? 0, diameter ?? 0, height ?? 0];
+}
+
+/** What lies on something that turns shows where that does, and else who looks. */
+function isDown(build: Builder, { frames }: Scene, axis: number): boolean {
+  const turning = frames.find(({ name }) => name === build.frame.on)?.joints.find(({ turns }) => turns);
+  const [about, sign] = directionOf(turning?.along ?? "+z");
+  return axis !== 2 && (about !== axis || sign < 0);
+}
+
 function body(build: Builder, { scene }: Known): void {
   const its = scene.bodies.find(({ name }) => name === build.frame.name);
   if (its === undefined) return;
-  const { size, prism } = shapeOf(its);
-  build.add([0, 0, size[2] / 2], size, its.lit === null ? "frame" : "glass", {
-    prism,
-    color: its.color,
-    shown: its.when === null ? null : `${its.name}.present`,
-    pin: its.lit === null ? null : `${its.name}.lit`,
-  });
+  const size = extentOf(its);
+  const { when, lit, draws, draws_on, line_to, color } = its;
+  const shown = when === null ? null : `${its.name}.present`;
+  const pin = lit === null ? null : `${its.name}.lit`;
+  for (const part of partsOf(its, isDown(build, scene, axisOf(size))))
+    build.add(plus(part.at, [0, 0, size[2] / 2]), part.size, lit === null ? "frame" : "glass", {
+      ...{ prism: part.prism, color: part.color ?? color, shown, pin },
+    });
+  const line = (at: Vector, signal: string | null, to: string | null, end: Vector) =>
+    build.add(at, [0, 0, 0], "line", {
+      color: signal === null ? null : color,
+      line: { signal, on: scene.frames.findIndex(({ name }) => name === to), end },
+    });
+  if (draws) line([0, 0, 0], `${its.name}.draws`, draws_on, [0, 0, 0]);
+  if (line_to) line([0, 0, size[2] / 2], null, line_to, [0, 0, extentOf(scene.bodies.find(({ name }) => name === line_to))[2] / 2]); // prettier-ignore
 }
 
 type Draw = (build: Builder, known: Known) => void;
@@ -258,6 +319,7 @@ const withElement =
 
 /** What elements are drawn with, by their kinds. */
 const KINDS: Readonly<Record<string, Draw>> = {
+  dcmotor: turntable,
   axis: (build, known) =>
     known.axis?.kind === "rotary" ? turntable(build, known) : known.axis && linear(build, known.axis),
   cylinder: withElement(cylinder),

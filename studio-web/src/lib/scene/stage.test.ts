@@ -13,6 +13,7 @@ const SCENE = {
   cups: [{ name: "cup", diameter: 20 }],
   nests: [],
   beams: [],
+  origins: [],
 } as unknown as Scene; // prettier-ignore
 const AXIS = { name: "x", controller: "table", axis: "1", kind: "linear", travel: [0, 50], switches: [], brake: "b" };
 const LIMITS = ["table.M1_POSLIM_L", "table.M1_POSLIM_R"];

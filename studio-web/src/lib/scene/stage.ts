@@ -4,6 +4,8 @@ import type { Solid, Vector } from "./builder";
 import { Pieces, type Piece } from "./pieces";
 import { copyPose, POSE, Poses, shift, type Scene } from "./poses";
 import { solidsOf } from "./solids";
+import { Strand, type Drawn } from "./strand";
+import { Trace } from "./trace";
 
 /** What goes less far is not drawn at its target. */
 const GONE_MM = 1;
@@ -49,6 +51,8 @@ export class Stage {
   readonly extent: Extent;
   /** Frames of what works on workpieces, or of the outermost axes. */
   readonly tips: readonly number[];
+  /** Lines, by the numbers of their solids. */
+  readonly lines: ReadonlyMap<number, Drawn>;
   /** Whether tips are drawn where they are going, too. */
   showsTargets = false;
   /** The element whose travel is shown; null: all. */
@@ -66,7 +70,9 @@ export class Stage {
     this.solids = hasAids ? [...solids, ...aidsOf(scene, model, solids, this.tips)] : solids;
     this.fixed = this.solids.length;
     this.aids = solids.length;
-    const more = this.solids.flatMap(({ slide, shown }) => [slide?.signal ?? [], shown ?? []].flat());
+    const more = this.solids.flatMap(({ slide, shown, line }) =>
+      [slide?.signal ?? [], shown ?? [], line?.signal ?? []].flat(),
+    );
     this.poses = new Poses(scene, more);
     this.pieces = new Pieces(scene, this.poses);
     this.aims = new Poses(scene, more);
@@ -74,6 +80,14 @@ export class Stage {
     const place = (signal: string | undefined | null) => (signal ? this.poses.signals.indexOf(signal) : -1);
     this.slides = Int32Array.from(this.solids, ({ slide }) => place(slide?.signal));
     this.shown = Int32Array.from(this.solids, ({ shown }) => place(shown));
+    this.lines = new Map(
+      this.solids.flatMap(
+        ({ line, frame, at }, n): [number, Trace | Strand][] =>
+        line === undefined
+          ? []
+          : [[n, line.signal === null ? new Strand(this.poses, frame, at, line.on, line.end) : new Trace(this.poses, frame, line.on, place(line.signal))]], // prettier-ignore
+      ),
+    );
     this.take(pieces);
     this.extent = this.widest(rangesOf(scene, model));
     this.poses.values.fill(NaN);
@@ -93,6 +107,11 @@ export class Stage {
     this.revision++;
   }
 
+  /** Bodies draw up to where they are at a moment [ns], for which `poses` are up to date. */
+  trace(now: number): void {
+    for (const line of this.lines.values()) if (line instanceof Trace) line.take(now);
+  }
+
   /** Everything from the values of `poses` and `pieces`. */
   update(): void {
     const { poses, places, aims, targets } = this;
@@ -110,11 +129,15 @@ export class Stage {
       this.bound(n);
     }
     for (let n = 0; n < this.fixed; n++) {
-      const { isCarried, frame, at, slide, material } = this.solids[n] as Solid;
+      const { isCarried, frame, at, slide, material, line } = this.solids[n] as Solid;
       const from = n * POSE;
       const isGhost = material === "ghost";
       if (n >= this.aids && !this.isAsked(n)) {
         this.isThere[n] = 0;
+        continue;
+      }
+      if (line !== undefined) {
+        this.placeLine(n, line.signal === null ? -1 : line.on);
         continue;
       }
       const of = isGhost ? aims : poses;
@@ -148,6 +171,28 @@ export class Stage {
     for (let k = frame * POSE; k < (frame + 1) * POSE; k++)
       way = Math.max(way, Math.abs((this.aims.carried[k] as number) - (this.poses.carried[k] as number)));
     return way > GONE_MM;
+  }
+
+  private placeLine(n: number, on: number): void {
+    const { places, poses, lows, highs } = this;
+    const trace = this.lines.get(n) as Drawn;
+    if (trace instanceof Strand) trace.update();
+    const from = n * POSE;
+    if (on < 0) copyPose(places, from, poses.floor, 0);
+    else copyPose(places, from, poses.carried, on * POSE);
+    this.isThere[n] = trace.count > 0 ? 1 : 0;
+    for (let k = 0; k < 3; k++) {
+      const row = from + 3 * k;
+      let middle = places[from + 9 + k] as number;
+      let half = 0;
+      for (let j = 0; j < 3; j++) {
+        const by = places[row + j] as number;
+        middle += (by * ((trace.low[j] as number) + (trace.high[j] as number))) / 2;
+        half += (Math.abs(by) * ((trace.high[j] as number) - (trace.low[j] as number))) / 2;
+      }
+      lows[3 * n + k] = middle - half;
+      highs[3 * n + k] = middle + half;
+    }
   }
 
   private bound(n: number): void {

@@ -12,7 +12,10 @@ function stageOf(boxes: readonly Box[], more: Scene["frames"] = []): Stage {
   const frames = boxes.map(([name, at, , on = null]) => ({ name, kind: "body", on, at: [...at], along: null, joints: [] })); // prettier-ignore
   const bodies = boxes.map(([name, , size]) => ({ name, size: [...size], diameter: null, height: null, color: null, when: null })); // prettier-ignore
   const model = { mechanics: [], elements: [] } as unknown as Model;
-  return new Stage({ frames: [...frames, ...more], bodies, cups: [], nests: [], beams: [] } as unknown as Scene, model);
+  return new Stage(
+    { frames: [...frames, ...more], bodies, cups: [], nests: [], beams: [], origins: [] } as unknown as Scene,
+    model,
+  );
 }
 
 function orderOf(stage: Stage, view: ViewName): string[] {
@@ -72,7 +75,12 @@ test("the end of a cylinder that is seen fills its outline, whichever way it lie
     return Math.sign(points.reduce((sum, [x, y], k) => sum + x * points.at(k - 1)![1] - y * points.at(k - 1)![0], 0));
   };
   for (const axis of [0, 1, 2]) {
-    const prism = { axis, corners: 32, towards: axis === 0 ? ([0, 1, 0] as const) : ([1, 0, 0] as const) };
+    const prism = {
+      ends: [1, 1] as const,
+      axis,
+      corners: 32,
+      towards: axis === 0 ? ([0, 1, 0] as const) : ([1, 0, 0] as const),
+    };
     const { front, side, top } = facesOf({ size: [40, 40, 40], prism } as unknown as Solid, poses, 0, VIEWS.oblique);
     const [outline, ...others] = (front + side + top)
       .split("Z")

@@ -127,7 +127,8 @@ export class Order {
       least = overlap;
       isLower = apart < 0;
     }
-    return isFree === isOtherFree ? isLower : isOtherFree;
+    // Where both are free, neither covers the other, and an order would only make circles.
+    return isOtherFree ? !isFree : !isFree && isLower;
   }
 }
 

@@ -33,7 +33,7 @@ const EMPTY: Model = {
   buttons: [],
   elements: [],
   connections: [],
-  scene: { frames: [], bodies: [], cups: [], nests: [], beams: [] },
+  scene: { frames: [], bodies: [], cups: [], nests: [], beams: [], origins: [] },
   commands: new Set(),
 };
 /** Frames and statements are as frequent as requests: a panel that shows them follows them itself. */

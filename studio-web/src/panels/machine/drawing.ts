@@ -53,6 +53,8 @@ export class Drawing {
   private spots = new Float64Array();
   /** Of the stage, the workpieces of which have parts. */
   private revision = -1;
+  /** Versions of lines as they are drawn, by the numbers of their parts. */
+  private readonly versions = new Map<number, number>();
   private readonly order: Order;
   private readonly all: SVGGElement;
   private readonly trails: SVGPathElement[] = [];
@@ -114,7 +116,8 @@ export class Drawing {
       if (this.isSeen[n] !== isThere) (this.parts[n] as SVGGElement).style.display = isThere ? "" : "none";
       this.isSeen[n] = isThere;
       if (!isThere) continue;
-      if (this.hasTurned(n)) this.outline(n, this.parts[n] as SVGGElement);
+      if (this.hasTurned(n) || this.versions.get(n) !== stage.lines.get(n)?.version)
+        this.outline(n, this.parts[n] as SVGGElement);
       const x = spotX(this.view, stage.places, n * POSE + 9);
       const y = spotY(this.view, stage.places, n * POSE + 9);
       if (this.spots[2 * n] === x && this.spots[2 * n + 1] === y) continue;
@@ -207,7 +210,9 @@ export class Drawing {
   private outline(n: number, part: SVGGElement): void {
     const solid = this.stage.solids[n];
     if (solid === undefined) return;
-    const faces = facesOf(solid, this.stage.places, n * POSE, this.view);
+    const trace = this.stage.lines.get(n);
+    if (trace !== undefined) this.versions.set(n, trace.version);
+    const faces = facesOf(solid, this.stage.places, n * POSE, this.view, trace);
     LIGHTS.forEach((light, k) => part.children[k]?.setAttribute("d", faces[light]));
   }
 

@@ -30,6 +30,7 @@ import { facetsOf } from "../../lib/scene/faces";
 import { colourOf, DARK, lookOf, type Look } from "../../lib/scene/looks";
 import { POSE } from "../../lib/scene/poses";
 import type { Stage } from "../../lib/scene/stage";
+import type { Drawn } from "../../lib/scene/strand";
 import type { Trail } from "../../lib/scene/trail";
 import { frameOf, VIEWS, type ViewName } from "../../lib/scene/view";
 import type { Marks } from "./drawing";
@@ -73,6 +74,8 @@ export class Space {
   private marks: Marks | null = null;
   /** Version of the stage when it was marked. */
   private knowledge = -1;
+  /** Versions of lines as they are drawn, by the numbers of their solids. */
+  private readonly versions = new Map<number, number>();
   /** Something has changed since the last picture. */
   private isStale = true;
 
@@ -136,6 +139,16 @@ export class Space {
       const isVisible = isThere[n] === 1;
       if (setMatrix(mesh.matrixWorld, places, n * POSE) || mesh.visible !== isVisible) this.isStale = true;
       mesh.visible = isVisible;
+    }
+    for (const [n, { count, version }] of this.stage.lines) {
+      if (this.versions.get(n) === version) continue;
+      this.versions.set(n, version);
+      const { children, material } = this.meshes[n] as SolidMesh;
+      const { geometry, material: its } = children[1] as Line<BufferGeometry, LineBasicMaterial>;
+      its.color = material.color;
+      geometry.setDrawRange(0, count);
+      geometry.getAttribute("position").needsUpdate = true;
+      this.isStale = true;
     }
     if (this.isFollowing) this.goAlong();
     if (!this.isStale) return;
@@ -279,6 +292,8 @@ export class Space {
       lines.geometry = edges;
       lines.visible = solid.material !== "light";
       mesh.material = this.materialOf(solid.material, solid, false);
+      const line = stage.lines.get(n);
+      if (line !== undefined) mesh.add(lineOf(line, mesh.matrixWorld));
     }
     this.revision = stage.revision;
     this.isStale = true;
@@ -324,6 +339,16 @@ export class Space {
     }
     return found;
   }
+}
+
+/** A line that goes with what it is drawn on, as the mesh of its solid does. */
+function lineOf({ points }: Drawn, matrix: Matrix4): Line {
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new BufferAttribute(points, 3));
+  const line = new Line(geometry, new LineBasicMaterial());
+  line.matrixAutoUpdate = line.matrixWorldAutoUpdate = line.frustumCulled = false;
+  line.matrixWorld = matrix;
+  return line;
 }
 
 /** The triangles of all faces; edges of less than that are smooth. */
