@@ -111,14 +111,15 @@ bench: $(DEV_STAMP)  ## Measure requests per second and latencies against other 
 # Versions that agree, nothing that is not committed; the wheel is tried before its checksum is written.
 RELEASE := build/release
 BOM := $(RELEASE)/steptwin-$$v
-release: $(DEV_STAMP) $(PAGE) docs vsix  ## Build wheel, source archive, extension, pages, lists of components, checksums: build/release
+release: $(DEV_STAMP)  ## Build wheel, source archive, extension, site, lists of components, checksums: build/release
 	@$(BIN)/python .ci/release.py check
+	@$(MAKE) --no-print-directory page vsix site
 	@rm -rf $(RELEASE) && mkdir -p $(RELEASE)
 	@$(BIN)/python -m hatchling build -t sdist -t wheel -d $(RELEASE) >/dev/null
 	@.tools/bin/pip install -qq --disable-pip-version-check --require-hashes -r requirements/release.txt
 	@v=$$($(BIN)/python -c 'import steptwin; print(steptwin.__version__)') \
 	&& cp build/steptwin.vsix $(RELEASE)/steptwin-$$v.vsix \
-	&& tar -czf $(RELEASE)/steptwin-$$v-docs.tar.gz -C build docs \
+	&& tar -czf $(RELEASE)/steptwin-$$v-site.tar.gz -C build site \
 	&& .tools/bin/cyclonedx-py requirements requirements/run.txt --pyproject pyproject.toml --output-reproducible -o $(BOM)-python.cdx.json \
 	&& $(WEB) sbom > $(BOM)-page.cdx.json
 	@$(BIN)/python .ci/release.py finish $(RELEASE)
