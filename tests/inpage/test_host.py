@@ -32,6 +32,7 @@ class Page:
         self.events: list[tuple[str, int]] = []
         self.errors: list[str] = []
         self.refusals: list[str] = []
+        self.kept = b""
         self._id = 0
 
     def opened(self, number: int) -> None:
@@ -47,6 +48,9 @@ class Page:
 
     def closed(self, number: int, code: int) -> None:
         self.events.append(("closed", code))
+
+    def keep(self, state: bytes) -> None:
+        self.kept = state
 
     def refused(self, text: str) -> None:
         self.refusals.append(text)
@@ -185,6 +189,36 @@ def test_a_link_has_the_programs_as_they_are_now_or_says_why_it_cannot() -> None
         assert json.loads(twin.link())["programs"] == {"a.prg": "n = 2\n"}
         await page.ask("download", controller="table", place="program 2", text="n = 3\n")
         assert "program 2" in json.loads(twin.link())["refused"]
+
+    run_virtually(visit())
+
+
+def test_a_twin_goes_on_from_a_kept_state_with_what_was_downloaded() -> None:
+    async def visit() -> None:
+        loop = asyncio.get_running_loop()
+        assert isinstance(loop, VirtualLoop)
+        page = Page()
+        page.twin = twin = PageTwin(page, "hall", PROGRAMMED, {"a.prg": b"n = 1\n"}, lambda: loop.now_ns)
+        twin.begin()
+        await page.enter()
+        for place in ("program 0", "program 1"):
+            await page.ask("download", controller="table", place=place, text="n = 2\n")
+        await asyncio.sleep(3)
+        other = Page()
+        other.twin = again = PageTwin(other, "hall", PROGRAMMED, {"a.prg": b"n = 1\n"}, lambda: loop.now_ns, page.kept)
+        again.begin()
+        assert twin.world.now - SECOND <= again.world.now <= twin.world.now
+        assert json.loads(again.link()) == {"description": PROGRAMMED, "programs": {"a.prg": "n = 2\n"}}
+        # Time stands until somebody wants it to go.
+        await other.enter()
+        stood = again.world.now
+        await asyncio.sleep(1)
+        assert again.world.now == stood
+        await other.ask("resume")
+        await asyncio.sleep(1)
+        assert again.world.now > stood
+        await other.ask("download", controller="table", place="program 0", text="n = 3\n")
+        assert page.errors == other.errors == []
 
     run_virtually(visit())
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
+import pickle
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 
 from steptwin import __version__
@@ -23,11 +26,17 @@ from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.studio.shownworld import ShownWorld
 from steptwin.live.world import LiveWorld
 from steptwin.live.world_control import WorldControl
+from steptwin.simulation.describe.blueprint import Blueprint
+from steptwin.simulation.describe.description import read_world
+from steptwin.simulation.describe.includes import given_files
+from steptwin.simulation.scheduler.trace import Mark
 from steptwin.studio.hub import Hub
 from steptwin.studio.viewers import Viewers
 
 SLICE_NS: Nanos = 20 * MILLISECOND
 """Longest real time for which the world advances at once: a stop waits no longer for it."""
+KEPT_S = 1.0
+"""A state is given to the page so often, in real time."""
 
 
 class PageTwin:
@@ -40,13 +49,18 @@ class PageTwin:
         text: str,
         files: Mapping[str, bytes | memoryview],
         clock: Callable[[], Nanos] = time.monotonic_ns,
+        kept: bytes | None = None,
     ) -> None:
-        """``text``: a description; ``files``: those that it names. Raises `WorldError` for a wrong description."""
-        self.world = world = World.from_toml(text, {file: bytes(content) for file, content in files.items()}, name=name)
+        """``text``: a description; ``files``: those that it names; ``kept``: a state of this twin that the page was given, from
+        which it goes on instead. Raises `WorldError` for a wrong description."""
+        contents = {file: bytes(content) for file, content in files.items()}
+        self.world = world = World.from_toml(text, contents, name=name) if kept is None else _world_at(name, kept)
         world.trace.let_go()
+        self._page = page
         self._text = text
-        live = LiveWorld(world)
-        realtime = RealTimeDriver(live, Clock(wall_ns=clock, begin=world.now), SLICE_NS)
+        self._begins_at = 1.0 if kept is None else 0.0
+        self._live = live = LiveWorld(world)
+        self._realtime = realtime = RealTimeDriver(live, Clock(wall_ns=clock, begin=world.now), SLICE_NS)
         self.pace = Pace(live, realtime, live.show, has_clients=False)
         shown = ShownWorld(live, realtime, self.pace, WorldControl(realtime, live, self.pace, None))
         around = shown.surroundings(
@@ -69,14 +83,30 @@ class PageTwin:
             return json.dumps({"refused": str(error)})
 
     def begin(self) -> None:
-        """Time goes from now on."""
-        self.pace.begin(1.0)
+        """Time goes from now on; it stands at a state that was kept, for what came after it may happen again."""
+        self.pace.begin(self._begins_at)
+        self._keep()
+
+    def _keep(self) -> None:
+        state = replace(self.world.snapshot(with_inputs=False), trace=Mark(()))  # as a branch begins: without a past
+        self._live.is_dirty = True
+        self._realtime.leave()
+        self._page.keep(pickle.dumps(state))
+        asyncio.get_running_loop().call_later(KEPT_S, self._keep)
 
 
-def open_twin(page: Page, name: str, text: str, files: Mapping[str, bytes | memoryview]) -> PageTwin | None:
-    """A twin whose time goes; None where its description is wrong, after the page was given the reason."""
+def _world_at(name: str, kept: bytes) -> World:
+    state = pickle.loads(kept)  # pickled by `PageTwin._keep`; only the page has had it since
+    text, seed, overrides, files = state.description
+    return World(Blueprint(read_world(name, text, seed, overrides, given_files(files)), files), at=state)
+
+
+def open_twin(
+    page: Page, name: str, text: str, files: Mapping[str, bytes | memoryview], kept: bytes | None = None
+) -> PageTwin | None:
+    """A twin that can be used; None where its description is wrong, after the page was given the reason."""
     try:
-        twin = PageTwin(page, name, text, files)
+        twin = PageTwin(page, name, text, files, kept=kept and bytes(kept))
     except Misuse as error:
         page.refused(str(error))
         return None

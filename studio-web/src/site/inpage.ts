@@ -4,12 +4,21 @@ import type { Answer } from "../lib/protocol/types";
 import { pack, type Linked } from "./links";
 import type { FromWorker, Task, Texts, ToWorker } from "./messages";
 
+interface Waiting<T> {
+  done(value: T): void;
+  failed(error: Error): void;
+}
+
+const ENDED = "the worker of the twin has ended";
+
 /** A worker with Python in it. It goes on when a connection to it ends. */
 class PythonWorker {
+  /** The last state that it gave. */
+  kept?: Uint8Array;
   private readonly worker = new Worker(new URL("./python.worker.ts", import.meta.url), { type: "module" });
   private readonly links = new Map<number, LinkEvents>();
-  private readonly asked: ((texts: Texts) => void)[] = [];
-  private readonly askedForLink: ((link: string) => void)[] = [];
+  private readonly asked: Waiting<Texts>[] = [];
+  private readonly askedForLink: Waiting<string>[] = [];
   private next = 1;
   private hasFailed = false;
 
@@ -36,29 +45,30 @@ class PythonWorker {
 
   texts(): Promise<Texts> {
     this.tell({ texts: true });
-    return new Promise((done) => this.asked.push(done));
+    return new Promise((done, failed) => this.asked.push({ done, failed }));
   }
 
   link(): Promise<string> {
     this.tell({ link: true });
-    return new Promise((done) => this.askedForLink.push(done));
+    return new Promise((done, failed) => this.askedForLink.push({ done, failed }));
   }
 
+  /** All that is connected to it has lost its connection, and gets no other one. */
   end(): void {
+    this.hasFailed = true;
     this.worker.terminate();
+    for (const { failed } of [...this.asked, ...this.askedForLink]) failed(new Error(ENDED));
+    for (const events of this.links.values()) events.closed(0);
+    this.links.clear();
   }
 
   private tell(message: ToWorker): void {
     this.worker.postMessage(message);
   }
 
-  /** All that is connected to it has lost its connection, and gets no other one. */
   private fail(failed: string): void {
-    this.hasFailed = true;
-    this.worker.terminate();
     this.loading({ failed });
-    for (const events of this.links.values()) events.closed(0);
-    this.links.clear();
+    this.end();
   }
 
   private take(message: FromWorker): void {
@@ -70,8 +80,9 @@ class PythonWorker {
       const events = this.links.get(message.closed);
       this.links.delete(message.closed);
       events?.closed(message.code);
-    } else if ("texts" in message) this.asked.shift()?.(message.texts);
-    else if ("link" in message) this.askedForLink.shift()?.(message.link);
+    } else if ("texts" in message) this.asked.shift()?.done(message.texts);
+    else if ("link" in message) this.askedForLink.shift()?.done(message.link);
+    else if ("kept" in message) this.kept = message.kept;
     else if ("progress" in message) this.loading({ phase: message.progress });
     else this.fail(message.failed);
   }
@@ -79,7 +90,7 @@ class PythonWorker {
 
 /** The studio inside the page: a twin in one worker, and the editor server in another one when it is asked for. */
 export class InPage implements Backend {
-  private readonly twin: PythonWorker;
+  private twin: PythonWorker;
   private editor: PythonWorker | null = null;
   private tellLoading: (loading: Loading) => void = () => undefined;
 
@@ -89,7 +100,12 @@ export class InPage implements Backend {
     private readonly name: string,
     private readonly linked: Linked | null,
   ) {
-    this.twin = new PythonWorker(root, this.task(), (loading) => {
+    this.twin = this.start();
+  }
+
+  /** `kept`: a state of a twin that has ended, from which this one goes on. */
+  private start(kept?: Uint8Array): PythonWorker {
+    return new PythonWorker(this.root, this.task(kept), (loading) => {
       if ("phase" in loading) performance.mark(loading.phase);
       this.tellLoading(loading);
     });
@@ -130,8 +146,10 @@ export class InPage implements Backend {
   }
 
   restart(): void {
-    this.twin.end();
-    location.reload();
+    const ended = this.twin;
+    this.tellLoading({ phase: "python" });
+    this.twin = this.start(ended.kept);
+    ended.end();
   }
 
   stopAll(): Promise<void> {
@@ -144,23 +162,23 @@ export class InPage implements Backend {
           if (error) failed(errorOf(error));
           else done();
         },
-        closed: () => failed(new Error("the worker of the twin has ended")),
+        closed: () => failed(new Error(ENDED)),
       });
     });
   }
 
-  private async task(): Promise<Task> {
+  private async task(kept?: Uint8Array): Promise<Task> {
     if (this.linked !== null) {
       const programs = Object.entries(this.linked.programs);
       const files = programs.map(([name, text]) => [name, new TextEncoder().encode(text)] as const);
-      return { twin: { name: "link", text: this.linked.description, files: Object.fromEntries(files) } };
+      return { twin: { name: "link", text: this.linked.description, files: Object.fromEntries(files), kept } };
     }
     const { files } = (await (await this.get(`${this.name}.json`)).json()) as { files: string[] };
     const text = await (await this.get(`${this.name}.toml`)).text();
     const contents = files.map(
       async (file) => [file, new Uint8Array(await (await this.get(file)).arrayBuffer())] as const,
     );
-    return { twin: { name: this.name, text, files: Object.fromEntries(await Promise.all(contents)) } };
+    return { twin: { name: this.name, text, files: Object.fromEntries(await Promise.all(contents)), kept } };
   }
 
   private async get(file: string): Promise<Response> {

@@ -5,8 +5,9 @@ import type { Loading } from "../lib/protocol/backend";
 /** Contents by name. */
 export type Texts = Record<string, Uint8Array>;
 
-/** What a worker is for: a twin of a description, with the files that it names, or the editor server for texts by address. */
-export type Task = { twin: { name: string; text: string; files: Texts } } | { editor: Texts };
+/** What a worker is for: a twin of a description, with the files that it names, from its beginning or a state that another worker
+ * gave; or the editor server for texts by address. */
+export type Task = { twin: { name: string; text: string; files: Texts; kept?: Uint8Array } } | { editor: Texts };
 
 export type ToWorker =
   | { start: Task; root: string }
@@ -26,6 +27,8 @@ export type FromWorker =
   | { texts: Texts }
   /** JSON of `PageTwin.link`. */
   | { link: string }
+  /** A state from which another worker can go on. */
+  | { kept: Uint8Array }
   /** Nothing will come any more. */
   | { failed: string };
 

@@ -62,6 +62,7 @@ const page = {
     outgoing.delete(number);
     tell({ closed: number, code });
   },
+  keep: (state: PyProxy) => tell({ kept: state.toJs() as Uint8Array }),
   refused: (text: string) => tell({ failed: text }),
   failed: (text: string) => console.error(text),
 };
@@ -88,8 +89,8 @@ async function start(task: Task, root: string): Promise<void> {
   const room = pyodide.pyimport("twin" in task ? "steptwin.inpage.host" : "steptwin.inpage.editor");
   during("world");
   if ("twin" in task) {
-    const { name, text, files } = task.twin;
-    const twin: Twin | undefined = room.open_twin(page, name, text, pyodide.toPy(files));
+    const { name, text, files, kept } = task.twin;
+    const twin: Twin | undefined = room.open_twin(page, name, text, pyodide.toPy(files), pyodide.toPy(kept));
     if (twin === undefined) return;
     host = twin;
   } else {

@@ -3,7 +3,7 @@ export const en = {
   noAnswer: "{name}: no answer within {seconds} s",
   connectionLost: "the connection was lost before the answer came; whether it was done is not known",
   connecting: "connecting",
-  loading: "The twin runs inside this page and is being loaded: {what}. Its machine is shown at its beginning.",
+  loading: "The twin runs inside this page and is being loaded: {what}. Until then its machine stands.",
   python: "Python",
   modules: "modules",
   world: "the machine",
@@ -163,5 +163,5 @@ export const en = {
   linkProgram: "{name} is no program: names end in .prg, .csv or .m1486, without a folder, and contents are text",
   restart: "Restart",
   restartHelp:
-    "Ends the twin and begins anew, with the description and programs that it began with. Texts that were typed and not downloaded are kept; downloaded ones and the past are lost.",
+    "Ends the twin and begins another one at its last state, which is about a second old. Time stands there. Downloaded programs are kept; the past, breakpoints and watches are lost.",
 } as const;

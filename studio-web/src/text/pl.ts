@@ -5,7 +5,7 @@ export const pl: Record<keyof typeof en, string> = {
   noAnswer: "{name}: brak odpowiedzi przez {seconds} s",
   connectionLost: "połączenie zerwało się przed odpowiedzią; nie wiadomo, czy to wykonano",
   connecting: "łączenie",
-  loading: "Bliźniak działa w tej stronie i jest wczytywany: {what}. Maszyna jest pokazana w stanie początkowym.",
+  loading: "Bliźniak działa w tej stronie i jest wczytywany: {what}. Do tego czasu maszyna stoi.",
   python: "Python",
   modules: "moduły",
   world: "maszyna",
@@ -168,5 +168,5 @@ export const pl: Record<keyof typeof en, string> = {
   linkProgram: "{name} nie jest programem: nazwy kończą się na .prg, .csv lub .m1486, bez folderu, a treść to tekst",
   restart: "Uruchom ponownie",
   restartHelp:
-    "Kończy bliźniaka i zaczyna od nowa, z opisem i programami, od których zaczął. Wpisane i niewgrane teksty zostają; wgrane teksty i przeszłość przepadają.",
+    "Kończy bliźniaka i zaczyna następnego od jego ostatniego stanu, sprzed około sekundy. Czas tam stoi. Wgrane programy zostają; przeszłość, punkty przerwania i podglądy przepadają.",
 };

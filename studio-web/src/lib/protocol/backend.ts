@@ -33,7 +33,7 @@ export interface Backend {
   address(kind: FileKind, name: string): string | null;
   /** An address that opens description and programs of the twin again; null where others do not reach it. Rejects with why there is none. */
   share: (() => Promise<string>) | null;
-  /** Ends the twin, even where it does not answer, and loads the page anew; null where the page does not own it. */
+  /** Ends the twin, even where it does not answer, and begins another one at its last state; null where the page does not own it. */
   restart: (() => void) | null;
   /** Stop all where the studio does not accept this page: a stop needs no token. Rejects with the words of the studio. */
   stopAll(): Promise<void>;
