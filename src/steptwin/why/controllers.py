@@ -188,8 +188,8 @@ class ControllerCauses:
         def before() -> FoundCause:
             if last is None and event is not None:
                 found = self.commanded(controller, change._replace(order=event[0]), None)
-                found = found or self._ended(controller, change.time, of)
-                return found or self._earlier(controller, change.time, of)
+                ended = self._ended(controller, change.time, of)
+                return found or (self._earlier(controller, change.time, of) if ended is None else ended.before())
             if last is None:
                 return self._earlier(controller, change.time, of)
             edge = next(one for one in self._log.changes[last[1]] if one.order == last[0])
