@@ -127,7 +127,7 @@ def test_what_was_before_the_past_that_is_kept_is_not_known(run: Run) -> None:
         ]
         assert (await rig.why("cell"))["text"].splitlines() == [
             "cell waits at line 4 `WAIT IN2 = ON`, since before 2.000000 s (at 5 s)",
-            "    5.000000 s  cell       cell.IN2 is 0 since before 2.000000 s",
+            "    5.000000 s  cell       cell.IN2 is 0 since before 2.000000 s, to which nothing is wired",
             "    2.000000 s  cell       line 4 `WAIT IN2 = ON` was in execution before",
             "                (what was before 2.000000 s is not known)",
         ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 
 import pytest
 from compositions import composed, finish
@@ -14,7 +15,7 @@ from steptwin.why.chain import NOT_KNOWN, Cause, Chain, Place, broken, nothing
 
 
 def cause(time: int, order: int = 0, number: int = 0, *, is_root: bool = False) -> Cause:
-    link = ChainLink(time, "a", MessageText("something"))
+    link = ChainLink(time, "a", MessageText(f"something at {time}"))
     return Cause(link, Place(time, order, number), nothing if is_root else lambda: None, Cover.DELAY)
 
 
@@ -54,8 +55,23 @@ def test_causes_come_once_and_the_latest_ones_first() -> None:
 def test_a_cause_that_breaks_a_rule_is_left_out_and_the_others_are_followed() -> None:
     first = cause(5)._replace(before=lambda: cause(7), besides=lambda: [cause(2, is_root=True)])
     found = chain(first)
-    assert [str(link.text) for link in found.links] == ["something", str(NOT_KNOWN()), "something"]
+    assert [str(link.text) for link in found.links] == ["something at 5", str(NOT_KNOWN()), "something at 2"]
     assert found.broken is ChainRule.ORDER
+
+
+def test_what_was_so_several_times_is_there_once_and_what_led_to_the_first_time_is_found() -> None:
+    link = cause(9).link
+    before = cause(4)._replace(link=replace(link, time=4), before=lambda: cause(1, is_root=True))
+    assert [one.time for one in chain(cause(9)._replace(before=lambda: before)).links] == [9, 1]
+
+
+def test_the_nearest_causes_are_taken_first() -> None:
+    far = cause(7)._replace(before=lambda: cause(6, is_root=True))
+    first = cause(9)._replace(before=lambda: far, besides=lambda: [cause(1, is_root=True)])
+    found = Chain(cause(10).link, Place(10, 1), first, is_whole=True, is_owed=False)
+    for _ in range(3):
+        found.go_on()
+    assert [link.time for link in found.links] == [9, 7, 1]
 
 
 @pytest.mark.parametrize("first", [None, cause(9)])

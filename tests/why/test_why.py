@@ -79,7 +79,7 @@ def test_a_wait_for_ever_shows_what_it_depends_on() -> None:
         "5.000000 s cell cell.IN2 is 0 from the beginning, driven by both.out",
         "5.000000 s both both.out is 0 from the beginning, driven by guard.no and cell.OUT3",
         "5.000000 s guard guard.no is 1 since 1.021000 s, driven by cell.OUT1",
-        "5.000000 s cell cell.OUT3 is 0 from the beginning",
+        "5.000000 s cell cell.OUT3 is 0 from the beginning, which no statement of its program sets",
         "5.000000 s cell cell.OUT1 is 1 since 1.011000 s",
         "1.012000 s cell line 5 `WAIT IN2 = ON` was executed",
     ]
@@ -326,7 +326,7 @@ def test_commands_of_an_m1486() -> None:
     world.run(1.0)
     assert shown(world, "chip")[:2] == [
         "chip waits at line 4 `Z2`, since 0.101000 s (at 1 s)",
-        "1.000000 s chip chip.B2 is 1 from the beginning",
+        "1.000000 s chip chip.B2 is 1 from the beginning, to which nothing is wired",
     ]
     world.apply_input(do.Set((("chip", "B2", 0.0),)))
     world.run(20.0)
@@ -582,7 +582,8 @@ def test_the_output_that_enables_a_drive() -> None:
     assert world.why("M1_EN == 0").links[1].text == "line 3 `M1 = OFF` was executed"
     assert world.why("M1_EN == 1", 0.2).links[1].text == "line 1 `M1 = ON` was executed"
     assert world.why("M2_EN == 1").links[1].text == "line 4 `M2 = ON` was executed"
-    assert world.why("M3_EN").links == ()
+    (never,) = world.why("M3_EN").links
+    assert never.text == "c.M3_EN is 0 from the beginning, which no statement of its program sets"
 
 
 REQUESTS = """

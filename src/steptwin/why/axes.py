@@ -16,6 +16,7 @@ from steptwin.simulation.kinds.programs import Resource, ResourceKind
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
+from steptwin.why import points
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, covered, unknown
 from steptwin.why.controllers import acted
@@ -25,7 +26,13 @@ GIVES_POWER = Message("why.gives-power", ", which gives {axis} its power")
 BEGAN_TO_MOVE = Message("why.began-to-move", "{axis} began to move")
 STOPPED = Message("why.stopped", "{axis} stopped")
 MOTION_ENDED = Message("why.motion-ended", "the motion of {axis} ended, which began at {time:.6f} s")
+NOTHING_HAS_COMMANDED = Message("why.nothing-has-commanded", "nothing has commanded {axis} to move")
+STOPPED_AT_SOFT_LIMIT = Message("why.stopped-at-soft-limit", "{axis} stopped at its soft limit {limit}")
 POSITION = "position"
+SETTINGS = ("VMAX", "ACC", "DEC")
+"""Registers of an axis by which a motion is made."""
+LIMITS = {9: "POSLIM_L", 10: "POSLIM_R"}
+"""Registers of its soft limits, by the status at them (manual 4.1)."""
 
 
 class AxisCauses:
@@ -53,11 +60,16 @@ class AxisCauses:
         if plan.time == self._log.begin and not profile.segments:  # it has not moved yet
             return None
         place = Place(plan.time, plan.order)
-        cover: Cover | None = None
-        if not profile.segments:
-            text = STOPPED(axis=shown)
+        cover, names = None, SETTINGS
+        limit = self._soft_limit(controller, record.subject, plan.time if profile.end is None else profile.end, until)
+        if limit:
+            text, names = STOPPED_AT_SOFT_LIMIT(axis=shown, limit=limit), (limit.partition("_")[2],)
+            place = max(place, Place(plan.time if profile.end is None else profile.end))
+        elif not profile.segments:
+            text, names = STOPPED(axis=shown), ()
         elif profile.end is not None and profile.end <= until:
             text, place = MOTION_ENDED(axis=shown, time=plan.time / SECOND), max(place, Place(profile.end))
+            names = ()
         else:
             text, cover = BEGAN_TO_MOVE(axis=shown), Cover.MOTION
 
@@ -67,7 +79,29 @@ class AxisCauses:
                 found = self._turned(controller, record.subject, plan) or found
             return covered(found, Cover.MOTION)
 
-        return Cause(ChainLink(place.time, controller, text), place, planned, cover)
+        besides = partial(self.settings, controller, record.subject, place.time, names)
+        return Cause(ChainLink(place.time, controller, text), place, planned, cover, besides)
+
+    def settings(self, controller: str, axis: str, until: Nanos, names: Collection[str] = SETTINGS) -> Iterator[Cause]:
+        """Who gave an axis the settings that it has at a moment, as far as they have changed."""
+        wanted = Resource(ResourceKind.AXIS, axis)
+        for name in names:
+            point = f"M{axis}_{name}"
+            series = self._log.points.series(f"{controller}.{point}")
+            since = None if series is None else points.since(series, until)
+            if since is not None and since < until:
+                found = covered(self._all.controllers.at_moment(controller, since, wanted, point), Cover.LEVEL)
+                if found is not None:
+                    yield found
+
+    def _soft_limit(self, controller: str, axis: str, end: Nanos, until: Nanos) -> str:
+        """The register of the soft limit at which a motion has ended; empty for another one."""
+        event = self._log.last_axis_event(controller, axis, end)
+        series = self._log.points.series(f"{controller}.M{axis}_STATUS")
+        if end > until or series is None or (event is not None and event.time == end):
+            return ""
+        name = LIMITS.get(int(points.level(series, end)))
+        return "" if name is None else f"M{axis}_{name}"
 
     def moved(self, axis: str, until: Nanos, before: int = LAST, *, is_held: bool = True) -> FoundCause:
         """Cause before an order that moved the load of an axis last, or left it where it is: a motion, the power of its motor
@@ -91,7 +125,7 @@ class AxisCauses:
             return power
         lost = self._lost_by_fault(axis, until, before, LOSES_PULSES)
         if motion is None and lost is None:
-            return self._ignored(axis, until, before)
+            return self.ignored(controller, number, until, before)
         is_last = lost is not None and (motion is None or (motion.cover is None and lost.place > motion.place))
         return lost if is_last else motion
 
@@ -116,10 +150,20 @@ class AxisCauses:
         held = [one for one in (None if is_motion else found, blocked) if one is not None]
         return covered(max(held, key=lambda one: one.place, default=None), Cover.MOTION)
 
-    def _ignored(self, axis: str, until: Nanos, before: int) -> FoundCause:
+    def unmoved(self, controller: str, number: str, until: Nanos) -> FoundCause:
+        """Reason why an axis of a controller has not moved by a moment."""
+        if self.motion(controller, number, until) is not None:
+            return None
+        ignored = self.ignored(controller, number, until)
+        if ignored is not None:
+            return ignored
+        begin = self._log.begin
+        text = NOTHING_HAS_COMMANDED(axis=f"{controller}.M{number}")
+        return Cause(ChainLink(begin, controller, text), Place(begin), self._all.at_begin, Cover.LEVEL)
+
+    def ignored(self, controller: str, number: str, until: Nanos, before: int = LAST) -> FoundCause:
         """The last event about an axis that never moved: a command that its controller ignored."""
-        controller, name = self._world.axes[axis].spec.drive
-        event = self._log.last_axis_event(controller, name.removeprefix("M"), until, before)
+        event = self._log.last_axis_event(controller, number, until, before)
         if event is None:
             return None
         return covered(self._all.controllers.axis_event(controller, event, Place(event.time, event.order)), Cover.LEVEL)

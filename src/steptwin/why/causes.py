@@ -7,6 +7,7 @@ from functools import partial, reduce
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message, MessageText
+from steptwin.simulation.components.button import BUTTON
 from steptwin.simulation.components.elementspec import NamedSpec
 from steptwin.simulation.components.logic import TerminalComponent
 from steptwin.simulation.components.registry import ELEMENTS
@@ -32,6 +33,10 @@ AND = Message("why.and", "{one} and {other}")
 IS = Message("why.is", "{signal} is {value}")
 FAULT = Message("why.fault", "fault {name}: {what}")
 IS_WIRED_TO = Message("why.is-wired-to", ", which is wired to {pin}")
+NOTHING_IS_WIRED = Message("why.nothing-is-wired", ", to which nothing is wired")
+NO_STATEMENT_SETS = Message("why.no-statement-sets", ", which no statement of its program sets")
+NOTHING_HAS_SET = Message("why.nothing-has-set", ", which nothing has set")
+NOBODY_PRESSED = Message("why.nobody-pressed", ", which nobody has pressed")
 CONTACT_OF = Message("why.contact-of", ", a contact of {pin}")
 CONTACT_BOUNCED = Message("why.contact-bounced", ", and the contact bounced")
 DRIVES = Message("why.drives", "[[{kind}]] in {where} drives {pin}")
@@ -62,14 +67,33 @@ class Causes:
         text = BECAME(signal=signal, value=change.value, how=how or "")
         return Cause(ChainLink(change.time, owner, text), place, partial(self._of_change, signal, change))
 
-    def state(self, signal: str, at: Nanos) -> MessageText:
-        """The level of a signal at a moment, since when, and what drives it."""
+    def state(self, signal: str, at: Nanos, begin: Nanos | None = None) -> MessageText:
+        """The level of a signal at a moment, since when, and what drives it. ``begin``: since when it is known that it has not
+        changed before the log began."""
         hold, drivers, since = self.log.hold(signal, at), self.drivers(signal, at), self.log.since(signal, at)
         if hold is not None and hold.held is not None:
             return IS_HELD(signal=signal, held=hold.held.description(), time=hold.time / SECOND)
-        when = since_before(self.log.begin) if since is None else SINCE(time=since / SECOND)
+        when = since_before(self.log.begin if begin is None else begin) if since is None else SINCE(time=since / SECOND)
         driven = DRIVEN_BY(names=reduce(lambda one, other: AND(one=one, other=other), drivers)) if drivers else ""
+        if since is None and not drivers:
+            driven = self.undriven(signal) or ""
         return IS_SINCE(signal=signal, value=self.log.level(signal, at), since=when, how=driven)
+
+    def undriven(self, signal: str) -> MessageText | None:
+        """Reason why a signal that has not changed cannot change by itself; None where it can."""
+        owner, _, pin = signal.partition(".")
+        if owner not in self._world.controllers:
+            is_unpressed = self.log.is_whole and signal in self._world.objects.built(BUTTON)
+            return NOBODY_PRESSED() if is_unpressed else None
+        terminals, programs = self._world.kind(owner).terminals, self._world.programs.get(owner)
+        is_written = programs is not None and self.programs.is_written(owner, Resource(ResourceKind.PIN, pin))
+        if pin not in self._world.controllers[owner].pins() or is_written or PinName(owner, pin) in self._world.objects.driven:
+            return None
+        if pin in (*terminals.digital_inputs, *terminals.analog_inputs):
+            return NOTHING_IS_WIRED()
+        if programs is not None and programs.texts:
+            return NO_STATEMENT_SETS()
+        return NOTHING_HAS_SET() if self.log.is_whole else None
 
     def first(self, signal: str, value: float, place: Place, how: MessageText | None = None) -> Cause:
         """A signal has had a level since the log began."""

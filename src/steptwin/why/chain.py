@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
 from steptwin.controller import Nanos
-from steptwin.messages import Message
+from steptwin.messages import Message, MessageText
 from steptwin.why.answer import ChainLink, ChainRule, Cover
 
 NOT_KNOWN = Message("why.not-known", "what caused this is not known from here")
@@ -58,19 +58,36 @@ def broken(cause: Cause, effect: Place) -> ChainRule | None:
     return ChainRule.COVER if cause.place.time < effect.time and cause.cover is None else None
 
 
+class _Waiting(NamedTuple):
+    """A cause that has not been taken yet. ``distance``: number of causes between it and what is asked for."""
+
+    distance: int
+    cause: Cause
+
+
 class Chain:
-    """The causes of what is so at a place, each before what it leads to, the latest ones first. ``is_whole``: whether nothing was
-    before what is known. One that breaks a rule is left out, and a link says so in its place."""
+    """The causes of what is so at a place: the nearest ones are taken first. ``is_whole``: whether nothing was before what is
+    known. One that breaks a rule is left out, and a link says so in its place."""
 
     def __init__(self, effect: ChainLink, place: Place, first: FoundCause, *, is_whole: bool, is_owed: bool) -> None:
         self._is_whole = is_whole
-        self._waiting: list[Cause] = []
-        self._taken = set[tuple[Place, ChainLink]]()
-        self.links: list[ChainLink] = []
+        self._waiting: list[_Waiting] = []
+        self._taken: dict[tuple[Place, ChainLink], None] = {}
         self.is_cut = False
         """Whether something is because of what was before."""
         self.broken: ChainRule | None = None
-        self._lead(effect, place, () if first is None else (first,), is_owed=is_owed)
+        self._lead(effect, place, () if first is None else (first,), 0, is_owed=is_owed)
+
+    def __len__(self) -> int:
+        return len(self._taken)
+
+    @property
+    def links(self) -> Sequence[ChainLink]:
+        """The latest ones first. What was so several times, as in a loop, is there once."""
+        found: dict[tuple[str, MessageText], ChainLink] = {}
+        for _, link in sorted(self._taken, key=lambda one: one[0], reverse=True):
+            found.setdefault((link.subject, link.text), link)
+        return tuple(found.values())
 
     @property
     def is_followed(self) -> bool:
@@ -78,22 +95,23 @@ class Chain:
         return not self._waiting
 
     def go_on(self) -> None:
-        """Take the latest one that waits."""
-        cause = max(self._waiting, key=lambda one: one.place)
-        self._waiting.remove(cause)
+        """Take the nearest one that waits, of several the latest."""
+        taken = max(self._waiting, key=lambda one: (-one.distance, one.cause.place))
+        self._waiting.remove(taken)
+        cause = taken.cause
         if (cause.place, cause.link) not in self._taken:
-            self._taken.add((cause.place, cause.link))
-            self.links.append(cause.link)
+            self._taken[cause.place, cause.link] = None
             before = cause.before()
             found = (*(() if before is None else (before,)), *cause.besides())
-            self._lead(cause.link, cause.place, found, is_owed=before is None and cause.before is not nothing)
+            is_owed = before is None and cause.before is not nothing
+            self._lead(cause.link, cause.place, found, taken.distance + 1, is_owed=is_owed)
 
-    def _lead(self, effect: ChainLink, place: Place, causes: Sequence[Cause], *, is_owed: bool) -> None:
+    def _lead(self, effect: ChainLink, place: Place, causes: Sequence[Cause], distance: int, *, is_owed: bool) -> None:
         """Let causes wait that lead to something. ``is_owed``: one more should have been found."""
         rules = [broken(one, place) for one in causes]
-        self._waiting += [one for one, rule in zip(causes, rules, strict=True) if rule is None]
+        self._waiting += [_Waiting(distance, one) for one, rule in zip(causes, rules, strict=True) if rule is None]
         self.is_cut |= is_owed and not self._is_whole
         rule = next((rule for rule in rules if rule), ChainRule.ROOT if is_owed and self._is_whole else None)
         if rule is not None:
             self.broken = self.broken or rule
-            self.links.append(replace(effect, text=NOT_KNOWN(), root=None))
+            self._taken[place._replace(number=place.number - 1), replace(effect, text=NOT_KNOWN(), root=None)] = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -28,6 +28,8 @@ CLIENT = Message("why.client", "client {client}: {meaning}")
 SCRIPT = Message("why.script", "script {name}: {what}")
 FROM_OUTSIDE = Message("why.from-outside", "from outside: {what}")
 STOPPED_WHERE = Message("why.stopped-where", "{event}: {level}")
+NOT_ENABLED = "drive-off"
+"""Event of an axis that ignored a command because it is not enabled."""
 POSITION_ERROR = "position-error"
 """Event of an axis that did not reach its position."""
 REQUEST = Message("why.request", "request: {meaning}")
@@ -66,7 +68,10 @@ class ControllerCauses:
         return self.axis_event(controller, event, Place(event.time, min(event.order, change.order), -1))
 
     def _pin_of(self, controller: str, event: Change) -> str | None:
-        """The input of the limit switch that an event names."""
+        """The pin because of which an event about an axis came: of its limit switch, or the one that enables it."""
+        record = self._log.record(event)
+        if record.subject == NOT_ENABLED:
+            return f"{controller}.M{dict(record.facts)['axis']}_EN"
         values = words_of(self._log.record(event)).values
         axes: Any = getattr(getattr(self._world.controllers[controller], "config", None), "axes", ())
         if not axes or "limit" not in values:
@@ -82,12 +87,15 @@ class ControllerCauses:
 
         def before() -> FoundCause:
             led = self.commanded(controller, event, wanted) or self._asked_before(controller, event)
-            led = led or self._earlier(controller, event.time, wanted)
+            return led or self._earlier(controller, event.time, wanted)
+
+        def besides() -> Iterator[Cause]:
             came = None if pin is None else covered(self._all.last((pin,), place.time, before=place.order), Cover.LEVEL)
-            return max((one for one in (came, led) if one is not None), key=lambda one: one.place, default=None)
+            if came is not None:
+                yield came
 
         text = said if pin is None else STOPPED_WHERE(event=said, level=self._all.state(pin, event.time))
-        return Cause(ChainLink(event.time, controller, text), place, before)
+        return Cause(ChainLink(event.time, controller, text), place, before, besides=besides)
 
     def commanded(self, controller: str, change: Change, wanted: Resource | None, point: str = "") -> FoundCause:
         """A statement, request or action at the moment of a change in a controller."""

@@ -127,7 +127,9 @@ class PastQuestions:
                 begin = found.known_from
                 if begin == 0 and known.rests(question, at):
                     return (yield from self._further(known, question, at, answer))._replace(known_from=begin)
-                return answer._replace(known_from=begin, is_cut=begin > 0, is_complete=begin == 0)
+                return answer._replace(
+                    links=known.since(answer, asked.signals, begin), known_from=begin, is_cut=begin > 0, is_complete=begin == 0
+                )
             before = yield from self._then(question, found.since, further=True)
             if before.since == found.since:
                 return _joined(answer, before, self._most_links)
@@ -194,6 +196,10 @@ class _Known:
     def begin(self) -> Nanos:
         """From when on it is known."""
         return self._why.log.begin
+
+    def since(self, answer: Answer, signals: Iterable[str], begin: Nanos) -> tuple[ChainLink, ...]:
+        """See `Why.since`."""
+        return self._why.since(answer, signals, begin)
 
     def rests(self, question: str, at: Nanos) -> bool:
         """See `Why.rests`."""

@@ -60,6 +60,37 @@ class ProgramCauses:
             found = self._uses[key] = self._world.programs[controller].use(key[1])
         return found
 
+    def is_written(self, controller: str, wanted: Resource) -> bool:
+        """Whether a statement of the present programs changes something, other than by ending the program."""
+        programs = self._world.programs[controller]
+        for text in programs.texts:
+            for number in range(len(programs.statements(text))):
+                writes = programs.use(StatementLocation(text, number)).writes
+                if wanted in writes or (wanted._replace(name="") in writes and not any(_is_program(one) for one in writes)):
+                    return True
+        return False
+
+    def decided_against(self, controller: str, wanted: Resource, at: Nanos) -> FoundCause:
+        """The last evaluation by a moment of a condition that decides whether a statement that changes something is executed."""
+        programs, governing = self._world.programs[controller], set[StatementLocation]()
+        for text in programs.texts:
+            uses = [programs.use(StatementLocation(text, number)) for number in range(len(programs.statements(text)))]
+            writing = [number for number, use in enumerate(uses) if wanted in use.writes]
+            governing |= {
+                StatementLocation(text, number)
+                for number, use in enumerate(uses)
+                if not use.waits and any(one in use.governs for one in writing)
+            }
+        executed, latest = self._log.executed[controller], self._log.last_executed(controller, at)
+        looked_at = range(latest, max(-1, latest - MOST_LOOKED_BACK), -1) if governing else ()
+        index = next((one for one in looked_at if executed.locations[one] in governing), None)
+        if index is None or not self._log.is_of_present_text(executed[index]):
+            return None
+        here, place = executed[index], Place(executed[index].time, executed[index].order, 3 * index + 2)
+        last = covered(max(self._read(controller, index, place), key=lambda one: one.place, default=None), Cover.LEVEL)
+        link = ChainLink(here.time, controller, DECIDED(statement=statement(self._log, here)))
+        return Cause(link, place, self._all.at_begin if last is None else lambda: last, Cover.LEVEL)
+
     def leads_to(self, controller: str, index: int, wanted: Resource) -> bool:
         """Whether the program can still come from an executed statement to one that changes something."""
         location, programs = self._log.executed[controller][index].location, self._world.programs[controller]
@@ -112,6 +143,12 @@ class ProgramCauses:
         locations = self._log.executed[controller].locations
         here = locations[index]
         return next((one for one in range(index - 1, max(-1, index - MOST_LOOKED_BACK), -1) if locations[one] == here), None)
+
+    def decides_in_loop(self, controller: str, index: int) -> Sequence[Resource]:
+        """Resources that the conditions read that were evaluated since a statement was executed before; none without a loop."""
+        before = self._executed_before(controller, index)
+        uses = [] if before is None else [self.use(controller, one) for one in range(before, index)]
+        return list(dict.fromkeys(read for use in uses if use.governs or use.is_loop for read in use.reads))
 
     def _handlers(self, controller: str, text: str) -> Sequence[range]:
         """The statements of each interrupt of a text, with the one that it begins with."""
@@ -176,8 +213,10 @@ class ProgramCauses:
         if use.is_loop:  # its condition is written where it begins
             executed = executed._replace(location=executed.location._replace(number=use.governs.start - 1))
         link = ChainLink(place.time, controller, how(statement=statement(self._log, executed)))
-        ended = self._of_wait if how is ENDED else self._of_decision
-        return Cause(link, place, partial(ended, controller, index, place), Cover.PROGRAM)
+        if how is ENDED:
+            return Cause(link, place, partial(self._of_wait, controller, index, place), Cover.PROGRAM)
+        first, *others = self._of_decision(controller, index, place) or (None,)
+        return Cause(link, place, lambda: first, Cover.PROGRAM, lambda: [one for one in others if one is not None])
 
     def _did_not_wait(self, controller: str, index: int) -> Cause:
         """A wait for something that was there already: for that, or for what led to the wait, whichever came later."""
@@ -201,10 +240,15 @@ class ProgramCauses:
             if cause is not None:
                 yield cause
 
-    def _of_decision(self, controller: str, index: int, place: Place) -> FoundCause:
-        """Change by which what a condition reads has had its value since."""
-        last = max(self._read(controller, index, place), key=lambda cause: cause.place, default=None)
-        return self._of_statement(controller, index) if last is None else covered(last, Cover.LEVEL)
+    def _of_decision(self, controller: str, index: int, place: Place) -> Sequence[FoundCause]:
+        """Change by which what a condition reads has had its value since; of one that was evaluated for the first time, what led
+        to that, if it came later."""
+        last = covered(max(self._read(controller, index, place), key=lambda cause: cause.place, default=None), Cover.LEVEL)
+        is_new = not self.use(controller, index).waits and self._executed_before(controller, index) is None
+        if last is not None and not is_new:
+            return (last,)
+        led = self._of_statement(controller, index)
+        return (led, last) if last is None or (led is not None and led.place > last.place) else (last,)
 
     def _of_wait(self, controller: str, index: int, place: Place) -> FoundCause:
         """Change that a statement waited for, which came while it did, at most `LONGEST_REACTION_NS` before its end. A wait for a
@@ -302,3 +346,7 @@ class ProgramCauses:
             return None
         first = self._log.executed[controller][0]
         return Cause(ChainLink(first.time, controller, PROGRAM_STARTED()), Place(first.time, first.order), nothing, Cover.PROGRAM)
+
+
+def _is_program(resource: Resource) -> bool:
+    return resource.kind is ResourceKind.PROGRAM

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeAlias
 
@@ -23,8 +23,9 @@ from steptwin.simulation.world.snapshotlog import outside_past
 from steptwin.why import points
 from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Cover
 from steptwin.why.causes import FAULT, IS, Causes
-from steptwin.why.chain import Cause, Chain, Place, covered
+from steptwin.why.chain import Cause, Chain, FoundCause, Place, covered
 from steptwin.why.log import LAST, MOST_NOTED, OF_MECHANICS, CauseLog, in_parts
+from steptwin.why.presentstates import WAITS, PresentStates
 from steptwin.why.replayed import ReplayedSignals, TimeSeries, watch_truth, watch_value
 from steptwin.why.search import Asked
 from steptwin.why.sentences import statement
@@ -105,13 +106,8 @@ IS_NUMBER = Message("why.is-number", "{name} is {value:g}")
 IS_TRUE = Message("why.is-true", "{name} is true")
 IS_FALSE = Message("why.is-false", "{name} is false")
 IS_IN_UNIT = Message("why.is-in-unit", "{name} is {value:.6g} {unit}")
-WAITS = Message("why.waits", "{controller} waits at {statement}")
 DOES_NOT_WAIT = Message("why.does-not-wait", "{controller} does not wait: {statement}")
 PROGRAM_IS = Message("why.program-is", "{controller}: {held}")
-WAITS_FOR_A_TIME = Message("why.waits-for-a-time", "it waits for a time only")
-DEPENDS_ON = Message("why.depends-on", "it depends on {name}")
-ANY_PIN = Message("why.any-pin", "any pin")
-NO_AXIS_HAS_MOVED = Message("why.no-axis-has-moved", "no axis has moved until {time:g} s")
 BECOMES_TRUE = Message("why.becomes-true", "it becomes true at {time:.6f} s if nothing comes from outside")
 ONLY_FROM_OUTSIDE = Message(
     "why.only-from-outside", "it does not become true within {time:g} s if nothing comes from outside: only from outside"
@@ -226,6 +222,12 @@ class Why:
         moving = frozenset(signals[name] for name in moving)
         return Asked(text, frozenset(signals.values()), edges, moving, flip)
 
+    def since(self, answer: Answer, signals: Iterable[str], begin: Nanos) -> tuple[ChainLink, ...]:
+        """The links of an answer about signals that have not changed since ``begin`` either, which is before the log."""
+        state = self._causes.state
+        other = {state(name, answer.at): state(name, answer.at, begin) for name in signals if self.log.has(name)}
+        return tuple(replace(link, text=other.get(link.text, link.text)) for link in answer.links)
+
     def rests(self, question: str, at: Nanos) -> bool:
         """Whether a condition depends on where an axis is, or on a program that is not executed."""
         names = [self._canonical(name) for name in parse_condition(self._named(_text_of(question))).names()]
@@ -251,10 +253,12 @@ class Why:
         first = self._causes.lasting(signals, at, None if since is None else self._changed(signals, since))
         if first is not None or since is not None:
             return (yield from self._answer(text, at, state, since, first))
-        resting = (yield from self._resting(signals, at)) or self._held(signals, at)
+        resting = (yield from self._resting(signals, at)) or self._held(signals, at) or self._ignored(signals, at)
         answer = yield from self._answer(text, at, state, None, resting)
-        states = [link for name in signals if self.log.has(name) for link in self._states(name, at)]
-        says_more = resting is not None or len(states) > len(signals) or any(self._causes.drivers(name, at) for name in signals)
+        present, named = (yield from self._present(at)), [name for name in signals if self.log.has(name)]
+        states = [link for name in named for link in present.of([name])]
+        says_more = resting is not None or len(states) > len(signals)
+        says_more |= any(self._causes.drivers(name, at) or self._causes.undriven(name) is not None for name in signals)
         return self._after(states if says_more else [], answer)
 
     def lacking(self, question: str, at: Nanos) -> Lacking:
@@ -279,7 +283,7 @@ class Why:
         for name in dict.fromkeys(name for one in deciding(node, value, wanted=True) for name in one.names()):
             full, unit = self._canonical(name), self._unit(name)
             if self.log.is_recorded(full):
-                links += self._states(full, at)
+                links += PresentStates(self._causes, other, ALL_LINKS).of([full])
             else:
                 text = IS_IN_UNIT(name=name, value=value(name), unit=unit) if unit else IS_NUMBER(name=name, value=value(name))
                 links.append(ChainLink(at, name.partition(".")[0], text))
@@ -519,7 +523,11 @@ class Why:
         axis = _AXIS.match(rest)
         is_of_axis = axis is not None or (self._is_signal(signal) and world.signal(signal).continuous)
         wanted = Resource(ResourceKind.AXIS, (axis and axis[1]) or "") if is_of_axis else None
-        return causes.controllers.at_moment(owner, time, wanted, rest)
+        found = causes.controllers.at_moment(owner, time, wanted, rest)
+        if found is None or wanted is None or "vel" not in rest.lower():
+            return found
+        besides, until = found.besides, found.place.time
+        return found._replace(besides=lambda: (*besides(), *causes.axes.settings(owner, wanted.name, until)))
 
     def _moving(self, signal: str, at: Nanos) -> Asking:
         """Cause of a quantity that changes all the time: the motion, or since when it stands."""
@@ -534,9 +542,9 @@ class Why:
             if self._is_of_rotor(full):
                 changed = None if since is None else covered(self._of_unrecorded(full, since), Cover.LEVEL)
             elif self._point(signal) is None:  # what left it where it is may have come a moment after it was there
-                changed = covered(self._of_unrecorded(full, at), Cover.LEVEL)
+                changed = covered(self._of_unrecorded(full, at), Cover.LEVEL) or self._ignored((full,), at)
             else:
-                changed = None if since is None else self._changed((full,), since)
+                changed = self._ignored((full,), at) if since is None else self._changed((full,), since)
             return (yield from self._answer(signal, at, state, since, changed))
         since: Nanos | None = at
         if isinstance(standing, SignalOf) and is_constant(standing, at):
@@ -560,19 +568,22 @@ class Why:
         here = executed[index]
         use = causes.programs.use(controller, index)
         text, since = statement(log, here), None if log.is_in_progress(here) else here.time
+        links = list((yield from self._present(at)).awaited(controller))
         if not use.waits or at - here.time <= log.world.programs[controller].statement_time:
             state = DOES_NOT_WAIT(controller=controller, statement=text)
             first = covered(causes.programs.statement(controller, index), Cover.PROGRAM)
-            return (yield from self._answer(controller, at, state, since, first))
-        links = [link for resource in use.reads for link in self._awaited(controller, resource, at)]
-        if not use.reads:
-            links.append(ChainLink(here.time, controller, WAITS_FOR_A_TIME()))
-        found = [cause for resource in use.reads if (cause := causes.programs.resource(controller, resource, index, at))]
-        changed = [cause for cause in found if cause.link.time > here.time]
+            return self._after(links, (yield from self._answer(controller, at, state, since, first)))
+        found = {one: cause for one in use.reads if (cause := causes.programs.resource(controller, one, index, at))}
+        others = [cause._replace(cover=Cover.LEVEL) for one, cause in found.items() if one.kind is not ResourceKind.PIN]
+        changed = [cause for cause in found.values() if cause.link.time > here.time]
         last = max(changed, key=lambda cause: cause.link.time, default=None)
         pins = [f"{controller}.{resource.name}" for resource in use.reads if resource.kind is ResourceKind.PIN and resource.name]
         resting = ((yield from self._resting(pins, at)) or self._held(pins, at)) if last is None else None
-        first = covered(last, Cover.LEVEL) or resting or covered(causes.programs.statement(controller, index), Cover.WAIT)
+        first = (
+            covered(last, Cover.LEVEL)
+            or resting
+            or causes.programs.statement(controller, index)._replace(cover=Cover.WAIT, besides=lambda: others)
+        )
         answer = yield from self._answer(controller, at, WAITS(controller=controller, statement=text), since, first)
         return self._after(links, answer)
 
@@ -582,25 +593,41 @@ class Why:
         is_all = len(links) <= self._most_links and (self._most_links != MOST_LINKS or len(states) < MOST_SNAPSHOTS)
         return answer._replace(links=links[: self._most_links], is_complete=answer.is_complete and is_all)
 
-    def _owners(self, signals: Iterable[str], at: Nanos) -> set[str]:
-        """Owners of signals, and of those that drive one of them."""
+    def _behind(self, signals: Iterable[str], at: Nanos) -> set[str]:
+        """Signals, and those that drive one of them."""
         waiting, seen = list(signals), set[str]()
         while waiting:
             name = waiting.pop()
             if name not in seen:
                 seen.add(name)
                 waiting += (*self._causes.drivers(name, at), *self._causes.elements.behind(name))
-        return {name.partition(".")[0] for name in seen}
+        return seen
 
     def _axes_of(self, signals: Iterable[str], at: Nanos) -> set[str]:
         """The axes whose position or switch is among signals, or drives one of them."""
-        return self._owners(signals, at) & set(self.log.world.axes)
+        return {name.partition(".")[0] for name in self._behind(signals, at)} & set(self.log.world.axes)
 
     def _held(self, signals: Iterable[str], at: Nanos) -> Cause | None:
-        """Cause that holds a program on which signals depend."""
-        programs = self._owners(signals, at) & set(self.log.world.programs)
-        held = [found for one in programs if (found := self._causes.programs.held(one, at)) is not None]
-        return max(held, key=lambda one: one.place, default=None)
+        """Cause for which a program does not change signals, or those that drive them: it is held, or has decided against it."""
+        found: list[FoundCause] = []
+        programs = self._causes.programs
+        for name in self._behind(signals, at):
+            owner, _, pin = name.partition(".")
+            if owner in self.log.world.programs and not self._causes.drivers(name, at):
+                held = programs.held(owner, at)
+                found.append(held or programs.decided_against(owner, Resource(ResourceKind.PIN, pin), at))
+        return max((one for one in found if one is not None), key=lambda one: one.place, default=None)
+
+    def _ignored(self, signals: Iterable[str], at: Nanos) -> Cause | None:
+        """Cause for which an axis of a controller has not moved: a command that was ignored, or that there was none."""
+        for name in signals:
+            owner, _, rest = name.partition(".")
+            drive = self.log.world.axes[owner].spec.drive if owner in self.log.world.axes else (owner, rest)
+            axis = _AXIS.match(f"{drive[1]}.")
+            moves = name == f"{owner}.position" or (self._is_signal(name) and self.log.world.signal(name).continuous)
+            if drive[0] in self.log.world.controllers and axis is not None and (moves or rest.lower().endswith("status")):
+                return self._causes.axes.unmoved(drive[0], axis[1] or "1", at)
+        return None
 
     def _resting(self, signals: Sequence[str], at: Nanos) -> Resting:
         """Where an axis of `_axes_of` is, and what brought it there, or left it; of several the one moved last. None if nothing
@@ -614,52 +641,9 @@ class Why:
         text = IS_IN_UNIT(name=name, value=other.read(name), unit=other.signal(name).unit)
         return Cause(ChainLink(at, axis, text), Place(at, LAST, -1), lambda: covered(cause, Cover.LEVEL))
 
-    def _awaited(self, controller: str, resource: Resource, at: Nanos) -> Iterator[ChainLink]:
-        """The present state of what a statement waits for, and of what that depends on."""
-        if resource.kind is ResourceKind.PIN and resource.name:
-            yield from self._states(f"{controller}.{resource.name}", at, controller)
-        elif resource.kind is ResourceKind.AXIS:
-            motion = self._causes.axes.motion(controller, resource.name, at)
-            yield ChainLink(at, controller, NO_AXIS_HAS_MOVED(time=at / SECOND)) if motion is None else motion.link
-        else:
-            point = self.log.world.programs[controller].point(resource.name)
-            known = f"{controller}.{point}" if point else ""
-            is_noted = self.log.points.series(known) is not None
-            text = self._causes.state(known, at) if is_noted else DEPENDS_ON(name=resource.name or ANY_PIN())
-            yield ChainLink(at, controller, text)
-
-    def _states(self, signal: str, at: Nanos, waits: str = "") -> Iterator[ChainLink]:
-        """The level of a signal and, one after the other, of the signals that drive it. ``waits``: the controller that waits for
-        it, of which that is known."""
-        waiting, seen = [signal], set[str]()
-        while waiting and len(seen) < (MOST_SNAPSHOTS if self._most_links == MOST_LINKS else ALL_LINKS):
-            name = waiting.pop(0)
-            if name in seen:
-                continue
-            seen.add(name)
-            waiting += self._causes.drivers(name, at)
-            yield ChainLink(at, name.partition(".")[0], self._causes.state(name, at))
-            if name.partition(".")[0] != waits:
-                waiting += yield from self._not_written(name, at)
-
-    def _not_written(self, signal: str, at: Nanos) -> Generator[ChainLink, None, list[str]]:
-        """Wait that stands between a program and an output that it writes and never has. Returns the signals that it waits for,
-        or the supply that its controller lacks."""
-        owner, _, pin = signal.partition(".")
-        world, log, programs = self.log.world, self.log, self._causes.programs
-        if owner not in world.controllers or self._causes.drivers(signal, at) or log.since(signal, at) is not None:
-            return []
-        supply = f"{world.objects.supplied.get(owner, '')}.good"
-        if log.has(supply) and not log.level(supply, at):
-            return [supply]
-        index = log.last_executed(owner, at)
-        if index < 0 or not programs.leads_to(owner, index, Resource(ResourceKind.PIN, pin)):
-            return []
-        here, use = log.executed[owner][index], programs.use(owner, index)
-        if not use.waits or programs.held(owner, at) is not None or at - here.time <= world.programs[owner].statement_time:
-            return []
-        yield ChainLink(at, owner, WAITS(controller=owner, statement=statement(log, here)))
-        return [f"{owner}.{one.name}" for one in use.reads if one.kind is ResourceKind.PIN and one.name]
+    def _present(self, at: Nanos) -> Generator[None, None, PresentStates]:
+        most = MOST_SNAPSHOTS if self._most_links == MOST_LINKS else ALL_LINKS
+        return PresentStates(self._causes, (yield from self._world_at(at)), most)
 
     # ------------------------------------------------------------------ the chain
 
@@ -670,7 +654,7 @@ class Why:
         chain = Chain(
             effect, Place(at, LAST), first, is_whole=log.is_whole, is_owed=first is None and not (since is None and log.is_whole)
         )
-        while not chain.is_followed and len(chain.links) < self._most_links:
+        while not chain.is_followed and len(chain) < self._most_links:
             chain.go_on()
             yield
         is_complete = chain.is_followed and not chain.is_cut

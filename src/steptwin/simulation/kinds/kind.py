@@ -354,6 +354,10 @@ class ControllerKind(OptionalMethods, ABC, Generic[S, M, V]):
         """Its inputs for the switches of its axes."""
         return ()
 
+    def ends_motion(self, controller: M, axis: int, /) -> str | None:
+        """The input that ends the present motion of an axis (from 1); empty if it has none; None for a motion that needs none."""
+        return None
+
     def would_end_seek(self, controller: M, pin: str, /) -> bool:
         """Whether a seek of an input (`steptwin.simulation.script.control.Seek`) would end without any motion now."""
         return False

@@ -164,6 +164,13 @@ class Mic488Kind(ControllerKind[Mic488Spec, Mic488Device, Mic488View]):
                     stops = bool(config.limit_mode & bit)
                     yield EndSwitch(axis.number, direction, f"IN{pin + 1}", active, stops, (f"M{axis.number}", attribute))
 
+    def ends_motion(self, device: Mic488Device, axis: int) -> str | None:
+        homing = device.axes[axis - 1].homing
+        if homing.leg in (homing.NONE, homing.TO_STOP):
+            return None
+        number = index_input(axis - 1) if homing.leg == homing.TO_INDEX else homing.sensor
+        return "" if number == NO_INPUT else f"IN{number + 1}"
+
     def scale(self, given: GivenScale, device: Mic488Device, axis: int) -> DriveScale:
         its = device.axes[axis - 1]
         return DriveScale(

@@ -1,0 +1,132 @@
+"""The present states on which something depends that has not come: levels, what drives them, waits, motions without end."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Sequence
+from typing import TypeAlias
+
+from steptwin.controller import SECOND, Nanos
+from steptwin.messages import Message, MessageText
+from steptwin.motion.divisions import profile_of
+from steptwin.simulation.kinds.programs import Resource, ResourceKind
+from steptwin.simulation.world.simulation import Simulation
+from steptwin.why.answer import ChainLink
+from steptwin.why.causes import Causes
+from steptwin.why.sentences import statement
+
+WAITS = Message("why.waits", "{controller} waits at {statement}")
+WAITS_FOR_A_TIME = Message("why.waits-for-a-time", "it waits for a time only")
+DEPENDS_ON = Message("why.depends-on", "it depends on {name}")
+IS_NOT_SET = Message("why.is-not-set", "{name} is {value:g}: nothing has set it")
+IS_STILL = Message("why.is-still", "{name} is {value:g} since {time:.6f} s")
+ANY_PIN = Message("why.any-pin", "any pin")
+NO_AXIS_HAS_MOVED = Message("why.no-axis-has-moved", "no axis has moved until {time:g} s")
+MOVES_WITHOUT_END = Message("why.moves-without-end", "{axis} moves without end")
+MOVES_UNTIL = Message("why.moves-until", "{axis} moves until {pin} ends it")
+HAS_NO_INPUT = Message("why.has-no-input", "{axis} homes without end: no input is configured that could end it")
+
+_Asked: TypeAlias = "str | tuple[str, Resource]"
+"""A signal, or what a statement of a controller reads."""
+_Links: TypeAlias = Generator[ChainLink, None, Sequence[_Asked]]
+
+
+class PresentStates:
+    """Finds present states. ``world`` is at the moment; ``most``: limit of what is looked at."""
+
+    def __init__(self, causes: Causes, world: Simulation, most: int) -> None:
+        self._causes = causes
+        self._log = causes.log
+        self._world = world
+        self._at: Nanos = world.now
+        self._most = most
+
+    def of(self, asked: Sequence[_Asked], waits: str = "") -> Iterator[ChainLink]:
+        """The states of these and, one after the other, of what they depend on. ``waits``: the controller that waits for them, of
+        which that is known."""
+        waiting, seen = list(asked), set[_Asked]()
+        while waiting and sum(isinstance(one, str) for one in seen) < self._most:
+            one = waiting.pop(0)
+            if one not in seen:
+                seen.add(one)
+                waiting += yield from (self._signal(one, waits) if isinstance(one, str) else self._resource(*one))
+
+    def awaited(self, controller: str) -> Iterator[ChainLink]:
+        """Those for which the program of a controller waits, or which the loop reads in which it is."""
+        programs, last = self._causes.programs, self._log.last_executed(controller, self._at)
+        use = programs.use(controller, last)
+        reads = use.reads if use.waits else programs.decides_in_loop(controller, last)
+        if use.waits and not reads:
+            yield ChainLink(self._at, controller, WAITS_FOR_A_TIME())
+        yield from self.of([(controller, one) for one in reads], controller)
+
+    def motion(self, controller: str, number: str) -> _Links:
+        """Motions of an axis, of all if ``number`` is empty, that need something to end. Returns the inputs that can do that."""
+        pins: list[_Asked] = []
+        for plan in self._log.plans_in_force(controller, number, self._at):
+            record = self._log.record(plan)
+            profile, axis = profile_of(record.plan()), f"{controller}.M{record.subject}"
+            if not profile.segments or profile.end is not None:
+                continue
+            pin = self._world.kind(controller).ends_motion(self._world.controller(controller), int(record.subject))
+            if pin:
+                pins.append(f"{controller}.{pin}")
+            text = MOVES_UNTIL(axis=axis, pin=pins[-1]) if pin else HAS_NO_INPUT(axis=axis) if pin == "" else None
+            yield ChainLink(self._at, controller, text or MOVES_WITHOUT_END(axis=axis))
+        return pins
+
+    def _signal(self, name: str, waits: str) -> _Links:
+        owner = name.partition(".")[0]
+        yield ChainLink(self._at, owner, self._causes.state(name, self._at))
+        others = () if owner == waits else (yield from self._not_written(name))
+        return (*self._causes.drivers(name, self._at), *others)
+
+    def _resource(self, controller: str, resource: Resource) -> _Links:
+        """What a statement waits for."""
+        if resource.kind is ResourceKind.PIN and resource.name:
+            return [f"{controller}.{resource.name}"]
+        if resource.kind is ResourceKind.AXIS:
+            motion = self._causes.axes.motion(controller, resource.name, self._at)
+            if motion is None:
+                yield ChainLink(self._at, controller, NO_AXIS_HAS_MOVED(time=self._at / SECOND))
+            else:
+                yield motion.link
+            return (yield from self.motion(controller, resource.name))
+        yield ChainLink(self._at, controller, self._value(controller, resource))
+        return ()
+
+    def _value(self, controller: str, resource: Resource) -> MessageText:
+        programs, at = self._world.programs[controller], self._at
+        point = programs.point(resource.name)
+        known = f"{controller}.{point}" if point else ""
+        if self._log.points.series(known) is not None:
+            return self._causes.state(known, at)
+        value = programs.read(resource.name, at) if resource.name else None
+        if value is None:
+            return DEPENDS_ON(name=resource.name or ANY_PIN())
+        written = self._causes.programs.resource(controller, resource, self._log.last_executed(controller, at) + 1, at)
+        if written is None:
+            return IS_NOT_SET(name=resource.name, value=value)
+        return IS_STILL(name=resource.name, value=value, time=written.place.time / SECOND)
+
+    def _not_written(self, signal: str) -> _Links:
+        """Wait that stands between a program and an output that it can change. Returns what it waits for, or the supply that its
+        controller lacks."""
+        owner, _, pin = signal.partition(".")
+        log, programs, at = self._log, self._causes.programs, self._at
+        if owner not in self._world.controllers or self._causes.drivers(signal, at):
+            return ()
+        supply = f"{self._world.objects.supplied.get(owner, '')}.good"
+        if log.has(supply) and not log.level(supply, at):
+            return [supply]
+        index = log.last_executed(owner, at)
+        if index < 0 or not programs.leads_to(owner, index, Resource(ResourceKind.PIN, pin)):
+            return ()
+        here, use = log.executed[owner][index], programs.use(owner, index)
+        against = None if use.reads else programs.decided_against(owner, Resource(ResourceKind.PIN, pin), at)
+        if against is not None:
+            yield against.link
+            return [(owner, one) for one in programs.use(owner, (against.place.number - 2) // 3).reads]
+        if not use.waits or programs.held(owner, at) is not None or at - here.time <= self._world.programs[owner].statement_time:
+            return ()
+        yield ChainLink(at, owner, WAITS(controller=owner, statement=statement(log, here)))
+        return [(owner, one) for one in use.reads]
