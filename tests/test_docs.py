@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from steptwin.simulation.describe.tables import written_tables
+
 ROOT = Path(__file__).parent.parent
 ROW = re.compile(r"^\| ((?:MIC|WBC|M)-\d+) \|", re.MULTILINE)
 PREFIXES = ("MIC", "WBC", "M")
@@ -67,6 +69,24 @@ def test_names_in_docstrings_exist() -> None:
     assert {name: file for name, file in cited.items() if not exists(name)} == {}
     assert not exists("steptwin.controller.WirePort")
     assert not exists("steptwin.room.Port")
+
+
+def test_keys_and_signals_of_the_pages_of_elements_exist() -> None:
+    """Those in tables with *key* in their head, of which the description has one as a key, or an element as a signal."""
+    keys = {key.name for rows in written_tables().values() for key in rows}
+    known = keys | set(re.findall(r"`(\w+)`", (ROOT / "docs/elements/signals.md").read_text()))
+    pages = [path for folder in ("elements", "space", "motors") for path in (ROOT / "docs" / folder).glob("*.md")]
+    tables = [
+        (path.name, table) for path in pages for table in re.findall(r"^\| key.*\n(?:^\|.*\n)+", path.read_text(), re.MULTILINE)
+    ]
+    named = {
+        (page, name)
+        for page, table in tables
+        for row in table.splitlines()
+        for name in re.findall(r"`(\w+)[^`]*`", row.split("|")[1])
+    }
+    assert len(named) > 100
+    assert {(page, name) for page, name in named if name not in known} == set()
 
 
 def test_pages_that_are_read_are_short() -> None:
