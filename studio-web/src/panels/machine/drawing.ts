@@ -2,6 +2,7 @@ import { isAid } from "../../lib/scene/aids";
 import { isLike, type Solid } from "../../lib/scene/builder";
 import { facesOf } from "../../lib/scene/faces";
 import { colourOf, lookOf, type Levels, type Look } from "../../lib/scene/looks";
+import { namedOf } from "../../lib/scene/names";
 import { POSE } from "../../lib/scene/poses";
 import type { Stage } from "../../lib/scene/stage";
 import type { Trail } from "../../lib/scene/trail";
@@ -60,7 +61,7 @@ export class Drawing {
   private readonly trails: SVGPathElement[] = [];
   private readonly labels = new Map<string, SVGTextElement>();
   /** The solids of each element with a label. */
-  private readonly named = new Map<string, number[]>();
+  private readonly named: ReadonlyMap<string, readonly number[]>;
   private readonly frame: readonly number[];
   private ordered_ms = 0;
   private marks: Marks | null = null;
@@ -80,11 +81,7 @@ export class Drawing {
     this.all = create("g", svg);
     this.order = new Order(stage, view);
     this.renew();
-    const fixed = stage.solids.slice(0, stage.aids);
-    fixed.forEach(({ element, material }, n) => {
-      if (material !== "frame" || fixed.some((one) => one.element === element && one.material !== "frame"))
-        this.named.set(element, [...(this.named.get(element) ?? []), n]);
-    });
+    this.named = namedOf(stage);
     for (const _ of stage.tips) this.trails.push(create("path", svg, "trail"));
     const words = create("g", svg, "labels");
     for (const name of this.named.keys()) {
@@ -233,8 +230,7 @@ export class Drawing {
     let [left, right, top] = [Infinity, -Infinity, Infinity];
     for (const n of solids) {
       const x = this.spots[2 * n] as number;
-      if (!this.stage.isThere[n] || !this.stage.solids[n]?.isCarried !== !this.stage.solids[solids[0] ?? 0]?.isCarried)
-        continue;
+      if (!this.stage.isThere[n]) continue;
       left = Math.min(left, x);
       right = Math.max(right, x);
       top = Math.min(top, this.spots[2 * n + 1] as number);

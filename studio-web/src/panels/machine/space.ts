@@ -28,6 +28,7 @@ import { isAid } from "../../lib/scene/aids";
 import type { Solid } from "../../lib/scene/builder";
 import { facetsOf } from "../../lib/scene/faces";
 import { colourOf, DARK, lookOf, type Look } from "../../lib/scene/looks";
+import { namedOf } from "../../lib/scene/names";
 import { POSE } from "../../lib/scene/poses";
 import type { Stage } from "../../lib/scene/stage";
 import type { Drawn } from "../../lib/scene/strand";
@@ -74,6 +75,8 @@ export class Space {
   private marks: Marks | null = null;
   /** Version of the stage when it was marked. */
   private knowledge = -1;
+  /** Names of elements, with their solids. */
+  private readonly labels = new Map<HTMLElement, readonly [string, readonly number[]]>();
   /** Versions of lines as they are drawn, by the numbers of their solids. */
   private readonly versions = new Map<number, number>();
   /** Something has changed since the last picture. */
@@ -83,6 +86,7 @@ export class Space {
   constructor(
     private readonly canvas: HTMLCanvasElement,
     private readonly stage: Stage,
+    private readonly words: HTMLElement,
   ) {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
     const { low, high } = stage.extent;
@@ -95,6 +99,12 @@ export class Space {
     this.controls.addEventListener("change", this.change);
     this.renew();
     this.light();
+    for (const [name, solids] of namedOf(stage)) {
+      const label = document.createElement("span");
+      label.textContent = name;
+      words.append(label);
+      this.labels.set(label, [name, solids]);
+    }
     canvas.addEventListener("webglcontextrestored", this.change);
   }
 
@@ -154,6 +164,7 @@ export class Space {
     if (!this.isStale) return;
     this.isStale = false;
     this.renderer.render(this.scene, this.camera);
+    for (const [label, [name, solids]] of this.labels) this.name(label, name, solids);
   }
 
   /** The path of a tip; null: none. */
@@ -245,6 +256,7 @@ export class Space {
 
   end(): void {
     this.isEnded = true;
+    this.words.replaceChildren();
     for (const model of this.models) model.traverse(dispose);
     this.canvas.removeEventListener("webglcontextrestored", this.change);
     this.controls.dispose();
@@ -276,6 +288,22 @@ export class Space {
     const sun = new DirectionalLight(0xffffff, 2.2);
     sun.position.set(-0.4, -0.7, 1);
     this.scene.add(new HemisphereLight(0xffffff, 0x777777, 1.2), new AmbientLight(0xffffff, 0.5), sun);
+  }
+
+  /** Above the middle of its solids. */
+  private name(label: HTMLElement, name: string, solids: readonly number[]): void {
+    const isSelected = name === this.marks?.selected;
+    label.hidden = !(this.marks?.labels || isSelected);
+    if (label.hidden) return;
+    label.classList.toggle("selected", isSelected);
+    const { lows, highs } = this.stage;
+    const ends = (k: number) =>
+      [Math.min(...solids.map((n) => lows[3 * n + k] as number)), Math.max(...solids.map((n) => highs[3 * n + k] as number))] as const; // prettier-ignore
+    const [[left, right], [front, back], [, top]] = [ends(0), ends(1), ends(2)];
+    this.place.set((left + right) / 2, (front + back) / 2, top).project(this.camera);
+    const [x, y] = [50 * (1 + this.place.x), 50 * (1 - this.place.y)];
+    label.style.left = `${x.toFixed(1)}%`;
+    label.style.top = `${y.toFixed(1)}%`;
   }
 
   /** A mesh for each solid. */
