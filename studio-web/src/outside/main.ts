@@ -1,4 +1,6 @@
 import css from "../app.css?raw";
+import type { Solid } from "../lib/scene/builder";
+import { meshOf } from "../lib/scene/faces";
 import type { Piece } from "../lib/scene/pieces";
 import { colourOf } from "../lib/scene/looks";
 import { palettesOf, pictureOf } from "../lib/scene/picture";
@@ -47,15 +49,21 @@ function show(stage: Stage, valueOf: (name: string) => number): void {
   stage.update();
 }
 
-/** Solids of the elements of a machine, and of workpieces with the names of these, with their colours, for other formats. */
+/** Solids of the elements of a machine, and of workpieces with the names of these, with their colours and the meshes that they have
+ * at a size of 1, for other formats. */
 function solids(machine: Machine, pieces: readonly Piece[]) {
   const { light } = PALETTES;
   const stage = stageOf(machine, pieces);
-  return stage.solids.flatMap((solid, n) => {
+  const shapes = new Map<string, Solid["prism"]>();
+  const drawn = stage.solids.flatMap((solid, n) => {
+    if (solid.line !== undefined) return [];
     const own = colourOf(solid.material, solid);
+    const shape = JSON.stringify(solid.prism);
+    shapes.set(shape, solid.prism);
     const piece = n < stage.fixed ? null : stage.pieces.names[n - stage.fixed];
-    return solid.line === undefined ? [{ ...solid, color: light.get(own) ?? own, piece }] : [];
+    return [{ ...solid, color: light.get(own) ?? own, piece, mesh: [...shapes.keys()].indexOf(shape) }];
   });
+  return { solids: drawn, meshes: [...shapes.values()].map(meshOf) };
 }
 
 /** The last moment of a machine in a recorded run, as the text of an SVG with its name. */

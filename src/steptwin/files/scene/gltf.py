@@ -12,8 +12,8 @@ import struct
 from array import array
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import chain, pairwise
-from math import atan2, ceil, cos, radians, sin, sqrt, tau
+from itertools import chain
+from math import ceil, cos, radians, sin, sqrt
 from typing import IO, Any, NamedTuple
 
 from steptwin import __version__
@@ -69,7 +69,7 @@ class _Gltf:
         self._views: list[dict[str, Any]] = []
         self._accessors: list[dict[str, Any]] = []
         self._materials: dict[tuple[str, bool], int] = {}
-        self._shapes: dict[object, tuple[int, int, int]] = {}
+        self._shapes: list[tuple[int, int, int]] = []
         self._meshes: dict[object, int] = {}
         self._list_of_meshes: list[dict[str, Any]] = []
         self._times: dict[tuple[float, ...], int] = {}
@@ -129,8 +129,9 @@ class _Gltf:
     def _add_solids(self, frames: Sequence[str]) -> None:
         scene = self._scene
         pieces = {name: place for name, stints in scene.workpieces.items() for _, place in stints[::-1] if place is not None}
-        solids = SceneScript().call("solids", to_json(scene.machine), to_json(tuple(pieces.values())))
-        for solid in solids:
+        drawn = SceneScript().call("solids", to_json(scene.machine), to_json(tuple(pieces.values())))
+        self._shapes = [self._shape(mesh["places"], mesh["normals"], mesh["indices"]) for mesh in drawn["meshes"]]
+        for solid in drawn["solids"]:
             if solid["piece"] is not None:
                 self._add_workpiece(solid["piece"], solid, scene.workpieces[solid["piece"]])
                 continue
@@ -284,12 +285,8 @@ class _Gltf:
     # ------------------------------------------------------------------ shapes
 
     def _mesh(self, solid: Mapping[str, Any]) -> int:
-        prism = solid["prism"]
-        shape = None if prism is None else (prism["axis"], prism["corners"], tuple(prism["towards"]), tuple(prism["ends"]))
-        look = solid["color"], solid["material"] == "light"
+        shape, look = solid["mesh"], (solid["color"], solid["material"] == "light")
         if (shape, look) not in self._meshes:
-            if shape not in self._shapes:
-                self._shapes[shape] = self._shape(*(_box() if prism is None else _prism(prism)))
             places, normals, indices = self._shapes[shape]
             primitive = {
                 "attributes": {"POSITION": places, "NORMAL": normals},
@@ -300,7 +297,7 @@ class _Gltf:
             self._meshes[shape, look] = len(self._list_of_meshes) - 1
         return self._meshes[shape, look]
 
-    def _shape(self, places: list[float], normals: list[float], indices: list[int]) -> tuple[int, int, int]:
+    def _shape(self, places: Sequence[float], normals: Sequence[float], indices: Sequence[int]) -> tuple[int, int, int]:
         return (
             self._accessor(array("f", places), "VEC3", _ARRAY, with_range=True),
             self._accessor(array("f", normals), "VEC3", _ARRAY),
@@ -341,58 +338,3 @@ def _material(color: str, *, is_light: bool) -> dict[str, object]:
     linear = [share / 12.92 if share <= 0.04045 else ((share + 0.055) / 1.055) ** 2.4 for share in shares]
     surface = {"baseColorFactor": [*linear, 0.3 if is_light else 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.7}
     return {"pbrMetallicRoughness": surface, **({"alphaMode": "BLEND"} if is_light else {})}
-
-
-def _box() -> tuple[list[float], list[float], list[int]]:
-    """Places, normals and triangles of a cube with sides of 1 about the origin, counterclockwise seen from outside."""
-    places: list[float] = []
-    normals: list[float] = []
-    indices: list[int] = []
-    for axis in range(3):
-        for side in (-1.0, 1.0):
-            first = len(places) // 3
-            for u, v in ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)):
-                place, normal = [0.0] * 3, [0.0] * 3
-                place[axis], normal[axis] = side / 2.0, side
-                place[(axis + 1) % 3], place[(axis + 2) % 3] = u, v
-                places += place
-                normals += normal
-            ring = [first + k for k in ((0, 1, 2, 0, 2, 3) if side > 0.0 else (0, 2, 1, 0, 3, 2))]
-            indices += ring
-    return places, normals, indices
-
-
-def _prism(prism: Mapping[str, Any]) -> tuple[list[float], list[float], list[int]]:
-    """As `_box`, of a prism on a circle with a diameter of 1; with many corners it is round."""
-    axis, corners = prism["axis"], prism["corners"]
-    a, b = (axis + 1) % 3, (axis + 2) % 3
-    first = atan2(prism["towards"][b], prism["towards"][a])
-    angles = [first + tau * k / corners for k in range(corners + 1)]
-    is_round = corners > 8
-    places: list[float] = []
-    normals: list[float] = []
-    indices: list[int] = []
-
-    def add(angle: float, height: float, normal: float | None) -> int:
-        """A corner; ``normal``: the angle of its normal, or None for that of an end."""
-        place, its = [0.0] * 3, [0.0] * 3
-        wide = 0.5 * prism["ends"][height > 0.0]
-        place[axis], place[a], place[b] = height, wide * cos(angle), wide * sin(angle)
-        if normal is None:
-            its[axis] = 1.0 if height > 0.0 else -1.0
-        else:
-            its[a], its[b] = cos(normal), sin(normal)
-        places.extend(place)
-        normals.extend(its)
-        return len(places) // 3 - 1
-
-    for one, other in pairwise(angles):
-        middle = (one + other) / 2.0
-        left, right = (one, other) if is_round else (middle, middle)
-        quad = add(one, -0.5, left), add(other, -0.5, right), add(other, 0.5, right), add(one, 0.5, left)
-        indices += (quad[k] for k in (0, 1, 2, 0, 2, 3))
-    for height in (-0.5, 0.5):
-        ring = [add(angle, height, None) for angle in angles[:-1]]
-        for one, other in pairwise(ring[1:]):
-            indices += (ring[0], one, other) if height > 0.0 else (ring[0], other, one)
-    return places, normals, indices

@@ -1,4 +1,4 @@
-import { dot, type Solid, type Vector } from "./builder";
+import { dot, ROUND, times, type Solid, type Vector } from "./builder";
 import type { Drawn } from "./strand";
 import type { View } from "./view";
 
@@ -61,6 +61,24 @@ function normalOf([a, b, c]: readonly Vector[]): Vector {
   const across: Vector = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
   const length = Math.hypot(...across);
   return across.map((one) => one / length) as unknown as Vector;
+}
+
+/** Places, normals and triangles of a shape at a size of 1; what is round is smooth. */
+export function meshOf(prism: Solid["prism"]): { places: number[]; normals: number[]; indices: number[] } {
+  const facets = facetsOf({ size: [1, 1, 1], prism });
+  const mesh = { places: [] as number[], normals: [] as number[], indices: [] as number[] };
+  facets.forEach((facet, n) => {
+    const isSmooth = prism?.corners === ROUND && n < facets.length - 2;
+    const flat = normalOf(facet);
+    const first = mesh.places.length / 3;
+    for (const corner of facet) {
+      const out = corner.map((one, k) => (k === prism?.axis ? 0 : one)) as unknown as Vector;
+      mesh.places.push(...corner);
+      mesh.normals.push(...(isSmooth ? times(out, 1 / Math.hypot(...out)) : flat));
+    }
+    for (let k = 1; k < facet.length - 1; k++) mesh.indices.push(first, first + k, first + k + 1);
+  });
+  return mesh;
 }
 
 const SEEN = 1e-6;
