@@ -300,6 +300,7 @@ def test_progreset_starts_again_with_drives_off() -> None:
         ("AccM1 = y", "AccM1 = 0: permitted are numbers greater than 0"),
         ("y = -1\nTIMA1 = y", "TIMA1 = -1: permitted are numbers 0…999999"),
         ("y = 2\nCFGINT_MODBUS = y", "CFGINT_MODBUS = 2: permitted are numbers 0 or 4"),
+        ("y = 35\nM1 = y", "M1 = 35: permitted are numbers 0 or 1; PABS M1 and PREL M1 move it"),
         ("PULSE(OUT1, y)", "PULSE"),
         ("y = 3000000000\nPABS M1 y", "PABS M1 = 3000000000 imp: permitted are -2147483648…2147483647 imp"),
         ("RETURN", "RETURN without a JUMP"),

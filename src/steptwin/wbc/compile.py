@@ -194,7 +194,8 @@ def _taken(row: RegisterRow, name: str, *, calculated: bool) -> Callable[[float]
         if domain.whole:
             value = round(value)
         if not domain.has(value):
-            raise ProgramFault(f"{name} = {real_text(value)}: permitted are numbers {domain}")
+            moves = f"; PABS {name} and PREL {name} move it" if row.name == "M" else ""
+            raise ProgramFault(f"{name} = {real_text(value)}: permitted are numbers {domain}{moves}")
         return value
 
     return taken

@@ -34,6 +34,9 @@ _FAMILIES: Mapping[str, str] = {
 """Names of the configuration and the Modbus map for registers of WBC, and user registers without their sign."""
 _CERTAIN = frozenset({"OUTPUT", "INPUT"})
 """Names that never denote a variable intentionally. Others are reported only if the variable is not used."""
+_MOTIONS = {"ABS": "PABS", "REL": "PREL"}
+_MOTION = re.compile(r"(M[1-4])_POS_(ABS|REL)$")
+"""Modbus registers that begin a motion; a program has statements for that."""
 _NAME = re.compile(r"([A-Z_]+?)([0-9]{1,4})$")
 
 
@@ -53,7 +56,9 @@ def unused_variables(executable: s.Executable, scope: ProgramScope, dialect: Dia
     for index, name in enumerate(scope.variables.values()):
         if index not in read:
             meant = register_meant(name.key, dialect) or scope.nearest_register(name.text)
-            hint = REMOVE_OR_DID_YOU_MEAN(meant=meant or f.A_REGISTER())
+            motion = _MOTION.match(name.key)
+            moves = None if motion is None else f"{_MOTIONS[motion[2]]} {motion[1]}"
+            hint = REMOVE_OR_DID_YOU_MEAN(meant=meant or moves or f.A_REGISTER())
             named = None if meant is None else Fix(Span(name.start, name.end), meant, is_named=True)
             fix = named or _removed(executable, index)
             found.append(f.NEVER_USED.at(name, IS_SET_BUT_NEVER_USED(name=name.text), hint, fix))

@@ -373,7 +373,10 @@ def degrees_per_unit(axis: BuiltAxis) -> Fraction:
     """Degrees in a unit of a rotary axis. Raises `Misuse` where its unit is no angle."""
     revs = TURNS.get(axis.scale.unit)
     if revs is None:
-        raise Misuse(f"{axis.spec.name!r} counts in {axis.scale.unit}: what is on it turns by {' or '.join(TURNS)}")
+        raise Misuse(
+            f"{axis.spec.name!r} counts in {axis.scale.unit}: what is on it turns by {' or '.join(TURNS)}; "
+            "a belt that it moves has mm_per_unit"
+        )
     return revs * 360
 
 
