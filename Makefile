@@ -20,7 +20,7 @@ PAGE_SOURCES := docs/studio.schema.json $(shell find studio-web -type f -not -pa
   -not -name types.ts)
 
 # The page with the studio inside it; the last file that is written for it. What Python it has in it is known when it has been built.
-SITE := build/site/try/world/demo.json
+SITE := build/site/try/service.js
 SITE_SOURCES := $(filter-out %.test.ts, $(PAGE_SOURCES))
 -include build/modules.d
 

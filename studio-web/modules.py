@@ -21,7 +21,7 @@ OF_EDITOR = ("pygls", "lsprotocol", "attr", "attrs", "cattr", "cattrs", "typing_
 PYODIDE = """Pyodide, under the Mozilla Public License 2.0, https://www.mozilla.org/MPL/2.0/; its source is at
 https://github.com/pyodide/pyodide. It has CPython in it, under the PSF License Agreement, https://docs.python.org/3/license.html.
 All files are as they were published, except python_stdlib.zip: of the modules in it those that are used are left, compiled."""
-SITE = "build/site/try/world/demo.json"
+SITE = "build/site/try/service.js"
 """The file that is written last."""
 DEMO = SOURCE / "steptwin" / "live" / "studio" / "demo_machine"
 

@@ -1,6 +1,7 @@
 // Makes what the studio inside a page needs beside its page: `node scripts/site.mjs MODULES.json FOLDER`. Pyodide, whose own Python
 // compiles the modules, and the whole state at the beginning, which the page shows before Python is there.
-import { copyFileSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
+import { createHash } from "node:crypto";
+import { copyFileSync, mkdirSync, readFileSync, readdirSync, writeFileSync } from "node:fs";
 import { loadPyodide } from "pyodide";
 
 const [modules, folder] = process.argv.slice(2);
@@ -62,6 +63,24 @@ mkdirSync(`${folder}/world`, { recursive: true });
 writeFileSync(`${folder}/world/${world.name}.hello.json`, JSON.stringify(hello));
 writeFileSync(`${folder}/world/${world.name}.toml`, text);
 for (const [name, bytes] of Object.entries(files)) writeFileSync(`${folder}/world/${name}`, bytes);
-// Last: it says that all is there.
 writeFileSync(`${folder}/world/${world.name}.json`, JSON.stringify({ files: Object.keys(files) }));
+// Last: it says that all is there.
+writeFileSync(`${folder}/service.js`, service());
 process.exit(0);
+
+/** The service worker, with the digests of all files. The page itself has the address of the folder. */
+function service() {
+  const names = readdirSync(folder, { recursive: true, withFileTypes: true })
+    .filter((one) => one.isFile())
+    .map((one) => `${one.parentPath}/${one.name}`.slice(folder.length + 1))
+    .filter((name) => name !== "service.js")
+    .sort();
+  const digest = (bytes) => createHash("sha256").update(bytes).digest("base64");
+  const found = names.map((name) => [
+    name === "index.html" ? "./" : name,
+    `sha256-${digest(readFileSync(`${folder}/${name}`))}`,
+  ]);
+  const given = JSON.stringify(Object.fromEntries(found));
+  const code = readFileSync(new URL("../src/site/service.js", import.meta.url), "utf-8");
+  return `const VERSION = ${JSON.stringify(digest(given))};\nconst FILES = ${given};\n${code}`;
+}

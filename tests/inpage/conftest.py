@@ -19,7 +19,21 @@ TRY = ROOT / "build/site/try"
 SITE_POLICY = POLICY.replace("script-src 'self'", "script-src 'self' 'wasm-unsafe-eval'")
 
 
-class _Handler(SimpleHTTPRequestHandler):
+class Handler(SimpleHTTPRequestHandler):
+    is_newer = False
+    """Whether the site has another version than it was built with."""
+
+    def do_GET(self) -> None:
+        if not (self.is_newer and self.path.endswith("/service.js")):
+            super().do_GET()
+            return
+        content = Path(self.translate_path(self.path)).read_bytes() + b"// newer\n"
+        self.send_response(200)
+        self.send_header("content-type", "text/javascript")
+        self.send_header("content-length", str(len(content)))
+        self.end_headers()
+        self.wfile.write(content)
+
     def end_headers(self) -> None:
         self.send_header("content-security-policy", SITE_POLICY)
         self.send_header("x-content-type-options", "nosniff")
@@ -32,7 +46,7 @@ class _Handler(SimpleHTTPRequestHandler):
 @pytest.fixture(scope="session")
 def built() -> Path:
     """The folder with the page; skipped where it has not been built, an error where a source of it has changed since."""
-    made = TRY / "world/demo.json"
+    made = TRY / "service.js"
     if not made.exists():
         if os.environ.get("STEPTWIN_REQUIRE_PEERS") == "1":
             pytest.fail("build/site has not been built: run 'make site'", pytrace=False)
@@ -46,7 +60,7 @@ def built() -> Path:
 
 @pytest.fixture(scope="module")
 def address(built: Path) -> Iterator[str]:
-    serving = ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(_Handler, directory=built.parents[1]))
+    serving = ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Handler, directory=built.parents[1]))
     thread = threading.Thread(target=serving.serve_forever)
     thread.start()
     yield f"http://127.0.0.1:{serving.server_port}/{built.parent.name}/{built.name}/"

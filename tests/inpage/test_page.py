@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
 from studio_page import WAIT_MS, button, show
+from tests.inpage.conftest import Handler
 from tests.studio.conftest import browser, require_node, web_builder  # noqa: F401  fixtures
 
 from steptwin import Misuse, World
@@ -135,12 +136,17 @@ def test_all_examples_have_the_digests_of_cpython(built: Path, require_node: Non
     assert json.loads(ran.stdout) == expected
 
 
-def test_a_part_that_the_server_does_not_give_is_named(address: str, browser: Browser) -> None:  # noqa: F811
+def test_a_part_that_the_server_gives_wrongly_is_named(address: str, browser: Browser) -> None:  # noqa: F811
     context = browser.new_context(locale="en-US")
-    context.route("**/steptwin.zip", lambda route: route.fulfill(status=404))
     page = context.new_page()
-    page.goto(address)
-    expect(page.get_by_role("status").first).to_contain_text(re.compile(r"could not be loaded: .*/python/steptwin\.zip: 404"))
+    for file, answer, words in (
+        ("steptwin.zip", {"status": 404}, "404"),
+        ("pyodide.mjs", {"content_type": "text/plain"}, "the server sends it as text/plain; it has to be text/javascript"),
+    ):
+        context.route(f"**/{file}", lambda route, _, answer=answer: route.fulfill(**answer))
+        page.goto(address)
+        expect(page.get_by_role("status").first).to_contain_text(re.compile(rf"could not be loaded: .*/python/{file}: {words}"))
+        context.unroute(f"**/{file}")
     context.close()
 
 
@@ -183,11 +189,15 @@ def test_the_demo_moves_in_a_page_without_a_service(demo: Demo) -> None:
 
 
 @pytest.mark.timeout(300)
-def test_a_link_to_the_machine_opens_another_twin_in_another_tab(demo: Demo) -> None:
+def test_a_link_to_the_machine_opens_another_twin_in_another_tab(demo: Demo, monkeypatch: pytest.MonkeyPatch) -> None:
     expect(time_of(demo.page)).to_contain_text("live", timeout=LOADING_MS)
     button(demo.page, "Share").click()
     expect(demo.page).to_have_url(re.compile("#world="))
     other = demo.tab()
+
+    # All of the page is stored meanwhile: this tab has no network.
+    expect(demo.page.get_by_title("can be opened without a network")).to_be_visible()
+    demo.context.set_offline(True)
     other.goto(demo.page.url)
 
     # Nothing of it runs before a click. What was typed and not downloaded is not in it.
@@ -211,4 +221,14 @@ def test_a_link_to_the_machine_opens_another_twin_in_another_tab(demo: Demo) -> 
     expect(other.get_by_role("status").first).to_contain_text("being loaded")
     expect(other.get_by_role("status").first).not_to_contain_text("being loaded", timeout=LOADING_MS)
     expect(time_of(other)).to_contain_text(re.compile(r"paused.*[1-9]\.\d+ s", re.DOTALL))
+
+    # A newer version is offered, and does not begin under a twin.
+    demo.context.set_offline(False)
+    monkeypatch.setattr(Handler, "is_newer", True)
+    demo.page.evaluate("async () => { await (await navigator.serviceWorker.ready).update() }")
+    button(demo.page, "New version").click()
+    expect(demo.page.get_by_text("1 are open")).to_be_visible()
+    expect(time_of(demo.page)).to_contain_text("live")
     other.close()
+    with demo.page.expect_navigation():
+        button(demo.page, "New version").click()

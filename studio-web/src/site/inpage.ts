@@ -2,6 +2,7 @@ import type { Backend, FileKind, Link, LinkEvents, Loading, OpenLink } from "../
 import { errorOf, type Hello } from "../lib/protocol/connection";
 import type { Answer } from "../lib/protocol/types";
 import { pack, type Linked } from "./links";
+import Offline from "./Offline.svelte";
 import type { FromWorker, Task, Texts, ToWorker } from "./messages";
 
 interface Waiting<T> {
@@ -90,6 +91,7 @@ class PythonWorker {
 
 /** The studio inside the page: a twin in one worker, and the editor server in another one when it is asked for. */
 export class InPage implements Backend {
+  readonly origin = Offline;
   private twin: PythonWorker;
   private editor: PythonWorker | null = null;
   private tellLoading: (loading: Loading) => void = () => undefined;

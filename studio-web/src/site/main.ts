@@ -6,12 +6,14 @@ import { START, unpack, type Linked } from "./links";
 import Offer from "./Offer.svelte";
 
 const root = new URL(".", document.baseURI);
+const target = document.getElementById("app") as HTMLElement;
+target.replaceChildren();
 const open = (linked: Linked | null) => start(new InPage(root, "demo", linked));
 
 if (location.hash.startsWith(START)) {
   restoreLanguage();
   const offer = mount(Offer, {
-    target: document.getElementById("app") as HTMLElement,
+    target,
     props: {
       linked: unpack(location.hash),
       open: (linked: Linked | null) => void unmount(offer).then(() => open(linked)),

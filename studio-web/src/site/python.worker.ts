@@ -107,6 +107,24 @@ async function bytesOf(address: string): Promise<Uint8Array> {
   return new Uint8Array(await response.arrayBuffer());
 }
 
+/** What a server has to say of the files that the browser runs itself. */
+const TYPES = {
+  "pyodide.mjs": ["text/javascript", "application/javascript"],
+  "pyodide.asm.mjs": ["text/javascript", "application/javascript"],
+  "pyodide.asm.wasm": ["application/wasm"],
+};
+
+/** Which of them the server gave wrongly: browsers do not say it. */
+async function wrongFile(python: string): Promise<string | null> {
+  for (const [name, types] of Object.entries(TYPES)) {
+    const { ok, status, statusText, headers } = await fetch(python + name, { method: "HEAD" });
+    if (!ok) return `${python}${name}: ${status} ${statusText}`;
+    const type = headers.get("content-type")?.split(";")[0] ?? "no type";
+    if (!types.includes(type)) return `${python}${name}: the server sends it as ${type}; it has to be ${types[0]}`;
+  }
+  return null;
+}
+
 function take(host: Twin | Editor, message: ToWorker): void {
   const { connections } = host;
   if ("open" in message) {
@@ -124,8 +142,9 @@ function take(host: Twin | Editor, message: ToWorker): void {
 
 self.onmessage = ({ data }: MessageEvent<ToWorker>) => {
   if ("start" in data) {
-    start(data.start, data.root).catch((error: unknown) => {
-      tell({ failed: error instanceof Error ? error.message : String(error) });
+    start(data.start, data.root).catch(async (error: unknown) => {
+      const wrong = await wrongFile(`${data.root}python/`).catch(() => null);
+      tell({ failed: wrong ?? (error instanceof Error ? error.message : String(error)) });
     });
   } else if (host === null) waiting.push(data);
   else take(host, data);

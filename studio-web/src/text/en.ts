@@ -161,6 +161,16 @@ export const en = {
   linkOther: "it has {name}; a link can have description and programs only",
   linkWithout: "it has no {name}",
   linkProgram: "{name} is no program: names end in .prg, .csv or .m1486, without a folder, and contents are text",
+  offline: "offline ✓",
+  offlineHelp: "This page is stored in the browser and can be opened without a network.",
+  onlineOnly: "not offline",
+  offlineInsecure:
+    "This page cannot be stored for use without a network: browsers permit that over https, and from the computer itself (localhost), not over plain http.",
+  offlineUnsupported: "This browser, or this window of it, stores no pages for use without a network.",
+  offlineFailed: "This page could not be stored for use without a network. {why}",
+  newer: "New version",
+  newerHelp: "A newer version of this page is stored. It begins with the page: this twin ends.",
+  newerBusy: "The newer version begins when no other tab has this page: {others} are open.",
   restart: "Restart",
   restartHelp:
     "Ends the twin and begins another one at its last state, which is about a second old. Time stands there. Downloaded programs are kept; the past, breakpoints and watches are lost.",

@@ -166,6 +166,16 @@ export const pl: Record<keyof typeof en, string> = {
   linkOther: "zawiera {name}; link może mieć tylko opis i programy",
   linkWithout: "brak w nim {name}",
   linkProgram: "{name} nie jest programem: nazwy kończą się na .prg, .csv lub .m1486, bez folderu, a treść to tekst",
+  offline: "offline ✓",
+  offlineHelp: "Ta strona jest zapisana w przeglądarce i otwiera się bez sieci.",
+  onlineOnly: "tylko z siecią",
+  offlineInsecure:
+    "Tej strony nie można zapisać do pracy bez sieci: przeglądarki pozwalają na to przez https i z tego samego komputera (localhost), a nie przez zwykłe http.",
+  offlineUnsupported: "Ta przeglądarka albo to jej okno nie zapisuje stron do pracy bez sieci.",
+  offlineFailed: "Nie udało się zapisać tej strony do pracy bez sieci. {why}",
+  newer: "Nowa wersja",
+  newerHelp: "Zapisana jest nowsza wersja tej strony. Zacznie się wraz ze stroną: ten bliźniak się skończy.",
+  newerBusy: "Nowsza wersja zacznie się, gdy żadna inna karta nie ma tej strony: otwartych jest {others}.",
   restart: "Uruchom ponownie",
   restartHelp:
     "Kończy bliźniaka i zaczyna następnego od jego ostatniego stanu, sprzed około sekundy. Czas tam stoi. Wgrane programy zostają; przeszłość, punkty przerwania i podglądy przepadają.",

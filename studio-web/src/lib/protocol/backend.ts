@@ -1,3 +1,4 @@
+import type { Component } from "svelte";
 import type { HelloMessage } from "./types";
 
 /** One connection to a studio, wherever that is. What it hands over is already read from JSON. */
@@ -33,6 +34,8 @@ export interface Backend {
   address(kind: FileKind, name: string): string | null;
   /** An address that opens description and programs of the twin again; null where others do not reach it. Rejects with why there is none. */
   share: (() => Promise<string>) | null;
+  /** What the page shows of where it is from, beside Share; null where there is nothing. */
+  origin: Component | null;
   /** Ends the twin, even where it does not answer, and begins another one at its last state; null where the page does not own it. */
   restart: (() => void) | null;
   /** Stop all where the studio does not accept this page: a stop needs no token. Rejects with the words of the studio. */

@@ -37,6 +37,7 @@ const addressOf = (kind: FileKind, name: string) => `/api/${kind}/${name.split("
 /** The service that has sent the page. */
 export const served: Backend = {
   share: null,
+  origin: null,
   restart: null,
   open,
   follow: () => undefined,
