@@ -6,10 +6,11 @@ Names such as ``table.M1.position``, ``table.hr:10020`` and ``table.USER_REGISTE
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
+from itertools import chain
 from math import inf, nextafter
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
@@ -179,14 +180,19 @@ class _Comparison:
 
 def crossing(signal: Signal, level: float | Fraction, now: Nanos) -> Nanos | None:
     """First whole nanosecond after ``now`` at which the signal is on another side of ``level`` (below, at, above)."""
-    border = Border.of(level)
-    begin = now
-    for turn in signal.turning_points(now):
-        found = _first_other(signal, border, begin, turn)
-        if found is not None:
-            return found
-        begin = turn
-    return _first_other(signal, border, begin, now + FARTHEST_NS)
+    return first_crossing(signal, (Border.of(level),), now)
+
+
+def first_crossing(signal: Signal, borders: Collection[Border], now: Nanos) -> Nanos | None:
+    """As `crossing`, of any of these levels."""
+    begin, first = now, signal.value(now)
+    for end in chain(signal.turning_points(now), (now + FARTHEST_NS,)):
+        last = signal.value(end)
+        crossed = [border for border in borders if border.side(last) != border.side(first)]
+        if crossed:
+            return min(_first_other(signal, border, (begin, first), (end, last)) for border in crossed)
+        begin, first = end, last
+    return None
 
 
 GREATEST = sys.float_info.max
@@ -213,13 +219,11 @@ class Border(NamedTuple):
         return (value > self.below) - (value < self.above)
 
 
-def _first_other(signal: Signal, border: Border, begin: Nanos, end: Nanos) -> Nanos | None:
-    """The first moment after ``begin``, up to ``end``, at which the signal is on another side; it goes one way between them."""
-    first, last = signal.value(begin), signal.value(end)
+def _first_other(signal: Signal, border: Border, begin: tuple[Nanos, float], end: tuple[Nanos, float]) -> Nanos:
+    """The first moment at which the signal is on another side than it is at ``begin``, as at ``end``; it goes one way between
+    these, each with its value."""
+    (low, first), (high, last) = begin, end
     side = border.side(first)
-    if border.side(last) == side:
-        return None
-    low, high = begin, end
     step = kept = 0
     while high - low > 1:
         # Where a straight line would cross (Illinois: what is kept twice counts half); every third step halves what is left, and

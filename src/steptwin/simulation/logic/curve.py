@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from itertools import pairwise
-from math import floor, isnan
+from math import isnan, lcm
 from typing import ClassVar
 
 from steptwin.controller import Nanos
-from steptwin.simulation.logic.condition import Signal, crossing
+from steptwin.simulation.logic.condition import Border, Signal, first_crossing
 from steptwin.simulation.mechanics.scale import exact_fraction
 from steptwin.simulation.toml.values import MOST
 from steptwin.state import Plain, Stateful
+
+
+MOST_KNOWN = 4096
+"""Levels whose ends are kept."""
 
 
 class Curve:
@@ -22,41 +26,56 @@ class Curve:
     Computed in fractions: a value at which the level changes, and the level there, fit together whatever is rounded.
     """
 
-    __slots__ = ("_points", "step")
+    __slots__ = ("_ends", "_first", "_lines", "_points", "step")
 
     def __init__(self, points: Iterable[tuple[float, float]], step: float) -> None:
         self._points = tuple((exact_fraction(x), exact_fraction(y)) for x, y in points)
         self.step = exact_fraction(step)
+        self._first = [Border.of(x).above for x, _ in self._points]
+        """The first value from each point on."""
+        constant = Fraction(0)
+        slopes = [(y1 - y0) / (x1 - x0) if x1 > x0 else constant for (x0, y0), (x1, y1) in pairwise(self._points)]
+        begins = [self._points[0], *self._points]
+        self._lines = [self._line(*begin, slope) for begin, slope in zip(begins, (constant, *slopes, constant), strict=True)]
+        """Before each point, and after the last, each in whole numbers: (slope · value + constant) / scale, rounded down, is the
+        level."""
+        self._ends: dict[int, tuple[Border, ...]] = {}
+
+    def _line(self, x: Fraction, y: Fraction, slope: Fraction) -> tuple[int, int, int]:
+        by_value, constant = slope / self.step, (y - slope * x) / self.step + Fraction(1, 2)
+        scale = lcm(by_value.denominator, constant.denominator)
+        return int(by_value * scale), int(constant * scale), scale
 
     def level(self, value: float) -> int:
         """The nearest whole number of steps."""
-        return floor(self._at(Fraction(value)) / self.step + Fraction(1, 2))
+        slope, constant, scale = self._lines[bisect_right(self._first, value)]
+        over, under = value.as_integer_ratio()
+        return (slope * over + constant * under) // (scale * under)
 
     @property
     def highest(self) -> float:
         return float(max(y for _, y in self._points))
 
-    def _at(self, value: Fraction) -> Fraction:
-        i = bisect_right(self._points, value, key=lambda point: point[0])
-        if i == 0:
-            return self._points[0][1]
-        if i == len(self._points):
-            return self._points[-1][1]
-        (x0, y0), (x1, y1) = self._points[i - 1], self._points[i]
-        return y0 + (y1 - y0) * (value - x0) / (x1 - x0)
+    def ends(self, value: float, level: int) -> Sequence[Border]:
+        """The values next to one with its level, below, above or here, beyond which the level may be another."""
+        if level not in self._ends:
+            if len(self._ends) == MOST_KNOWN:
+                self._ends.clear()
+            self._ends[level] = tuple(map(Border.of, sorted(self._ends_of(level))))
+        below: list[Border] = []
+        for border in self._ends[level]:
+            side = border.side(value)
+            if side <= 0:
+                return (*below, border)
+            below = [border]
+        return below
 
-    def ends(self, value: float) -> list[Fraction]:
-        """The values next to this one, below, above or here, beyond which the level may be another."""
-        level = self.level(value)
+    def _ends_of(self, level: int) -> Iterator[Fraction]:
         bounds = [(level + side) * self.step for side in (Fraction(-1, 2), Fraction(1, 2))]
-        found = [
-            x0 + (bound - y0) * (x1 - x0) / (y1 - y0)
-            for (x0, y0), (x1, y1) in pairwise(self._points)
-            for bound in bounds
-            if y0 != y1 and min(y0, y1) <= bound <= max(y0, y1)
-        ]
-        below, above = [at for at in found if at <= value], [at for at in found if at >= value]
-        return [*([max(below)] if below else []), *([min(above)] if above else [])]
+        for (x0, y0), (x1, y1) in pairwise(self._points):
+            for bound in bounds:
+                if y0 != y1 and min(y0, y1) <= bound <= max(y0, y1):
+                    yield x0 + (bound - y0) * (x1 - x0) / (y1 - y0)
 
 
 class Stepped(Stateful):
@@ -90,13 +109,8 @@ class Stepped(Stateful):
         if not isnan(value):  # it stays where it is: a register can have a value that is not a number
             value = min(max(value, -MOST), MOST)
             self._level = self._curve.level(value)
-            self.due = self._next(value, now)
-
-    def _next(self, value: float, now: Nanos) -> Nanos | None:
-        if not self._signal.continuous:
-            return None
-        deadlines = (crossing(self._signal, end, now) for end in self._curve.ends(value))
-        return min((due for due in deadlines if due is not None), default=None)
+            if self._signal.continuous:
+                self.due = first_crossing(self._signal, self._curve.ends(value, self._level), now)
 
     def set_state(self, plain: Plain) -> None:
         super().set_state(plain)
