@@ -51,7 +51,8 @@ class MotionController(Controller, Protocol):
         """Advance to the first moment at which an output, a plan or anything else outside a program may have changed, or to
         ``until``; returns that moment.
 
-        Nothing may come in before ``until``: a program that only calculates may have been executed up to there already.
+        Nothing may come in before ``until``: a program that only calculates may have been executed up to there already. Where
+        nothing but the next deadline has changed, `changed` need not be called.
         """
         ...
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from unittest.mock import patch
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -29,6 +30,11 @@ TOGETHER = (
     + '[[wire]]\nfrom = "m.OUT1"\nto = "other.IN1"\n'
     + '[[wire]]\nfrom = "m.OUT3"\nto = "other.IN2"\n[[wire]]\nfrom = "other.OUT1"\nto = "m.IN1"\ndelay = "2 ms"\n'
 )
+CONDITIONS = st.sampled_from(["", "m.OUT1", "m.OUT3 == 1", "m.M1.status > 1", "m.M1.position > 3", "m.USER_REGISTER[0] > 2", "m.program == 0", "idle"])
+SCRIPT = (
+    '[[script]]\nname = "s"\nrepeat = 1000\n'
+    'steps = [{ until = "CONDITION" }, { set = { "m.IN2" = 1 } }, { wait = "1500 us" }, { set = { "m.IN2" = 0 } }]\n'
+)
 END: Nanos = 60 * MILLISECOND
 
 
@@ -38,12 +44,15 @@ def made(text: str, wbc: str, other: str = "", chip: str = "") -> World:
 
 
 @settings(deadline=None, max_examples=20)
-@given(st.lists(WBC_LINES, max_size=8), st.lists(WBC_LINES, max_size=8), st.lists(CHIP_LINES, max_size=8))
-def test_a_run_is_the_same_event_by_event(first: list[str], second: list[str], chip: list[str]) -> None:
+@given(st.lists(WBC_LINES, max_size=8), st.lists(WBC_LINES, max_size=8), st.lists(CHIP_LINES, max_size=8), CONDITIONS)
+def test_a_run_is_the_same_event_by_event(first: list[str], second: list[str], chip: list[str], condition: str) -> None:
     programs = WBC.format("\n".join(first)), WBC.format("\n".join(second)), CHIP.format("\n".join(chip))
+    waits = SCRIPT.replace("CONDITION", condition) if condition else ""
     for text in (ALONE, TOGETHER):
-        at_once, by_events = made(text, *programs), made(text, *programs)
+        at_once, by_events = made(text + waits, *programs), made(text + waits, *programs)
         at_once.run_to(END)
+        for scheduler in by_events.schedulers:
+            scheduler.is_step_exact = True
         while (due := next_due(by_events)) is not None and due <= END:
             by_events.run_to(due)
         by_events.run_to(END)
@@ -63,9 +72,10 @@ def test_what_happens_meanwhile_is_told_at_its_moment() -> None:
     assert {late for lates in told.values() for late in lates} == {0}
 
 
-def test_statements_that_only_calculate_cost_no_look_at_the_signals() -> None:
+@pytest.mark.parametrize("waits", ["", SCRIPT.replace("CONDITION", "m.OUT1")])
+def test_statements_that_only_calculate_cost_no_look_at_the_signals(waits: str) -> None:
     program = "n = 0\nMAIN:\n" + "n = n + 1\n" * 20 + "JUMP MAIN\n"
-    world = made(ALONE.replace("100 us", "1 us"), program)
+    world = made(ALONE.replace("100 us", "1 us") + waits, program)
     with patch.object(ControllerCore, "take_edges", autospec=True, side_effect=ControllerCore.take_edges) as looks:
         world.run_to(1000 * MICROSECOND)
     assert looks.call_count < 10

@@ -249,7 +249,7 @@ class ControllerCore(Stateful):
             if acted_at is not None:
                 self.now = acted_at
                 others = self._due_without_program()
-            self._plan_ahead(others, lamp=acted_at is not None or happened)
+            self._plan_ahead(others, has_changed=acted_at is not None or happened)
             if self._due is None or self._due > at:
                 return
         raise Runaway(TOO_MANY_EVENTS(most=MAX_EVENTS_PER_INSTANT, at=at))
@@ -278,7 +278,7 @@ class ControllerCore(Stateful):
     def _propagate(self) -> None:
         """After a change from outside: notify the program, compute the next deadline and the ERR output."""
         self.program.disturbed(self.now, inside=False)
-        self._plan_ahead(self._due_without_program(), lamp=True)
+        self._plan_ahead(self._due_without_program(), has_changed=True)
 
     def _due_without_program(self) -> Nanos | None:
         due = self.inputs.deadline()
@@ -288,20 +288,22 @@ class ControllerCore(Stateful):
                 due = at
         return due
 
-    def _plan_ahead(self, others: Nanos | None, *, lamp: bool) -> None:
-        """Find the next deadline, which for all but the program is ``others``, and the ERR ``lamp`` anew."""
+    def _plan_ahead(self, others: Nanos | None, *, has_changed: bool) -> None:
+        """Find the next deadline, which for all but the program is ``others``; and the ERR lamp anew, where anything but the
+        program ``has_changed``."""
         self._others = others
         """The next deadline of everything except the program, ns."""
         due = self.program.deadline()
         self._due = others if due is None or (others is not None and others < due) else due
-        if lamp:
-            lit = self.program.error
-            for axis in self.axes:
-                if axis.status is _ERROR:
-                    lit = True
-            if lit is not self.error_led:
-                self.error_led = lit
-                self._edges.append(PinEdge(self.now, "ERR", float(lit)))
+        if not has_changed:
+            return
+        lit = self.program.error
+        for axis in self.axes:
+            if axis.status is _ERROR:
+                lit = True
+        if lit is not self.error_led:
+            self.error_led = lit
+            self._edges.append(PinEdge(self.now, "ERR", float(lit)))
         self.changed()
 
     # ------------------------------------------------------------------ banks of programs and positions

@@ -154,6 +154,8 @@ class Scheduler:
         counts as one."""
         self.hears_requests = False
         """Whether every request counts as an event, because what one may change is noted."""
+        self.hears_programs = False
+        """Whether it counts as an event where a program that only calculates begins to wait, because that is reported."""
         self.on_change: Callable[[Scheduler], None] | None = None
         """Called with the scheduler after each of its events and after each change from outside."""
         self.subscribers: SchedulerSubscribers | None = None
@@ -412,26 +414,44 @@ class Scheduler:
             self.subscribers.leave(now)  # something may come from outside next
         self.now = now
 
-    def _run(self, now: Nanos) -> None:
-        """Process all events due by ``now``, in order."""
+    def advance_to_event(self, until: Nanos) -> Nanos:
+        """Process the next event, if it is due by ``until``; returns its moment. Nothing may come in before ``until``: a program
+        that only calculates runs on until it changes something else."""
+        if self.is_dirty:
+            self.propagate()
+        if self._due is not None and self._due <= until:
+            self._run(until, is_one=True)
+        return self.now
+
+    def _run(self, now: Nanos, *, is_one: bool = False) -> None:
+        """Process all events due by ``now``, in order, or ``is_one`` only."""
         if self._alone is not None:
-            self._advance_alone(*self._alone, now)
+            self._advance_alone(*self._alone, now, is_one=is_one)
             if self.on_change is not None:
                 self.on_change(self)
             return
+        is_quiet = False
         while self._due is not None and self._due <= now:
             if self.subscribers is not None and self.subscribers.leaving:
                 self.subscribers.leave(self._due)
             self.now = self._due
-            self._advance_controllers(now)
+            is_quiet = self._advance_controllers(now)
+            if is_quiet:
+                self._find_due()
+                continue
             for number in self._parts.deadlines.take(self.now):
                 self._parts.queue.add(number)
             if self.wires.delayed:
                 self.wires.arrive(self.now)
             self.propagate()
+            if is_one:
+                return
+        if is_quiet and self.on_change is not None:
+            self.on_change(self)
 
-    def _advance_controllers(self, now: Nanos) -> None:
-        """Advance the controllers that are due; a single one to where it changes something, or where anything else is due."""
+    def _advance_controllers(self, now: Nanos) -> bool:
+        """Advance the controllers that are due; a single one to where it changes something, or where anything else is due. Whether
+        a program has only calculated up to there, so that nothing has changed."""
         due = self._controller_deadlines.take(self.now)
         until = self._nothing_else_until(now) if len(due) == 1 and not self.is_step_exact else self.now
         for number in due:
@@ -439,10 +459,14 @@ class Scheduler:
             self.is_dirty = False
             if until > self.now:
                 self.now = self.controllers[name].advance_to_change(until)
+                if not self.is_dirty and not self.hears_programs:
+                    self._controller_deadlines.put(number, self.controllers[name].deadline())
+                    return True
             else:
                 self.controllers[name].advance(self.now)
             if not self.is_dirty:  # the controller has not called its hook
                 self.notify(name)
+        return False
 
     def _nothing_else_until(self, now: Nanos) -> Nanos:
         """The last moment, at most ``now``, before anything is due besides a controller that is due now."""
@@ -452,7 +476,7 @@ class Scheduler:
                 until = due - 1
         return until
 
-    def _advance_alone(self, name: str, plans: RecordedPlans, now: Nanos) -> None:
+    def _advance_alone(self, name: str, plans: RecordedPlans, now: Nanos, *, is_one: bool) -> None:
         controller, due = self.controllers[name], self._due
         self._changed.add(name)
         while due is not None and due <= now:
@@ -467,6 +491,8 @@ class Scheduler:
             if self.subscribers is not None:
                 self.subscribers.news |= self.subscribers.by_name.get(name, {})
                 self.subscribers.notify(self.now)
+            if is_one:
+                return
             due = self._due
             if self.is_step_exact and self.on_change is not None:
                 self.on_change(self)
@@ -548,7 +574,10 @@ class Scheduler:
             parts.deadlines.put(number, parts.parts[number].deadline())
         self._controllers_visited.clear()
         parts.visited.clear()
-        due, of_parts = self._controller_deadlines.first(), parts.deadlines.first()
+        self._find_due()
+
+    def _find_due(self) -> None:
+        due, of_parts = self._controller_deadlines.first(), self._parts.deadlines.first()
         if due is None or (of_parts is not None and of_parts < due):
             due = of_parts
         arrival = self.wires.next_arrival() if self.wires.delayed else None

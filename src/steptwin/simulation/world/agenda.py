@@ -161,10 +161,16 @@ class Dependencies:
         """When a scheduler on which a script depends is due, as far as `take` has nothing to give."""
         return self._deadlines.first()
 
-    def advance(self, now: Nanos) -> None:
-        """Advance the schedulers that are due by ``now``."""
-        for number in self._deadlines.take(now):
+    def advance(self, now: Nanos, until: Nanos) -> Nanos:
+        """Advance the schedulers that are due at ``now``; a single one to its event, which may be as late as ``until`` if no other
+        is due before. Returns the moment of the event."""
+        numbers = self._deadlines.take(now)
+        if len(numbers) == 1 and until > now:
+            other = self._deadlines.first()
+            return max(now, self._schedulers[numbers[0]].advance_to_event(until if other is None else min(until, other - 1)))
+        for number in numbers:
             self._schedulers[number].advance(now)
+        return now
 
     def change(self, scheduler: Scheduler) -> None:
         """Register a change of ``scheduler``: the scripts that depend on what has changed there have to be evaluated."""

@@ -154,9 +154,12 @@ class Scripts:
         self._renew()
         return self._dependencies.due(), self._described.first(), self._external.first()
 
-    def advance_schedulers(self) -> None:
-        """Advance the schedulers that are due now; scripts that wait for what happens there become due."""
-        self._dependencies.advance(self._model.now)
+    def advance_schedulers(self, until: Nanos) -> Nanos:
+        """Advance the schedulers that are due now to their next event, which comes by ``until``, and return its moment; scripts
+        that wait for what happens there become due."""
+        now = self._model.now
+        is_exact = any(subscriber.sources for subscriber in self._subscribers)  # each may look at every statement
+        return self._dependencies.advance(now, now if is_exact else until)
 
     def _renew(self) -> None:
         """Update the due moments of scripts when something has changed on which they depend."""

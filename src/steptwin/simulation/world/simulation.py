@@ -156,7 +156,8 @@ class Simulation(Model):
             look = self._scripts.first_look()
             if look is not None and (due is None or look < due):
                 due = look
-            if due is None or due > (now if self.stopped is None else self.now):
+            end = now if self.stopped is None else self.now
+            if due is None or due > end:
                 break
             if due > self.now:
                 self._scripts.leave(due)
@@ -165,7 +166,8 @@ class Simulation(Model):
             if rounds > MOST_STEPS_PER_INSTANT:
                 raise Runaway(SCRIPTS_LOOP(now=self.now))
             if schedulers is not None and schedulers <= self.now:
-                self._scripts.advance_schedulers()
+                others = [moment - 1 for moment in (own, guests, look) if moment is not None]
+                self.now = self._scripts.advance_schedulers(min((end, *others)))
             elif own is not None and own <= self.now:
                 self._scripts.run_described()
             elif guests is not None and guests <= self.now:

@@ -73,6 +73,7 @@ class ProgramWatch:
         """Axes that were reported to follow their encoders."""
         device.program.interpreter.add_hook(self._begins)
         scheduler.add_part(self, (name,))
+        scheduler.hears_programs = True
         scheduler.edge_subscribers.append(self._edge)
 
     # ------------------------------------------------------------------ what the program does
