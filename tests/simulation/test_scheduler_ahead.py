@@ -30,7 +30,9 @@ TOGETHER = (
     + '[[wire]]\nfrom = "m.OUT1"\nto = "other.IN1"\n'
     + '[[wire]]\nfrom = "m.OUT3"\nto = "other.IN2"\n[[wire]]\nfrom = "other.OUT1"\nto = "m.IN1"\ndelay = "2 ms"\n'
 )
-CONDITIONS = st.sampled_from(["", "m.OUT1", "m.OUT3 == 1", "m.M1.status > 1", "m.M1.position > 3", "m.USER_REGISTER[0] > 2", "m.program == 0", "idle"])
+CONDITIONS = st.sampled_from(
+    ["", "m.OUT1", "m.OUT3 == 1", "m.M1.status > 1", "m.M1.position > 3", "m.USER_REGISTER[0] > 2", "m.program == 0", "idle"]
+)
 SCRIPT = (
     '[[script]]\nname = "s"\nrepeat = 1000\n'
     'steps = [{ until = "CONDITION" }, { set = { "m.IN2" = 1 } }, { wait = "1500 us" }, { set = { "m.IN2" = 0 } }]\n'

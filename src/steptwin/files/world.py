@@ -40,6 +40,7 @@ from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import SimulationSnapshot
 from steptwin.simulation.world.views import LineView, MechanicsView, Views
 from steptwin.why.answer import Answer
+from steptwin.why.keptstates import KeptStates
 from steptwin.why.replayedrun import ReplayedRun
 
 LONGEST_RUN_NS: Nanos = 3600 * SECOND
@@ -85,6 +86,8 @@ class World(Simulation):
         self._failing = {(failed.time, failed.controller): failed.reason for failed in failing}
         self.failed_saves: list[FailedSave] = []
         """Failed saves so far, if inputs are kept: a replay repeats them."""
+        self._states: KeptStates | None = None
+        """Its past since its beginning, if it keeps states."""
         keep = None if state is None and not self._failing else self._save
         super().__init__(blueprint, keep_trace=keep_trace, keep_inputs=keep_inputs, keep_memory=keep, at=at)
 
@@ -329,6 +332,23 @@ class World(Simulation):
 
     # ------------------------------------------------------------------ causes
 
+    def keep_states(self) -> None:
+        """Keep states of this world at its beginning and while it runs, so that `past` need not run it again to have them; until
+        a snapshot is restored. Raises `Misuse` for a world that does not keep its inputs, and later than at its beginning."""
+        if not self.keeps_inputs or self.now:
+            raise Misuse("states are kept of worlds that keep their inputs, from their beginning on")
+        self._states = KeptStates(self)
+
+    def run_to(self, end: Nanos, until: str | None = None) -> str | None:
+        """As `Simulation.run_to`; in parts, if states are kept."""
+        states = self._states
+        while states is not None and end > self.now + states.distance:
+            reason = super().run_to(self.now + states.distance, until)
+            if reason is not None:
+                return reason
+            states.take(len(self.inputs))
+        return super().run_to(end, until)
+
     @property
     def past(self) -> ReplayedRun:
         """The past until now, for questions (`ReplayedRun.ask`). Raises `Misuse` for a world that does not keep its inputs."""
@@ -336,7 +356,9 @@ class World(Simulation):
             raise Misuse("this world does not keep its inputs, so its past is not known: make it with keep_inputs=True")
         self.advance(self.now)
         self.sync_all()
-        return ReplayedRun(lambda: type(self)(self.blueprint, failing=self.failed_saves), self.inputs, self.now)
+        again = lambda: type(self)(self.blueprint, failing=self.failed_saves)  # noqa: E731
+        again = partial(type(self), self.blueprint, failing=self.failed_saves)
+        return ReplayedRun(again, self.inputs, self.now, self._states)
 
     def why(self, question: str, at: Duration | None = None, *, try_without: bool = False, everything: bool = False) -> Answer:
         """Why a signal has its value, a condition its truth, or a controller's program waits; now or at a moment.
@@ -353,6 +375,9 @@ class World(Simulation):
     def restore(self, snapshot: SimulationSnapshot) -> None:
         """As `Simulation.restore`."""
         super().restore(snapshot)
+        if self._states is not None:
+            self._states.close()
+            self._states = None
         self.failed_saves = [failed for failed in self.failed_saves if failed.time <= snapshot.now]
 
     def branch(self, snapshot: SimulationSnapshot | None = None) -> Self:

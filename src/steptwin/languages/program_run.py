@@ -95,6 +95,8 @@ def world_of(
 ) -> Generator[World]:
     name, asks = f"run {options.program.name}", bool(options.questions)
     with World.from_toml(text, files, name=name, overrides=overrides, keep_trace=keep_trace, keep_inputs=asks) as world:
+        if asks:
+            world.keep_states()
         yield world
 
 

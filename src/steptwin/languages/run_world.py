@@ -81,6 +81,13 @@ def run(options: WorldRun, out: Print, warn: Print) -> bool:
     reports = CoverageReports(options.coverage)
     keep_trace = options.trace is not None or not options.as_json
     recorder = SceneRecorder()
+
+    def begun(world: World) -> None:
+        if options.questions:
+            world.keep_states()
+        if options.trace is not None:
+            recorder.follow(world)
+
     with load_world(
         options.world,
         warn,
@@ -90,7 +97,7 @@ def run(options: WorldRun, out: Print, warn: Print) -> bool:
         keep_trace=keep_trace,
         allow_outside=options.run.allow_outside,
         state=options.run.state,
-        begun=recorder.follow if options.trace is not None else lambda world: None,
+        begun=begun,
     ) as world:
         reports.observe(world, options.world.parent)
         return _run_and_report(world, options, reports, recorder, out, warn)

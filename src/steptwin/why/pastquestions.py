@@ -53,7 +53,7 @@ class PastQuestions:
         self._most = MOST_NOTED if most is None else most
         self._known: _Known | None = None
         self._most_links = MOST_LINKS
-        self._changes = LastChanges(snapshots, _second_world)
+        self._changes = LastChanges(snapshots, second_world)
 
     def asking(self, question: str, at: Nanos | None = None, *, try_without: bool = False, everything: bool = False) -> Asking:
         """The answer for a moment, by default the present, with ``everything`` that is found. ``try_without``: the same, and what
@@ -166,7 +166,7 @@ class _Known:
         self._snapshots = snapshots
         self._branch = snapshots.branch
         self._most = most
-        self._why = Why(partial(_second_world, snapshots.world, state.snapshot), (), state.snapshot.now, most)
+        self._why = Why(partial(second_world, snapshots.world, state.snapshot), (), state.snapshot.now, most)
 
     def fits(self, at: Nanos, not_before: Nanos) -> bool:
         """Whether a question about a moment can be answered from it. ``not_before``: up to when it must have come."""
@@ -251,7 +251,8 @@ def first_span(world: Simulation) -> Nanos:
     return min([FIRST_SPAN_NS, *(FIRST_STATEMENTS * time for time in times)])
 
 
-def _second_world(world: Simulation, snapshot: SimulationSnapshot) -> Simulation:
+def second_world(world: Simulation, snapshot: SimulationSnapshot) -> Simulation:
+    """Another one like it, at a snapshot, which records nothing."""
     second = Simulation(world.blueprint, keep_trace=False, keep_inputs=False, at=snapshot)
     second.trace.stop()
     return second

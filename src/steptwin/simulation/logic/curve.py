@@ -15,7 +15,6 @@ from steptwin.simulation.mechanics.scale import exact_fraction
 from steptwin.simulation.toml.values import MOST
 from steptwin.state import Plain, Stateful
 
-
 MOST_KNOWN = 4096
 """Levels whose ends are kept."""
 

@@ -450,8 +450,8 @@ class Scheduler:
             self.on_change(self)
 
     def _advance_controllers(self, now: Nanos) -> bool:
-        """Advance the controllers that are due; a single one to where it changes something, or where anything else is due. Whether
-        a program has only calculated up to there, so that nothing has changed."""
+        """Advance the controllers that are due; a single one to where it changes something, or where anything else is due.
+        Returns whether a program has only calculated up to there, so that nothing has changed."""
         due = self._controller_deadlines.take(self.now)
         until = self._nothing_else_until(now) if len(due) == 1 and not self.is_step_exact else self.now
         for number in due:

@@ -162,8 +162,8 @@ class Dependencies:
         return self._deadlines.first()
 
     def advance(self, now: Nanos, until: Nanos) -> Nanos:
-        """Advance the schedulers that are due at ``now``; a single one to its event, which may be as late as ``until`` if no other
-        is due before. Returns the moment of the event."""
+        """Advance the schedulers that are due at ``now``; a single one to its event, which may be as late as ``until`` if no
+        other is due before. Returns the moment of the event."""
         numbers = self._deadlines.take(now)
         if len(numbers) == 1 and until > now:
             other = self._deadlines.first()

@@ -187,9 +187,14 @@ class ChangedSince:
         for points in self._points:
             points.read()
 
+    @property
+    def names(self) -> frozenset[Changed]:
+        """Those since the last `take`."""
+        return frozenset(self._names)
+
     def take(self) -> frozenset[Changed]:
         """The names since the last call."""
-        names = frozenset(self._names)
+        names = self.names
         self._names.clear()
         return names
 
