@@ -25,4 +25,6 @@ myst_heading_anchors = 3
 html_theme = "furo"
 html_title = f"steptwin {release}"
 html_copy_source = False
+html_static_path = ["_static"]
+html_css_files = ["narrow.css"]
 copybutton_prompt_text = "$ "
