@@ -11,7 +11,11 @@ const TRACES = 8;
 export function aidsOf(scene: Scene, model: Model, solids: readonly Solid[], tips: readonly number[]): Solid[] {
   const found: Solid[] = [];
   for (const one of solids)
-    if (tips.includes(one.frame) && (one.isCarried || scene.frames[one.frame]?.joints.length === 0))
+    if (
+      one.line === undefined &&
+      tips.includes(one.frame) &&
+      (one.isCarried || scene.frames[one.frame]?.joints.length === 0)
+    )
       found.push({ ...one, material: "ghost", color: null, pin: null, shown: null });
   const put = (solid: Solid) => found.push(solid);
   model.mechanics.forEach((axis, n) => {
@@ -20,7 +24,13 @@ export function aidsOf(scene: Scene, model: Model, solids: readonly Solid[], tip
     if (frame?.joints[0]?.turns === false)
       travel(new Builder(frame, place, put), axis, softLimits(model, axis), `--trace-${1 + (n % TRACES)}`);
   });
-  for (const tip of tips) workspace(scene, model, tip, put);
+  for (const tip of tips) {
+    workspace(scene, model, tip, put);
+    const { name } = scene.frames[tip] as Scene["frames"][number];
+    new Builder(scene.frames[tip] as Scene["frames"][number], tip, put).add([0, 0, 0], [0, 0, 0], "line", {
+      ...{ element: name, color: "--trace-6", line: { signal: null, on: -1, end: null } },
+    });
+  }
   return found;
 }
 

@@ -29,9 +29,9 @@ export interface Solid {
   shown: string | null;
   /** It is lit while this is on. */
   pin: string | null;
-  /** Instead of a solid: the line that its place leaves on a frame (below 0: the floor) while a signal is above 0, or the one to
-   * the middle of another element. */
-  line?: { signal: string | null; on: number; end: Vector };
+  /** Instead of a solid: the line that its place leaves on a frame (below 0: the floor) while a signal is above 0 (null: always,
+   * and only the last seconds of it); or the one to its end on that frame. */
+  line?: { signal: string | null; on: number; end: Vector | null };
 }
 
 /** Whether a solid has the shape of another one. */

@@ -302,12 +302,12 @@ function body(build: Builder, { scene }: Known): void {
     build.add(plus(part.at, [0, 0, size[2] / 2]), part.size, lit === null ? "frame" : "glass", {
       ...{ prism: part.prism, color: part.color ?? color, shown, pin },
     });
-  const line = (at: Vector, signal: string | null, to: string | null, end: Vector) =>
+  const line = (at: Vector, signal: string | null, to: string | null, end: Vector | null) =>
     build.add(at, [0, 0, 0], "line", {
       color: signal === null ? null : color,
       line: { signal, on: scene.frames.findIndex(({ name }) => name === to), end },
     });
-  if (draws) line([0, 0, 0], `${its.name}.draws`, draws_on, [0, 0, 0]);
+  if (draws) line([0, 0, 0], `${its.name}.draws`, draws_on, null);
   if (line_to) line([0, 0, size[2] / 2], null, line_to, [0, 0, extentOf(scene.bodies.find(({ name }) => name === line_to))[2] / 2]); // prettier-ignore
 }
 

@@ -9,11 +9,16 @@ import { Trace } from "./trace";
 
 /** What goes less far is not drawn at its target. */
 const GONE_MM = 1;
+/** So long the way of a tip is seen. */
+const SEEN_NS = 10e9;
 const WORKS = new Set(["vacuum", "gripper", "tool"]);
 
-function tipsOf({ frames }: Scene): number[] {
+function tipsOf({ frames, bodies }: Scene): number[] {
   const places = frames.map((_, place) => place);
-  const working = places.filter((place) => WORKS.has(frames[place]?.kind ?? ""));
+  const drawing = new Set(bodies.flatMap(({ name, draws }) => (draws ? [name] : [])));
+  const working = places.filter(
+    (place) => WORKS.has(frames[place]?.kind ?? "") || drawing.has(frames[place]?.name ?? ""),
+  );
   if (working.length) return working;
   const carriers = new Set(frames.map(({ joints, on }) => (joints.length ? on : null)));
   return places.filter((place) => frames[place]?.kind === "axis" && !carriers.has(frames[place].name));
@@ -53,7 +58,7 @@ export class Stage {
   readonly tips: readonly number[];
   /** Lines, by the numbers of their solids. */
   readonly lines: ReadonlyMap<number, Drawn>;
-  /** Whether tips are drawn where they are going, too. */
+  /** Whether tips are drawn where they were and where they are going, too. */
   showsTargets = false;
   /** The element whose travel is shown; null: all. */
   travelShown: string | null = "";
@@ -81,11 +86,8 @@ export class Stage {
     this.slides = Int32Array.from(this.solids, ({ slide }) => place(slide?.signal));
     this.shown = Int32Array.from(this.solids, ({ shown }) => place(shown));
     this.lines = new Map(
-      this.solids.flatMap(
-        ({ line, frame, at }, n): [number, Trace | Strand][] =>
-        line === undefined
-          ? []
-          : [[n, line.signal === null ? new Strand(this.poses, frame, at, line.on, line.end) : new Trace(this.poses, frame, line.on, place(line.signal))]], // prettier-ignore
+      this.solids.flatMap((solid, n): [number, Trace | Strand][] =>
+        solid.line === undefined ? [] : [[n, this.lineOf(solid, solid.line)]],
       ),
     );
     this.take(pieces);
@@ -107,9 +109,20 @@ export class Stage {
     this.revision++;
   }
 
-  /** Bodies draw up to where they are at a moment [ns], for which `poses` are up to date. */
+  private lineOf({ frame, at }: Solid, { signal, on, end }: NonNullable<Solid["line"]>): Trace | Strand {
+    if (end !== null) return new Strand(this.poses, frame, at, on, end);
+    return signal === null
+      ? new Trace(this.poses, frame, on, -1, SEEN_NS)
+      : new Trace(this.poses, frame, on, this.poses.signals.indexOf(signal));
+  }
+
+  /** Lines go up to where things are at a moment [ns], for which `poses` are up to date. */
   trace(now: number): void {
-    for (const line of this.lines.values()) if (line instanceof Trace) line.take(now);
+    for (const [n, line] of this.lines) {
+      if (!(line instanceof Trace)) continue;
+      if (n >= this.aids && !this.showsTargets) line.clear();
+      else line.take(now);
+    }
   }
 
   /** Everything from the values of `poses` and `pieces`. */
@@ -137,7 +150,7 @@ export class Stage {
         continue;
       }
       if (line !== undefined) {
-        this.placeLine(n, line.signal === null ? -1 : line.on);
+        this.placeLine(n, line.end === null ? line.on : -1);
         continue;
       }
       const of = isGhost ? aims : poses;
@@ -159,6 +172,7 @@ export class Stage {
   /** Whether somebody wants to see an aid that there is now. */
   private isAsked(n: number): boolean {
     const { element, frame, material } = this.solids[n] as Solid;
+    if (material === "line") return this.showsTargets;
     if (material === "ghost") return this.showsTargets && this.isGoing(frame);
     const slides = this.slides[n] as number;
     const isKnown = slides < 0 || !Number.isNaN(this.poses.values[slides]);

@@ -61,3 +61,15 @@ test("where time was not seen the line begins anew, and it never has too many po
   for (let n = 0; n < 3 * MOST; n++) draw(n % 2, true);
   expect(trace.count).toBeLessThanOrEqual(MOST);
 });
+
+test("the way of a tip has its last seconds, whether it draws or not", () => {
+  const frames = [frame("tip", null, [0, 0, 0], [joint("x", "+x")])];
+  const poses = new Poses({ frames } as unknown as Scene);
+  const way = new Trace(poses, 0, -1, -1, 10 * STEP_NS);
+  for (let n = 0; n < 50; n++) {
+    poses.values[0] = n;
+    poses.update();
+    way.take(n * STEP_NS);
+  }
+  expect(pointsOf(way).map(([x]) => x)).toEqual([40, 41, 42, 43, 44, 45, 46, 47, 48, 49]);
+});

@@ -11,7 +11,8 @@ const GIVEN_UP = 512;
 /** Points nearer to a straight line are not kept. [mm] */
 const STRAIGHT_MM = 0.02;
 
-/** What a body has drawn, in the frame that the line goes on with: points x, y, z; before each further stroke is one of NaN. */
+/** What a body has drawn, or where a tip was, in the frame that the line goes on with: points x, y, z; before each further stroke is
+ * one of NaN. */
 export class Trace implements Drawn {
   readonly points = new Float32Array(3 * MOST);
   count = 0;
@@ -26,13 +27,16 @@ export class Trace implements Drawn {
   /** How far those that were not kept since the last corner are beside the line, together: a curve is no straight line bit by bit. */
   private bent = 0;
   private readonly at = new Float64Array(3);
+  /** When the points were drawn that are given up after a time. [ns] */
+  private readonly times: number[] = [];
 
-  /** `frame` draws, on another one (below 0: the floor), while a value is above 0. */
+  /** `frame` draws, on another one (below 0: the floor), while a value is above 0 (below 0: always), and is seen for so long. */
   constructor(
     private readonly poses: Poses,
     private readonly frame: number,
     private readonly on: number,
     private readonly value: number,
+    private readonly kept_ns = Infinity,
   ) {}
 
   /** Where time has gone back, or was not seen, it begins anew. */
@@ -40,17 +44,26 @@ export class Trace implements Drawn {
     if (now < this.last || now - this.last > LOST_NS) this.clear();
     else if (now - this.last < STEP_NS) return;
     this.last = now;
-    const draws = (this.poses.values[this.value] as number) > 0;
+    const draws = this.value < 0 || (this.poses.values[this.value] as number) > 0;
     if (!draws && this.stroke === 0) return;
     this.look();
     this.add();
+    if (this.kept_ns < Infinity) this.giveUp(now);
     if (!draws) this.stroke = 0;
   }
 
   clear(): void {
-    this.count = this.stroke = 0;
+    if (this.count > 0) this.version++;
+    this.count = this.stroke = this.times.length = 0;
     this.last = NaN;
-    this.version++;
+  }
+
+  private giveUp(now: number): void {
+    this.times.push(now);
+    const old = this.times.findIndex((time) => now - time < this.kept_ns);
+    this.times.splice(0, old);
+    this.points.copyWithin(0, 3 * old, 3 * this.count);
+    this.count -= old;
   }
 
   /** Where the body is, seen from what it draws on. */
@@ -76,7 +89,7 @@ export class Trace implements Drawn {
       this.count -= GIVEN_UP;
     }
     if (this.stroke === 0 && this.count > 0) points[3 * this.count++] = NaN;
-    if (this.stroke > 1 && this.isStraight()) this.count--;
+    if (this.stroke > 1 && this.kept_ns === Infinity && this.isStraight()) this.count--;
     else {
       this.stroke++;
       this.bent = 0;

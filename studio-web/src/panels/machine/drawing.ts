@@ -5,7 +5,6 @@ import { colourOf, lookOf, type Levels, type Look } from "../../lib/scene/looks"
 import { namedOf } from "../../lib/scene/names";
 import { POSE } from "../../lib/scene/poses";
 import type { Stage } from "../../lib/scene/stage";
-import type { Trail } from "../../lib/scene/trail";
 import { frameOf, Order, spotX, spotY, type View } from "../../lib/scene/view";
 
 const SVG = "http://www.w3.org/2000/svg";
@@ -58,7 +57,6 @@ export class Drawing {
   private readonly versions = new Map<number, number>();
   private readonly order: Order;
   private readonly all: SVGGElement;
-  private readonly trails: SVGPathElement[] = [];
   private readonly labels = new Map<string, SVGTextElement>();
   /** The solids of each element with a label. */
   private readonly named: ReadonlyMap<string, readonly number[]>;
@@ -82,7 +80,6 @@ export class Drawing {
     this.order = new Order(stage, view);
     this.renew();
     this.named = namedOf(stage);
-    for (const _ of stage.tips) this.trails.push(create("path", svg, "trail"));
     const words = create("g", svg, "labels");
     for (const name of this.named.keys()) {
       const label = create("text", words);
@@ -127,14 +124,6 @@ export class Drawing {
     this.sort();
   }
 
-  /** The path of a tip; null: none. */
-  trail(tip: number, trail: Trail | null): void {
-    let d = "";
-    for (let at = 0; trail !== null && at < 3 * trail.count; at += 3)
-      d += `${at ? "L" : "M"}${spotX(this.view, trail.places, at).toFixed(1)} ${spotY(this.view, trail.places, at).toFixed(1)}`;
-    this.trails[tip]?.setAttribute("d", d);
-  }
-
   mark(marks: Marks): void {
     this.marks = marks;
     this.knowledge = this.stage.knowledge;
@@ -155,7 +144,7 @@ export class Drawing {
     const { stage, parts } = this;
     const { solids } = stage;
     while (parts.length > solids.length) parts.pop()?.remove();
-    this.moves.length = parts.length;
+    this.moves.length = this.painted.length = parts.length;
     this.isSeen = new Uint8Array(solids.length).fill(NEITHER);
     this.turns = grown(this.turns, 9 * solids.length);
     this.spots = grown(this.spots, 2 * solids.length);

@@ -32,7 +32,6 @@ import { namedOf } from "../../lib/scene/names";
 import { POSE } from "../../lib/scene/poses";
 import type { Stage } from "../../lib/scene/stage";
 import type { Drawn } from "../../lib/scene/strand";
-import type { Trail } from "../../lib/scene/trail";
 import { frameOf, VIEWS, type ViewName } from "../../lib/scene/view";
 import type { Marks } from "./drawing";
 
@@ -70,8 +69,6 @@ export class Space {
   private view: ViewName = "oblique";
   private readonly models: Object3D[] = [];
   private isEnded = false;
-  private readonly trails: Line[] = [];
-  private readonly trailLook = new LineBasicMaterial({ depthTest: false });
   private marks: Marks | null = null;
   /** Version of the stage when it was marked. */
   private knowledge = -1;
@@ -167,29 +164,6 @@ export class Space {
     for (const [label, [name, solids]] of this.labels) this.name(label, name, solids);
   }
 
-  /** The path of a tip; null: none. */
-  trail(tip: number, trail: Trail | null): void {
-    let line = this.trails[tip];
-    if (line === undefined) {
-      if (trail === null) return;
-      this.trails[tip] = line = new Line(new BufferGeometry(), this.trailLook);
-      line.frustumCulled = false;
-      line.renderOrder = 1;
-      this.scene.add(line);
-    }
-    line.visible = trail !== null;
-    this.isStale = true;
-    if (trail === null) return;
-    let place = line.geometry.getAttribute("position") as BufferAttribute | undefined;
-    if (place?.array !== trail.places) {
-      line.geometry.dispose();
-      line.geometry = new BufferGeometry();
-      line.geometry.setAttribute("position", (place = new BufferAttribute(trail.places, 3)));
-    }
-    place.needsUpdate = true;
-    line.geometry.setDrawRange(0, trail.count);
-  }
-
   /** The model of a body is seen in its place, from its origin on. A shape has the colour of the body, and other models their own. */
   dress(element: string, model: BufferGeometry | Object3D): void {
     const n = this.stage.solids.findIndex((one) => one.element === element);
@@ -239,7 +213,6 @@ export class Space {
       material.emissiveIntensity = look === "shining" ? 0.9 : 0.45;
     }
     this.lines.color.set(style.getPropertyValue("--dim"));
-    this.trailLook.color.set(style.getPropertyValue("--trace-6"));
     this.isStale = true;
   }
 
@@ -264,7 +237,6 @@ export class Space {
       shape.dispose();
       edges.dispose();
     }
-    for (const line of this.trails) line?.geometry.dispose();
     for (const material of this.looks.values()) material.dispose();
     this.renderer.dispose();
   }
@@ -321,7 +293,7 @@ export class Space {
       lines.visible = solid.material !== "light";
       mesh.material = this.materialOf(solid.material, solid, false);
       const line = stage.lines.get(n);
-      if (line !== undefined) mesh.add(lineOf(line, mesh.matrixWorld));
+      if (line !== undefined) mesh.add(lineOf(line, mesh.matrixWorld, n >= stage.aids));
     }
     this.revision = stage.revision;
     this.isStale = true;
@@ -370,10 +342,11 @@ export class Space {
 }
 
 /** A line that goes with what it is drawn on, as the mesh of its solid does. */
-function lineOf({ points }: Drawn, matrix: Matrix4): Line {
+function lineOf({ points }: Drawn, matrix: Matrix4, isAid: boolean): Line {
   const geometry = new BufferGeometry();
   geometry.setAttribute("position", new BufferAttribute(points, 3));
-  const line = new Line(geometry, new LineBasicMaterial());
+  const line = new Line(geometry, new LineBasicMaterial({ depthTest: !isAid }));
+  line.renderOrder = Number(isAid);
   line.matrixAutoUpdate = line.matrixWorldAutoUpdate = line.frustumCulled = false;
   line.matrixWorld = matrix;
   return line;
