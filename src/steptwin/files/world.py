@@ -356,7 +356,6 @@ class World(Simulation):
             raise Misuse("this world does not keep its inputs, so its past is not known: make it with keep_inputs=True")
         self.advance(self.now)
         self.sync_all()
-        again = lambda: type(self)(self.blueprint, failing=self.failed_saves)  # noqa: E731
         again = partial(type(self), self.blueprint, failing=self.failed_saves)
         return ReplayedRun(again, self.inputs, self.now, self._states)
 
