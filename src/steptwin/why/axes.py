@@ -10,6 +10,7 @@ from typing import Any
 from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message, MessageText
 from steptwin.motion.divisions import profile_of
+from steptwin.simulation.components.brake import RELEASED, BrakeSpec
 from steptwin.simulation.components.touch import JAM
 from steptwin.simulation.faults.kinds_physics import IS_BLOCKED, LOSES_PULSES
 from steptwin.simulation.kinds.programs import Resource, ResourceKind
@@ -28,6 +29,8 @@ STOPPED = Message("why.stopped", "{axis} stopped")
 MOTION_ENDED = Message("why.motion-ended", "the motion of {axis} ended, which began at {time:.6f} s")
 NOTHING_HAS_COMMANDED = Message("why.nothing-has-commanded", "nothing has commanded {axis} to move")
 STOPPED_AT_SOFT_LIMIT = Message("why.stopped-at-soft-limit", "{axis} stopped at its soft limit {limit}")
+BRAKES_NS: Nanos = SECOND // 10
+"""How much later than a load stands its brake may have closed (`steptwin.simulation.components.brake`)."""
 POSITION = "position"
 SETTINGS = ("VMAX", "ACC", "DEC")
 """Registers of an axis by which a motion is made."""
@@ -103,9 +106,12 @@ class AxisCauses:
         name = LIMITS.get(int(points.level(series, end)))
         return "" if name is None else f"M{axis}_{name}"
 
-    def moved(self, axis: str, until: Nanos, before: int = LAST, *, is_held: bool = True) -> FoundCause:
+    def moved(
+        self, axis: str, until: Nanos, before: int = LAST, *, is_held: bool = True, since: Nanos | None = None
+    ) -> FoundCause:
         """Cause before an order that moved the load of an axis last, or left it where it is: a motion, the power of its motor
-        meanwhile, or what keeps its rotor from following the motion. ``is_held``: also what does so since before the motion."""
+        meanwhile, or what keeps its rotor from following the motion. ``is_held``: also what does so since before the motion;
+        ``since``: since when it stands, if that is known."""
         built = self._world.axes[axis]
         controller, number = built.spec.drive[0], built.spec.drive[1].removeprefix("M")
         motion, power = self.motion(controller, number, until, axis, before), self.power(axis, until)
@@ -121,8 +127,8 @@ class AxisCauses:
             is_unpowered = built.mechanism.build.coasts_unpowered or any(self._end(one)[0] > power.link.time for one in plans)
         if event is not None and not (is_unpowered and power is not None and power.place > Place(event.time, event.order)):
             return self.rotor_event(axis, event)
-        if is_unpowered:
-            return power
+        if is_unpowered and power is not None:
+            return self._let_go(axis, power, until if since is None else min(until, since + BRAKES_NS))
         lost = self._lost_by_fault(axis, until, before, LOSES_PULSES)
         if motion is None and lost is None:
             return self.ignored(controller, number, until, before)
@@ -136,6 +142,13 @@ class AxisCauses:
         if signal and found is None and not self._log.level(signal, until):  # it has never had any
             found = self._all.first(signal, 0.0, Place(self._log.begin), GIVES_POWER(axis=axis))
         return covered(found, Cover.MOTION)
+
+    def _let_go(self, axis: str, power: Cause, until: Nanos) -> Cause:
+        """The last that let an axis without power move, or held it: its power or a brake, along with the others."""
+        brakes = [name for name, spec in self._all.specs.items() if isinstance(spec, BrakeSpec) and spec.axis == axis]
+        found = [covered(self._all.last((f"{name}.{RELEASED.lower()}",), until), Cover.MOTION) for name in brakes]
+        first, *others = sorted((power, *(one for one in found if one is not None)), key=lambda one: one.place, reverse=True)
+        return first._replace(along=tuple(others))
 
     def _power_of(self, axis: str) -> str:
         """The output that gives the motor of an axis power; empty for one that always has some."""

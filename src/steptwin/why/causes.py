@@ -8,6 +8,7 @@ from functools import partial, reduce
 from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message, MessageText
 from steptwin.simulation.components.button import BUTTON
+from steptwin.simulation.components.conveyortable import FEED
 from steptwin.simulation.components.elementspec import NamedSpec
 from steptwin.simulation.components.logic import TerminalComponent
 from steptwin.simulation.components.registry import ELEMENTS
@@ -83,6 +84,8 @@ class Causes:
         """Reason why a signal that has not changed cannot change by itself; None where it can."""
         owner, _, pin = signal.partition(".")
         if owner not in self._world.controllers:
+            if owner in self.parts and pin.upper() in inputs(self.parts[owner]):
+                return NOTHING_IS_WIRED()
             is_unpressed = self.log.is_whole and signal in self._world.objects.built(BUTTON)
             return NOBODY_PRESSED() if is_unpressed else None
         terminals, programs = self._world.kind(owner).terminals, self._world.programs.get(owner)
@@ -225,9 +228,18 @@ class Causes:
             return []
         owner, _, terminal = signal.partition(".")
         part = self.parts.get(owner)
+        if part is not None and terminal.upper() in inputs(part):
+            return list(self.sources(PinName(owner, terminal.upper())))
         if part is not None:
-            return [source for name in inputs(part) for source in self._held_or_sources(owner, name, at)]
+            found = [source for name in inputs(part) for source in self._held_or_sources(owner, name, at)]
+            return [*found, *self._unwired(owner, part)]
         return list(self.sources(PinName(owner, terminal))) if owner in self._world.controllers else []
+
+    def _unwired(self, owner: str, part: TerminalComponent) -> Iterator[str]:
+        """The input without which an element does nothing, if nothing is wired to it."""
+        first = next(iter(inputs(part)), FEED)
+        if first != FEED and not any(self.sources(PinName(owner, first))):
+            yield f"{owner}.{first.lower()}"
 
     def _held_or_sources(self, owner: str, terminal: str, at: Nanos) -> Iterator[str]:
         signal = f"{owner}.{terminal.lower()}"

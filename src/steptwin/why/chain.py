@@ -31,6 +31,8 @@ class Cause(NamedTuple):
     before: Callable[[], Cause | None]
     cover: Cover | None = None
     besides: Callable[[], Iterable[Cause]] = tuple
+    along: tuple[Cause, ...] = ()
+    """Other causes of the same effect."""
 
 
 FoundCause: TypeAlias = "Cause | None"
@@ -76,7 +78,7 @@ class Chain:
         self.is_cut = False
         """Whether something is because of what was before."""
         self.broken: ChainRule | None = None
-        self._lead(effect, place, () if first is None else (first,), 0, is_owed=is_owed)
+        self._lead(effect, place, () if first is None else (first, *first.along), 0, is_owed=is_owed)
 
     def __len__(self) -> int:
         return len(self._taken)
@@ -102,7 +104,7 @@ class Chain:
         if (cause.place, cause.link) not in self._taken:
             self._taken[cause.place, cause.link] = None
             before = cause.before()
-            found = (*(() if before is None else (before,)), *cause.besides())
+            found = (*(() if before is None else (before, *before.along)), *cause.besides())
             is_owed = before is None and cause.before is not nothing
             self._lead(cause.link, cause.place, found, taken.distance + 1, is_owed=is_owed)
 

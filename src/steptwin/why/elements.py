@@ -156,31 +156,47 @@ class ElementCauses:
 
     def of_followed(self, name: str, change: Change) -> FoundCause:
         """The last cause by a moment of what an element follows; that of the same moment, if there is one, or of an axis that
-        moves then."""
-        found: list[tuple[bool, bool, Cause]] = []
-        for signal in self._log.movers.get((name, change.time)) or self.followed(name):
-            owner, _, rest = signal.rpartition(".")
-            before = self._all.before(signal, change, change.time)
-            if before is not None:
-                cause = covered(self._all.change(signal, before[0]), Cover.ACTION)
-            elif signal in self._log.first_levels:
-                cause = covered(self._all.first(signal, self._log.first_levels[signal], Place(self._log.begin)), Cover.ACTION)
-            elif owner in self._world.axes:
-                cause = covered(self._all.axes.moved(owner, change.time, change.order), Cover.MOTION)
-            elif owner in self._world.controllers:
-                cause = self._all.controllers.at_moment(owner, change.time, Resource(ResourceKind.AXIS, ""), rest)
-            elif owner in self._log.events and rest in (PUSHED, FALLS, GOES_ON):
-                cause = self._all.workpieces.last(owner, rest, change)
-            elif rest == TRAVEL:
-                cause = self._all.workpieces.travel(owner, change)
-            else:
-                cause = covered(self.of_element(owner, rest, change.time, change.order), Cover.ACTION)
-            if cause is not None and cause.place < Place(change.time, change.order):
-                drive = self._world.axes[owner].spec.drive if owner in self._world.axes else None
-                moves = drive is not None and self._all.axes.is_moving(drive[0], drive[1].removeprefix("M"), change.time)
-                found.append((cause.place.time == change.time, moves, cause))
-        best = max(found, key=lambda one: (one[0], one[1], one[2].place), default=None)
-        return None if best is None else best[2]
+        moves then; of a collision, along with what led its other body there."""
+        moving = self._log.movers.get((name, change.time))
+        found = {
+            signal: cause for signal in moving or self.followed(name) if (cause := self._of_signal(signal, change)) is not None
+        }
+        best = max(found, key=lambda one: self._urgency(one, found[one], change), default=None)
+        if best is None:
+            return None
+        others: list[Cause] = []
+        for signal in self.followed(name) if hasattr(self._all.specs.get(name), "effect") else ():
+            cause = found.get(signal) or self._of_signal(signal, change)
+            if cause is not None and signal != best:
+                others.append(cause)
+        return found[best]._replace(along=tuple(others))
+
+    def _urgency(self, signal: str, cause: Cause, change: Change) -> tuple[bool, bool, Place]:
+        """Of several causes, the one with the highest decides."""
+        owner = signal.rpartition(".")[0]
+        drive = self._world.axes[owner].spec.drive if owner in self._world.axes else None
+        moves = drive is not None and self._all.axes.is_moving(drive[0], drive[1].removeprefix("M"), change.time)
+        return cause.place.time == change.time, moves, cause.place
+
+    def _of_signal(self, signal: str, change: Change) -> FoundCause:
+        """The last cause before a change of a signal that an element follows."""
+        owner, _, rest = signal.rpartition(".")
+        before = self._all.before(signal, change, change.time)
+        if before is not None:
+            cause = covered(self._all.change(signal, before[0]), Cover.ACTION)
+        elif signal in self._log.first_levels:
+            cause = covered(self._all.first(signal, self._log.first_levels[signal], Place(self._log.begin)), Cover.ACTION)
+        elif owner in self._world.axes:
+            cause = covered(self._all.axes.moved(owner, change.time, change.order), Cover.MOTION)
+        elif owner in self._world.controllers:
+            cause = self._all.controllers.at_moment(owner, change.time, Resource(ResourceKind.AXIS, ""), rest)
+        elif owner in self._log.events and rest in (PUSHED, FALLS, GOES_ON):
+            cause = self._all.workpieces.last(owner, rest, change)
+        elif rest == TRAVEL:
+            cause = self._all.workpieces.travel(owner, change)
+        else:
+            cause = covered(self.of_element(owner, rest, change.time, change.order), Cover.ACTION)
+        return cause if cause is not None and cause.place < Place(change.time, change.order) else None
 
 
 def inputs(part: TerminalComponent) -> list[str]:

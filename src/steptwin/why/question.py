@@ -506,14 +506,15 @@ class Why:
         found = [cause for name in signals if (cause := self._of_unrecorded(name, time))]
         return max(found, key=lambda cause: cause.link.time, default=None)
 
-    def _of_unrecorded(self, signal: str, time: Nanos) -> Cause | None:
+    def _of_unrecorded(self, signal: str, time: Nanos, since: Nanos | None = None) -> Cause | None:
+        """Cause of what is in no trace at a moment; ``since``: since when it stands."""
         owner, _, rest = signal.partition(".")
         world, causes = self.log.world, self._causes
         if owner in world.axes:
             if rest in SLIPS:
                 return causes.axes.slipped(owner, time, SLIPS[rest])
             if rest != "power":
-                return causes.axes.moved(owner, time)
+                return causes.axes.moved(owner, time, since=since)
             drive, switched = world.axes[owner].spec.drive, causes.axes.power(owner, time)
             if switched is not None and switched.link.time == time:
                 return switched
@@ -542,7 +543,7 @@ class Why:
             if self._is_of_rotor(full):
                 changed = None if since is None else covered(self._of_unrecorded(full, since), Cover.LEVEL)
             elif self._point(signal) is None:  # what left it where it is may have come a moment after it was there
-                changed = covered(self._of_unrecorded(full, at), Cover.LEVEL) or self._ignored((full,), at)
+                changed = covered(self._of_unrecorded(full, at, since), Cover.LEVEL) or self._ignored((full,), at)
             else:
                 changed = self._ignored((full,), at) if since is None else self._changed((full,), since)
             return (yield from self._answer(signal, at, state, since, changed))
