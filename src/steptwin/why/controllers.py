@@ -139,6 +139,23 @@ class ControllerCauses:
                 return Cause(self._all.fault_link(record), Place(fault.time, fault.order), older, Cover.FAULT)
         return None
 
+    def given(self, controller: str, index: int) -> FoundCause:
+        """The frame with a command that came over the line by itself: of several with the same one the first that has not been
+        executed before."""
+        on, executed = self._world.objects.line_of.get(controller), self._log.executed[controller]
+        if on is None:
+            return None
+        here, group = executed[index], self._log.group(controller)
+        found: list[tuple[TraceRecord, int]] = []
+        for position in range(self._log.position(group, here.time)):
+            record, order = self._log.records[group][position], self._log.order(group, position)
+            if record.kind == "frame" and record.controller == on[0].name and on[1] in self._log.requests.get(order, ()):
+                lines = "".join(record.data().decode("ascii", "replace").split(" ")).upper().split("\r")
+                found += [(record, order)] * lines.count(here.location.text.upper())
+        done = executed.locations[:index].count(here.location) if self._log.is_whole else len(found)
+        record, order = found[min(done, len(found) - 1)] if found else (None, 0)
+        return None if record is None or order > here.order else covered(self._frame(record, order), Cover.FRAME)
+
     def variable_set(self, controller: str, name: str, until: Nanos) -> FoundCause:
         """The last action by a moment that set a variable of a program."""
         for act in self._log.acts_before(until, LAST):

@@ -28,7 +28,7 @@ class Frames:
         self._read.clear()
         self.traffic[record.controller].frame(record.time, client, FrameDirection.IN, record.data())
         if self._read:
-            return self._read[-1].meaning
+            return "; ".join(one.meaning for one in self._read)
         return record.data().decode("ascii", "backslashreplace")
 
     def changes(self, record: TraceRecord) -> Collection[int]:

@@ -20,7 +20,7 @@ from steptwin.messages import Message, MessageText, text_of
 from steptwin.simulation.components.beam import BEAM, SEEN
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.faults.active import ActiveFault, HeldLevel
-from steptwin.simulation.kinds.programs import Programs, ProgramState, StatementLocation
+from steptwin.simulation.kinds.programs import Programs, ProgramState, StatementLocation, StatementUse
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
@@ -136,6 +136,9 @@ class CauseLog:
         """Events of `OF_MECHANICS` by axis or collision, and jams of pushers."""
         self.axis_events: dict[tuple[str, str], list[Change]] = defaultdict(list)
         """Events of controllers about an axis, by its number."""
+        self.given: dict[tuple[str, StatementLocation], StatementUse] = {}
+        """Uses of commands that came over a line by themselves; their locations have their code instead of a text, and a negative
+        number."""
         self.begins: dict[str, list[Change]] = defaultdict(list)
         """Events of `BEGINS` by controller, whose program began anew."""
         self.frames = Frames(world)
@@ -327,13 +330,18 @@ class CauseLog:
             nonlocal before
             location = location_of(number)
             if location is None:
-                return
+                given = programs.given(number)
+                if given is None:
+                    return
+                location = StatementLocation(given.code, -1 - number)
+                self.given[name, location] = given.use
             add_time(now)
             add_location(location)
             add_order(8 * self._events + 4)
             keeps = keeping.get(location)
             if keeps is None:
-                keeps = keeping[location] = programs.use(location).keeps
+                use = self.given.get((name, location))
+                keeps = keeping[location] = (programs.use(location) if use is None else use).keeps
             if keeps or before:
                 points.executes(name, now, keeps=keeps)
                 before = keeps

@@ -8,7 +8,7 @@ from typing import TypeAlias
 from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message, MessageText
 from steptwin.motion.divisions import profile_of
-from steptwin.simulation.kinds.programs import Resource, ResourceKind
+from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementUse
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.why.answer import ChainLink
 from steptwin.why.causes import Causes
@@ -50,12 +50,18 @@ class PresentStates:
                 seen.add(one)
                 waiting += yield from (self._signal(one, waits) if isinstance(one, str) else self._resource(*one))
 
+    def waits(self, controller: str, use: StatementUse) -> bool:
+        """Whether a program waits at a statement that it has executed last, which may be over if it is a wait for a time."""
+        kind = self._world.kind(controller)
+        return use.waits and (bool(use.reads) or not kind.is_idle(self._world.controller(controller), self._at))
+
     def awaited(self, controller: str) -> Iterator[ChainLink]:
         """Those for which the program of a controller waits, or which the loop reads in which it is."""
         programs, last = self._causes.programs, self._log.last_executed(controller, self._at)
         use = programs.use(controller, last)
-        reads = use.reads if use.waits else programs.decides_in_loop(controller, last)
-        if use.waits and not reads:
+        is_waiting = self.waits(controller, use)
+        reads = use.reads if is_waiting else programs.decides_in_loop(controller, last)
+        if is_waiting and not reads:
             yield ChainLink(self._at, controller, WAITS_FOR_A_TIME())
         yield from self.of([(controller, one) for one in reads], controller)
 

@@ -52,8 +52,9 @@ class ProgramCauses:
     def use(self, controller: str, index: int) -> StatementUse:
         """Reads and changes of an executed statement; none if its text was replaced since."""
         executed = self._log.executed[controller][index]
-        if not self._log.is_of_present_text(executed):
-            return StatementUse()
+        given = self._log.given.get((controller, executed.location))
+        if given is not None or not self._log.is_of_present_text(executed):
+            return given or StatementUse()
         key = controller, executed.location
         found = self._uses.get(key)
         if found is None:
@@ -111,16 +112,22 @@ class ProgramCauses:
     def _values(self, controller: str, index: int) -> Iterator[Cause]:
         """Values that an executed statement makes others of, or acts by."""
         use, here = self.use(controller, index), self._log.executed[controller][index]
-        for one in use.reads if use.writes and not use.waits else ():
-            if one not in use.writes:
-                value = self.resource(controller, one, index, here.time, here.order)
-                if value is not None:
-                    yield covered(value, Cover.LEVEL) or value
+        for one in (*(use.reads if use.writes and not use.waits else ()), *use.acts_by):
+            value = None if one in use.writes else self.resource(controller, one, index, here.time, here.order)
+            if value is not None and not (one in use.acts_by and self._is_just_before(controller, index, value)):
+                yield value._replace(cover=Cover.LEVEL)
+
+    def _is_just_before(self, controller: str, index: int, value: Cause) -> bool:
+        """Whether a value by which a statement of a text acts has come since it was decided that this is executed."""
+        led = self._of_statement(controller, index)
+        return self._log.executed[controller].locations[index].number >= 0 and led is not None and value.place > led.place
 
     def _of_executed(self, controller: str, index: int) -> FoundCause:
         """Value that a statement reads, if it has changed since the last execution, so that another one was written, or of the
         first execution since that was decided; otherwise what let it be executed."""
         use = self.use(controller, index)
+        if self._log.executed[controller].locations[index].number < 0:
+            return self._of_statement(controller, index)
         reads = [one for one in use.reads if one not in use.writes]
         if not reads or not use.writes or use.waits:
             return self._of_statement(controller, index)
@@ -160,7 +167,17 @@ class ProgramCauses:
         return self._interrupts[key]
 
     def _of_statement(self, controller: str, index: int) -> FoundCause:
-        """The wait or condition that let a statement be executed."""
+        """The wait or condition that let a statement be executed; of a command that came over the line by itself that, or the
+        wait behind which it stood."""
+        led = self._led(controller, index)
+        if self._log.executed[controller].locations[index].number >= 0:
+            return led
+        came = self._all.controllers.given(controller, index)
+        if came is None or led is None or led.place < came.place or led.link.text == PROGRAM_STARTED():
+            return came or led
+        return led._replace(along=(came,))
+
+    def _led(self, controller: str, index: int) -> FoundCause:
         executed = self._log.executed[controller]
         number = executed[index].location.number
         at_once, after = self._world.programs[controller].statement_time, index

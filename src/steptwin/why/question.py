@@ -569,8 +569,9 @@ class Why:
         here = executed[index]
         use = causes.programs.use(controller, index)
         text, since = statement(log, here), None if log.is_in_progress(here) else here.time
-        links = list((yield from self._present(at)).awaited(controller))
-        if not use.waits or at - here.time <= log.world.programs[controller].statement_time:
+        present = yield from self._present(at)
+        links = list(present.awaited(controller))
+        if not present.waits(controller, use) or at - here.time <= log.world.programs[controller].statement_time:
             state = DOES_NOT_WAIT(controller=controller, statement=text)
             first = covered(causes.programs.statement(controller, index), Cover.PROGRAM)
             return self._after(links, (yield from self._answer(controller, at, state, since, first)))

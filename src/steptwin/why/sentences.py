@@ -32,6 +32,7 @@ REQUESTS = Message("why.requests", "requests {data} of {unit} on {line}")
 COUPLES = Message("why.couples", "lets the encoder of {axis} be turned by: {to}")
 REPLACED_STATEMENT = Message("why.replaced-statement", "a statement of a program that was replaced since")
 LINE = Message("why.line", "line {line} `{code}`")
+GIVEN = Message("why.given", "`{code}`")
 END_OF_PROGRAM = Message("why.end-of-program", "the end of the program")
 
 
@@ -70,6 +71,8 @@ def describe_input(what: ExternalInput) -> MessageText:
 
 def statement(log: CauseLog, executed: Executed) -> MessageText:
     """A statement with its line: "line 12 `OUT3 = OFF`"."""
+    if executed.location.number < 0:
+        return GIVEN(code=executed.location.text)
     if not log.is_of_present_text(executed):
         return REPLACED_STATEMENT()
     programs, location = log.world.programs[executed.controller], executed.location

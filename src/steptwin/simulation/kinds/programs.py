@@ -72,8 +72,17 @@ class StatementUse(NamedTuple):
     """Whether it also decides when those after them are executed."""
     jumps: int | None = None
     """Where the program goes on, if that depends on nothing."""
+    acts_by: tuple[Resource, ...] = ()
+    """Values by which it acts, besides those that it reads, such as the distance of a move."""
     keeps: bool = False
     """Whether it may change a point of the controller without an event of that (`steptwin.points.LivePoint.is_kept`)."""
+
+
+class GivenCommand(NamedTuple):
+    """A command that came over a line by itself, in no text."""
+
+    code: str
+    use: StatementUse
 
 
 class ProgramState(enum.Enum):
@@ -144,6 +153,10 @@ class Programs(Protocol):
 
     @property
     def state(self) -> ProgramState: ...
+
+    def given(self, number: int) -> GivenCommand | None:
+        """Command for which a hook was called, at that moment, where `location` knows none; None where nothing is given so."""
+        ...
 
     def depth(self) -> int:
         """How many calls and interrupts have not returned yet."""

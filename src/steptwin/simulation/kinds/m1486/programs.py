@@ -22,7 +22,7 @@ from steptwin.m1486.unit import MASK
 from steptwin.messages import Message
 from steptwin.simulation.kinds.m1486.memory import PLACE as TEXT
 from steptwin.simulation.kinds.m1486.statement_use import use_of
-from steptwin.simulation.kinds.programs import Frame, ProgramState, Statement, StatementLocation, StatementUse, Wait
+from steptwin.simulation.kinds.programs import Frame, GivenCommand, ProgramState, Statement, StatementLocation, StatementUse, Wait
 from steptwin.statements import StatementHook
 
 BEGIN = "program"
@@ -162,6 +162,10 @@ class ChipPrograms:
             return None
         there = (StatementLocation(TEXT, one) for one in found if text.commands[one] == stored.command)
         return next(there, None)
+
+    def given(self, number: int) -> GivenCommand | None:
+        stored = decode(self._chip.memory.fetch(number))
+        return None if stored is None else GivenCommand(str(stored.command), use_of(stored.command))
 
     def begun(self, now: Nanos) -> Sequence[int]:
         program = self._chip.program

@@ -15,6 +15,7 @@ from steptwin.simulation.kinds.programs import Resource, ResourceKind, Statement
 from steptwin.tables import complete
 
 _AXIS = Resource(ResourceKind.AXIS, "1")
+_DISTANCE = Resource(ResourceKind.VALUE, "distance")
 _EVERYTHING = range(1 << 16)
 """A jump that depends on something decides about what comes after it, wherever that is."""
 _KEPT = ChipState.FLAGS | ChipState.CARRY
@@ -25,11 +26,13 @@ def use_of(command: ChipCommand) -> StatementUse:
     use = command.use
     # What is sent does not decide how long that waits.
     reads = NOTHING if use.waits is Wait.SENDING else use.reads
+    writes = _resources(use.writes, command)
     return StatementUse(
         _resources(reads, command),
-        _resources(use.writes, command),
+        (*writes, _DISTANCE) if ChipState.DISTANCE in use.writes else writes,
         waits=use.waits is not Wait.NOTHING,
         governs=_EVERYTHING if is_computed(command) or use.control is Control.BRANCH else range(0),
+        acts_by=(_DISTANCE,) if ChipState.DISTANCE in use.reads and ChipState.MOTION in use.writes else (),
         keeps=bool(use.writes & _KEPT),
     )
 
@@ -73,8 +76,9 @@ _RESOURCES: Mapping[ChipState, Callable[[ChipCommand], Iterable[Resource]]] = co
         ChipState.REMAINDER: _always(_value(f"register{REMAINDER_REGISTER}")),
         ChipState.FLAGS: _of_number("flag", USER_FLAGS),
         ChipState.CARRY: _always(_value(f"flag{CARRY}")),
+        ChipState.DISTANCE: _always(),  # what a move acts by
         # Neither pins nor axes, nor what a program calculates with.
-        **dict.fromkeys((ChipState.FUNCTIONS, ChipState.DISTANCE, ChipState.SETTINGS, ChipState.HELD), _always()),
+        **dict.fromkeys((ChipState.FUNCTIONS, ChipState.SETTINGS, ChipState.HELD), _always()),
         **dict.fromkeys((ChipState.LOOPS, ChipState.CALL, ChipState.SENDING), _always()),
         **dict.fromkeys((ChipState.LISTENING, ChipState.MEMORY), _always()),
     },

@@ -14,7 +14,7 @@ from steptwin.mic488.program_banks import LoadedProgram
 from steptwin.mic488.program_registers import ACCESS
 from steptwin.mic488.status import ProgramState as Control
 from steptwin.simulation.kinds.mic488.statement_use import use_of
-from steptwin.simulation.kinds.programs import Frame, ProgramState, Statement, StatementLocation, StatementUse, Wait
+from steptwin.simulation.kinds.programs import Frame, GivenCommand, ProgramState, Statement, StatementLocation, StatementUse, Wait
 from steptwin.simulation.kinds.programtexts import bank_text
 from steptwin.statements import StatementHook
 from steptwin.wbc.dialect import Dialect
@@ -90,6 +90,9 @@ class WbcPrograms:
     @property
     def state(self) -> ProgramState:
         return _STATES[self._device.program.state]
+
+    def given(self, number: int) -> GivenCommand | None:
+        return None  # statements come from texts only
 
     def depth(self) -> int:
         return len(self._device.program.interpreter.stack)
