@@ -24,6 +24,7 @@ def value(name: str) -> Resource:
 
 
 ANY_AXIS, ANY_PIN = axis(""), pin("")
+PROGRAM = Resource(ResourceKind.PROGRAM, "")
 SIGNALS = pin("BOOST"), pin("DIRECTION"), pin("B1")
 OPERANDS = ANY_PIN, value("variable"), value("register5")
 """Of + - * /: functions 46 and 58 make lines or a register of the number."""
@@ -76,8 +77,8 @@ WBC_USES = [
     StatementUse((axis(2),), waits=True),
     StatementUse((ANY_AXIS,), waits=True),
     StatementUse(jumps=17),
-    StatementUse((), (ANY_AXIS, ANY_PIN)),
-    StatementUse((), (ANY_AXIS, ANY_PIN)),
+    StatementUse((), (ANY_AXIS, ANY_PIN, PROGRAM)),
+    StatementUse((), (ANY_AXIS, ANY_PIN, PROGRAM)),
     StatementUse((pin("IN6"),), waits=True, governs=range(20, 22)),  # an interrupt: up to its RETURN
     StatementUse((), (value("x"),)),
     StatementUse(),
@@ -86,7 +87,7 @@ WBC_USES = [
     StatementUse((), waits=True, governs=range(25, 27)),
     StatementUse((), (value("x"),)),
     StatementUse(),
-    StatementUse((), (ANY_AXIS, ANY_PIN)),  # the end
+    StatementUse((), (ANY_AXIS, ANY_PIN, PROGRAM)),  # the end
 ]
 
 
@@ -123,7 +124,7 @@ def test_statements_of_wbc() -> None:
         ("U1", StatementUse(waits=True)),
         ("I3H1", StatementUse((pin("B3"),), governs=range(1 << 16))),
         ("W100", StatementUse(waits=True)),
-        ("R", StatementUse((axis(1),), (axis(1), *SIGNALS), waits=True)),
+        ("R", StatementUse((axis(1),), (axis(1), *SIGNALS), waits=True, acts_by=(value("distance"),))),
         (")4", StatementUse((axis(1), pin("B4")), (axis(1), *SIGNALS), waits=True)),
         ("(4", StatementUse((axis(1), pin("B4")), (axis(1), *SIGNALS), waits=True)),
         ("V300", StatementUse()),
