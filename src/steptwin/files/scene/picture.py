@@ -58,7 +58,7 @@ def picture(world: Simulation, view: View, recorder: SceneRecorder | None = None
     """The text of an SVG. Raises `Misuse` as `write_picture`."""
     if recorder is None:
         recorder = SceneRecorder()
-        recorder.follow(world)
+        recorder.follow(world, ends=True)
     scene = recorder.recorded()
     if scene is None:
         raise Misuse(

@@ -149,8 +149,8 @@ class SceneRecorder:
         self._bodies: object = None
         self._stints: dict[str, list[Stint]] = {}
 
-    def follow(self, world: Simulation) -> None:
-        """Record a world from its present moment on, if it has places in space."""
+    def follow(self, world: Simulation, *, ends: bool = False) -> None:
+        """Record a world from its present moment on, if it has places in space. ``ends``: up to that moment only."""
         if not world.objects.frames:
             return
         self._world = world
@@ -162,7 +162,8 @@ class SceneRecorder:
         for scheduler in world.schedulers:
             scheduler.deadline()  # which settles it
             self._changed(scheduler)
-        world.subscribe_to_schedulers(self._changed)
+        if not ends:
+            world.subscribe_to_schedulers(self._changed)
 
     def recorded(self) -> RecordedScene | None:
         """The scene up to the present moment; None without one."""
