@@ -107,6 +107,8 @@ IS_TRUE = Message("why.is-true", "{name} is true")
 IS_FALSE = Message("why.is-false", "{name} is false")
 IS_IN_UNIT = Message("why.is-in-unit", "{name} is {value:.6g} {unit}")
 DOES_NOT_WAIT = Message("why.does-not-wait", "{controller} does not wait: {statement}")
+SCRIPT_WAITS = Message("why.script-waits", "script {name} waits until {condition}: that is false")
+SCRIPT_DOES_NOT_WAIT = Message("why.script-does-not-wait", "script {name} waits for no condition at {at:g} s: ask about a signal")
 PROGRAM_IS = Message("why.program-is", "{controller}: {held}")
 BECOMES_TRUE = Message("why.becomes-true", "it becomes true at {time:.6f} s if nothing comes from outside")
 ONLY_FROM_OUTSIDE = Message(
@@ -180,6 +182,8 @@ class Why:
         self._causes = Causes(self.log)  # programs may be others by now
         if _without_not(text) in self.log.world.controllers:
             return (yield from self._wait(_without_not(text), moment))
+        if self._is_script(text):
+            return (yield from self._script(text, moment))
         variable = self._variable(text)
         if variable is not None:
             return (yield from self._of_variable(text, *variable, moment))
@@ -198,7 +202,9 @@ class Why:
         """The change that `LastChanges` searches for; None for a controller, for a bare quantity that moves all the time, and for
         `idle`. Raises `Misuse`."""
         text = _text_of(question)
-        if not text or _without_not(text) in self.log.world.controllers or self._variable(text) is not None:
+        if not text or self._is_script(text):
+            return None
+        if _without_not(text) in self.log.world.controllers or self._variable(text) is not None:
             return None
         text = self._named(text)
         names = tuple(dict.fromkeys(parse_condition(text).names()))
@@ -642,6 +648,19 @@ class Why:
         other, name = (yield from self._world_at(at)), f"{axis}.position"
         text = IS_IN_UNIT(name=name, value=other.read(name), unit=other.signal(name).unit)
         return Cause(ChainLink(at, axis, text), Place(at, LAST, -1), lambda: covered(cause, Cover.LEVEL))
+
+    def _is_script(self, name: str) -> bool:
+        """Whether it is the name of a script, and of no signal."""
+        return any(one.name == name for one in self.log.world.spec.scripts) and not self._has(name)
+
+    def _script(self, name: str, at: Nanos) -> Asking:
+        """Cause for which a script waits: what its condition depends on."""
+        other = yield from self._world_at(at)
+        waiting = next((one.waiting for one in other.scripts if one.name == name), None)
+        if waiting is None or not waiting.condition:
+            raise Misuse(SCRIPT_DOES_NOT_WAIT(name=name, at=at / SECOND))
+        answer = yield from self._condition(waiting.condition, at)
+        return answer._replace(question=name, state=SCRIPT_WAITS(name=name, condition=waiting.condition))
 
     def _present(self, at: Nanos) -> Generator[None, None, PresentStates]:
         most = MOST_SNAPSHOTS if self._most_links == MOST_LINKS else ALL_LINKS
