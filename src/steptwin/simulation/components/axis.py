@@ -403,7 +403,7 @@ def moved_by(axis: BuiltAxis) -> tuple[str, str]:
 
 
 def _moves(spec: AxisSpec, axis: BuiltAxis) -> Sequence[Movement]:
-    blocks, sources = (axis.mechanism.block,), moved_by(axis)
+    blocks, sources = (axis.mechanism.block,), (spec.name,)
     if spec.kind == "rotary":
         degrees = degrees_per_unit(axis)
         motion = load_motion(axis, degrees / 90 / axis.scale.pulses_per_unit)

@@ -112,6 +112,7 @@ class Mechanism(Stateful):
         "_power",
         "_revision",
         "_scheduler",
+        "_seen",
         "build",
         "controller",
         "number",
@@ -187,6 +188,8 @@ class Mechanism(Stateful):
         self._rest_due: Nanos | None = None
         """When a coasting rotor that moves comes to rest."""
         self._changes = 0
+        self._seen: object = None
+        """The version of its trajectory of which what moves with it was notified."""
         self._reported: tuple[LoadSection, ...] | None = (LoadSection(scheduler.now, True, 0),)
         """The position of the load as reported last; None while it moves freely."""
         self._reported_trajectory: Trajectory | None = None
@@ -242,24 +245,32 @@ class Mechanism(Stateful):
 
     def update(self, now: Nanos) -> None:
         if not self._simple:
-            if self._power is not None:
-                self._switch(self._scheduler.level(self._power) != 0.0, now)
-            drive = self._drive
-            if drive.revision != self._revision or (self._hold is not None and self._hold.is_switched(drive, now)):
+            self._follow(now)
+        version = self.version()
+        if version != self._seen:
+            self._seen = version
+            self._scheduler.notify(self._name)
+
+    def _follow(self, now: Nanos) -> None:
+        """Process what may change its trajectory, and report it."""
+        if self._power is not None:
+            self._switch(self._scheduler.level(self._power) != 0.0, now)
+        drive = self._drive
+        if drive.revision != self._revision or (self._hold is not None and self._hold.is_switched(drive, now)):
+            self._renew(drive, now)
+            self._scheduler.notify(self.controller)  # switches on it look ahead
+        elif self._due is not None and self._due <= now:
+            self._turn_encoders(now)
+        if self._stall_due is not None and self._stall_due <= now:
+            self._watch_motor(now)
+            if self._lets_go(now):
                 self._renew(drive, now)
-                self._scheduler.notify(self.controller)  # switches on it look ahead
-            elif self._due is not None and self._due <= now:
-                self._turn_encoders(now)
-            if self._stall_due is not None and self._stall_due <= now:
-                self._watch_motor(now)
-                if self._lets_go(now):
-                    self._renew(drive, now)
-                    self._scheduler.notify(self.controller)
-            if self._stop_due is not None and self._stop_due <= now:
-                self._watch_stops(now)
-            if self._rest_due is not None and self._rest_due <= now:
-                self._watch_fall(now, None)
-            self._report_load(now)
+                self._scheduler.notify(self.controller)
+        if self._stop_due is not None and self._stop_due <= now:
+            self._watch_stops(now)
+        if self._rest_due is not None and self._rest_due <= now:
+            self._watch_fall(now, None)
+        self._report_load(now)
 
     def _report_load(self, now: Nanos) -> None:
         """Report the position of the load, unless it follows from earlier reports or from the plan of the drive."""
