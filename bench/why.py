@@ -1,9 +1,10 @@
-"""Questions with `why`: the first one about a past, those about what never changed, and the same again; of sessions and in a
-debugger."""
+"""Questions with `why`: the first one about a past, those about what never changed, and the same again; of sessions, in a
+debugger, and of the examples as shares of their runs."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from time import process_time
 
 from steptwin.controller import SECOND
@@ -11,6 +12,7 @@ from steptwin.debug.debugger import Debugger
 from steptwin.files.world import World
 
 GOAL_S = 0.1
+EXAMPLES = Path(__file__).parents[1] / "examples/worlds"
 MOVES = (
     "M1 = ON\nn = 0\nMAIN:\n"
     "    n = n + 1\n    $I4 = n\n    PABS M1 500\n    WAITPOS\n    OUT1 = ON\n    PABS M1 0\n    WAITPOS\n    OUT1 = OFF\n"
@@ -68,8 +70,32 @@ def debugger(name: str, program: str) -> None:
     measure(name, debugger.why)
 
 
+def examples() -> None:
+    """As ``steptwin run --why``, and as ``steptwin why`` of a recording."""
+    for path in sorted(EXAMPLES.glob("*/*.toml")):
+        world = World.load(path)
+        world.keep_states()
+        run = seconds(lambda world=world: world.run(for_=40.0))
+        again = World.load(path)
+        again.run(for_=40.0)
+        name = next(iter(world.controllers))
+        shares: list[str] = []
+        programs = [owner for owner, one in world.programs.items() if one.texts]
+        for question in (*programs[:1], f"{name}.OUT1", f"{name}.IN1"):
+            kept, replayed = (seconds(lambda one=one, question=question: one.why(question)) for one in (world, again))
+            shares.append(f"{question} {kept:.2f} s, {kept / run:.2f} of the run (of a recording {replayed / run:.2f})")
+        print(f"{path.stem}: 40 s took {run:.2f} s; {'; '.join(shares)}")
+
+
+def seconds(do: Callable[[], object]) -> float:
+    begin = process_time()
+    do()
+    return process_time() - begin
+
+
 def main() -> None:
     session("300 s, moves", MOVES)
     session("300 s, calculates", CALCULATES)
     debugger("debugger, 1 000 000 statements that calculate", ONLY)
     debugger("debugger, 1 000 000 statements, some of which act", ACTS)
+    examples()
