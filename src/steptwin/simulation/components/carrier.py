@@ -12,6 +12,7 @@ from steptwin.simulation.components.logic import Joint, TerminalComponent, Termi
 from steptwin.simulation.components.mount import MountSpec
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.workpiece import Workpiece
+from steptwin.simulation.scheduler.scheduledparts import Depends
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.table import key, table
 from steptwin.simulation.toml.values import OUTPUT_PIN, NameOf, Terminal, number
@@ -89,7 +90,7 @@ class Grip(Protocol):
         ...
 
     @property
-    def depends_on(self) -> tuple[str, ...] | None:
+    def depends_on(self) -> Depends:
         """As `TerminalComponent.depends_on`."""
         ...
 
@@ -120,7 +121,7 @@ class Carrier(TerminalComponent):
         self.grip = grip
 
     @property
-    def depends_on(self) -> tuple[str, ...] | None:
+    def depends_on(self) -> Depends:
         return self.grip.depends_on
 
     def is_occupied(self, now: Nanos) -> bool:

@@ -113,9 +113,9 @@ class Grasp(Stateful):
         return min((change for change in changes if change is not None), default=None)
 
     @property
-    def depends_on(self) -> None:
-        """Any change: workpieces may be anywhere."""
-        return None
+    def depends_on(self) -> Callable[[], Iterable[str]]:
+        """What changes where it is, or where workpieces are, when all that has some is there."""
+        return lambda: (*self.sources, *self._workpieces.sources)
 
     # ------------------------------------------------------------------ holding
 

@@ -30,6 +30,7 @@ from steptwin.simulation.logic.curve import Stepped
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.motor import Burden
 from steptwin.simulation.mechanics.scale import Loading, burden_of
+from steptwin.simulation.scheduler.scheduledparts import Depends
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
@@ -115,7 +116,7 @@ class FurtherLoad(TerminalComponent):
         """Fault: how much of it there is instead of all."""
 
     @property
-    def depends_on(self) -> tuple[str, ...] | None:
+    def depends_on(self) -> Depends:
         """All, with a condition or a curve: they may be over anything."""
         return super().depends_on if self._condition is None and self._curve is None else None
 

@@ -22,6 +22,7 @@ from steptwin.simulation.kinds.kind import Terminals
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.channels import MovedChannel
 from steptwin.simulation.mechanics.drawing import Drawing
+from steptwin.simulation.scheduler.scheduledparts import Depends
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.scheduler.wires import PinName, Wire
 from steptwin.simulation.toml.keypaths import Path
@@ -68,8 +69,8 @@ class TerminalComponent(Stateful, ABC):
         self.block = block
 
     @property
-    def depends_on(self) -> tuple[str, ...] | None:
-        """The controllers and elements whose changes concern it; None: all."""
+    def depends_on(self) -> Depends:
+        """The controllers and elements whose changes concern it."""
         return (self.block.name,)
 
     @property

@@ -434,5 +434,5 @@ def resting_of(context: ElementContext, scheduler: Scheduler) -> Resting:
         belt.conveyor.drop = partial(made.drop_from, belt)
     workpieces.holders.append(made)
     workpieces.falling = made.falling
-    scheduler.add_part(made, None, WORKPIECES)
+    scheduler.add_part(made, lambda: workpieces.sources, WORKPIECES)
     return made

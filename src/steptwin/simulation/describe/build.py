@@ -159,8 +159,7 @@ class _Builder:
         if not self.spec.text.findings:
             self.context.close_circuits()
             for number, scheduler in enumerate(self.objects.schedulers):
-                if order := self.blueprint.memo.once(("order", number), scheduler.order):
-                    scheduler.arrange(order)
+                scheduler.arrange(self.blueprint.memo.once(("order", number), scheduler.order))
 
     def _place_elements(self) -> None:
         """Give elements their places in space, after all were built."""

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from typing import TypeAlias
 
 from steptwin.simulation.scheduler.deadlines import Deadlines
 from steptwin.simulation.scheduler.order import successors, update_order
 from steptwin.simulation.scheduler.runqueue import RunQueue
 from steptwin.simulation.scheduler.scheduledpart import ScheduledPart
 from steptwin.simulation.scheduler.wires import Wire
+
+Depends: TypeAlias = "Iterable[str] | Callable[[], Iterable[str]] | None"
+"""Names of controllers, lines and elements. A function gives them when all parts are there; None: everything."""
 
 
 class ScheduledParts:
@@ -23,10 +27,10 @@ class ScheduledParts:
         self.parts: list[ScheduledPart] = []
         self.by_name: dict[str, list[int]] = {}
         """The parts that depend on a controller, a line or an element, by its name."""
-        self._depends_on: list[tuple[str, ...] | None] = []
-        """The names on which each part depends; None: everything."""
+        self._depends_on: list[tuple[str, ...] | Callable[[], Iterable[str]] | None] = []
+        """What each part depends on."""
         self.all: list[int] = []
-        """Those that depend on everything."""
+        """Those that depend on everything, or until `resolve` on what is not known."""
         self.computes: list[str | None] = []
         """The line or element whose signals each part computes."""
         self._drives: dict[int, str] = {}
@@ -37,21 +41,33 @@ class ScheduledParts:
         self.visited: set[int] = set()
         """Those whose deadlines may have changed since the signals last settled."""
 
-    def add(self, part: ScheduledPart, depends_on: Iterable[str] | None, computes: str | None, drives: str | None) -> int:
-        """The number of another part, the last one. ``depends_on``: None is everything."""
+    def add(self, part: ScheduledPart, depends_on: Depends, computes: str | None, drives: str | None) -> int:
+        """The number of another part, the last one."""
         number = len(self.parts)
         self.parts.append(part)
         self.computes.append(computes)
         if drives is not None:
             self._drives[number] = drives
-        dependencies = None if depends_on is None else tuple(dict.fromkeys(depends_on))
-        self._depends_on.append(dependencies)
-        if dependencies is None:
+        if depends_on is None or callable(depends_on):
+            self._depends_on.append(depends_on)
             self.all.append(number)
         else:
-            for name in dependencies:
-                self.by_name.setdefault(name, []).append(number)
+            names = tuple(dict.fromkeys(depends_on))
+            self._depends_on.append(names)
+            self._run_after(names, number)
         return number
+
+    def _run_after(self, names: Iterable[str], number: int) -> None:
+        for name in names:
+            self.by_name.setdefault(name, []).append(number)
+
+    def resolve(self) -> None:
+        """All parts are there, in their order: find what those depend on of which that was not known."""
+        for number in tuple(self.all):
+            depends_on = self._depends_on[number]
+            if callable(depends_on):
+                self.all.remove(number)
+                self._run_after(dict.fromkeys(depends_on()), number)
 
     def order(self, wires: Iterable[Wire]) -> Sequence[int]:
         """Their numbers in the order in which they should be updated; empty if they are in that order."""

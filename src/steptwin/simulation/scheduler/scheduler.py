@@ -28,7 +28,7 @@ from steptwin.simulation.scheduler.deadlines import Deadlines
 from steptwin.simulation.scheduler.recordedplans import RecordedPlans
 from steptwin.simulation.scheduler.runqueue import RunQueue
 from steptwin.simulation.scheduler.scheduledpart import ScheduledPart
-from steptwin.simulation.scheduler.scheduledparts import ScheduledParts
+from steptwin.simulation.scheduler.scheduledparts import Depends, ScheduledParts
 from steptwin.simulation.scheduler.schedulerstate import SchedulerState
 from steptwin.simulation.scheduler.subscribers import SchedulerSubscriber, SchedulerSubscribers
 from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
@@ -231,14 +231,14 @@ class Scheduler:
         self.terminal_blocks[block.name] = block
 
     def add_part(
-        self, part: ScheduledPart, depends_on: Iterable[str] | None = None, name: str | None = None, drives: str | None = None
+        self, part: ScheduledPart, depends_on: Depends = None, name: str | None = None, drives: str | None = None
     ) -> None:
         """Add a part; it is first updated when the signals settle next, then whenever it is due or something that it depends on
         has changed.
 
-        ``depends_on``: names of controllers, lines and elements; None: every change. ``name``: the line or element whose signals
-        it computes; they may change with each of its updates, and only then. ``drives``: the controller or element whose input
-        it drives.
+        ``depends_on``: names of controllers, lines and elements, or what gives them in `arrange`; None: every change. ``name``:
+        the line or element whose signals it computes; they may change with each of its updates, and only then. ``drives``: the
+        controller or element whose input it drives.
         """
         self._join()
         number = self._parts.add(part, depends_on, name, drives)
@@ -255,9 +255,12 @@ class Scheduler:
         return self._parts.order(self.wires)
 
     def arrange(self, order: Sequence[int]) -> None:
-        """Update its parts in another order from now on, before the first moment. ``order``: their present numbers."""
-        self._parts = self._parts.arranged(order)
-        self.notify()
+        """Update its parts in another order from now on, before the first moment, when all are there. ``order``: their present
+        numbers; empty if they are in that order."""
+        if order:
+            self._parts = self._parts.arranged(order)
+            self.notify()
+        self._parts.resolve()
 
     def source(self, name: str) -> Source:
         """The controller, line or element ``name`` as what a value depends on."""
