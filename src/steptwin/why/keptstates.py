@@ -15,7 +15,7 @@ from steptwin.simulation.world.snapshotlog import (
 )
 from steptwin.why.pastquestions import first_span
 
-STATES_OF_A_SPAN = 5
+STATES_OF_A_SPAN = 10
 """So many are kept in the time that is searched first."""
 
 
