@@ -64,6 +64,17 @@ def test_parts_keep_what_they_watch_when_they_are_numbered_anew() -> None:
     assert found.order([]) == ()
 
 
+def test_what_a_part_depends_on_may_be_known_later_and_leaves_the_order_as_it_is() -> None:
+    parts, holders = ScheduledParts(), ["a"]
+    parts.add(Clock(1), lambda: holders, None, None)
+    parts.add(Clock(2), ["b"], None, None)
+    found = parts.arranged(parts.order([]))
+    holders.append("b")
+    assert (found.all, found.by_name) == ([1], {"b": [0]})
+    found.resolve()
+    assert (found.all, found.by_name) == ([], {"a": [1], "b": [0, 1]})
+
+
 @pytest.mark.parametrize("is_settled", [False, True])
 def test_each_part_has_its_own_deadlines_when_they_are_numbered_anew(is_settled: bool) -> None:
     scheduler, clocks = Scheduler(), [Clock(period * MILLISECOND) for period in (2, 3, 5)]
