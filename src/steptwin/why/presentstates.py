@@ -115,8 +115,8 @@ class PresentStates:
         return IS_STILL(name=resource.name, value=value, time=written.place.time / SECOND)
 
     def _not_written(self, signal: str) -> _Links:
-        """Wait that stands between a program and an output that it can change. Returns what it waits for, or the supply that its
-        controller lacks."""
+        """Wait that stands between a program and an output that it can change, or what holds the program. Returns what it waits
+        for, or the supply that its controller lacks."""
         owner, _, pin = signal.partition(".")
         log, programs, at = self._log, self._causes.programs, self._at
         if owner not in self._world.controllers or self._causes.drivers(signal, at):
@@ -124,6 +124,13 @@ class PresentStates:
         supply = f"{self._world.objects.supplied.get(owner, '')}.good"
         if log.has(supply) and not log.level(supply, at):
             return [supply]
+        held = programs.held(owner, at)
+        if held is not None:
+            yield held.link
+            by = held.before()
+            if by is not None:
+                yield by.link
+            return ()
         index = log.last_executed(owner, at)
         if index < 0 or not programs.leads_to(owner, index, Resource(ResourceKind.PIN, pin)):
             return ()
@@ -132,7 +139,7 @@ class PresentStates:
         if against is not None:
             yield against.link
             return [(owner, one) for one in programs.use(owner, (against.place.number - 2) // 3).reads]
-        if not use.waits or programs.held(owner, at) is not None or at - here.time <= self._world.programs[owner].statement_time:
+        if not use.waits or at - here.time <= self._world.programs[owner].statement_time:
             return ()
         yield ChainLink(at, owner, WAITS(controller=owner, statement=statement(log, here)))
         return [(owner, one) for one in use.reads]
