@@ -160,6 +160,17 @@ def test_a_draft_outlives_the_page(studio: Studio) -> None:
     expect(text_of(page)).to_contain_text("// kept")
     expect(page.get_by_text("The text differs from what is in the twin.")).to_be_visible()
 
+    # Of two tabs with it the one in which it was changed first keeps it; the other one says that.
+    text_of(page).click()
+    page.keyboard.type("// of the first")
+    until(lambda: "// of the first" in page.evaluate(kept), "the browser has the draft")
+    other = page.context.new_page()
+    other.goto(page.url)
+    text_of(other).click()
+    other.keyboard.type("// of the second")
+    expect(other.get_by_text("Another tab")).to_be_visible()
+    assert "// of the second" not in page.evaluate(kept)
+
 
 def test_positions_are_taught(studio: Studio) -> None:
     page = studio.page(panel="Program")

@@ -11,10 +11,12 @@ export function restore<T>(key: string, version: number, isWhole: (value: unknow
   }
 }
 
-export function keep(key: string, version: number, value: unknown): void {
+/** Gives whether there is a storage, with room; the page works without it. */
+export function keep(key: string, version: number, value: unknown): boolean {
   try {
     localStorage.setItem(`steptwin.${key}`, JSON.stringify({ version, value }));
+    return true;
   } catch {
-    // No storage, or no room: the page works without it.
+    return false;
   }
 }

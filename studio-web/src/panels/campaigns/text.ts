@@ -4,7 +4,7 @@ export const t = texts(
   {
     title: "Campaigns",
     none: "No campaign of this machine is in the folder of its description. Such a file, campaign.toml, has one:",
-    noFile: "No campaigns here: start the studio with the file of a machine.",
+    noFile: "No campaigns here: they need the file of a machine, and steptwin studio on a computer with it.",
     meaning:
       "A campaign runs this machine many times, each time a little different, and says how often each property held.",
     runs: "{done} of {total} runs",
@@ -36,7 +36,7 @@ export const t = texts(
   {
     title: "Kampanie",
     none: "W katalogu opisu tej maszyny nie ma kampanii. Taki plik, campaign.toml, ją opisuje:",
-    noFile: "Nie ma tu kampanii: uruchom studio z plikiem maszyny.",
+    noFile: "Nie ma tu kampanii: potrzebują pliku maszyny, a z nim steptwin studio na komputerze.",
     meaning:
       "Kampania uruchamia tę maszynę wiele razy, za każdym razem nieco inną, i podaje, jak często każda własność zachodziła.",
     runs: "{done} z {total} przebiegów",

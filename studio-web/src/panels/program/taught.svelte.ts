@@ -1,5 +1,6 @@
 import type { Studio } from "../../lib/state/studio.svelte";
-import { draftOf, keepDraft } from "./drafts";
+import { draftOf, keepDraft, ownDrafts } from "./drafts";
+import { t } from "./text";
 import { withRow } from "./rows";
 
 export interface Taught {
@@ -34,7 +35,8 @@ interface Table {
 /** A row gets into the text of a table that is not in an editor; it stays a draft until it is downloaded. */
 export async function teachDraft(studio: Studio, table: Table, { name, row }: Taught): Promise<void> {
   const world = studio.model.name;
+  if (!(await ownDrafts(world))) throw new Error(t("draftsElsewhere"));
   const { text } = await studio.ask("program_text", { controller: table.controller, place: table.place });
   const [changed] = withRow(draftOf(world, table.address) ?? text, name, row);
-  keepDraft(world, table.address, changed === text ? null : changed);
+  if (!keepDraft(world, table.address, changed === text ? null : changed)) throw new Error(t("draftsFull"));
 }

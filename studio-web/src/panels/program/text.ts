@@ -19,6 +19,9 @@ export const t = texts(
     openFile: "Open file…",
     saveFile: "Save as file",
     close: "Close",
+    draftsElsewhere:
+      "Another tab with this machine has changed its texts: what is typed here lasts until it is downloaded or this tab is closed.",
+    draftsFull: "The browser has no room for this text: it lasts until it is downloaded or this tab is closed.",
     noHelp: "The editor server cannot be reached: no help while typing, and no findings.",
     mayNot: "This role may read programs, not change them.",
     teach: "Take position",
@@ -153,6 +156,9 @@ export const t = texts(
     openFile: "Otwórz plik…",
     saveFile: "Zapisz jako plik",
     close: "Zamknij",
+    draftsElsewhere:
+      "W innej karcie z tą maszyną zmieniono jej teksty: tekst wpisany tutaj zostaje do wgrania albo zamknięcia tej karty.",
+    draftsFull: "Przeglądarka nie ma miejsca na ten tekst: zostaje on do wgrania albo zamknięcia tej karty.",
     noHelp: "Brak połączenia z serwerem edytora: nie ma pomocy przy pisaniu ani uwag.",
     mayNot: "Ta rola może czytać programy, ale nie zmieniać.",
     teach: "Pobierz pozycję",
