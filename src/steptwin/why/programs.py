@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 from steptwin.controller import MILLISECOND, Nanos
@@ -232,8 +232,9 @@ class ProgramCauses:
         link = ChainLink(place.time, controller, how(statement=statement(self._log, executed)))
         if how is ENDED:
             return Cause(link, place, partial(self._of_wait, controller, index, place), Cover.PROGRAM)
-        first, *others = self._of_decision(controller, index, place) or (None,)
-        return Cause(link, place, lambda: first, Cover.PROGRAM, lambda: [one for one in others if one is not None])
+        led = cache(partial(self._of_decision, controller, index, place))
+        besides = lambda: [one for one in led()[1:] if one is not None]  # noqa: E731
+        return Cause(link, place, lambda: led()[0], Cover.PROGRAM, besides)
 
     def _did_not_wait(self, controller: str, index: int) -> Cause:
         """A wait for something that was there already: for that, or for what led to the wait, whichever came later."""
