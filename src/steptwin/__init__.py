@@ -12,7 +12,7 @@ from steptwin.errors import LineFailure, Misuse, Refusal, SteptwinError
 if TYPE_CHECKING:
     from steptwin.files.world import World
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"
 
 __all__ = ["LineFailure", "Misuse", "Refusal", "SteptwinError", "World", "__version__"]
 
