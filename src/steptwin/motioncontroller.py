@@ -43,6 +43,11 @@ class MotionController(Controller, Protocol):
     """Hook: called whenever the next deadline, an output or a plan may have changed."""
 
     @property
+    def now(self) -> Nanos:
+        """The moment that it has reached."""
+        ...
+
+    @property
     def axes(self) -> Sequence[Drive]:
         """The drives, the same objects throughout."""
         ...

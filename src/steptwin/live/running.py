@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import sys
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -132,7 +132,7 @@ def send_away(world: World) -> None:
 async def _serve(
     options: UpOptions,
     world: World,
-    past: Sequence[TraceRecord],
+    past: list[TraceRecord],
     kept: Kept,
     reports: CoverageReports,
     addition: Addition | None,
@@ -141,6 +141,7 @@ async def _serve(
         output = options.log.output()
         stack.callback(output.close)
         stack.enter_context(options.log.tracing(world.spec.name, output.notice))
+        world.trace.subscribers.append(past.append)  # controllers may act while links are opened
         live = LiveWorld(world)
         realtime = RealTimeDriver(live, Clock(begin=world.now))
         quiet = addition is not None
@@ -156,6 +157,7 @@ async def _serve(
             recorder = _recorder(live, kept)
             begun = True
             head = banner(world, server.end_points, remarks_on(world, listen_any=options.live.listen_any))
+            world.trace.subscribers.remove(past.append)
             display.begin(head, server.announcement(), past)
             pace.begin(read_speed(options.live.speed, least=0))
             await display.show(server)

@@ -311,7 +311,8 @@ class M1486Chip(Stateful):
     def set_pin(self, pin: str, value: float, now: Nanos) -> None:
         """Pull a pin low (0) or let it go high (1) from outside: B1–B21, JOG, LIMIT, SD, RST, S&D, DUAL."""
         name = settable_pin(pin, value)
-        self.advance(now)
+        if now > self.now:  # at the beginning, lines have their levels before the first command
+            self.advance(now)
         level = int(value)
         if name in LINE_PINS:
             self.io.set_external(LINE_PINS[name], level, now)

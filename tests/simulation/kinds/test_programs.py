@@ -73,9 +73,8 @@ def test_statements_of_wbc_are_reported_with_their_lines_and_a_wait_once() -> No
 def test_commands_of_an_m1486_are_reported_with_their_lines() -> None:
     world = two()
     rows = [(time, line) for time, controller, _, line in executed(world, 0.012) if controller == "c"]
-    # The first command is done at power-on, before anybody can follow.
-    lines = [4, 5, 6, 5, 6, 7, 11, 12, 8]
-    assert rows == [(n * MILLISECOND, line) for n, line in enumerate(lines, start=1)]
+    lines = [2, 4, 5, 6, 5, 6, 7, 11, 12, 8]
+    assert rows == [(n * MILLISECOND, line) for n, line in enumerate(lines)]
 
 
 def test_the_programs_of_a_world() -> None:
@@ -125,11 +124,22 @@ def test_what_is_reached(name: str, text: str, starts: list[int], reached: Itera
 def test_what_has_begun_before_anybody_could_look() -> None:
     world = two()
     mic, chip = world.programs["m"], world.programs["c"]
+    world.sync_all()
     assert (mic.begun(0), chip.begun(0)) == ((), (0,))
     assert (mic.statement_time, chip.statement_time) == (MILLISECOND, MILLISECOND)
     assert chip.begun(1) == ()
     world.run_to(3 * MILLISECOND)
     assert (mic.begun(world.now), chip.begun(world.now)) == ((), ())
+
+
+def test_pins_have_their_levels_before_the_first_statement() -> None:
+    """A line of a chip is high by itself; a button that nobody presses holds it low."""
+    buttons = '[[button]]\nname = "go"\nto = "c.B3"\n[[button]]\nname = "on"\nto = "m.IN1"\n'
+    texts = {"m.prg": b"WAIT IN1 = ON\nOUT1 = ON\n", "c.m1486": b"[\nO3\nT5\nC5\n]\n"}
+    world = World.from_toml(WORLD + buttons, texts)
+    world.run_to(SECOND)
+    waits = [programs.wait(world.now) for programs in world.programs.values()]
+    assert [(wait.location.text, wait.location.number) for wait in waits if wait] == [("program 0", 0), ("program", 0)]
 
 
 def test_calls_come_back_and_loops_do_not() -> None:

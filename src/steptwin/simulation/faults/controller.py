@@ -161,6 +161,10 @@ class FaultyController(Stateful):
     # ------------------------------------------------------------------ the controller's own
 
     @property
+    def now(self) -> Nanos:
+        return self.inner.now
+
+    @property
     def axes(self) -> Sequence[Drive]:
         return self.inner.axes
 

@@ -199,7 +199,7 @@ class Scheduler:
         """Add a controller and set its ``changed`` hook. Raises `TimeReversal` if its time is after the scheduler's."""
         if name in self.controllers:
             raise Misuse(CONTROLLER_IS_THERE(name=name))
-        if not self.is_blank:
+        if not self.is_blank and controller.now != self.now:  # at its beginning, circuits set its pins before its first statement
             controller.advance(self.now)
         self.controllers[name] = controller
         self._numbers[name] = len(self._names)
