@@ -168,7 +168,7 @@ class AxisCauses:
         if self.motion(controller, number, until) is not None:
             return None
         ignored = self.ignored(controller, number, until)
-        if ignored is not None:
+        if ignored is not None or not self._log.is_whole:
             return ignored
         begin = self._log.begin
         text = NOTHING_HAS_COMMANDED(axis=f"{controller}.M{number}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 from steptwin.controller import SECOND, Nanos
@@ -11,7 +12,7 @@ from steptwin.motion.divisions import profile_of
 from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementUse
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.why.answer import ChainLink
-from steptwin.why.causes import Causes
+from steptwin.why.causes import IS, Causes
 from steptwin.why.sentences import statement
 
 WAITS = Message("why.waits", "{controller} waits at {statement}")
@@ -92,9 +93,9 @@ class PresentStates:
             return [f"{controller}.{resource.name}"]
         if resource.kind is ResourceKind.AXIS:
             motion = self._causes.axes.motion(controller, resource.name, self._at)
-            if motion is None:
+            if motion is None and self._log.is_whole:
                 yield ChainLink(self._at, controller, NO_AXIS_HAS_MOVED(time=self._at / SECOND))
-            else:
+            elif motion is not None:
                 yield motion.link
             return (yield from self.motion(controller, resource.name))
         yield ChainLink(self._at, controller, self._value(controller, resource))
@@ -111,7 +112,7 @@ class PresentStates:
             return DEPENDS_ON(name=resource.name or ANY_PIN())
         written = self._causes.programs.resource(controller, resource, self._log.last_executed(controller, at) + 1, at)
         if written is None:
-            return IS_NOT_SET(name=resource.name, value=value)
+            return IS_NOT_SET(name=resource.name, value=value) if self._log.is_whole else IS(signal=resource.name, value=value)
         return IS_STILL(name=resource.name, value=value, time=written.place.time / SECOND)
 
     def _not_written(self, signal: str) -> _Links:
@@ -126,7 +127,7 @@ class PresentStates:
             return [supply]
         held = programs.held(owner, at)
         if held is not None:
-            yield held.link
+            yield held.link if held.place.order >= 0 or log.is_whole else replace(held.link, time=at)
             by = held.before()
             if by is not None:
                 yield by.link

@@ -329,7 +329,8 @@ class ProgramCauses:
         if change is None or change.state is ProgramState.RUNS:
             return None
         if change.order < 0:
-            return Cause(ChainLink(change.time, controller, NOT_STARTED()), Place(change.time), self._all.at_begin, Cover.LEVEL)
+            text = NOT_STARTED() if self._log.is_whole else HELD[change.state](where="")
+            return Cause(ChainLink(change.time, controller, text), Place(change.time), self._all.at_begin, Cover.LEVEL)
         where = ""
         index = self._log.last_executed(controller, change.time)
         if change.state is not ProgramState.STOPPED and index >= 0:

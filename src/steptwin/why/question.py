@@ -128,6 +128,7 @@ VARIABLE_OF_A_PROGRAM = Message(
 NOTHING_EXECUTED_YET = Message(
     "why.nothing-executed-yet", "{controller} has executed no statement until {at:g} s: ask about one of its signals"
 )
+NOTHING_EXECUTED_SINCE = Message("why.nothing-executed-since", "{controller} has executed no statement since {begin:g} s")
 
 
 class Why:
@@ -569,8 +570,11 @@ class Why:
             since = held.link.time if held.place.order >= 0 else None
             first = held if since is None else covered(held.before(), Cover.LEVEL)
             return (yield from self._answer(controller, at, PROGRAM_IS(controller=controller, held=held.link.text), since, first))
-        if index < 0:
+        if index < 0 and log.is_whole:
             raise Misuse(NOTHING_EXECUTED_YET(controller=controller, at=at / SECOND))
+        if index < 0:
+            state = NOTHING_EXECUTED_SINCE(controller=controller, begin=log.begin / SECOND)
+            return (yield from self._answer(controller, at, state, None, None))
         executed = log.executed[controller]
         here = executed[index]
         use = causes.programs.use(controller, index)
@@ -582,7 +586,7 @@ class Why:
             first = covered(causes.programs.statement(controller, index), Cover.PROGRAM)
             return self._after(links, (yield from self._answer(controller, at, state, since, first)))
         found = {one: cause for one in use.reads if (cause := causes.programs.resource(controller, one, index, at))}
-        others = [cause._replace(cover=Cover.LEVEL) for one, cause in found.items() if one.kind is not ResourceKind.PIN]
+        others = [cause._replace(cover=Cover.LEVEL) for one, cause in found.items() if not self._is_held(controller, one, at)]
         changed = [cause for cause in found.values() if cause.link.time > here.time]
         last = max(changed, key=lambda cause: cause.link.time, default=None)
         pins = [f"{controller}.{resource.name}" for resource in use.reads if resource.kind is ResourceKind.PIN and resource.name]
@@ -594,6 +598,12 @@ class Why:
         )
         answer = yield from self._answer(controller, at, WAITS(controller=controller, statement=text), since, first)
         return self._after(links, answer)
+
+    def _is_held(self, controller: str, resource: Resource, at: Nanos) -> bool:
+        """Whether a fault holds a pin, or what drives it: the run without the fault proves it."""
+        pin = [f"{controller}.{resource.name}"] if resource.kind is ResourceKind.PIN else []
+        holds = [self.log.hold(name, at) for name in self._behind(pin, at) if self._is_signal(name)]
+        return any(hold is not None for hold in holds)
 
     def _after(self, states: Sequence[ChainLink], answer: Answer) -> Answer:
         """An answer after present states."""
