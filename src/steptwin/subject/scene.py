@@ -52,7 +52,7 @@ class BodyDescription:
 
 @dataclass(frozen=True, slots=True)
 class OriginDescription:
-    """What the workpieces look like that come from an element, whose names begin with its name and a point."""
+    """Look of the workpieces that come from an element; their names begin with its name and a point."""
 
     name: str
     shape: Annotated[str | None, "Within their size: bottle, wheel ..."]

@@ -172,7 +172,7 @@ class ElementCauses:
         return found[best]._replace(along=tuple(others))
 
     def _urgency(self, signal: str, cause: Cause, change: Change) -> tuple[bool, bool, Place]:
-        """Of several causes, the one with the highest decides."""
+        """The highest decides among several causes."""
         owner = signal.rpartition(".")[0]
         drive = self._world.axes[owner].spec.drive if owner in self._world.axes else None
         moves = drive is not None and self._all.axes.is_moving(drive[0], drive[1].removeprefix("M"), change.time)

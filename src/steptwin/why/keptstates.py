@@ -48,7 +48,7 @@ class KeptStates:
         return state
 
     def changed(self, after: Nanos, until: Nanos) -> frozenset[Changed]:
-        """What has changed between two moments, or at most a state later."""
+        """Names of all that has changed between two moments, or at most a state later."""
         found, state = set[Changed](), self._states.after(after)
         while state is not None:
             found |= state.changed

@@ -88,7 +88,7 @@ class PresentStates:
         return (*self._causes.drivers(name, self._at), *others)
 
     def _resource(self, controller: str, resource: Resource) -> _Links:
-        """What a statement waits for."""
+        """Links and signals of the thing that a statement waits for."""
         if resource.kind is ResourceKind.PIN and resource.name:
             return [f"{controller}.{resource.name}"]
         if resource.kind is ResourceKind.AXIS:

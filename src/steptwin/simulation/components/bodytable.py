@@ -47,7 +47,7 @@ def color_value(value: Any) -> str:
 
 
 SHAPES = ("cylinder", "bottle", "cone", "funnel", "wheel")
-"""Of pictures, within a box or an upright cylinder: `studio-web/src/lib/scene/shapes.ts` knows what they look like."""
+"""Looks in pictures, within a box or an upright cylinder; `studio-web/src/lib/scene/shapes.ts` has their sections."""
 
 
 @table("[[body]]")

@@ -114,7 +114,7 @@ class Grasp(Stateful):
 
     @property
     def depends_on(self) -> Callable[[], Iterable[str]]:
-        """What changes where it is, or where workpieces are, when all that has some is there."""
+        """Names of parts that change where it is, or where workpieces are; known when all that has some is there."""
         return lambda: (*self.sources, *self._workpieces.sources)
 
     # ------------------------------------------------------------------ holding

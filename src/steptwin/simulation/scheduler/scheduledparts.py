@@ -28,7 +28,7 @@ class ScheduledParts:
         self.by_name: dict[str, list[int]] = {}
         """The parts that depend on a controller, a line or an element, by its name."""
         self._depends_on: list[tuple[str, ...] | Callable[[], Iterable[str]] | None] = []
-        """What each part depends on."""
+        """Names that each part depends on."""
         self.all: list[int] = []
         """Those that depend on everything, or until `resolve` on what is not known."""
         self.computes: list[str | None] = []
