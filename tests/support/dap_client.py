@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 from collections.abc import Callable
+from contextlib import suppress
 from queue import Queue
 from threading import Thread
 from typing import Any
@@ -78,13 +79,15 @@ class DapClient:
         self.event("initialized")
 
     def close(self) -> int:
-        self.send("disconnect")
+        with suppress(BrokenPipeError):  # an adapter that was detached has ended
+            self.send("disconnect")
         return self.end()
 
     def end(self) -> int:
         """As an editor that ends without a word; the exit code."""
         assert self.process.stdin is not None
-        self.process.stdin.close()
+        with suppress(BrokenPipeError):
+            self.process.stdin.close()
         code = self.process.wait(LONG_S)
         self._reader.join(LONG_S)
         assert self.process.stdout is not None

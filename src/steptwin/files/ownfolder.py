@@ -21,8 +21,10 @@ def path_in_folder(folder: Path, name: str) -> Path:
     """
     path = folder / name
     try:
-        is_within = path.parent.resolve().is_relative_to(folder.resolve())
-        is_link = path.is_symlink() or (path.is_file() and path.stat().st_nlink > 1)
+        parent = path.parent.resolve()
+        is_within = parent.is_relative_to(folder.resolve())
+        is_circle = any(place.is_symlink() for place in (parent, *parent.parents))  # Python 3.13 leaves it as it is
+        is_link = is_circle or path.is_symlink() or (path.is_file() and path.stat().st_nlink > 1)
     except (OSError, RuntimeError) as error:  # RuntimeError: links in a circle
         raise Misuse(NOT_IN_THE_FOLDER(path=format_path(path), why=reason(error))) from None
     if not is_within or path.name in ("", ".."):
