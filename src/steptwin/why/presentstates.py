@@ -32,7 +32,7 @@ _Links: TypeAlias = Generator[ChainLink, None, Sequence[_Asked]]
 
 
 class PresentStates:
-    """Finds present states. ``world`` is at the moment; ``most``: limit of what is looked at."""
+    """Finds present states. ``world`` is at the moment; ``most``: limit of the number of signals."""
 
     def __init__(self, causes: Causes, world: Simulation, most: int) -> None:
         self._causes = causes

@@ -83,8 +83,8 @@ class ProgramCauses:
                 if not use.waits and any(one in use.governs for one in writing)
             }
         executed, latest = self._log.executed[controller], self._log.last_executed(controller, at)
-        looked_at = range(latest, max(-1, latest - MOST_LOOKED_BACK), -1) if governing else ()
-        index = next((one for one in looked_at if executed.locations[one] in governing), None)
+        recent = range(latest, max(-1, latest - MOST_LOOKED_BACK), -1) if governing else ()
+        index = next((one for one in recent if executed.locations[one] in governing), None)
         if index is None or not self._log.is_of_present_text(executed[index]):
             return None
         here, place = executed[index], Place(executed[index].time, executed[index].order, 3 * index + 2)
