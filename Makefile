@@ -65,7 +65,7 @@ LOWEST_TESTS := test_import_weight.py wire/test_rtu.py cli/test_main.py live/tes
   files/test_certificate.py live/test_telemetry.py bluesky history/test_database.py campaign/test_cases.py \
   campaign/test_search.py::test_the_same_cases_for_the_same_results \
   campaign/test_campaign.py::test_a_worker_of_dask_that_is_killed_loses_nothing
-lowest: $(PYTHON_STAMP)  ## Try the lowest versions of libraries that pyproject.toml permits
+lowest: $(PYTHON_STAMP) $(PAGE)  ## Try the lowest versions of libraries that pyproject.toml permits
 	@$(UV) venv --quiet --clear --no-project --python $(BIN)/python $(LOWEST)
 	@$(UV) pip compile --quiet --resolution lowest-direct --all-extras --python $(LOWEST)/bin/python pyproject.toml -o $(LOWEST)/libraries.txt
 	@$(UV) pip install --quiet --python $(LOWEST)/bin/python -r $(LOWEST)/libraries.txt --group build --group test --editable .
