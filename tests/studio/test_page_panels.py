@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Page, expect
 from studio_page import Studio, button, downloaded, enable, number, show, virtual_time_ns
 from tests.conftest import until
 from tests.studio.conftest import Process
@@ -242,6 +242,22 @@ def seconds_text(time_ns: int) -> str:
     return f"{time_ns // 1000 / 1e6:.6f}"
 
 
+def polls_a_request(page: Page) -> None:
+    """A list of requests is sent again and again; what is answered is seen without them being sent by hand."""
+    for typed in ("m1_status", "03 23 28 00 01"):
+        page.get_by_label("Function code and data (hex)").fill(typed)
+        button(page, "Add to poll list").click()
+    polled = page.get_by_role("region", name="Poll list")
+    expect(polled.get_by_role("row")).to_have_count(2)
+    polls = polled.get_by_role("button", name="Poll", exact=True)
+    polls.click()
+    expect(polled.get_by_role("row", name=re.compile("M1_STATUS = "))).to_be_visible()
+    expect(polled.get_by_role("row", name=re.compile("▲ exception 02"))).to_be_visible()
+    polled.get_by_role("button", name="Remove 0323280001 from the poll list").click()
+    expect(polled.get_by_role("row")).to_have_count(1)
+    polls.click()
+
+
 def test_frames_are_shown_in_words_and_sent(studio: Studio, tmp_path: Path, require_peer: Callable[[str], str]) -> None:
     page = studio.page(panel="Frames")
     frames = page.get_by_role("region", name="Frames of the lines")
@@ -264,6 +280,7 @@ def test_frames_are_shown_in_words_and_sent(studio: Studio, tmp_path: Path, requ
     page.get_by_label("Function code and data (hex)").fill("05 7")
     button(page, "Send request").click()
     expect(page.get_by_role("alert").last).to_contain_text("pairs of hexadecimal digits")
+    polls_a_request(page)
     (tmp_path / "frames.pcapng").write_bytes(downloaded(page, "Save as pcapng"))
     command = [require_peer("tshark"), "-r", str(tmp_path / "frames.pcapng"), "-T", "fields", "-e", "modbus.func_code"]
     decoded = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
