@@ -133,7 +133,8 @@ class TaskLine(Generic[Q, A]):
         if self._timer is not None:
             self._timer.cancel()
         self._timer_ns = due
-        self._timer = self._running().call_at(due / SECOND, self._wake)
+        # The loop of a browser refuses moments that have passed.
+        self._timer = self._running().call_later(max(due - self.now(), 0) / SECOND, self._wake)
 
     def _wake(self) -> None:
         self._timer = None
