@@ -15,7 +15,7 @@ import grimp
 
 ROOT = Path(__file__).resolve().parents[1]
 SOURCE = ROOT / "src"
-HOSTS = ("steptwin.inpage.host", "steptwin.inpage.editor")
+HOSTS = ("steptwin.inpage.host", "steptwin.inpage.devices", "steptwin.inpage.editor")
 OF_EDITOR = ("pygls", "lsprotocol", "attr", "attrs", "cattr", "cattrs", "typing_extensions")
 """Libraries of the editor server; they are in Python alone."""
 PYODIDE = """Pyodide, under the Mozilla Public License 2.0, https://www.mozilla.org/MPL/2.0/; its source is at

@@ -8,15 +8,18 @@ import re
 import runpy
 import subprocess
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Locator, Page, expect
+from pymodbus.client import ModbusTcpClient
 from studio_page import WAIT_MS, button, show
 from tests.inpage.conftest import Handler
+from tests.peers.conftest import Master
 from tests.studio.conftest import browser, require_node, web_builder  # noqa: F401  fixtures
+from web_serial import WebSerial
 
 from steptwin import Misuse, World
 
@@ -36,6 +39,7 @@ class Demo:
         self.context.on(
             "request", lambda asked: None if asked.url.startswith((address, "blob:")) else self.elsewhere.append(asked.url)
         )
+        self.serial = WebSerial(self.context)
         self.page = self.tab()
         self.page.goto(address)
 
@@ -51,7 +55,7 @@ class Demo:
 def demo(address: str, browser: Browser) -> Iterator[Demo]:  # noqa: F811
     made = Demo(browser, address)
     yield made
-    assert made.complaints == []
+    assert made.complaints == [], "\n".join(made.complaints)
     assert made.elsewhere == []
     made.context.close()
 
@@ -161,7 +165,11 @@ def test_the_demo_moves_in_a_page_without_a_service(demo: Demo) -> None:
     expect(page.get_by_label("M1 position", exact=True)).not_to_have_text("0.00")
 
     # What needs a service is named, and what it needs.
-    for panel, words in {"Devices": "on a computer", "Recordings": "files of a computer", "Gateways": "with ports"}.items():
+    for panel, words in {
+        "Devices": "All other devices need the studio on a computer",
+        "Recordings": "files of a computer",
+        "Gateways": "with ports",
+    }.items():
         show(page, panel)
         expect(page.get_by_text(words)).to_be_visible()
 
@@ -186,6 +194,85 @@ def test_the_demo_moves_in_a_page_without_a_service(demo: Demo) -> None:
     causes.get_by_role("listitem").first.get_by_role("button").click()
     expect(page.get_by_role("group", name="The past")).to_be_visible()
     button(page, "To the present").click()
+
+
+def test_the_panels_ask_the_twin_as_a_master_and_a_terminal_do(demo: Demo) -> None:
+    page = demo.page
+    expect(time_of(page)).to_contain_text("live", timeout=LOADING_MS)
+    show(page, "Frames")
+    page.get_by_label("Function code and data (hex)").fill("M1_POS_ACT")
+    button(page, "Send request").click()
+    expect(page.get_by_role("status").filter(has_text="answer 03 04")).to_be_visible()
+    button(page, "Add to poll list").click()
+    polled = page.get_by_role("region", name="Poll list")
+    button(page, "Poll").click()
+    expect(polled.get_by_role("row")).to_contain_text("M1_POS_ACT = ")
+    shown = polled.get_by_role("row").inner_text()
+    expect(polled.get_by_role("row")).not_to_have_text(shown)  # it is asked again, and the axis moves
+    button(page, "Poll").click()
+
+    show(page, "Program")
+    page.get_by_label("Text", exact=True).select_option("steptwin:///drum/program.m1486")
+    button(page, "Terminal").click()
+    page.get_by_label("To send to chips").fill("X1")
+    page.keyboard.press("Enter")
+    page.get_by_label("To send to chips").fill("U1")
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("log", name="What went over chips")).to_contain_text("←")
+
+
+def until(page: Page, condition: Callable[[], bool], what: str) -> None:
+    """Wait while bytes of the page pass."""
+    for _ in range(1000):
+        if condition():
+            return
+        page.wait_for_timeout(20)
+    raise AssertionError(f"not seen: {what}")
+
+
+@pytest.mark.timeout(300)
+def test_a_device_at_a_serial_port_of_the_browser_moves_to_a_target_and_nothing_without_end(
+    demo: Demo, serve: Callable[..., Any]
+) -> None:
+    page = demo.page
+    expect(time_of(page)).to_contain_text("live", timeout=LOADING_MS)
+    twin = serve()
+    demo.serial.path = str(twin.pty)
+    client = ModbusTcpClient("127.0.0.1", port=twin.tcp_port)
+    assert client.connect()
+    master = Master(client)
+
+    show(page, "Devices")
+    button(page, "Choose a serial port…").click()
+    address = page.get_by_label("Address of the device")
+    expect(address).to_have_value("webserial1")
+    address.fill("webserial1,baud=19200,timeout=3")  # bytes go a long way here
+    address.press("Enter")
+    expect(button(page, "Disconnect mic488")).to_be_visible()
+    assert demo.serial.bauds == [19200]
+    expect(page.get_by_role("banner").get_by_text("REAL")).to_be_visible()
+
+    show(page, "Axes")
+    button(page, "Enable mic488 M1").click()
+    until(page, lambda: master.status(1) == 1, "the drive is on")
+    page.get_by_label("Target mic488 M1").fill("30")
+    button(page, "Move mic488 M1 to").click()
+    until(page, lambda: master.sample(1).position == 30.0, "the axis is at its target")
+    button(page, "Home mic488 M1").click()
+    expect(page.get_by_role("alert").last).to_contain_text("need not end by itself")
+    assert master.status(1) == 4  # at its target, as before
+    jog = button(page, "Jog mic488 M1 +")
+    jog.hover()
+    page.mouse.down()
+    until(page, lambda: master.sample(1).velocity > 0, "it runs while the button is held")
+    page.mouse.up()
+    until(page, lambda: master.sample(1).velocity == 0, "it brakes")
+    client.close()
+
+    show(page, "Devices")
+    button(page, "Disconnect mic488").click()
+    expect(page.get_by_text("No device is connected.")).to_be_visible()
+    expect(page.get_by_role("banner").get_by_text("REAL")).to_have_count(0)
 
 
 @pytest.mark.timeout(300)

@@ -18,6 +18,7 @@ from steptwin.drivers.kind import DeviceAddress, DriverKind
 from steptwin.drivers.kinds import DRIVERS, others_there
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.subject import AsyncDeviceSubject, DevicePart
+from steptwin.drivers.tcp import Endpoint
 from steptwin.errors import LineFailure, Misuse
 from steptwin.eventloop import later
 from steptwin.messages import Message, text_of
@@ -30,12 +31,14 @@ NAME_FORM = "1 to 40 letters, digits, '-' and '_', the first no digit"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Computer:
-    """Ports and twins of a computer. Both may block, and raise `SteptwinError`."""
+    """Ports and twins of a computer. ``ports`` and ``find`` may block; all raise `SteptwinError`."""
 
     ports: Callable[[], Sequence[Mapping[str, object]]]
     """``address`` and ``what`` of serial ports."""
     find: Callable[[str], DeviceAddress]
     """The address in a text."""
+    line: Callable[[DeviceAddress], str | Endpoint] = lambda address: address.place
+    """What the driver of a device opens as its line: the address of the line, or a serial port."""
 
 
 @dataclass(slots=True)
@@ -125,7 +128,7 @@ class DeviceConnections:
                 raise Misuse(TOO_MANY_DEVICES(most=MOST_DEVICES))
             name = self._free_name(address, name)
             key = address.kind, address.place, address.baud
-            line = self._lines.get(key) or _SharedLine(DRIVERS[address.kind].line(address.place, address.baud))
+            line = self._lines.get(key) or _SharedLine(DRIVERS[address.kind].line(self._computer.line(address), address.baud))
             try:
                 driver = await _device_at(address, line.line)
             except BaseException:

@@ -57,6 +57,8 @@ class DeviceSurroundings:
     keep: Callable[[str, str], str]
     """Keeps the settings of a controller, a text of JSON; where they are. Raises `SteptwinError`."""
     on_internal: Callable[[Exception], object]
+    check: Callable[[DevicePart, Command], object] = lambda device, wanted: None
+    """Raises `Refusal` for a command that a device is not sent from here. Stops and jogs are not asked about."""
 
 
 CONNECTION_IS_LOST = Message("devices.connection-is-lost", "{command} was not sent: the connection is lost ({lost})")
@@ -196,6 +198,7 @@ class ConnectedDevice:
         try:
             if self._is_stop(wanted):
                 return await self._stop(wanted)
+            self._around.check(self._device, wanted)
             if self.lost is not None:
                 raise LineFailure(CONNECTION_IS_LOST(command=type_of(wanted).name, lost=text_of(self.lost)))
             if type(wanted) in LOOKS or self._effect_of(wanted) is RawEffect.LOOK:

@@ -17,6 +17,7 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
 from steptwin.controller import Nanos
 from steptwin.drivers.line import DriverLine
 from steptwin.drivers.subject import DevicePart
+from steptwin.drivers.tcp import Endpoint
 from steptwin.errors import Misuse, Refusal
 from steptwin.messages import Message
 from steptwin.optionalmethods import OptionalMethods
@@ -339,8 +340,8 @@ class DriverKind(OptionalMethods, ABC, Generic[D]):
 
     # ------------------------------------------------------------------ as a subject, in an event loop
 
-    def line(self, place: str, baud: int) -> DriverLine[Any, Any]:
-        """A line at an address, which is not opened."""
+    def line(self, place: str | Endpoint, baud: int) -> DriverLine[Any, Any]:
+        """A line at an address, or on a serial port that is given. It is not opened."""
         raise Misuse(FOR_COMMANDS_ONLY(kind=self.title))
 
     async def part(self, address: DeviceAddress, line: DriverLine[Any, Any]) -> DevicePart:

@@ -50,10 +50,12 @@ SERIAL_PORT_WAS_LOST = Message("drivers.serial-port-was-lost", "serial port {pla
 NO_PORT = Message("drivers.no-port", "{text!r} names no port: {forms}")
 
 
-def parse_line_address(text: str, baud: int) -> LineAddress:
-    """Parse an address. ``baud`` is for serial ports. Raises `Misuse`."""
+def parse_line_address(text: str | Endpoint, baud: int) -> LineAddress:
+    """Parse an address; an end point instead of one is a serial port. ``baud`` is for serial ports. Raises `Misuse`."""
     if not BAUDS[0] <= baud <= BAUDS[1]:
         raise Misuse(WRONG_BAUD(baud=baud, least=BAUDS[0], most=BAUDS[1]))
+    if not isinstance(text, str):
+        return LineAddress(text, serial=SerialLine(baud))
     scheme, separator, _ = text.partition("://")
     if not separator:
         if not text or (":" in text and "/" not in text):

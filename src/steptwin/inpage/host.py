@@ -31,6 +31,7 @@ from steptwin.simulation.describe.description import read_world
 from steptwin.simulation.describe.includes import given_files
 from steptwin.simulation.scheduler.trace import Mark
 from steptwin.studio.hub import Hub
+from steptwin.studio.surroundings import Connections as DeviceConnections
 from steptwin.studio.viewers import Viewers
 
 SLICE_NS: Nanos = 20 * MILLISECOND
@@ -69,6 +70,7 @@ class PageTwin:
             program=__version__,
             on_internal=partial(report, page),
         )
+        self.subject = shown.subject
         self.hub = Hub(shown.subject, shown.subject, around)
         self.connections = Connections(Viewers(self.hub, clock).serve, page)
         self.texts: Callable[[], Mapping[str, bytes]] = around.programs.files
@@ -81,6 +83,11 @@ class PageTwin:
             return json.dumps({"description": self._text, "programs": self._linked.present()})
         except Misuse as error:
             return json.dumps({"refused": str(error)})
+
+    def offer(self, connections: DeviceConnections) -> None:
+        """Devices can be connected from now on; viewers are told."""
+        self.hub.around = replace(self.hub.around, connections=connections)
+        self.hub.descriptions += 1
 
     def begin(self) -> None:
         """Time goes from now on; it stands at a state that was kept, for what came after it may happen again."""

@@ -33,6 +33,7 @@ from steptwin.studio.requests import (
     OF_RECORDINGS,
     OF_SERVICES,
     OF_TIME_TRAVEL,
+    OF_WORK,
     REQUESTS,
     LeaseTerm,
     WorldTraffic,
@@ -256,6 +257,7 @@ class Hub:
             (around.services, OF_SERVICES),
             (around.campaigns, OF_CAMPAIGNS),
             (around.connections, OF_DEVICES),
+            (around.work, OF_WORK),
             (around.traffic, frozenset({"traffic"})),
         )
         missing = frozenset[str]().union(*(names for part, names in needed if part is None))

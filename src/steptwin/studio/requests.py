@@ -381,9 +381,11 @@ OF_BRANCHES, OF_DRAWINGS, OF_SERVICES = _names(BranchRequest), _names(DrawingReq
 """Requests that need a world."""
 OF_CAMPAIGNS = _names(CampaignRequest)
 """Requests that need a world of a file."""
-OF_DEVICES = _names(WorkRequest) | _names(DeviceRequest) | {"ports", "connect", "disconnect"}
+OF_DEVICES = _names(DeviceRequest) | {"ports", "connect", "disconnect"}
 """Requests that need a computer to which devices are connected."""
-WITH_TOKEN = _names(WorkRequest) | {"connect"}
+OF_WORK = _names(WorkRequest)
+"""Requests that need such a computer, and processes or threads."""
+WITH_TOKEN = OF_WORK | {"connect"}
 """Requests that reach devices, or describe them: they need a token also where nothing else does."""
 OF_CONNECTION = frozenset({"subscribe", "unsubscribe", *(one.name for one in REQUESTS.values() if one.is_of_connection)})
 

@@ -133,7 +133,7 @@ class Surroundings:
     connections: Connections | None = None
     """None where no device can be connected."""
     work: LongWork | None = None
-    """As ``connections``."""
+    """As ``connections``; None also where there are no threads."""
     configuration: Callable[[str], SourceText | None] = lambda controller: None
     """The configuration file of a twin by name; None without one."""
     time_travel: TimeTravel | None = None

@@ -1,8 +1,10 @@
 import type { Backend, FileKind, Link, LinkEvents, Loading, OpenLink } from "../lib/protocol/backend";
 import { errorOf, type Hello } from "../lib/protocol/connection";
+import { save } from "../lib/save";
 import type { Answer } from "../lib/protocol/types";
 import { pack, type Linked } from "./links";
 import Offline from "./Offline.svelte";
+import { SerialPorts } from "./serial";
 import type { FromWorker, Task, Texts, ToWorker } from "./messages";
 
 interface Waiting<T> {
@@ -20,6 +22,8 @@ class PythonWorker {
   private readonly links = new Map<number, LinkEvents>();
   private readonly asked: Waiting<Texts>[] = [];
   private readonly askedForLink: Waiting<string>[] = [];
+  private readonly offered: Waiting<string>[] = [];
+  private readonly ports = new SerialPorts((message) => this.tell(message));
   private next = 1;
   private hasFailed = false;
 
@@ -54,11 +58,20 @@ class PythonWorker {
     return new Promise((done, failed) => this.askedForLink.push({ done, failed }));
   }
 
+  /** Gives the address of a serial port that the user has chosen; null where none was. */
+  async choosePort(): Promise<string | null> {
+    const chosen = await this.ports.choose();
+    if (chosen === null) return null;
+    this.tell({ offer: chosen.number, what: chosen.what });
+    return new Promise((done, failed) => this.offered.push({ done, failed }));
+  }
+
   /** All that is connected to it has lost its connection, and gets no other one. */
   end(): void {
     this.hasFailed = true;
     this.worker.terminate();
-    for (const { failed } of [...this.asked, ...this.askedForLink]) failed(new Error(ENDED));
+    this.ports.end();
+    for (const { failed } of [...this.asked, ...this.askedForLink, ...this.offered]) failed(new Error(ENDED));
     for (const events of this.links.values()) events.closed(0);
     this.links.clear();
   }
@@ -73,7 +86,8 @@ class PythonWorker {
   }
 
   private take(message: FromWorker): void {
-    if ("messages" in message) {
+    if ("port" in message) this.ports.take(message);
+    else if ("messages" in message) {
       this.links.get(message.on)?.messages(message.messages);
       this.tell({ taken: message.on });
     } else if ("opened" in message) this.links.get(message.opened)?.opened();
@@ -83,6 +97,11 @@ class PythonWorker {
       events?.closed(message.code);
     } else if ("texts" in message) this.asked.shift()?.done(message.texts);
     else if ("link" in message) this.askedForLink.shift()?.done(message.link);
+    else if ("address" in message) {
+      const waiting = this.offered.shift();
+      if (message.address === null) waiting?.failed(new Error(message.why));
+      else waiting?.done(message.address);
+    } else if ("file" in message) save(new Blob([message.text], { type: "application/json" }), message.file);
     else if ("kept" in message) this.kept = message.kept;
     else if ("progress" in message) this.loading({ phase: message.progress });
     else this.fail(message.failed);
@@ -146,6 +165,8 @@ export class InPage implements Backend {
     if ("refused" in found) throw new Error(found.refused);
     return new URL(await pack(found), this.root).href;
   }
+
+  readonly serial = { problem: SerialPorts.problem, choose: () => this.twin.choosePort() };
 
   restart(): void {
     const ended = this.twin;

@@ -9,7 +9,23 @@ export type Texts = Record<string, Uint8Array>;
  * gave; or the editor server for texts by address. */
 export type Task = { twin: { name: string; text: string; files: Texts; kept?: Uint8Array } } | { editor: Texts };
 
+/** What a worker asks of a serial port, by its number. `at`: of the wall clock [ms]. */
+export type FromPort =
+  | { port: number; open: number }
+  | { port: number; write: Uint8Array<ArrayBuffer>; at: number }
+  | { port: number; close: true };
+
+/** What becomes of it. `lost`: it is closed, and why; empty where that was asked. */
+export type ToPort =
+  | { port: number; opened: true }
+  | { port: number; failed: string }
+  | { port: number; received: Uint8Array }
+  | { port: number; lost: string };
+
 export type ToWorker =
+  | ToPort
+  /** A port that the user has chosen, by its number. */
+  | { offer: number; what: string }
   | { start: Task; root: string }
   | { open: number }
   | { send: string; on: number }
@@ -19,6 +35,11 @@ export type ToWorker =
   | { link: true };
 
 export type FromWorker =
+  | FromPort
+  /** The address of a port that was offered; null, and why devices cannot be used. */
+  | { address: string | null; why: string }
+  /** A file for the user. */
+  | { file: string; text: string }
   | { progress: Phase }
   | { opened: number }
   | { messages: unknown[]; on: number }

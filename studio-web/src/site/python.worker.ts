@@ -1,7 +1,7 @@
 import type { PyodideInterface } from "pyodide";
 import type { PyProxy } from "pyodide/ffi";
 import { Batches } from "../lib/protocol/batches";
-import type { FromWorker, Phase, Task, Texts, ToWorker } from "./messages";
+import type { FromWorker, Phase, Task, Texts, ToPort, ToWorker } from "./messages";
 
 /** `steptwin.inpage.connections.Connections`. */
 interface Connections {
@@ -14,6 +14,15 @@ interface Connections {
 /** `steptwin.inpage.editor.PageEditor`. */
 interface Editor {
   connections: Connections;
+}
+
+/** `steptwin.inpage.serialports.SerialPorts`. */
+interface Ports {
+  add(number: number, what: string): string;
+  opened(number: number): void;
+  failed(number: number, why: string): void;
+  received(number: number, data: PyProxy): void;
+  lost(number: number, why: string): void;
 }
 
 /** `steptwin.inpage.host.PageTwin`. */
@@ -54,7 +63,7 @@ class Outgoing {
 
 const outgoing = new Map<number, Outgoing>();
 
-/** `steptwin.inpage.connections.Page`. */
+/** `steptwin.inpage.devices.DevicePage`. */
 const page = {
   opened: (number: number) => tell({ opened: number }),
   send: (number: number, text: string) => outgoing.get(number)?.add(text),
@@ -62,23 +71,31 @@ const page = {
     outgoing.delete(number);
     tell({ closed: number, code });
   },
+  openPort: (port: number, open: number) => tell({ port, open }),
+  writePort: (port: number, data: PyProxy) =>
+    tell({ port, write: data.toJs() as Uint8Array<ArrayBuffer>, at: Date.now() }),
+  closePort: (port: number) => tell({ port, close: true }),
+  saveText: (file: string, text: string) => tell({ file, text }),
   keep: (state: PyProxy) => tell({ kept: state.toJs() as Uint8Array }),
   refused: (text: string) => tell({ failed: text }),
   failed: (text: string) => console.error(text),
 };
 
 let host: Twin | Editor | null = null;
+let python: PyodideInterface | null = null;
+let ports: Ports | null = null;
 let waiting: ToWorker[] = [];
 
 async function start(task: Task, root: string): Promise<void> {
   during("python");
-  const python = `${root}python/`;
-  const { loadPyodide } = (await import(/* @vite-ignore */ `${python}pyodide.mjs`)) as typeof import("pyodide");
+  const folder = `${root}python/`;
+  const { loadPyodide } = (await import(/* @vite-ignore */ `${folder}pyodide.mjs`)) as typeof import("pyodide");
   const archives = "twin" in task ? ["steptwin.zip"] : ["steptwin.zip", "editor.zip"];
   const [pyodide, ...files] = await Promise.all([
-    loadPyodide({ indexURL: python }) as Promise<PyodideInterface>,
-    ...archives.map((name) => bytesOf(python + name)),
+    loadPyodide({ indexURL: folder }) as Promise<PyodideInterface>,
+    ...archives.map((name) => bytesOf(folder + name)),
   ]);
+  python = pyodide;
   during("modules");
   // Nearly all that modules make stays: to look for what does not took a tenth of the time.
   pyodide.runPython("import gc, sys; gc.disable()");
@@ -125,9 +142,30 @@ async function wrongFile(python: string): Promise<string | null> {
   return null;
 }
 
+/** The drivers are imported with the first port. */
+function offer(number: number, what: string): void {
+  try {
+    ports ??= python?.pyimport("steptwin.inpage.devices").offer_devices(host, page) as Ports;
+    tell({ address: ports.add(number, what), why: "" });
+  } catch (error) {
+    tell({ address: null, why: error instanceof Error ? error.message : String(error) });
+  }
+}
+
+function takeFromPort(ports: Ports, message: ToPort): void {
+  const { port } = message;
+  if ("received" in message) ports.received(port, python?.toPy(message.received));
+  else if ("opened" in message) ports.opened(port);
+  else if ("failed" in message) ports.failed(port, message.failed);
+  else ports.lost(port, message.lost);
+}
+
 function take(host: Twin | Editor, message: ToWorker): void {
   const { connections } = host;
-  if ("open" in message) {
+  if ("port" in message) {
+    if (ports !== null) takeFromPort(ports, message);
+  } else if ("offer" in message) offer(message.offer, message.what);
+  else if ("open" in message) {
     outgoing.set(message.open, new Outgoing(message.open));
     connections.open(message.open);
   } else if ("send" in message) connections.receive(message.on, message.send);

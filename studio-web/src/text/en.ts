@@ -152,6 +152,10 @@ export const en = {
   linkOffer:
     "This link brings a machine: a description, and the programs that it names. Nothing of it runs before you open it.",
   linkOpen: "Open in the studio",
+  serialInsecure: "Browsers give serial ports to pages over https and of this computer (localhost) only.",
+  serialUnknown: "This browser has no Web Serial. Chrome, Edge and Opera on a computer have it.",
+  serialLate: "the page stood still: what it was to send is out of date",
+  serialClosed: "the port was closed",
   linkDemo: "Show the demo machine",
   linkDescription: "Description",
   linkBad: "this link cannot be opened: {why}",

@@ -157,6 +157,10 @@ export const pl: Record<keyof typeof en, string> = {
   linkOffer:
     "Ten link zawiera maszynę: opis i programy, które on wymienia. Nic z niego nie działa, zanim go nie otworzysz.",
   linkOpen: "Otwórz w studiu",
+  serialInsecure: "Przeglądarki dają porty szeregowe tylko stronom przez https i z tego komputera (localhost).",
+  serialUnknown: "Ta przeglądarka nie ma Web Serial. Mają ją Chrome, Edge i Opera na komputerze.",
+  serialLate: "strona stała: to, co miała wysłać, jest nieaktualne",
+  serialClosed: "port został zamknięty",
   linkDemo: "Pokaż maszynę demonstracyjną",
   linkDescription: "Opis",
   linkBad: "nie można otworzyć tego linku: {why}",

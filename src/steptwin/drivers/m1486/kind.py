@@ -41,6 +41,7 @@ from steptwin.drivers.m1486.motion import ChipMoveEnd, ChipReason
 from steptwin.drivers.m1486.subject import M1486Part
 from steptwin.drivers.m1486.sync import M1486, M1486Jog, M1486Line, download_to
 from steptwin.drivers.m1486.talk import chip_name
+from steptwin.drivers.tcp import Endpoint
 from steptwin.drivers.typed import format_value
 from steptwin.errors import LineFailure, Misuse
 from steptwin.m1486.microsteps import UNIT
@@ -103,7 +104,7 @@ class M1486Driver(DriverKind[M1486]):
     decoding = M1486Decoding()
     programs = (".m1486",)
 
-    def line(self, place: str, baud: int) -> DriverLine[Any, Any]:
+    def line(self, place: str | Endpoint, baud: int) -> DriverLine[Any, Any]:
         return AsyncM1486Line(place, baud=baud)
 
     async def part(self, address: DeviceAddress, line: DriverLine[Any, Any]) -> M1486Part:

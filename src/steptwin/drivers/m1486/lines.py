@@ -60,17 +60,18 @@ def described(data: bytes) -> str:
     return "".join(" CR " if byte == 0x0D else chr(byte) if 0x20 <= byte < 0x7F else f" {byte:02X}H " for byte in data).strip()
 
 
-def line_endpoint(address: str, baud: int) -> Endpoint:
+def line_endpoint(address: str | Endpoint, baud: int) -> Endpoint:
     place = parse_line_address(address, baud)
-    if address.startswith("tcp://") and address.rpartition(":")[2].strip("/").isdecimal() is False:
+    if isinstance(address, str) and address.startswith("tcp://") and address.rpartition(":")[2].strip("/").isdecimal() is False:
         raise Misuse(f"{address!r} names no port: expected tcp://HOST:PORT, such as tcp://127.0.0.1:5022")
     return place.endpoint
 
 
 class AsyncM1486Line(TaskLine[ChipRequest, bytes]):
-    """A line of chips for asyncio, at an address (``/dev/ttyUSB0``, ``tcp://host:5022`` raw, ``rfc2217://host:port``)."""
+    """A line of chips for asyncio, at an address (``/dev/ttyUSB0``, ``tcp://host:5022`` raw, ``rfc2217://host:port``), or
+    on a serial port that is given."""
 
-    def __init__(self, address: str, *, baud: int = BAUD, log: Callable[[str], object] | None = None) -> None:
+    def __init__(self, address: str | Endpoint, *, baud: int = BAUD, log: Callable[[str], object] | None = None) -> None:
         endpoint = line_endpoint(address, baud)
         super().__init__(endpoint, *talking(endpoint, baud, log))
 

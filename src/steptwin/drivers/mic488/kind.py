@@ -35,6 +35,7 @@ from steptwin.drivers.mic488.motion import MoveEnd, Reason, status_text
 from steptwin.drivers.mic488.program import ProgramState
 from steptwin.drivers.mic488.subject import Mic488Part
 from steptwin.drivers.mic488.sync import Mic488, Mic488Axis, Mic488Jog, ModbusLine
+from steptwin.drivers.tcp import Endpoint
 from steptwin.drivers.typed import tied
 from steptwin.errors import Misuse
 from steptwin.mic488.registers import AXES, CONTROLLER_STATUS_TEXTS, DEFAULT_FIRMWARE, register_map
@@ -94,7 +95,7 @@ class Mic488Driver(DriverKind[Mic488]):
         "--device"
     )
 
-    def line(self, place: str, baud: int) -> DriverLine[Any, Any]:
+    def line(self, place: str | Endpoint, baud: int) -> DriverLine[Any, Any]:
         return AsyncModbusLine(place, baud=baud)
 
     async def part(self, address: DeviceAddress, line: DriverLine[Any, Any]) -> Mic488Part:

@@ -11,6 +11,7 @@ from steptwin.drivers.lineframes import FRAMES, LineFrames
 from steptwin.drivers.mic488.frames import FrameLog
 from steptwin.drivers.modbus import ModbusQuery, RtuMaster, TcpMaster
 from steptwin.drivers.tasks import TaskLine
+from steptwin.drivers.tcp import Endpoint
 from steptwin.drivers.threads import ThreadLine
 from steptwin.errors import Misuse
 from steptwin.wire.slave import FrameDirection
@@ -43,11 +44,11 @@ def modbus_exchanger(
 
 
 class AsyncModbusLine(TaskLine[ModbusQuery, bytes]):
-    """A Modbus line for tasks, at an address. ``async with`` opens and closes it."""
+    """A Modbus line for tasks, at an address, or on a serial port that is given. ``async with`` opens and closes it."""
 
     def __init__(
         self,
-        address: str,
+        address: str | Endpoint,
         *,
         baud: int = 38400,
         frames_per_second: float | None = FRAMES_PER_SECOND,

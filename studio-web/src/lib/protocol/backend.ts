@@ -23,6 +23,13 @@ export type FileKind = "recordings" | "models" | "campaigns";
 export type Loading =
   { foreseen: HelloMessage["hello"] } | { phase: "python" | "modules" | "world" } | { failed: string };
 
+export interface SerialPorts {
+  /** Why there can be none here; null where there can. */
+  readonly problem: string | null;
+  /** Asks the user for one, on a click. Gives its address; null where the user does not want to. */
+  choose(): Promise<string | null>;
+}
+
 /** The studio behind the page: a service, or a worker of the page. What it can do is in its hello, not here. */
 export interface Backend {
   open: OpenLink;
@@ -36,6 +43,8 @@ export interface Backend {
   share: (() => Promise<string>) | null;
   /** What the page shows of where it is from, beside Share; null where there is nothing. */
   origin: Component | null;
+  /** Serial ports that only the browser can reach; null where the studio reaches them itself. */
+  serial: SerialPorts | null;
   /** Ends the twin, even where it does not answer, and begins another one at its last state; null where the page does not own it. */
   restart: (() => void) | null;
   /** Stop all where the studio does not accept this page: a stop needs no token. Rejects with the words of the studio. */

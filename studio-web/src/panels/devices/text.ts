@@ -4,6 +4,10 @@ export const t = texts(
   {
     title: "Devices",
     notHere: "No devices here: they need the studio on a computer, steptwin studio.",
+    noOthers: "All other devices need the studio on a computer, steptwin studio.",
+    fromPage:
+      "A device at a serial port of this computer. From a page an axis moves to a target, by a distance, or as long as a button is held: what would not end by itself is refused, because a page that stands still cannot stop it.",
+    choosePort: "Choose a serial port…",
     explained:
       "A device is connected by its address. Nothing moves by it. Before the first write its settings are kept in a file.",
     needToken:
@@ -76,6 +80,10 @@ export const t = texts(
   {
     title: "Urządzenia",
     notHere: "Nie ma tu urządzeń: potrzebne jest studio na komputerze, steptwin studio.",
+    noOthers: "Wszystkie inne urządzenia wymagają studia na komputerze, steptwin studio.",
+    fromPage:
+      "Urządzenie na porcie szeregowym tego komputera. Ze strony oś jedzie do celu, o odległość albo tak długo, jak trzymany jest przycisk: co nie skończyłoby się samo, jest odrzucane, bo strona, która stoi, nie może tego zatrzymać.",
+    choosePort: "Wybierz port szeregowy…",
     explained:
       "Urządzenie łączy się przez adres. Nic się przy tym nie rusza. Przed pierwszym zapisem ustawienia trafiają do pliku.",
     needToken:
