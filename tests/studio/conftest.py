@@ -214,8 +214,8 @@ def browser(require_peer: Callable[[str], str]) -> Iterator[Browser]:
     if changed is not None:
         pytest.fail(f"{changed.relative_to(ROOT)} is newer than the built page of the studio: run 'make page'", pytrace=False)
     with sync_playwright() as playwright:
-        # Root has no user namespace to put the sandbox into.
-        started = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        # Root has no user namespace to put the sandbox into; drawing by a graphics card that is not there costs a tenth more.
+        started = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox", "--disable-gpu"])
         yield started
         started.close()
 

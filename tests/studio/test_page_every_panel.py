@@ -1,14 +1,17 @@
-"""No panel is wider than its pane, on a phone and where two share a page, in a browser."""
+"""Every panel of the demo machine in a browser: on a screen, a tablet, a phone and where two share a page, for eyes and for
+assistive technology, in both languages."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
+from typing import NamedTuple
 
 import httpx
 import pytest
 from mosquitto import free_port
-from playwright.sync_api import Browser
-from studio_page import Studio, button, panels_of, show, wider_than_panes
+from playwright.sync_api import Browser, Page
+from studio_page import PICTURES, Studio, button, panels_of, serious, show, wider_than_panes
 from tests.studio.conftest import Process, StudioWorld
 
 from steptwin.live.studio.demo import describe_demo
@@ -29,28 +32,92 @@ DONE = (
     ("save_recording", {"name": "a_recording_with_a_long_name"}),
 )
 
+WIDTH_WHEN_DRAWN = """() => new Promise((done) =>
+  requestAnimationFrame(() => requestAnimationFrame(() => done(document.documentElement.scrollWidth))))"""
+ENGLISH = """() => {
+  const words =
+    /(?<![\\p{L}_])(the|of|with|which|and|from|that|are|is|not|for|has|have|this|it|its|when|where|after|before|until)(?![\\p{L}_])/iu;
+  const found = [];
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  for (let node = walker.nextNode(); node; node = walker.nextNode()) {
+    const own = node.parentElement.closest("[lang], .cm-editor, style, script");
+    if (own !== null && own !== document.documentElement) continue;
+    if (words.test(node.textContent.replace(/\\S*\\/\\S*/g, ""))) found.push(node.textContent.trim());
+  }
+  return [...new Set(found)];
+}"""
+
+
+class Look(NamedTuple):
+    """A page as somebody has it; it is opened in the first of its sizes."""
+
+    name: str
+    language: str
+    theme: str
+    sizes: tuple[tuple[int, int], ...]
+
+    @property
+    def stop_all(self) -> str:
+        return "Stop all" if self.language == "en-US" else "Zatrzymaj wszystko"
+
+
+LOOKS = (
+    Look("screen", "en-US", "light", ((1280, 720), (1920, 1080))),
+    Look("phone", "en-US", "light", ((390, 844),)),
+    Look("two panes", "pl-PL", "dark", ((1440, 900),)),
+    Look("tablet", "pl-PL", "dark", ((820, 1180),)),
+)
+FOR_ASSISTIVE_TECHNOLOGY = ("screen", "two panes")
+
 
 @pytest.fixture
 def studio_world() -> StudioWorld:
     return StudioWorld(describe_demo(free_ports=True) + PLANT.format(port=free_port()))
 
 
-def test_no_panel_is_wider_than_its_pane(start_studio: Callable[..., Process], browser: Browser) -> None:
-    """Nor is anything cut off in it, but for code, drawings and texts that end with an ellipsis."""
+@pytest.mark.parametrize("look", LOOKS, ids=lambda look: look.name)
+def test_every_panel(start_studio: Callable[..., Process], browser: Browser, look: Look) -> None:
+    """Nothing is cut off in it but code, drawings and texts that end with an ellipsis; nothing serious is wrong for assistive
+    technology; English texts of controllers and manuals are marked on the Polish page, so that they are read out as English."""
     process = start_studio()
     for request, fields in DONE:
         httpx.post(f"{process.url}/api/do/{request}", json=fields, timeout=60)
     studio = Studio(process, browser)
-    found: dict[str, list[str]] = {}
-    for size, width, height in (("phone", 390, 844), ("two panes", 1440, 900)):
-        page = studio.page(viewport={"width": width, "height": height})
-        if size == "two panes":
-            button(page, "Open beside").click()
-        for panel in panels_of(page):
-            show(page, panel)
-            page.wait_for_timeout(300)
-            found[f"{size}, {panel}"] = wider_than_panes(page)
-        page.context.close()
+    width, height = look.sizes[0]
+    alone = "Osie" if look.name == "two panes" else None
+    options = {"viewport": {"width": width, "height": height}, "color_scheme": look.theme, "bypass_csp": True}
+    page = studio.page(look.language, panel=alone, **options)
+    if look.name == "two panes":
+        button(page, "Otwórz obok").click()
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    found: list[str] = []
+    panels = panels_of(page)
+    for number, panel in enumerate(panels, 1):
+        show(page, panel)
+        page.wait_for_timeout(300)
+        found += [f"{panel}: {what}" for what in faults_of(page, look)]
+        page.screenshot(path=PICTURES / f"{look.name.replace(' ', '-')}-{number}.png")
+    if look.language == "pl-PL":
+        page.get_by_role("button", name=re.compile("Zdarzenia")).click()
+        found += [f"Zdarzenia: English: {text}" for text in page.evaluate(ENGLISH)]
     studio.close()
-    assert len(found) == 2 * 18
-    assert {where: parts for where, parts in found.items() if parts} == {}
+    assert len(panels) == 18
+    assert found == []
+    assert studio.complaints == []
+
+
+def faults_of(page: Page, look: Look) -> list[str]:
+    """In every size: the page is as wide as its window, and Stop all is in sight."""
+    found = serious(page) if look.name in FOR_ASSISTIVE_TECHNOLOGY else []
+    if look.language == "pl-PL":
+        found += [f"English: {text}" for text in page.evaluate(ENGLISH)]
+    for width, height in look.sizes[::-1]:
+        if len(look.sizes) > 1:
+            page.set_viewport_size({"width": width, "height": height})
+        if (drawn := page.evaluate(WIDTH_WHEN_DRAWN)) > width:
+            found.append(f"{drawn} instead of {width} px wide")
+        found += [f"wider than its pane at {width} px: {part}" for part in wider_than_panes(page)]
+        box = button(page, look.stop_all).bounding_box()
+        if box is None or not (0 <= box["x"] <= width - box["width"] and 0 <= box["y"] <= height - box["height"]):
+            found.append(f"{look.stop_all} at {box} is not in sight of {width} x {height}")
+    return found

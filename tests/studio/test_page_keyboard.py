@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from typing import Any
 
 import httpx
 from playwright.sync_api import Browser, Page, expect
-from studio_page import Studio, button, tab_to
+from studio_page import Studio, button, tab_to, tab_until
 from tests.conftest import until
 from tests.studio.conftest import Process
 
 
 def go(page: Page, panel: str) -> None:
     """To a panel, with the tab key and Enter."""
-    rail = page.get_by_role("navigation").get_by_role("button", name=panel, exact=True)
-    for _ in range(300):
-        if rail.evaluate("element => element === document.activeElement"):
-            break
-        page.keyboard.press("Tab")
+    name = json.dumps(panel)
+    tab_until(page, f"(one) => one.closest('nav') && [one.ariaLabel, one.innerText.trim()].includes({name})")
     page.keyboard.press("Enter")
     expect(page.get_by_role("region", name=panel, exact=True).last).not_to_be_empty()
 
@@ -71,10 +69,7 @@ def test_inputs_registers_time_and_frames(studio: Studio) -> None:
 def test_calculator_configuration_faults_recordings_and_devices(studio: Studio) -> None:
     page = studio.page(panel=None)
     go(page, "Calculator")
-    for _ in range(300):
-        page.keyboard.press("Tab")
-        if page.evaluate("document.activeElement.id") == "calc-velocity":
-            break
+    tab_until(page, "(element) => element.id === 'calc-velocity'")
     page.keyboard.press("Control+a")
     page.keyboard.type("25")
     expect(button(page, "Send to M1")).to_be_enabled()
@@ -142,9 +137,4 @@ def running(studio: Studio) -> bool:
 
 def tab_to_text(page: Page, text: str) -> None:
     """To a button without a name of its own."""
-    for _ in range(300):
-        page.keyboard.press("Tab")
-        words = page.evaluate("document.activeElement.tagName === 'BUTTON' ? document.activeElement.innerText : ''")
-        if words.strip().endswith(text):
-            return
-    raise AssertionError(f"the tab key does not reach {text}")
+    tab_until(page, f"(one) => one.tagName === 'BUTTON' && one.innerText.trim().endsWith({json.dumps(text)})")

@@ -1,6 +1,6 @@
 """The page in a real browser, against a studio in a process of its own. What moves is seen by an independent Modbus master.
 
-The pictures of `test_pictures` are in build/studio.
+The pictures of `test_every_panel` are in build/studio.
 """
 
 from __future__ import annotations

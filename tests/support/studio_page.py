@@ -3,6 +3,7 @@ Modbus master."""
 
 from __future__ import annotations
 
+import json
 import re
 from contextlib import ExitStack
 from pathlib import Path
@@ -117,14 +118,40 @@ def serious(page: Page) -> list[str]:
     ]
 
 
+AT_ONCE = 10
+NOTE_FOCUS = """() => {
+  window.focused = [];
+  const isWanted = WANTED;
+  const note = ({ target }) => focused.push([target.ariaLabel ?? "", Boolean(isWanted(target))]);
+  document.addEventListener("focusin", note);
+  window.noMore = () => document.removeEventListener("focusin", note);
+}"""
+
+
+def tab_until(page: Page, wanted: str) -> list[str]:
+    """With the tab key to the first element for which a JavaScript function is true; the names of what had the focus.
+
+    What each key does is noted in the page, so that some are pressed before it is asked; those too many are taken back.
+    """
+    page.evaluate(NOTE_FOCUS.replace("WANTED", wanted))
+    for _ in range(30):
+        for _ in range(AT_ONCE):
+            page.keyboard.press("Tab")
+        focused: list[tuple[str, bool]] = page.evaluate("focused")
+        found = next((place for place, (_, is_wanted) in enumerate(focused) if is_wanted), None)
+        if found is not None:
+            page.evaluate("noMore()")
+            for _ in range(AT_ONCE):
+                if page.evaluate(f"Boolean(({wanted})(document.activeElement))"):
+                    break
+                page.keyboard.press("Shift+Tab")
+            return [name for name, _ in focused[: found + 1]]
+    raise AssertionError(f"the tab key does not reach {wanted}, only {[name for name, _ in focused]}")
+
+
 def tab_to(page: Page, name: str) -> list[str]:
-    """With the tab key until that has the focus; the names of what had it."""
-    names: list[str] = []
-    while name not in names:
-        page.keyboard.press("Tab")
-        names.append(page.evaluate("document.activeElement.ariaLabel ?? ''"))
-        assert len(names) < 200, names
-    return names
+    """To an element with that name."""
+    return tab_until(page, f"(element) => element.ariaLabel === {json.dumps(name)}")
 
 
 def enable(page: Page, axis: str = "M1") -> None:
