@@ -82,7 +82,9 @@ def missed(scheduler: Scheduler) -> list[object]:
     return [*found, *(edge for controller in scheduler.controllers.values() for edge in controller.take_edges())]
 
 
-@pytest.mark.parametrize("name", ["pick_and_place/pick_and_place.toml", "feeder.toml", "handwheel.toml", "lift.toml", ""])
+@pytest.mark.parametrize(
+    "name", ["pick_and_place/pick_and_place.toml", "feeder.toml", "handwheel.toml", "lift.toml", "press/press.toml", ""]
+)
 def test_nothing_that_has_changed_is_missed(name: str) -> None:
     world = World.load(EXAMPLES / name) if name else World.from_toml(FOLLOWING)
     with world:
@@ -135,6 +137,23 @@ def test_a_part_is_updated_for_what_it_watches_and_when_it_is_due() -> None:
     scheduler.notify()
     scheduler.advance(20 * SECOND)
     assert (usual.updates, other.updates, curious.updates) == (24, 4, 25)
+
+
+def test_a_part_that_reads_signals_is_updated_after_each_update_of_what_computes_them() -> None:
+    """Also where it comes first, and what computes them reports no change."""
+    scheduler = Scheduler()
+    first, clock, last = Clock(100 * SECOND), Clock(SECOND), Clock(100 * SECOND)
+    scheduler.add_part(first, (), reads=("a",))
+    scheduler.add_part(clock, (), "a")
+    scheduler.add_part(last, (), reads=("a", "b"))
+    scheduler.arrange(())
+    scheduler.advance(0)
+    assert (first.updates, clock.updates, last.updates) == (2, 1, 1)
+    scheduler.advance(3 * SECOND)
+    assert (first.updates, clock.updates, last.updates) == (5, 4, 4)
+    scheduler.notify("b")
+    scheduler.advance(3 * SECOND)
+    assert (first.updates, clock.updates, last.updates) == (5, 4, 5)
 
 
 def test_a_part_that_comes_later_is_told_as_a_change() -> None:

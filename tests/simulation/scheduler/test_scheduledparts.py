@@ -68,11 +68,13 @@ def test_what_a_part_depends_on_may_be_known_later_and_leaves_the_order_as_it_is
     parts, holders = ScheduledParts(), ["a"]
     parts.add(Clock(1), lambda: holders, None, None)
     parts.add(Clock(2), ["b"], None, None)
+    parts.add(Clock(3), (), "c", None)
+    parts.add(Clock(4), ["b"], None, None, reads=["c"])
     found = parts.arranged(parts.order([]))
     holders.append("b")
-    assert (found.all, found.by_name) == ([1], {"b": [0]})
+    assert (found.all, found.by_name, found.readers) == ([2, 3], {"b": [0]}, {})
     found.resolve()
-    assert (found.all, found.by_name) == ([], {"a": [1], "b": [0, 1]})
+    assert (found.all, found.by_name, found.readers) == ([], {"a": [2], "b": [0, 2, 3], "c": [3]}, {1: [3]})
 
 
 @pytest.mark.parametrize("is_settled", [False, True])

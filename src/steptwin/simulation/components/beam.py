@@ -94,14 +94,21 @@ class BeamSpec(TerminalComponentSpec, MoverSpec):
 class Beam(TerminalComponent):
     """SEEN is on while anything that it sees is in one of its beams."""
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_depends_on", "_far", "_near")
+    FIXED: ClassVar[tuple[str, ...]] = ("_depends_on", "_far", "_near", "_reads")
     __slots__ = (*FIXED, "_due", "_sees", "by")
 
-    def __init__(self, block: TerminalBlock, near: Sequence[Probe], far: Sequence[Probe], depends_on: tuple[str, ...]) -> None:
+    def __init__(
+        self,
+        block: TerminalBlock,
+        near: Sequence[Probe],
+        far: Sequence[Probe],
+        depends_on: tuple[str, ...],
+        reads: tuple[str, ...],
+    ) -> None:
         """``far``: the probes while it sees something."""
         super().__init__(block)
         self._near, self._far = tuple(near), tuple(far)
-        self._depends_on = depends_on
+        self._depends_on, self._reads = depends_on, reads
         self._sees = False
         self.by = ""
         """The part or workpiece that it sees, or saw last."""
@@ -110,6 +117,10 @@ class Beam(TerminalComponent):
     @property
     def depends_on(self) -> tuple[str, ...]:
         return self._depends_on
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        return self._reads
 
     def update(self, now: Nanos) -> None:
         there = next((name for probe in (self._far if self._sees else self._near) for name in probe.met(now)), None)
@@ -148,13 +159,13 @@ def _make(spec: BeamSpec, context: ElementContext) -> Beam:
         return Probe(segment, lasting, pieces)
 
     moved = [movement for name in seen for movement in frames.between(frame, every[name].frame)]
-    owners = [owner for name in seen for owner in described[name].owners]
-    sources = (*sources_of(moved), *sources_of(frames.carrying(frame)), *owners)
+    owners = tuple(owner for name in seen for owner in described[name].owners)
+    sources = (spec.name, *sources_of(moved), *sources_of(frames.carrying(frame)))
     if WORKPIECES in spec.sees:
         sources += workpieces.sources
     near = [*map(probe, spec.segments(frame))]
     far = [*map(probe, spec.segments(frame, spec.hysteresis))] if spec.hysteresis else near
-    return Beam(block, near, far, tuple(dict.fromkeys((spec.name, *sources))))
+    return Beam(block, near, far, sources, owners)
 
 
 def _refers(spec: BeamSpec) -> Iterator[Reference]:

@@ -103,13 +103,13 @@ def _make(spec: CollisionSpec, context: ElementContext) -> Touch:
     block, jams = context.terminal_block(spec.name), spec.effect == JAM
     if spec.when is None:
         compared = Compared(block, context, spec.between, spec.apart_from, every_body=spec.all, jams=jams)
-        return Touch(block, jams, compared.contacts, compared.depends_on)
+        return Touch(block, jams, compared.contacts, compared.reads, compared.depends_on)
     axes = dict(_axes_of(spec, context))
     if jams and not axes:
         raise Misuse(NOTHING_JAMS(when=spec.when))
     text = partial(AXES_TOUCH, zone=spec.name, axes=" and ".join(axes)) if axes else partial(PARTS_TOUCH, zone=spec.name)
     blocks = tuple(mechanism.block for mechanism in axes.values())
-    return Touch(block, jams, [Contact(condition_of(spec.when, block, context), blocks, text)])
+    return Touch(block, jams, [Contact(condition_of(spec.when, block, context), blocks, text)], spec.owners)
 
 
 def _axes_of(spec: CollisionSpec, context: ElementContext) -> Iterator[tuple[str, Mechanism]]:

@@ -75,10 +75,14 @@ class Compared:
 
     @property
     def depends_on(self) -> tuple[str, ...]:
-        """Names of what changes whether they touch."""
-        owners = (owner for one in self._described.values() for owner in one.owners)
+        """Names of what moves them."""
         pieces = self._context.objects.workpieces.sources if self._has_workpieces else ()
-        return tuple(dict.fromkeys((self._block.name, *sources_of(self._moved), *owners, *pieces)))
+        return (*sources_of(self._moved), *pieces)
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """Names of what has the signals that say which bodies are there."""
+        return tuple(owner for one in self._described.values() for owner in one.owners)
 
     def _units(self, name: str) -> list[str]:
         if name == WORKPIECES or name in self._grasps:

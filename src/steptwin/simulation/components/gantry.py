@@ -87,7 +87,7 @@ class Gantry(Touch):
         self.signals = dict(_moving(ends))
         skewed = SignalCondition(f"abs({SKEW}) > {spec.limit!r}", self.signals.__getitem__)
         contact = Contact(skewed, tuple(end.mechanism.block for end in ends), self.touching)
-        super().__init__(block, spec.effect == JAM, [contact])
+        super().__init__(block, spec.effect == JAM, [contact], (spec.axis, spec.other))
         beam = Loading(mass=spec.mass, friction_force=spec.friction_force)
         self._loads = tuple(burden_of(beam, end.scale, "gantry") for end in ends)
         """The whole beam, for each motor."""

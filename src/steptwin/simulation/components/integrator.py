@@ -118,8 +118,8 @@ class Integrator(TerminalComponent):
         self.plan = Integral(now, exact_fraction(spec.start), Fraction(0), Fraction(0), None, self._limits)
 
     @property
-    def depends_on(self) -> None:
-        """All: it may be over anything."""
+    def reads(self) -> tuple[str, ...]:
+        return owners_in(self.spec.rate)
 
     def update(self, now: Nanos) -> None:
         is_reset, end = self.block.is_on(RESET), self.plan.end

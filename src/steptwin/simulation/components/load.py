@@ -30,7 +30,6 @@ from steptwin.simulation.logic.curve import Stepped
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.mechanics.motor import Burden
 from steptwin.simulation.mechanics.scale import Loading, burden_of
-from steptwin.simulation.scheduler.scheduledparts import Depends
 from steptwin.simulation.scheduler.scheduler import TerminalBlock
 from steptwin.simulation.toml.reader import TomlText
 from steptwin.simulation.toml.table import key, table
@@ -77,6 +76,10 @@ class LoadSpec(TerminalComponentSpec):
 
     def others(self, described: ElementSpecs) -> Iterator[tuple[str, str]]:
         yield "axis", self.axis
+        yield from self.over()
+
+    def over(self) -> Iterator[tuple[str, str]]:
+        """Its keys that are over signals, and the owners of these."""
         named = () if self.of is None else (owner_of(self.of),)
         for name, owners in (("when", () if self.when is None else owners_of(self.when)), ("of", named)):
             yield from ((name, owner) for owner in owners if owner != TIME)
@@ -97,13 +100,20 @@ class LoadSpec(TerminalComponentSpec):
 class FurtherLoad(TerminalComponent):
     """Loads the motor while its condition holds, with the share of its curve. ACTS is on while there is any."""
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_axis", "_condition", "_whole")
+    FIXED: ClassVar[tuple[str, ...]] = ("_axis", "_condition", "_reads", "_whole")
     __slots__ = (*FIXED, "_curve", "_due", "_share", "factor")
 
     def __init__(
-        self, block: TerminalBlock, axis: BuiltAxis, whole: Burden, condition: SignalCondition | None, curve: Stepped | None
+        self,
+        block: TerminalBlock,
+        axis: BuiltAxis,
+        whole: Burden,
+        condition: SignalCondition | None,
+        curve: Stepped | None,
+        reads: tuple[str, ...],
     ) -> None:
         super().__init__(block)
+        self._reads = reads
         self._axis = axis
         self._whole = whole
         self._condition = condition
@@ -116,9 +126,8 @@ class FurtherLoad(TerminalComponent):
         """Fault: how much of it there is instead of all."""
 
     @property
-    def depends_on(self) -> Depends:
-        """All, with a condition or a curve: they may be over anything."""
-        return super().depends_on if self._condition is None and self._curve is None else None
+    def reads(self) -> tuple[str, ...]:
+        return self._reads
 
     @property
     def most(self) -> float:
@@ -179,7 +188,8 @@ def _make(spec: LoadSpec, context: ElementContext) -> FurtherLoad:
     curve = None
     if spec.of is not None and spec.points is not None:
         curve = Stepped(signal_of("of", block, context, spec.of), spec.points, spec.resolution)
-    return FurtherLoad(block, axis, whole, None if spec.when is None else condition_of(spec.when, block, context), curve)
+    condition = None if spec.when is None else condition_of(spec.when, block, context)
+    return FurtherLoad(block, axis, whole, condition, curve, tuple(owner for _, owner in spec.over()))
 
 
 LOAD = with_terminals(

@@ -74,6 +74,11 @@ class TerminalComponent(Stateful, ABC):
         return (self.block.name,)
 
     @property
+    def reads(self) -> tuple[str, ...]:
+        """The controllers and elements whose signals it reads."""
+        return ()
+
+    @property
     def delays(self) -> tuple[Nanos, ...]:
         """How much later than an input an output may change."""
         return ()
@@ -197,7 +202,7 @@ def with_terminals(
 
     def build(found: S, context: ElementContext) -> P:
         component = make(found, context)
-        component.block.scheduler.add_part(component, component.depends_on, found.name)
+        component.block.scheduler.add_part(component, component.depends_on, found.name, reads=component.reads)
         for wire, path in context.memo.once((*found.path, "wires"), lambda: tuple(_wires(found))):
             context.join(wire, path)
         fit(found, component, context)

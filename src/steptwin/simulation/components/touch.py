@@ -43,16 +43,22 @@ class Touch(TerminalComponent):
     """The output is on while anything touches. If that jams it, its drives stand from then on; they are free again when RESET is
     switched on, and jam again when it touches the next time."""
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_contacts", "_depends_on", "_jams")
+    FIXED: ClassVar[tuple[str, ...]] = ("_contacts", "_depends_on", "_jams", "_reads")
     __slots__ = (*FIXED, "_due", "_jammed", "_short", "_touching", "_was_reset", "count")
 
     def __init__(
-        self, block: TerminalBlock, jams: bool, contacts: Sequence[Contact], depends_on: tuple[str, ...] | None = None
+        self,
+        block: TerminalBlock,
+        jams: bool,
+        contacts: Sequence[Contact],
+        reads: tuple[str, ...],
+        depends_on: tuple[str, ...] = (),
     ) -> None:
+        """``reads``: as `TerminalComponent.reads`; ``depends_on``: what else moves them."""
         super().__init__(block)
         self._jams = jams
         self._contacts = tuple(contacts)
-        self._depends_on = depends_on
+        self._reads, self._depends_on = reads, (block.name, *depends_on)
         self._due: Nanos | None = None
         """When parts may touch, or part, without an event."""
         none = (False,) * len(self._contacts)
@@ -64,8 +70,12 @@ class Touch(TerminalComponent):
         """How often parts touched."""
 
     @property
-    def depends_on(self) -> tuple[str, ...] | None:
+    def depends_on(self) -> tuple[str, ...]:
         return self._depends_on
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        return self._reads
 
     @property
     def output(self) -> str:

@@ -109,7 +109,7 @@ def _build(spec: TransducerSpec, context: ElementContext) -> Transducer:
     scheduler = context.scheduler(spec.target[0])
     context.input(spec.target, (*spec.path, "to"), ANALOG_INPUT)
     transducer = Transducer(scheduler, spec, _measured(spec, scheduler, context))
-    scheduler.add_part(transducer, name=spec.name)
+    scheduler.add_part(transducer, (), spec.name, reads=owners_in(spec.of))
     return transducer
 
 

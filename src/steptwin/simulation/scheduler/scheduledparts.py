@@ -21,7 +21,19 @@ class ScheduledParts:
     All that is kept by number is here, and `arranged` makes it anew, so that nothing of one numbering gets into another.
     """
 
-    __slots__ = ("_depends_on", "_drives", "all", "by_name", "computes", "deadlines", "parts", "queue", "visited")
+    __slots__ = (
+        "_depends_on",
+        "_drives",
+        "_reads",
+        "all",
+        "by_name",
+        "computes",
+        "deadlines",
+        "parts",
+        "queue",
+        "readers",
+        "visited",
+    )
 
     def __init__(self) -> None:
         self.parts: list[ScheduledPart] = []
@@ -30,7 +42,11 @@ class ScheduledParts:
         self._depends_on: list[tuple[str, ...] | Callable[[], Iterable[str]] | None] = []
         """Names that each part depends on."""
         self.all: list[int] = []
-        """Those that depend on everything, or until `resolve` on what is not known."""
+        """Those that depend on everything; until `resolve` also those of which it is not known yet, and those that read."""
+        self._reads: list[tuple[str, ...]] = []
+        """Names whose signals each part reads."""
+        self.readers: dict[int, list[int]] = {}
+        """The parts that read the signals that a part computes, by its number."""
         self.computes: list[str | None] = []
         """The line or element whose signals each part computes."""
         self._drives: dict[int, str] = {}
@@ -41,20 +57,22 @@ class ScheduledParts:
         self.visited: set[int] = set()
         """Those whose deadlines may have changed since the signals last settled."""
 
-    def add(self, part: ScheduledPart, depends_on: Depends, computes: str | None, drives: str | None) -> int:
+    def add(
+        self, part: ScheduledPart, depends_on: Depends, computes: str | None, drives: str | None, reads: Iterable[str] = ()
+    ) -> int:
         """The number of another part, the last one."""
         number = len(self.parts)
         self.parts.append(part)
         self.computes.append(computes)
         if drives is not None:
             self._drives[number] = drives
-        if depends_on is None or callable(depends_on):
-            self._depends_on.append(depends_on)
+        known = depends_on if depends_on is None or callable(depends_on) else tuple(dict.fromkeys(depends_on))
+        self._depends_on.append(known)
+        self._reads.append(tuple(dict.fromkeys(reads)))
+        if known is None or callable(known) or self._reads[number]:
             self.all.append(number)
         else:
-            names = tuple(dict.fromkeys(depends_on))
-            self._depends_on.append(names)
-            self._run_after(names, number)
+            self._run_after(known, number)
         return number
 
     def _run_after(self, names: Iterable[str], number: int) -> None:
@@ -62,12 +80,19 @@ class ScheduledParts:
             self.by_name.setdefault(name, []).append(number)
 
     def resolve(self) -> None:
-        """All parts are there, in their order: find what those depend on of which that was not known."""
+        """All parts are there, in their order: find what those depend on of which that was not known, and who reads what."""
+        readers: dict[str, list[int]] = {}
         for number in tuple(self.all):
-            depends_on = self._depends_on[number]
-            if callable(depends_on):
+            depends_on, reads = self._depends_on[number], self._reads[number]
+            if depends_on is not None:
                 self.all.remove(number)
-                self._run_after(dict.fromkeys(depends_on()), number)
+                names = depends_on() if callable(depends_on) else depends_on
+                self._run_after(dict.fromkeys((*names, *reads)), number)
+                for name in reads:
+                    readers.setdefault(name, []).append(number)
+        self.readers = {
+            number: readers[name] for number, name in enumerate(self.computes) if name is not None and name in readers
+        }
 
     def order(self, wires: Iterable[Wire]) -> Sequence[int]:
         """Their numbers in the order in which they should be updated; empty if they are in that order."""
@@ -78,5 +103,5 @@ class ScheduledParts:
         """The same parts, added in another order; none waits to run yet. ``order``: their present numbers."""
         found = ScheduledParts()
         for old in order:
-            found.add(self.parts[old], self._depends_on[old], self.computes[old], self._drives.get(old))
+            found.add(self.parts[old], self._depends_on[old], self.computes[old], self._drives.get(old), self._reads[old])
         return found

@@ -231,17 +231,23 @@ class Scheduler:
         self.terminal_blocks[block.name] = block
 
     def add_part(
-        self, part: ScheduledPart, depends_on: Depends = None, name: str | None = None, drives: str | None = None
+        self,
+        part: ScheduledPart,
+        depends_on: Depends = None,
+        name: str | None = None,
+        drives: str | None = None,
+        reads: Iterable[str] = (),
     ) -> None:
         """Add a part; it is first updated when the signals settle next, then whenever it is due or something that it depends on
         has changed.
 
         ``depends_on``: names of controllers, lines and elements, or what gives them in `arrange`; None: every change. ``name``:
         the line or element whose signals it computes; they may change with each of its updates, and only then. ``drives``: the
-        controller or element whose input it drives.
+        controller or element whose input it drives. ``reads``: names whose signals it reads; it is updated after each update of
+        what computes these, too.
         """
         self._join()
-        number = self._parts.add(part, depends_on, name, drives)
+        number = self._parts.add(part, depends_on, name, drives, reads)
         if name is not None:
             self._sources[name] = Source(self, name)
         if not self.is_blank:
@@ -544,10 +550,14 @@ class Scheduler:
         self._find_deadlines()
 
     def _update_parts(self) -> None:
-        parts, queue, visited = self._parts.parts, self._parts.queue, self._parts.visited
+        parts, queue, visited, readers = self._parts.parts, self._parts.queue, self._parts.visited, self._parts.readers
         while (number := queue.take()) is not None:
             visited.add(number)
             parts[number].update(self.now)
+            if number in readers:
+                for reader in readers[number]:
+                    queue.add(reader)
+                    self.is_dirty |= reader < number  # its turn is in the next round
 
     def _take_edges(self) -> None:
         while (number := self._controller_queue.take()) is not None:
