@@ -235,7 +235,7 @@ def _fit_encoder(axis: BuiltAxis, spec: EncoderSpec | None, axes: Mapping[str, B
         target = (name, encoders.index_input(mechanism.number))
         circuit = context.circuit(axis.scheduler, target, (*spec.path, "index"), None)
         zone = Zone(low, low + spec.index_width - 1, 0, axis.scale.pulses_per_rev)
-        axis.scheduler.add_part(Switch(circuit, RotorMark(turned.mechanism), zone, now), (turned.mechanism.controller,))
+        axis.scheduler.add_part(Switch(circuit, RotorMark(turned.mechanism), zone, now), (turned.spec.name,))
 
 
 def _check_followed(name: str, axes: Iterable[str], context: ElementContext) -> None:
@@ -395,11 +395,6 @@ def summed_travel(axes: Sequence[BuiltAxis], shares: Sequence[float]) -> tuple[f
         if axis.spec.travel is not None
     ]
     return (sum(map(min, ends)), sum(map(max, ends))) if len(ends) == len(axes) else None
-
-
-def moved_by(axis: BuiltAxis) -> tuple[str, str]:
-    """Names of what changes the motion of an axis."""
-    return axis.mechanism.controller, axis.spec.name
 
 
 def _moves(spec: AxisSpec, axis: BuiltAxis) -> Sequence[Movement]:

@@ -11,7 +11,7 @@ from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.motion.elastic import Response, Spring
-from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, mm_per_unit, moved_by, moves, nm_per_pulse
+from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, mm_per_unit, moves, nm_per_pulse
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs, NamedSpec, Reference
@@ -172,8 +172,7 @@ def _refers(spec: CarriageSpec, described: ElementSpecs) -> Iterator[Reference]:
 
 def _build(spec: CarriageSpec, context: ElementContext) -> Carriage:
     carriage = Carriage(spec, find_axis(spec.axis, context))
-    mechanism = carriage.axis.mechanism
-    carriage.axis.scheduler.add_part(carriage, (mechanism.controller, spec.axis), spec.name)
+    carriage.axis.scheduler.add_part(carriage, (spec.axis,), spec.name)
     for n, switch in enumerate(spec.switches, start=1):
         context.text.unless_wrong(switch.path, partial(_put_switch, carriage, switch, channel_of(spec.name, n), context))
     return carriage
@@ -205,7 +204,7 @@ def _moves(spec: CarriageSpec, carriage: Carriage) -> Sequence[Movement]:
     axis = carriage.axis
     if axis.spec.kind == "rotary":
         raise Misuse(f"{spec.axis!r} is rotary: only carriages of linear axes have a place in space")
-    sources = (*moved_by(axis), spec.name)
+    sources = (axis.spec.name, spec.name)
     towards = spec.towards(axis.spec.towards())
     return (Movement("position", carriage.motion, towards, float(mm_per_unit(axis)), (axis.mechanism.block,), sources),)
 

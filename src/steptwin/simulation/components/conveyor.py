@@ -108,7 +108,7 @@ class Conveyor(TerminalComponent):
         moved_by: tuple[str, ...] = (),
         turning_points: Callable[[Nanos], Iterator[Nanos]] = lambda now: iter(()),
     ) -> None:
-        """``moved_by``: the controller that moves the belt, between ``turning_points`` one way, unless it has a drive of its
+        """``moved_by``: the axis that moves the belt, between ``turning_points`` one way, unless it has a drive of its
         own."""
         super().__init__(block)
         self.spec = spec
@@ -480,7 +480,7 @@ def _make(spec: ConveyorSpec, context: ElementContext) -> Conveyor:
         per_mm = axis.scale.pulses_per_unit / exact_fraction(spec.mm_per_unit)
         belt = Belt(spec.name, spec.length, axis.mechanism, per_mm)
         turning_points = partial(turning_points_of_axis, axis)
-        conveyor = Conveyor(block, spec, belt, near, (axis.mechanism.controller,), turning_points)
+        conveyor = Conveyor(block, spec, belt, near, (axis.spec.name,), turning_points)
     if belt.length < 1:
         raise Misuse(
             f"length = {spec.length:g} mm: the belt is shorter than one step of its drive, {float(1 / belt.per_mm):g} mm"

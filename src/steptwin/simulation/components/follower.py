@@ -11,7 +11,7 @@ from typing import ClassVar
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.simulation.components.axis import AXIS, moved_by, moves, turning_points_of_axis
+from steptwin.simulation.components.axis import AXIS, moves, turning_points_of_axis
 from steptwin.simulation.components.coordinate import GRID_PER_UNIT
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementcontext import ElementContext
@@ -220,7 +220,7 @@ def _build(spec: FollowerSpec, context: ElementContext) -> Follower:
         raise Unknown(spec.shaft, f"no shaft is called {spec.shaft!r}")
     follower = Follower(spec, shaft, context.memo.once(spec.path, lambda: _cam(spec, shaft)))
     scheduler = shaft.axis.scheduler
-    scheduler.add_part(follower, (shaft.axis.mechanism.controller, shaft.axis.spec.name, spec.shaft, spec.name), spec.name)
+    scheduler.add_part(follower, (shaft.axis.spec.name, spec.shaft, spec.name), spec.name)
     for n, switch in enumerate(spec.switches, start=1):
         context.text.unless_wrong(switch.path, partial(_put_switch, follower, switch, channel_of(spec.name, n), context))
     return follower
@@ -242,9 +242,8 @@ def _put_switch(follower: Follower, spec: SwitchSpec, channel: str, context: Ele
         return floor(exact_fraction(units) * GRID_PER_UNIT + Fraction(1, 2))
 
     zone = context.memo.once(spec.path, lambda: zone_of(spec, to_grid))
-    mechanism = follower.shaft.axis.mechanism
-    scheduler = follower.shaft.axis.scheduler
-    put_switch(scheduler, follower, (mechanism.controller, follower.spec.shaft, follower.spec.name), zone, spec, channel, context)
+    axis = follower.shaft.axis
+    put_switch(axis.scheduler, follower, (axis.spec.name, follower.spec.shaft, follower.spec.name), zone, spec, channel, context)
 
 
 def _signals(follower: Follower) -> Mapping[str, SignalOf]:
@@ -258,7 +257,7 @@ def _moves(spec: FollowerSpec, follower: Follower) -> Sequence[Movement]:
     if metres is None:
         raise Misuse(f"{spec.name!r} is lifted by {spec.unit}: in space a lift is in {', '.join(LENGTHS)}")
     mm, axis = metres * 1000, follower.shaft.axis
-    sources = (*moved_by(axis), spec.shaft, spec.name)
+    sources = (axis.spec.name, spec.shaft, spec.name)
     motion, blocks = follower.motion(mm * NM_PER_MM), (axis.mechanism.block,)
     return (Movement("position", motion, spec.towards(), float(mm), blocks, sources, travel=(0.0, spec.highest)),)
 

@@ -8,7 +8,7 @@ from typing import ClassVar
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.simulation.components.axis import BuiltAxis, find_axis, mm_per_unit, moved_by, moves, summed_travel
+from steptwin.simulation.components.axis import BuiltAxis, find_axis, mm_per_unit, moves, summed_travel
 from steptwin.simulation.components.coordinate import Coordinate, Pulled
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs
@@ -186,7 +186,7 @@ def _signals(gantry: Gantry) -> Mapping[str, SignalOf]:
 def _moves(spec: GantrySpec, gantry: Gantry) -> Sequence[Movement]:
     one, other = gantry.ends
     motion = Coordinate(gantry.ends, SHARES["position"], (Pulled(), Pulled())).motion
-    blocks, sources = (one.mechanism.block, other.mechanism.block), (*moved_by(one), *moved_by(other))
+    blocks, sources = (one.mechanism.block, other.mechanism.block), (one.spec.name, other.spec.name)
     towards = spec.towards(one.spec.towards())
     travel = summed_travel(gantry.ends, SHARES["position"])
     return (Movement("position", motion, towards, float(mm_per_unit(one)), blocks, sources, travel=travel),)

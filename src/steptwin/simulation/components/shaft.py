@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, moved_by, moves, turning_points_of_axis
+from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, moves, turning_points_of_axis
 from steptwin.simulation.components.contact import ContactSpec
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementcontext import ElementContext
@@ -180,15 +180,14 @@ def _refers(spec: ShaftSpec, described: ElementSpecs) -> Iterator[Reference]:
 
 def _build(spec: ShaftSpec, context: ElementContext) -> GearedShaft:
     shaft = GearedShaft(spec, find_axis(spec.axis, context))
-    mechanism = shaft.axis.mechanism
-    shaft.axis.scheduler.add_part(shaft, (mechanism.controller, spec.axis, spec.name), spec.name)
+    shaft.axis.scheduler.add_part(shaft, (spec.axis, spec.name), spec.name)
     for n, cam in enumerate(spec.cams, start=1):
         context.text.unless_wrong(cam.path, partial(_put_cam, shaft, cam, channel_of(spec.name, n), context))
     return shaft
 
 
 def _put_cam(shaft: GearedShaft, cam: CamSpec, channel: str, context: ElementContext) -> None:
-    moved_by = shaft.axis.mechanism.controller, shaft.spec.name
+    moved_by = shaft.spec.axis, shaft.spec.name
     put_switch(shaft.axis.scheduler, shaft, moved_by, shaft.zone(cam), cam, channel, context)
 
 
@@ -214,7 +213,7 @@ def _is_left_behind(active: ActiveFault, shaft: GearedShaft, now: Nanos) -> bool
 
 def _moves(spec: ShaftSpec, shaft: GearedShaft) -> Sequence[Movement]:
     axis = shaft.axis
-    sources = (*moved_by(axis), spec.name)
+    sources = (axis.spec.name, spec.name)
     return (Movement("angle", shaft.motion, spec.towards(UPRIGHT), 1.0, (axis.mechanism.block,), sources, turns=True),)
 
 

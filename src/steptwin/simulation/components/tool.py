@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from steptwin.controller import Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, mm_per_unit, moved_by, moves, summed_travel
+from steptwin.simulation.components.axis import AXIS, BuiltAxis, find_axis, mm_per_unit, moves, summed_travel
 from steptwin.simulation.components.coordinate import GRID_PER_UNIT, Coordinate, Pulled, pulled_to
 from steptwin.simulation.components.element import Element
 from steptwin.simulation.components.elementcontext import ElementContext
@@ -194,15 +194,11 @@ def _build(spec: ToolSpec, context: ElementContext) -> Tool:
     if one.scale.unit != other.scale.unit:
         raise Misuse(f"{spec.axis!r} is in {one.scale.unit} and {spec.other!r} in {other.scale.unit}: a tool has one unit")
     tool = Tool(spec, (one, other))
-    one.scheduler.add_part(tool, (*_controllers(tool), spec.axis, spec.other, spec.name), spec.name)
+    one.scheduler.add_part(tool, (spec.axis, spec.other, spec.name), spec.name)
     for name, n, switch in spec.switches:
         channel = f"{spec.name}.{name}_switch{n}"
         context.text.unless_wrong(switch.path, partial(_put_switch, tool, name, switch, channel, context))
     return tool
-
-
-def _controllers(tool: Tool) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(axis.mechanism.controller for axis in tool.axes))
 
 
 def _put_switch(tool: Tool, name: str, spec: SwitchSpec, channel: str, context: ElementContext) -> None:
@@ -210,9 +206,8 @@ def _put_switch(tool: Tool, name: str, spec: SwitchSpec, channel: str, context: 
         return round(exact_fraction(units) * GRID_PER_UNIT)
 
     zone = zone_of(spec, to_grid, None if spec.period is None else to_grid(spec.period))
-    put_switch(
-        tool.axes[0].scheduler, tool.coordinates[name], (*_controllers(tool), tool.spec.name), zone, spec, channel, context
-    )
+    moved_by = tool.spec.axis, tool.spec.other, tool.spec.name
+    put_switch(tool.axes[0].scheduler, tool.coordinates[name], moved_by, zone, spec, channel, context)
 
 
 def _signals(tool: Tool) -> Mapping[str, SignalOf]:
@@ -241,7 +236,7 @@ def _is_left_behind(active: ActiveFault, tool: Tool, now: Nanos) -> bool:
 def _moves(spec: ToolSpec, tool: Tool) -> Sequence[Movement]:
     mm = float(mm_per_unit(tool.axes[0]))
     blocks = tuple(axis.mechanism.block for axis in tool.axes)
-    sources = tuple(dict.fromkeys((*moved_by(tool.axes[0]), *moved_by(tool.axes[1]), spec.name)))
+    sources = (spec.axis, spec.other, spec.name)
     return tuple(
         Movement(name, its.motion, along, mm, blocks, sources, travel=summed_travel(tool.axes, shares))
         for (name, its), along, shares in zip(tool.coordinates.items(), spec.along, (spec.x, spec.y), strict=True)

@@ -189,7 +189,7 @@ class Mechanism(Stateful):
         """When a coasting rotor that moves comes to rest."""
         self._changes = 0
         self._seen: object = None
-        """The version of its trajectory of which what moves with it was notified."""
+        """The version of its trajectory of which what depends on it was notified."""
         self._reported: tuple[LoadSection, ...] | None = (LoadSection(scheduler.now, True, 0),)
         """The position of the load as reported last; None while it moves freely."""
         self._reported_trajectory: Trajectory | None = None
@@ -246,10 +246,11 @@ class Mechanism(Stateful):
     def update(self, now: Nanos) -> None:
         if not self._simple:
             self._follow(now)
-        version = self.version()
-        if version != self._seen:
-            self._seen = version
-            self._scheduler.notify(self._name)
+        if self._scheduler.is_watched(self._name):
+            version = self.version()
+            if version != self._seen:
+                self._seen = version
+                self._scheduler.notify(self._name)
 
     def _follow(self, now: Nanos) -> None:
         """Process what may change its trajectory, and report it."""

@@ -352,6 +352,10 @@ class Scheduler:
         if self.on_change is not None:
             self.on_change(self)
 
+    def is_watched(self, name: str) -> bool:
+        """Whether parts depend on what is called so, and `notify` with its name concerns them."""
+        return name in self._parts.by_name
+
     # ------------------------------------------------------------------ levels
 
     def drive(self, target: PinName, level: float) -> None:
