@@ -26,7 +26,7 @@ def contact(post_at: int) -> BodyContact:
 def test_what_does_not_come_near_is_not_searched_for(monkeypatch: pytest.MonkeyPatch) -> None:
     searched: list[int] = []
 
-    def next_change(pair: Pair, now: int) -> Look:
+    def next_change(pair: Pair, now: int, *, overlap: bool) -> Look:
         searched.append(now)
         return NEVER
 

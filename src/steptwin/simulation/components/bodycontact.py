@@ -36,7 +36,8 @@ class BodyContact:
             self._version = version
             one, other = self._bodies
             if meet(one.sweep(now), other.sweep(now)):
-                self._overlap, self._found = self.pair.overlap(now), self.pair.next_change(now)
+                self._overlap = self.pair.overlap(now)
+                self._found = self.pair.next_change(now, overlap=self._overlap)
             else:
                 self._overlap, self._found = False, NEVER
 

@@ -102,6 +102,7 @@ class Resting(Stateful):
         "_piles",
         "_probes",
         "_scheduler",
+        "_seen",
         "_supports",
         "_workpieces",
     )
@@ -135,6 +136,8 @@ class Resting(Stateful):
         self._piles: Piles | None = None
         self._masses: Mapping[str, float] = {}
         """Those that carriers know."""
+        self._seen: Mapping[str, Body] | None = None
+        """All workpieces when it was updated last: without others, nothing comes to those that rest."""
 
     # ------------------------------------------------------------------ a holder
 
@@ -323,6 +326,9 @@ class Resting(Stateful):
 
     def update(self, now: Nanos) -> None:
         there = self._workpieces.bodies()
+        if there is self._seen and not self._falls:
+            return
+        self._seen = there
         for rest in self._rests:
             if rest.on and rest.on not in self._supports and rest.on not in there:
                 self.release(self.take(rest.workpiece.name, now), there[rest.workpiece.name].frame, now)

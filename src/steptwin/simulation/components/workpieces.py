@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from math import inf
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 from steptwin.controller import Nanos
@@ -13,7 +14,7 @@ from steptwin.simulation.scheduler.scheduler import Scheduler
 from steptwin.simulation.space.bodies import Body, Box, Cylinder, Shape, half_height
 from steptwin.simulation.space.frames import Frame, Joint, Vector, Z, pose
 from steptwin.simulation.space.pieces import standing
-from steptwin.simulation.space.sweeps import Sweep, Sweeps, SweptBody
+from steptwin.simulation.space.sweeps import Sweep, Sweeps, SweptBody, meet, sweep
 from steptwin.simulation.space.tops import top_below
 from steptwin.simulation.toml.values import number, permitting
 
@@ -140,6 +141,7 @@ class Workpieces:
         "_motions",
         "_order",
         "_plans",
+        "_supports",
         "_sweeps",
         "_swept",
         "_version",
@@ -157,6 +159,8 @@ class Workpieces:
         self._holder_of: Mapping[str, Holder] = {}
         self._swept: dict[str, SweptBody] = {}
         self._sweeps = Sweeps()
+        self._supports: dict[Body, SweptBody] = {}
+        """Supports with where they may come."""
         self._order: Mapping[str, int] = {}
         self._motions: tuple[Callable[[], object], ...] = ()
         """The versions of all that moves them."""
@@ -214,6 +218,7 @@ class Workpieces:
         """Find them and where they may come anew: a snapshot was restored, and holders make other bodies."""
         self._version = None
         self._swept.clear()
+        self._supports.clear()
         self._sweeps = Sweeps()
 
     def holder_of(self, name: str) -> Holder | None:
@@ -228,9 +233,17 @@ class Workpieces:
 
     def below(self, workpiece: str, frame: Frame, now: Nanos) -> Below | None:
         """Support of a workpiece whose lower face has its middle at the origin of a frame; None where nothing is."""
-        supports = {body.name: (holder, body) for holder in self.holders for body in holder.supports()}
+        (x, y, _), (its_x, its_y, z) = sweep(Body(workpiece, frame, Box((0, 0, 0))), now)
+        below = Sweep((x, y, -inf), (its_x, its_y, z + REACH_NM))
+        self.follow(now)
         bodies, falling = self.bodies(), self.falling()
-        there = {name: body for name, body in bodies.items() if name != workpiece and name not in falling}
+        supports = {
+            body.name: (holder, body)
+            for holder in self.holders
+            for body in holder.supports()
+            if meet(below, self._supports.setdefault(body, SweptBody(body)).sweep(now))
+        }
+        there = {name: bodies[name] for name in self.near(below) if name != workpiece and name not in falling}
         others = {name: (None, body) for name, body in there.items() if not body.is_on(frame)}
         every = {**supports, **others}
         found = top_below((body for _, body in every.values()), frame, (0, 0, REACH_NM), now)

@@ -72,11 +72,14 @@ class Pair:
         pieces = [next(motion.pieces(now)) for motion in self.moving.values()]
         return _Stretch(self, pieces, now, now).look(now).apart < OVERLAP_NM
 
-    def next_change(self, now: Nanos, most: int = MOST_LOOKS) -> Look:
-        """The first moment after ``now`` at which they overlap; where they do now, at which they no longer do."""
+    def next_change(self, now: Nanos, most: int = MOST_LOOKS, *, overlap: bool | None = None) -> Look:
+        """The first moment after ``now`` at which they overlap; where they do now, at which they no longer do. ``overlap``:
+        whether they do now, if that is known."""
         if self.is_constant:
             return NEVER
-        overlap, left = self.overlap(now), most
+        if overlap is None:
+            overlap = self.overlap(now)
+        left = most
         for begin, end, pieces in together([motion.pieces(now) for motion in self.moving.values()]):
             first, last = max(begin, now + 1), (begin + FARTHEST_NS if end is None else end) - 1
             if first <= last:
