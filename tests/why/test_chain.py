@@ -37,7 +37,7 @@ def test_rules(one: Cause, found: ChainRule | None) -> None:
 
 
 def chain(first: Cause | None, *, is_whole: bool = True) -> Chain:
-    found = Chain(cause(10).link, Place(10, 1), first, is_whole=is_whole, is_owed=first is None)
+    found = Chain(cause(10).link, Place(10, 1), first, is_whole=lambda moment: is_whole, is_owed=first is None)
     while not found.is_followed:
         found.go_on()
     return found
@@ -68,7 +68,7 @@ def test_what_was_so_several_times_is_there_once_and_what_led_to_the_first_time_
 def test_the_nearest_causes_are_taken_first() -> None:
     far = cause(7)._replace(before=lambda: cause(6, is_root=True))
     first = cause(9)._replace(before=lambda: far, besides=lambda: [cause(1, is_root=True)])
-    found = Chain(cause(10).link, Place(10, 1), first, is_whole=True, is_owed=False)
+    found = Chain(cause(10).link, Place(10, 1), first, is_whole=lambda moment: True, is_owed=False)
     for _ in range(3):
         found.go_on()
     assert [link.time for link in found.links] == [9, 7, 1]

@@ -1,5 +1,5 @@
-"""The questions of questions.txt: each answer is what was written by hand from the description and the program, and each of its
-roots is proved by the run without it."""
+"""The questions of questions.txt: each answer is what was written by hand from the description and the program, whatever is
+searched first, and each of its roots is proved by the run without it."""
 
 from __future__ import annotations
 
@@ -7,14 +7,18 @@ import re
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
+from unittest.mock import patch
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from steptwin.files.world import World
 from steptwin.simulation.faults import read as read_fault
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.inputs import Bytes, ExternalInput
+from steptwin.why import pastquestions
 from steptwin.why.answer import Answer, Effect
 from steptwin.why.replayedrun import ReplayedRun
 from steptwin.wire.crc import with_crc
@@ -27,6 +31,9 @@ SAME = "="
 HEAD = '[world]\nname = "w"\n'
 MIC = '[[mic488]]\nname = "c"\nprogram = "p.prg"\nstart = true\n'
 CHIP = '[[m1486]]\nname = "k"\nprogram = "p.m1486"\n'
+
+
+Asked: TypeAlias = "tuple[str, str, float | None]"
 
 
 class Machine(NamedTuple):
@@ -60,7 +67,7 @@ def machines() -> Iterator[Machine]:
 
 
 MACHINES = {machine.name: machine for machine in machines()}
-ASKED = [(machine.name, question, at) for machine in MACHINES.values() for question, at in machine.questions]
+ASKED: list[Asked] = [(machine.name, question, at) for machine in MACHINES.values() for question, at in machine.questions]
 
 
 def act(text: str) -> ExternalInput:
@@ -131,6 +138,18 @@ def test_each_root_is_proved(name: str, question: str, at: float | None) -> None
         together = any(link.startswith(SAME) and link[1:] in trial.link.text for link in links)
         assert (trial.effect is Effect.SAME) is together, trial
         assert trial.effect is not Effect.UNKNOWN, trial
+
+
+@given(st.sampled_from(ASKED), st.sampled_from([0.05, 0.2, 0.7, 1.0, 2.0]), st.booleans())
+@settings(max_examples=30)
+def test_an_answer_does_not_depend_on_what_is_searched_first(asked: Asked, span: float, everything: bool) -> None:
+    name, question, at = asked
+    moment = None if at is None else round(at * 1e9)
+    found: list[Answer] = []
+    for first in (span, 1e6):
+        with patch.multiple(pastquestions, FIRST_SPAN_NS=round(first * 1e9), FIRST_STATEMENTS=round(first * 1e9)):
+            found.append(past.__wrapped__(name).ask(question, moment, everything=everything))
+    assert found[0] == found[1]
 
 
 def test_there_are_enough() -> None:

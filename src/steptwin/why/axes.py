@@ -19,7 +19,7 @@ from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
 from steptwin.why import points
 from steptwin.why.answer import ChainLink, Cover
-from steptwin.why.chain import Cause, FoundCause, Place, covered, unknown
+from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing, unknown
 from steptwin.why.controllers import acted
 from steptwin.why.log import JAMS, LAST, OF_MECHANICS, Change, words_of
 
@@ -38,6 +38,9 @@ LIMITS = {9: "POSLIM_L", 10: "POSLIM_R"}
 """Registers of its soft limits, by the status at them (manual 4.1)."""
 
 
+EVENTS_OF_ROTORS = tuple(f"event {name}" for name in (*OF_MECHANICS, *JAMS))
+
+
 class AxisCauses:
     """Finds the causes of where the loads of axes are. ``causes`` has those of everything else."""
 
@@ -53,18 +56,20 @@ class AxisCauses:
             return None
         record = self._log.record(plan)
         profile = profile_of(record.plan())
+        if not profile.segments and not profile.start:  # it has not moved yet
+            return None
+        if self._log.was_before(plan):
+            there = self._all.of(profile.start)
+            if there is not None:
+                return there.axes.motion(controller, record.subject, until, mechanics)
         name = f"{controller}.M{record.subject}"
         shown = f"{mechanics} ({name})" if mechanics else name
-        is_before = not self._log.is_whole and plan.time == self._log.begin
-        if is_before and profile.start < plan.time and profile.segments:
-            return Cause(
-                ChainLink(profile.start, controller, BEGAN_TO_MOVE(axis=shown)), Place(profile.start), unknown, Cover.MOTION
-            )
-        if plan.time == self._log.begin and not profile.segments:  # it has not moved yet
-            return None
+        if self._log.was_before(plan):
+            began = ChainLink(profile.start, controller, BEGAN_TO_MOVE(axis=shown))
+            return Cause(began, Place(profile.start), unknown, Cover.MOTION) if profile.segments else None
         place = Place(plan.time, plan.order)
         cover, names = None, SETTINGS
-        limit = self._soft_limit(controller, record.subject, plan.time if profile.end is None else profile.end, until)
+        limit = self.soft_limit(controller, record.subject, plan.time if profile.end is None else profile.end, until)
         if limit:
             text, names = STOPPED_AT_SOFT_LIMIT(axis=shown, limit=limit), (limit.partition("_")[2],)
             place = max(place, Place(plan.time if profile.end is None else profile.end))
@@ -87,21 +92,28 @@ class AxisCauses:
 
     def settings(self, controller: str, axis: str, until: Nanos, names: Collection[str] = SETTINGS) -> Iterator[Cause]:
         """Who gave an axis the settings that it has at a moment, as far as they have changed."""
+        there = self._all.of(until)
+        if there is not self._all:
+            yield from () if there is None else there.axes.settings(controller, axis, until, names)
+            return
         wanted = Resource(ResourceKind.AXIS, axis)
         for name in names:
             point = f"M{axis}_{name}"
-            series = self._log.points.series(f"{controller}.{point}")
-            since = None if series is None else points.since(series, until)
-            if since is not None and since < until:
-                found = covered(self._all.controllers.at_moment(controller, since, wanted, point), Cover.LEVEL)
+            is_noted = self._log.points.series(f"{controller}.{point}") is not None
+            since = self._log.since(f"{controller}.{point}", until) if is_noted else None
+            if since is not None and since < until and (then := self._all.of(since)) is not None:
+                found = covered(then.controllers.at_moment(controller, since, wanted, point), Cover.LEVEL)
                 if found is not None:
                     yield found
 
-    def _soft_limit(self, controller: str, axis: str, end: Nanos, until: Nanos) -> str:
+    def soft_limit(self, controller: str, axis: str, end: Nanos, until: Nanos) -> str:
         """The register of the soft limit at which a motion has ended; empty for another one."""
+        there = self._all.of(end) if end <= until else None
+        if there is not self._all:
+            return "" if there is None else there.axes.soft_limit(controller, axis, end, until)
         event = self._log.last_axis_event(controller, axis, end)
         series = self._log.points.series(f"{controller}.M{axis}_STATUS")
-        if end > until or series is None or (event is not None and event.time == end):
+        if series is None or (event is not None and event.time == end):
             return ""
         name = LIMITS.get(int(points.level(series, end)))
         return "" if name is None else f"M{axis}_{name}"
@@ -120,6 +132,8 @@ class AxisCauses:
         events = list(self._of_rotor(axis, until, before))
         lasting = [one for one in events if one.time >= began or (is_held and self.holds_rotor(one, events))]
         event = max(lasting, key=lambda one: (one.time, one.order), default=None)
+        if event is None:
+            self._log.never_happened(*EVENTS_OF_ROTORS)
         is_off = power is not None and not self._log.level(self._power_of(axis), until)
         is_unpowered = power is not None and (is_off or motion is None or motion.link.time < power.link.time)
         if power is not None and is_unpowered:
@@ -140,7 +154,7 @@ class AxisCauses:
         signal = self._power_of(axis)
         found = self._all.last((signal,), until, GIVES_POWER(axis=axis)) if signal else None
         if signal and found is None and not self._log.level(signal, until):  # it has never had any
-            found = self._all.first(signal, 0.0, Place(self._log.begin), GIVES_POWER(axis=axis))
+            found = self._all.first(signal, GIVES_POWER(axis=axis))
         return covered(found, Cover.MOTION)
 
     def _let_go(self, axis: str, power: Cause, until: Nanos) -> Cause:
@@ -168,16 +182,16 @@ class AxisCauses:
         if self.motion(controller, number, until) is not None:
             return None
         ignored = self.ignored(controller, number, until)
-        if ignored is not None or not self._log.is_whole:
+        if ignored is not None or not self._log.never_happened(f"event of axis {number}"):
             return ignored
-        begin = self._log.begin
         text = NOTHING_HAS_COMMANDED(axis=f"{controller}.M{number}")
-        return Cause(ChainLink(begin, controller, text), Place(begin), self._all.at_begin, Cover.LEVEL)
+        return Cause(ChainLink(0, controller, text), Place(0), nothing, Cover.LEVEL)
 
     def ignored(self, controller: str, number: str, until: Nanos, before: int = LAST) -> FoundCause:
         """The last event about an axis that never moved: a command that its controller ignored."""
         event = self._log.last_axis_event(controller, number, until, before)
         if event is None:
+            self._log.never_happened(f"event of axis {number}")
             return None
         return covered(self._all.controllers.axis_event(controller, event, Place(event.time, event.order)), Cover.LEVEL)
 
@@ -185,6 +199,8 @@ class AxisCauses:
         """The last event by a moment after which the rotor of an axis is elsewhere than counted; its motion, if there is none."""
         events = (one for one in self._of_rotor(axis, until) if self._log.record(one).subject in subjects)
         event = max(events, key=lambda one: (one.time, one.order), default=None)
+        if event is None:
+            self._log.never_happened(*EVENTS_OF_ROTORS)
         found = None if event is None else self.rotor_event(axis, event)
         lost = self._lost_by_fault(axis, until, LAST, LOSES_PULSES, IS_BLOCKED)
         last = max((one for one in (found, lost) if one is not None), key=lambda one: one.place, default=None)
@@ -210,10 +226,14 @@ class AxisCauses:
 
     def jams(self, name: str) -> Iterator[Change]:
         """Events of the collisions that jam an axis or element."""
-        for one, spec in self._all.specs.items():
-            is_jam = getattr(spec, "effect", None) == JAM or getattr(spec, "pushes", False)
-            if is_jam and f"{name}.{POSITION}" in self._all.elements.followed(one):
-                yield from self._log.mechanics.get(one, ())
+        for one in self.is_jammed_by(name):
+            yield from self._log.mechanics.get(one, ())
+
+    def is_jammed_by(self, name: str) -> Sequence[str]:
+        """The collisions and pushers that can jam an axis or element."""
+        specs, moves = self._all.specs.items(), f"{name}.{POSITION}"
+        jam = [one for one, spec in specs if getattr(spec, "effect", None) == JAM or getattr(spec, "pushes", False)]
+        return [one for one in jam if moves in self._all.elements.followed(one)]
 
     def holds_rotor(self, event: Change, events: Sequence[Change]) -> bool:
         """Whether a rotor has not followed its motion since an event of it."""
@@ -260,6 +280,7 @@ class AxisCauses:
             if name == f"M{text.values['axis']}" and (change.time, change.order) < (until, before):
                 older = self._all.of_fault(record, change.order)
                 return Cause(self._all.fault_link(record), Place(change.time, change.order), older, Cover.FAULT)
+        self._log.lack_faults()
         return None
 
     def _turned(self, controller: str, number: str, plan: Change) -> FoundCause:
@@ -279,6 +300,8 @@ class AxisCauses:
             if isinstance(act.what, do.Turn) and (act.what.controller, act.what.axis) == (controller, int(number))
         )
         act = next(turned, None)
+        if act is None:
+            self._log.lack()
         return None if act is None else acted(act)
 
     def _end(self, plan: Change) -> tuple[float, Nanos]:

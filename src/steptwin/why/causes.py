@@ -21,8 +21,10 @@ from steptwin.why.axes import AxisCauses
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing, unknown
 from steptwin.why.controllers import ControllerCauses, acted
 from steptwin.why.elements import ElementCauses, inputs
+from steptwin.why.lacking import NEVER
 from steptwin.why.log import LAST, CauseLog, Change, sets
 from steptwin.why.programs import ProgramCauses
+from steptwin.why.roots import SetFault
 from steptwin.why.workpieces import WorkpieceCauses
 
 BECAME = Message("why.became", "{signal} became {value:g}{how}")
@@ -44,13 +46,13 @@ DRIVES = Message("why.drives", "[[{kind}]] in {where} drives {pin}")
 
 
 class Causes:
-    """Finds the causes of changes in what was noted."""
+    """Finds the causes of changes in what was noted. ``others``: those of a moment that another log has."""
 
-    def __init__(self, log: CauseLog) -> None:
+    def __init__(self, log: CauseLog, others: Callable[[Nanos], Causes | None] = lambda moment: None) -> None:
         self.log = log
+        self._others = others
         world = self._world = log.world
         built = world.objects.elements
-        self.at_begin = nothing if log.is_whole else unknown
         every = (spec for specs in world.spec.elements.values() for spec in specs)
         self.specs = {spec.name: spec for spec in every if isinstance(spec, NamedSpec) and spec.name}
         self.parts: dict[str, TerminalComponent] = {
@@ -60,21 +62,29 @@ class Causes:
         self.controllers, self.elements = ControllerCauses(self), ElementCauses(self)
         self.workpieces = WorkpieceCauses(self)
 
+    def of(self, moment: Nanos) -> Causes | None:
+        """Causes of what was at a moment; None as long as nothing of it is noted."""
+        return self if self.log.covers(moment) else self._others(moment)
+
+    @property
+    def at_begin(self) -> Callable[[], FoundCause]:
+        """The end of a chain at the beginning of the log."""
+        return nothing if self.log.is_whole else unknown
+
     def change(self, signal: str, change: Change, how: MessageText | None = None) -> Cause:
         """A signal took its value."""
         owner, place = signal.partition(".")[0], Place(change.time, change.order)
         if self.log.is_first(signal, change):
-            return self.first(signal, change.value, place, how)
+            return self.first(signal, how, place)
         text = BECAME(signal=signal, value=change.value, how=how or "")
         return Cause(ChainLink(change.time, owner, text), place, partial(self._of_change, signal, change))
 
-    def state(self, signal: str, at: Nanos, begin: Nanos | None = None) -> MessageText:
-        """The level of a signal at a moment, since when, and what drives it. ``begin``: since when it is known that it has not
-        changed before the log began."""
+    def state(self, signal: str, at: Nanos) -> MessageText:
+        """The level of a signal at a moment, since when, and what drives it."""
         hold, drivers, since = self.log.hold(signal, at), self.drivers(signal, at), self.log.since(signal, at)
         if hold is not None and hold.held is not None:
             return IS_HELD(signal=signal, held=hold.held.description(), time=hold.time / SECOND)
-        when = since_before(self.log.begin if begin is None else begin) if since is None else SINCE(time=since / SECOND)
+        when = since_before(self.log.before(signal).known_from) if since is None else SINCE(time=since / SECOND)
         driven = DRIVEN_BY(names=reduce(lambda one, other: AND(one=one, other=other), drivers)) if drivers else ""
         if since is None and not drivers:
             driven = self.undriven(signal) or ""
@@ -86,7 +96,7 @@ class Causes:
         if owner not in self._world.controllers:
             if owner in self.parts and pin.upper() in inputs(self.parts[owner]):
                 return NOTHING_IS_WIRED()
-            is_unpressed = self.log.is_whole and signal in self._world.objects.built(BUTTON)
+            is_unpressed = signal in self._world.objects.built(BUTTON) and self.log.before(signal) == NEVER
             return NOBODY_PRESSED() if is_unpressed else None
         terminals, programs = self._world.kind(owner).terminals, self._world.programs.get(owner)
         is_written = programs is not None and self.programs.is_written(owner, Resource(ResourceKind.PIN, pin))
@@ -96,18 +106,27 @@ class Causes:
             return NOTHING_IS_WIRED()
         if programs is not None and programs.texts:
             return NO_STATEMENT_SETS()
-        return NOTHING_HAS_SET() if self.log.is_whole else None
+        return NOTHING_HAS_SET() if self.log.before(signal) == NEVER else None
 
-    def first(self, signal: str, value: float, place: Place, how: MessageText | None = None) -> Cause:
-        """A signal has had a level since the log began."""
-        text = IS_SINCE(signal=signal, value=value, since=since_before(self.log.begin), how=how or "")
-        return Cause(ChainLink(place.time, signal.partition(".")[0], text), place, self.at_begin)
+    def first(self, signal: str, how: MessageText | None = None, place: Place | None = None) -> Cause:
+        """A signal has not changed in the log: its last change before that, or its level from the beginning, at a place."""
+        known = self.log.before(signal)
+        earlier = None if known.since is None else self.last((signal,), known.since, how)
+        if earlier is not None:
+            return earlier
+        value, place = self.log.level(signal, self.log.begin), place or Place(known.known_from)
+        text = IS_SINCE(signal=signal, value=value, since=since_before(known.known_from), how=how or "")
+        return Cause(ChainLink(place.time, signal.partition(".")[0], text), place, nothing if known == NEVER else unknown)
 
     def last(self, signals: Sequence[str], until: Nanos, how: MessageText | None = None, before: int = LAST) -> FoundCause:
         """The last change among signals by a moment, before an order."""
+        there = self.of(until)
+        if there is not self:
+            return None if there is None else there.last(signals, until, how, before)
         found = [(change, signal) for signal in signals if (change := self.log.last_change(signal, until, before))]
         if not found:
-            return None
+            times = [since for signal in signals if (since := self.log.before(signal).since) is not None]
+            return self.last(signals, max(times), how) if times else None
         change, signal = max(found, key=lambda one: (one[0].time, one[0].order))
         return self.change(signal, change, how)
 
@@ -141,7 +160,15 @@ class Causes:
     def fault_link(self, record: TraceRecord) -> ChainLink:
         """Link of a record of a fault."""
         text = FAULT(name=record.subject, what=record.value)
-        return ChainLink(record.time, record.controller, text, self.log.fault_root(record.subject, record.time))
+        return ChainLink(record.time, record.controller, text, self.fault_root(record.subject, record.time))
+
+    def fault_root(self, name: str, until: Nanos) -> SetFault:
+        """A fault that acts at a moment, with the act that set it."""
+        faults = self._world.objects.faults
+        active, acted = faults.find(name), faults.acts.get(name)
+        there = None if active is None or active.since > until else self.of(active.since)
+        first = until if acted is None else min(until, acted.first)
+        return SetFault(first, name, (there or self).log.setting(name, until))
 
     def of_fault(self, record: TraceRecord, order: int) -> Callable[[], FoundCause]:
         """Search for the action that set or cleared a fault, unless it belongs to the description."""
@@ -158,13 +185,15 @@ class Causes:
         time, signal, hold = max(holds, default=(-1, "", None))
         if hold is None or hold.held is None or (first is not None and time <= first.link.time):
             return first
-        held, place = hold.held, Place(time, hold.order)
+        held, there = hold.held, self.of(time) or self
+        began = hold if there is self else there.log.hold(signal, time) or hold
+        place = Place(time, began.order)
 
         text = IS(signal=signal, value=held.description())
-        link = ChainLink(time, signal.partition(".")[0], text, self.log.fault_root(held.fault, time))
+        link = ChainLink(time, signal.partition(".")[0], text, self.fault_root(held.fault, time))
 
         older = self.at_begin if first is None else lambda: covered(first, Cover.LEVEL)
-        act = self.log.fault_act(held.fault, time, hold.order)
+        act = there.log.fault_act(held.fault, time, began.order)
         before_it = older if act is None else partial(Cause, *acted(act)[:2], older, Cover.FAULT)
         return Cause(link, place, before_it, Cover.FAULT)
 

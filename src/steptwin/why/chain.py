@@ -69,9 +69,11 @@ class _Waiting(NamedTuple):
 
 class Chain:
     """The causes of what is so at a place: the nearest ones are taken first. ``is_whole``: whether nothing was before what is
-    known. One that breaks a rule is left out, and a link says so in its place."""
+    known of a moment. One that breaks a rule is left out, and a link says so in its place."""
 
-    def __init__(self, effect: ChainLink, place: Place, first: FoundCause, *, is_whole: bool, is_owed: bool) -> None:
+    def __init__(
+        self, effect: ChainLink, place: Place, first: FoundCause, *, is_whole: Callable[[Nanos], bool], is_owed: bool
+    ) -> None:
         self._is_whole = is_whole
         self._waiting: list[_Waiting] = []
         self._taken: dict[tuple[Place, ChainLink], None] = {}
@@ -112,8 +114,9 @@ class Chain:
         """Let causes wait that lead to something. ``is_owed``: one more should have been found."""
         rules = [broken(one, place) for one in causes]
         self._waiting += [_Waiting(distance, one) for one, rule in zip(causes, rules, strict=True) if rule is None]
-        self.is_cut |= is_owed and not self._is_whole
-        rule = next((rule for rule in rules if rule), ChainRule.ROOT if is_owed and self._is_whole else None)
+        is_rootless = is_owed and self._is_whole(effect.time)
+        self.is_cut |= is_owed and not is_rootless
+        rule = next((rule for rule in rules if rule), ChainRule.ROOT if is_rootless else None)
         if rule is not None:
             self.broken = self.broken or rule
             self._taken[place._replace(number=place.number - 1), replace(effect, text=NOT_KNOWN(), root=None)] = None

@@ -125,7 +125,7 @@ class ControllerCauses:
         found = acted(act) if act is not None else self._no_supply(controller, event)
         if found is None and supply is not None:
             found = self._all.elements.at_element(supply, event)
-        is_first = self._log.is_whole and event is self._log.begins[controller][0]
+        is_first = event is self._log.begins[controller][0] and self._log.is_whole
         link = ChainLink(event.time, controller, words_of(self._log.record(event)))
         before = nothing if found is None and is_first else lambda: found
         return Cause(link, Place(event.time, event.order), before, Cover.PROGRAM)
@@ -137,6 +137,7 @@ class ControllerCauses:
             if fault.order < event.order and isinstance(record.value, MessageText) and record.value.id == NO_SUPPLY.id:
                 older = self._all.of_fault(record, fault.order)
                 return Cause(self._all.fault_link(record), Place(fault.time, fault.order), older, Cover.FAULT)
+        self._log.lack_faults()
         return None
 
     def given(self, controller: str, index: int) -> FoundCause:
@@ -274,6 +275,8 @@ class ControllerCauses:
                 return covered(
                     programs.statement(controller, index), Cover.WAIT if use.lasts or is_waiting or is_of_axis else None
                 )
+        if last < MOST_LOOKED_BACK:
+            self._log.lack()
         return None
 
     def _is_of_pin(self, record: TraceRecord, order: int) -> bool:
@@ -299,6 +302,8 @@ class ControllerCauses:
         meaning = self._log.frames.meaning(record)
         acts = [act for act in self._log.acts_before(record.time, order) if _requests(act, record.controller, members)]
         act = next((act for act in acts if _names(act, meaning)), next(iter(acts), None))
+        if act is None:
+            self._log.lack()
         return None if act is None else covered(acted(act), Cover.FRAME)
 
     def _input(self, record: TraceRecord, order: int) -> Cause:

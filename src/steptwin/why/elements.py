@@ -12,7 +12,7 @@ from steptwin.simulation.logic.expression import parse_condition, parse_expressi
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
 from steptwin.why.answer import Cover
-from steptwin.why.axes import POSITION
+from steptwin.why.axes import EVENTS_OF_ROTORS, POSITION
 from steptwin.why.chain import Cause, FoundCause, Place, covered
 from steptwin.why.controllers import acted
 from steptwin.why.log import LAST, Change
@@ -55,12 +55,14 @@ class ElementCauses:
         jam = next((one for one in jams if self._all.axes.holds_rotor(one, jams)), None)
         if jam is not None:
             return self._all.axes.rotor_event(name, jam)
+        if signal == POSITION and self._all.axes.is_jammed_by(name):
+            self._log.never_happened(*EVENTS_OF_ROTORS)
         removed = next((act for act in self._log.acts_at(time, LAST) if isinstance(act.what, do.Remove)), None)
         if removed is not None and signal in OF_WORKPIECES:
             return acted(removed)
         if part is None and self.followed(name):
             return self.of_followed(name, change)
-        channels = [one for one in self._log.changes if one == name or one.startswith(f"{name}.")]
+        channels = [one for one in self._log.first_levels if one == name or one.startswith(f"{name}.")]
         found = None if part is None else self.of_inputs(name, change)
         found = self._all.last(channels, time) if found is None else found
         return covered(found, Cover.ACTION) if found is not None and found.cover is None else found
@@ -104,9 +106,11 @@ class ElementCauses:
             return Cause(link, Place(fault.time, fault.order), self._all.of_fault(record, fault.order), acts)
         on = [source for source in sources if self._log.level(source, change.time)] if latest is None else []
         if len(on) == 1:
-            level, place, how = self._log.level(on[0], change.time), Place(self._log.begin), HAS_ACTED_SINCE(name=name)
-            return covered(self._all.first(on[0], level, place, how), acts)
-        return None if latest is None else covered(self._all.change(source, latest, HAS_ACTED_SINCE(name=name)), acts)
+            return covered(self._all.first(on[0], HAS_ACTED_SINCE(name=name)), acts)
+        how = HAS_ACTED_SINCE(name=name)
+        return covered(
+            self._all.last(sources, change.time, how) if latest is None else self._all.change(source, latest, how), acts
+        )
 
     def followed(self, name: str) -> tuple[str, ...]:
         """The signals that an element follows besides its inputs: those of its condition, what it measures, its axes."""
@@ -185,7 +189,7 @@ class ElementCauses:
         if before is not None:
             cause = covered(self._all.change(signal, before[0]), Cover.ACTION)
         elif signal in self._log.first_levels:
-            cause = covered(self._all.first(signal, self._log.first_levels[signal], Place(self._log.begin)), Cover.ACTION)
+            cause = covered(self._all.first(signal), Cover.ACTION)
         elif owner in self._world.axes:
             cause = covered(self._all.axes.moved(owner, change.time, change.order), Cover.MOTION)
         elif owner in self._world.controllers:

@@ -31,9 +31,10 @@ from steptwin.simulation.world.snapshotlog import SLICE_NS, replay
 from steptwin.statements import StatementHook
 from steptwin.why import points
 from steptwin.why.frames import Frames
+from steptwin.why.lacking import HAPPENED, NEVER, Found, Lacking
 from steptwin.why.movers import movers
 from steptwin.why.programstates import ProgramStates
-from steptwin.why.roots import Act, SetFault
+from steptwin.why.roots import Act
 
 MOST_NOTED = 20_000_000
 """Limit of what is noted, because it is kept in memory."""
@@ -108,12 +109,14 @@ class CauseLog:
     """Notes what happens in ``world`` from now on while that runs.
 
     Records are in groups: what is joined is in one group, whose records come in the order of their causes. Of a world that is not
-    at its beginning, the statements in execution and the plans in force are noted first, as if they had begun now.
+    at its beginning, the statements in execution and the plans in force are noted first, as if they had begun now. ``lacking``
+    takes what was before the log and decides something.
     """
 
-    def __init__(self, world: Simulation, most: int = MOST_NOTED) -> None:
+    def __init__(self, world: Simulation, most: int = MOST_NOTED, lacking: Lacking | None = None) -> None:
         self.world = world
         self.begin = world.now
+        self.lacking = Lacking() if lacking is None else lacking
         self._most = most
         parts = world.objects
         numbers = {id(scheduler): number for number, scheduler in enumerate(world.schedulers)}
@@ -161,7 +164,7 @@ class CauseLog:
         self._events = 0
         self.inputs = 0
         """Number of inputs that were applied."""
-        for record in world.trace if self.is_whole else _plans(world):
+        for record in world.trace if not self.begin else _plans(world):
             self._take(record)
         world.trace.stop()  # it is noted here
         began = {fault.name: fault.begin for fault in parts.faults.active}
@@ -180,15 +183,29 @@ class CauseLog:
         for name, programs in self.world.programs.items():
             begun = (programs.location(number) for number in programs.begun(self.begin))
             present = (frame.location for frame in programs.stack(self.begin)[:1])
-            for location in begun if self.is_whole else present:
+            for location in begun if not self.begin else present:
                 if location is not None:
                     self._executes(name, self.begin, location)
             programs.add_hook(self._hook(name, programs))
 
     @property
     def is_whole(self) -> bool:
-        """Whether it has everything since the beginning of the world."""
-        return self.begin == 0
+        """Whether it has everything since the beginning of the world. Where it has not, what was before is lacking."""
+        self.lack()
+        return not self.begin
+
+    def lack(self) -> None:
+        """What was before the log decides, if anything was."""
+        if self.begin:
+            self.lacking.lack(self.begin)
+
+    def covers(self, moment: Nanos) -> bool:
+        """Whether everything at a moment is noted."""
+        return (self.begin < moment or not self.begin) and moment <= self.world.now
+
+    def was_before(self, change: Change) -> bool:
+        """Whether a plan was in force when the log began, after the beginning of the world."""
+        return self.begin > 0 and change.position < self._built.get(change.group, 0)
 
     def run(self, inputs: Sequence[RecordedInput], end: Nanos) -> Iterator[None]:
         """Go on to the moment ``end``, in parts, with all inputs since the beginning of the log. Raises `Misuse` for inputs that
@@ -402,7 +419,22 @@ class CauseLog:
 
     def last_fault(self, owner: str, until: Nanos, before: int) -> Change | None:
         """When a fault of a controller or element last began or ended by a moment, before an order."""
-        return _last(self.faults.get(owner, []), until, before)
+        last = _last(self.faults.get(owner, []), until, before)
+        if last is None:
+            self.lack_faults()
+        return last
+
+    def never_happened(self, *names: str) -> bool:
+        """Whether none of `steptwin.simulation.world.snapshotlog.happenings` was before the log. If one was, that decides."""
+        found = self.before(f"{HAPPENED}{', '.join(names)}")
+        if found.since is not None:
+            self.lack()
+        return found == NEVER
+
+    def lack_faults(self) -> None:
+        """What faults did before the log decides, if they did something."""
+        if any(acts.first <= self.begin for acts in self.world.objects.faults.acts.values()):
+            self.lack()
 
     def hold(self, signal: str, at: Nanos, before: int = LAST) -> Hold | None:
         """Cause that holds a signal at a moment, before an order, and since when."""
@@ -425,15 +457,24 @@ class CauseLog:
 
     def is_in_progress(self, executed: Executed) -> bool:
         """Whether a statement was in execution when the log began, after the beginning of the world."""
-        return not self.is_whole and executed == self.executed[executed.controller][0]
+        return executed == self.executed[executed.controller][0] and not self.is_whole
 
     def since(self, signal: str, until: Nanos) -> Nanos | None:
         """Since when a signal has the level of a moment; None: from the beginning."""
         series = self.points.series(signal)
         if series is not None:
-            return points.since(series, until)
-        last = self.last_change(signal, until)
-        return None if last is None or self.is_first(signal, last) else last.time
+            since = points.since(series, until)
+        else:
+            last = self.last_change(signal, until)
+            since = None if last is None or self.is_first(signal, last) else last.time
+        return self.before(signal).since if since is None else since
+
+    def before(self, asked: str) -> Found:
+        """The last change of a signal or condition before the log, as far as it is known."""
+        found = NEVER if not self.begin else self.lacking.change(asked, self.begin)
+        if found.since is None and found.known_from:
+            self.lacking.lack(found.known_from)
+        return found
 
     def plans_in_force(self, controller: str, axis: str, at: Nanos, before: int = LAST) -> Iterator[Change]:
         """The plan of an axis that is in force at a moment, before an order; of each axis, if ``axis`` is empty."""
@@ -469,12 +510,13 @@ class CauseLog:
         last = bisect_left(self.acts, (until, before), key=lambda act: (act.time, act.order)) - 1
         return (self.acts[index] for index in range(last, max(-1, last - MOST_LOOKED_BACK), -1))
 
-    def fault_root(self, name: str, until: Nanos) -> SetFault:
-        """A fault that acts at a moment."""
+    def setting(self, name: str, until: Nanos) -> Act | None:
+        """The last act by a moment that set a fault; None if its description does."""
         acts = (act for act in reversed(self._fault_acts.get(name, ())) if act.time <= until)
-        acted = self.world.objects.faults.acts.get(name)
-        first = until if acted is None else min(until, acted.first)
-        return SetFault(first, name, next((act for act in acts if isinstance(act.what, do.SetFault)), None))
+        by = next((act for act in acts if isinstance(act.what, do.SetFault)), None)
+        if by is None:
+            self.lack()
+        return by
 
     def fault_record(self, name: str, until: Nanos) -> TraceRecord | None:
         """The last record by a moment with which a fault began, never that of its end; its first one, where that is not known."""
@@ -482,7 +524,10 @@ class CauseLog:
         latest = began[-1] if began else until
         records = (self.record(one) for changes in self.faults.values() for one in changes if one.time <= latest)
         its = sorted((one for one in records if one.subject == name), key=lambda one: one.time)
-        return next((one for one in reversed(its) if one.time in began), its[0] if its else None)
+        found = next((one for one in reversed(its) if one.time in began), None)
+        if found is None and its:
+            self.lack()
+        return its[0] if found is None and its else found
 
     def fault_act(self, name: str, until: Nanos, before: int) -> Act | None:
         """The last act by a moment, before an order, that set or cleared a fault."""

@@ -9,7 +9,6 @@ from typing import Any
 from steptwin.controller import MILLISECOND, Nanos
 from steptwin.messages import Message
 from steptwin.simulation.kinds.programs import ProgramState, Resource, ResourceKind, StatementLocation, StatementUse
-from steptwin.why import points
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing, unknown
 from steptwin.why.log import LAST, MOST_LOOKED_BACK, Change, Executed
@@ -85,6 +84,8 @@ class ProgramCauses:
         executed, latest = self._log.executed[controller], self._log.last_executed(controller, at)
         recent = range(latest, max(-1, latest - MOST_LOOKED_BACK), -1) if governing else ()
         index = next((one for one in recent if executed.locations[one] in governing), None)
+        if index is None and governing and len(recent) < MOST_LOOKED_BACK:
+            self._log.lack()
         if index is None or not self._log.is_of_present_text(executed[index]):
             return None
         here, place = executed[index], Place(executed[index].time, executed[index].order, 3 * index + 2)
@@ -149,7 +150,11 @@ class ProgramCauses:
         """The number of the execution of a statement before this one."""
         locations = self._log.executed[controller].locations
         here = locations[index]
-        return next((one for one in range(index - 1, max(-1, index - MOST_LOOKED_BACK), -1) if locations[one] == here), None)
+        before = range(index - 1, max(-1, index - MOST_LOOKED_BACK), -1)
+        found = next((one for one in before if locations[one] == here), None)
+        if found is None and len(before) == index:
+            self._log.lack()
+        return found
 
     def decides_in_loop(self, controller: str, index: int) -> Sequence[Resource]:
         """Resources that the conditions read that were evaluated since a statement was executed before; none without a loop."""
@@ -223,6 +228,8 @@ class ProgramCauses:
         ):
             first = earlier if locations[earlier] == locations[index] else first
             earlier -= 1
+        if earlier < 0:
+            self._log.lack()
         return first
 
     def _decided(self, controller: str, index: int, place: Place, how: Message) -> Cause:
@@ -290,15 +297,14 @@ class ProgramCauses:
         pins = [f"{controller}.{one.name}" for one in reads if one.kind is ResourceKind.PIN and one.name]
         came += others
         if not came and len(pins) == 1 and self._log.since(pins[0], place.time) is None:  # a filter lets it in later
-            begin = self._log.begin
-            return covered(self._all.first(pins[0], self._log.level(pins[0], begin), Place(begin)), Cover.LEVEL)
+            return covered(self._all.first(pins[0]), Cover.LEVEL)
         return covered(max(came, key=lambda cause: cause.place, default=None), Cover.WAIT)
 
     def resource(self, controller: str, resource: Resource, index: int, time: Nanos, before: int = LAST) -> FoundCause:
         """The last change of what a statement reads by a moment, before an order."""
         match resource.kind:
             case ResourceKind.PIN:
-                every = [name for name in self._log.changes if name.startswith(f"{controller}.")]
+                every = [name for name in self._log.first_levels if name.startswith(f"{controller}.")]
                 read = [f"{controller}.{resource.name}"] if resource.name else every
                 return self._all.lasting(read, time, self._all.last(read, time, before=before), before)
             case ResourceKind.AXIS:
@@ -310,15 +316,20 @@ class ProgramCauses:
                 for earlier in range(index - 1, max(-1, index - MOST_LOOKED_BACK), -1):
                     if resource in self.use(controller, earlier).writes:
                         return covered(self.statement(controller, earlier), Cover.LEVEL)
+                if index < MOST_LOOKED_BACK and self.is_written(controller, resource):
+                    self._log.lack()
         return None
 
     def _register(self, controller: str, resource: Resource, time: Nanos, before: int) -> FoundCause:
         """The last change of a register of a controller that a program has a name for, by a moment, before an order."""
         point = self._world.programs[controller].point(resource.name)
-        series = None if point is None else self._log.points.series(f"{controller}.{point}")
-        since = None if series is None else points.since(series, time)
+        is_noted = point is not None and self._log.points.series(f"{controller}.{point}") is not None
+        since = self._log.since(f"{controller}.{point}", time) if is_noted else None
         if point is None or since is None:
             return None
+        there = self._all.of(since)
+        if there is not self._all:
+            return None if there is None else there.programs.resource(controller, resource, 0, since)
         group = self._log.group(controller)
         change = Change(since, 0.0, group, self._log.position(group, since), before if since == time else LAST)
         return covered(self._all.controllers.in_controller(controller, change, resource, point), Cover.LEVEL)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import TypeAlias
 
@@ -24,10 +24,12 @@ from steptwin.why import points
 from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Cover
 from steptwin.why.causes import FAULT, IS, Causes
 from steptwin.why.chain import Cause, Chain, FoundCause, Place, covered
+from steptwin.why.lacking import HAPPENED
+from steptwin.why.lacking import Lacking as Before
 from steptwin.why.log import LAST, MOST_NOTED, OF_MECHANICS, CauseLog, in_parts
 from steptwin.why.presentstates import WAITS, PresentStates
 from steptwin.why.replayed import ReplayedSignals, TimeSeries, watch_truth, watch_value
-from steptwin.why.search import Asked
+from steptwin.why.search import Asked, happened
 from steptwin.why.sentences import statement
 from steptwin.why.states import Interval, StatesOnTheWay, is_constant, rest_of
 
@@ -137,17 +139,24 @@ class Why:
     ``make`` gives the world at its beginning, or where its past is known from; ``inputs`` are what came from outside since then,
     ``end`` is the present, in ns. The past is run again when the first question is asked, and from the last change on once more
     for a question about what is in no trace, such as a register; what that showed is remembered. ``most``: limit of what is
-    noted.
+    noted; ``before``: takes what lacks because it was before; ``others``: causes of a moment before, if they are noted.
     """
 
     def __init__(
-        self, make: Callable[[], Simulation], inputs: Iterable[RecordedInput], end: Nanos, most: int = MOST_NOTED
+        self,
+        make: Callable[[], Simulation],
+        inputs: Iterable[RecordedInput],
+        end: Nanos,
+        most: int = MOST_NOTED,
+        before: Before | None = None,
+        others: Callable[[Nanos], Causes | None] = lambda moment: None,
     ) -> None:
         self._make = make
         self._inputs = list(inputs)
         self.end = end
-        self.log = CauseLog(make(), most)
-        self._causes = Causes(self.log)
+        self.log = CauseLog(make(), most, before)
+        self._others = others
+        self.causes = Causes(self.log, others)
         self._on_the_way = StatesOnTheWay(self.log.world)
         self._replayed = ReplayedSignals(make, self._inputs)
         self._most_links = MOST_LINKS
@@ -159,11 +168,13 @@ class Why:
 
     def fault_link(self, name: str, until: Nanos) -> ChainLink:
         """A fault that has acted by a moment, as a cause."""
-        log = self.log
-        record, active = log.fault_record(name, until), log.world.objects.faults.find(name)
+        record, active = self.log.fault_record(name, until), self.log.world.objects.faults.find(name)
+        last = None if record is not None else self.log.before(f"{HAPPENED}fault {name}").since
+        if last is not None and (there := self.causes.of(last)) is not None:
+            record = there.log.fault_record(name, last)
         what = record.value if record is not None else "" if active is None else str(active.fault)
         subject = "" if record is None else record.controller
-        root = log.fault_root(name, until)
+        root = self.causes.fault_root(name, until)
         return ChainLink(root.time if record is None else record.time, subject, FAULT(name=name, what=what), root)
 
     def ask(self, question: str, at: Nanos | None = None) -> Answer:
@@ -177,10 +188,7 @@ class Why:
         if not begin <= moment <= self.end:
             raise Misuse(outside_past(moment, begin, self.end))
         text = _text_of(question) or self._only_program()
-        for _ in self.log.run(self._inputs, self.end):
-            self._on_the_way.pass_by(self.log.inputs)
-            yield
-        self._causes = Causes(self.log)  # programs may be others by now
+        yield from self.running()
         if _without_not(text) in self.log.world.controllers:
             return (yield from self._wait(_without_not(text), moment))
         if self._is_script(text):
@@ -189,6 +197,13 @@ class Why:
         if variable is not None:
             return (yield from self._of_variable(text, *variable, moment))
         return (yield from self._condition(text, moment))
+
+    def running(self) -> Generator[None, None, None]:
+        """Note what happened until the present, in parts."""
+        for _ in self.log.run(self._inputs, self.end):
+            self._on_the_way.pass_by(self.log.inputs)
+            yield
+        self.causes = Causes(self.log, self._others)  # programs may be others by now
 
     def _only_program(self) -> str:
         """The controller that is meant without a question."""
@@ -203,6 +218,8 @@ class Why:
         """The change that `LastChanges` searches for; None for a controller, for a bare quantity that moves all the time, and for
         `idle`. Raises `Misuse`."""
         text = _text_of(question)
+        if text.startswith(HAPPENED):
+            return happened(text)
         if not text or self._is_script(text):
             return None
         if _without_not(text) in self.log.world.controllers or self._variable(text) is not None:
@@ -229,17 +246,6 @@ class Why:
         moving = frozenset(signals[name] for name in moving)
         return Asked(text, frozenset(signals.values()), edges, moving, flip)
 
-    def since(self, answer: Answer, signals: Iterable[str], begin: Nanos) -> tuple[ChainLink, ...]:
-        """The links of an answer about signals that have not changed since ``begin`` either, which is before the log."""
-        state = self._causes.state
-        other = {state(name, answer.at): state(name, answer.at, begin) for name in signals if self.log.has(name)}
-        return tuple(replace(link, text=other.get(link.text, link.text)) for link in answer.links)
-
-    def rests(self, question: str, at: Nanos) -> bool:
-        """Whether a condition depends on where an axis is, or on a program that is not executed."""
-        names = [self._canonical(name) for name in parse_condition(self._named(_text_of(question))).names()]
-        return bool(self._axes_of(names, at)) or self._held(names, at) is not None
-
     def _has_edges(self, signal: str) -> bool:
         owner, _, pin = signal.partition(".")
         return self.log.has(signal) or (owner in self.log.world.controllers and pin in self.log.world.controllers[owner].pins())
@@ -255,9 +261,10 @@ class Why:
             value, since = self._from_log(asked, canonical, at, is_bare=is_bare)
         else:
             value, since = yield from self._from_run(asked, canonical, at, is_bare=is_bare)
+        since = self.log.before(asked).since if since is None else since
         state = IS_NUMBER(name=asked, value=value) if is_bare else IS_TRUE(name=asked) if value else IS_FALSE(name=asked)
         signals = tuple(canonical.values())
-        first = self._causes.lasting(signals, at, None if since is None else self._changed(signals, since))
+        first = self.causes.lasting(signals, at, None if since is None else self._changed(signals, since))
         if first is not None or since is not None:
             return (yield from self._answer(text, at, state, since, first))
         resting = (yield from self._resting(signals, at)) or self._held(signals, at) or self._ignored(signals, at)
@@ -265,7 +272,7 @@ class Why:
         present, named = (yield from self._present(at)), [name for name in signals if self.log.has(name)]
         states = [link for name in named for link in present.of([name])]
         says_more = resting is not None or len(states) > len(signals)
-        says_more |= any(self._causes.drivers(name, at) or self._causes.undriven(name) is not None for name in signals)
+        says_more |= any(self.causes.drivers(name, at) or self.causes.undriven(name) is not None for name in signals)
         return self._after(states if says_more else [], answer)
 
     def lacking(self, question: str, at: Nanos) -> Lacking:
@@ -290,7 +297,7 @@ class Why:
         for name in dict.fromkeys(name for one in deciding(node, value, wanted=True) for name in one.names()):
             full, unit = self._canonical(name), self._unit(name)
             if self.log.is_recorded(full):
-                links += PresentStates(self._causes, other, ALL_LINKS).of([full])
+                links += PresentStates(self.causes, other, ALL_LINKS).of([full])
             else:
                 text = IS_IN_UNIT(name=name, value=value(name), unit=unit) if unit else IS_NUMBER(name=name, value=value(name))
                 links.append(ChainLink(at, name.partition(".")[0], text))
@@ -390,8 +397,8 @@ class Why:
         """The statement, or somebody, that wrote a variable last."""
         other = yield from self._world_at(at)
         number = self.log.last_executed(controller, at) + 1
-        written = self._causes.programs.resource(controller, Resource(ResourceKind.VALUE, name), number, at)
-        by_hand = self._causes.controllers.variable_set(controller, name, at)
+        written = self.causes.programs.resource(controller, Resource(ResourceKind.VALUE, name), number, at)
+        by_hand = self.causes.controllers.variable_set(controller, name, at)
         last = max((one for one in (written, by_hand) if one is not None), key=lambda one: one.place, default=None)
         state = IS_NUMBER(name=text, value=other.programs[controller].variables(at).get(name, 0.0))
         return (yield from self._answer(text, at, state, None if last is None else last.place.time, last))
@@ -506,7 +513,10 @@ class Why:
 
     def _changed(self, signals: Sequence[str], time: Nanos) -> Cause | None:
         """Cause of a change of one of these signals at a moment."""
-        log, causes = self.log, self._causes
+        causes = self.causes.of(time)
+        if causes is None:
+            return None
+        log = causes.log
         last = causes.last([name for name in signals if (change := log.last_change(name, time)) and change.time == time], time)
         if last is not None:
             return last
@@ -516,7 +526,9 @@ class Why:
     def _of_unrecorded(self, signal: str, time: Nanos, since: Nanos | None = None) -> Cause | None:
         """Cause of what is in no trace at a moment; ``since``: since when it stands."""
         owner, _, rest = signal.partition(".")
-        world, causes = self.log.world, self._causes
+        world, causes = self.log.world, self.causes.of(time)
+        if causes is None:
+            return None
         if owner in world.axes:
             if rest in SLIPS:
                 return causes.axes.slipped(owner, time, SLIPS[rest])
@@ -545,8 +557,10 @@ class Why:
         unit = world.signal(signal).unit
         state = IS_IN_UNIT(name=signal, value=value, unit=unit) if unit else IS(signal=signal, value=f"{value:.6g}")
         standing = other.signal(signal)
+        is_value = f"{signal} == {value!r}"
         if isinstance(standing, SignalOf) and (self._is_of_rotor(full) or rest_of(standing, at) is not None):
-            _, since = yield from self._from_run(f"{signal} == {value!r}", {signal: full}, at, is_bare=False)
+            _, since = yield from self._from_run(is_value, {signal: full}, at, is_bare=False)
+            since = self.log.before(is_value).since if since is None else since
             if self._is_of_rotor(full):
                 changed = None if since is None else covered(self._of_unrecorded(full, since), Cover.LEVEL)
             elif self._point(signal) is None:  # what left it where it is may have come a moment after it was there
@@ -556,7 +570,8 @@ class Why:
             return (yield from self._answer(signal, at, state, since, changed))
         since: Nanos | None = at
         if isinstance(standing, SignalOf) and is_constant(standing, at):
-            _, since = yield from self._from_run(f"{signal} == {value!r}", {signal: full}, at, is_bare=False)
+            _, since = yield from self._from_run(is_value, {signal: full}, at, is_bare=False)
+            since = self.log.before(is_value).since if since is None else since
         first = self._of_unrecorded(full, at)
         return (yield from self._answer(signal, at, state, since, first))
 
@@ -564,7 +579,7 @@ class Why:
 
     def _wait(self, controller: str, at: Nanos) -> Asking:
         """Cause for which the program of a controller waits."""
-        log, causes = self.log, self._causes
+        log, causes = self.log, self.causes
         index, held = log.last_executed(controller, at), causes.programs.held(controller, at)
         if held is not None:
             since = held.link.time if held.place.order >= 0 else None
@@ -618,7 +633,7 @@ class Why:
             name = waiting.pop()
             if name not in seen:
                 seen.add(name)
-                waiting += (*self._causes.drivers(name, at), *self._causes.elements.behind(name))
+                waiting += (*self.causes.drivers(name, at), *self.causes.elements.behind(name))
         return seen
 
     def _axes_of(self, signals: Iterable[str], at: Nanos) -> set[str]:
@@ -628,10 +643,10 @@ class Why:
     def _held(self, signals: Iterable[str], at: Nanos) -> Cause | None:
         """Cause for which a program does not change signals, or those that drive them: it is held, or has decided against it."""
         found: list[FoundCause] = []
-        programs = self._causes.programs
+        programs = self.causes.programs
         for name in self._behind(signals, at):
             owner, _, pin = name.partition(".")
-            if owner in self.log.world.programs and not self._causes.drivers(name, at):
+            if owner in self.log.world.programs and not self.causes.drivers(name, at):
                 held = programs.held(owner, at)
                 found.append(held or programs.decided_against(owner, Resource(ResourceKind.PIN, pin), at))
         return max((one for one in found if one is not None), key=lambda one: one.place, default=None)
@@ -644,14 +659,14 @@ class Why:
             axis = _AXIS.match(f"{drive[1]}.")
             moves = name == f"{owner}.position" or (self._is_signal(name) and self.log.world.signal(name).continuous)
             if drive[0] in self.log.world.controllers and axis is not None and (moves or rest.lower().endswith("status")):
-                return self._causes.axes.unmoved(drive[0], axis[1] or "1", at)
+                return self.causes.axes.unmoved(drive[0], axis[1] or "1", at)
         return None
 
     def _resting(self, signals: Sequence[str], at: Nanos) -> Resting:
         """Where an axis of `_axes_of` is, and what brought it there, or left it; of several the one moved last. None if nothing
         moved any."""
         axes = self._axes_of(signals, at)
-        moved = [(cause.place, axis, cause) for axis in axes if (cause := self._causes.axes.moved(axis, at))]
+        moved = [(cause.place, axis, cause) for axis in axes if (cause := self.causes.axes.moved(axis, at))]
         if not moved:
             return None
         _, axis, cause = max(moved, key=lambda one: one[:2])
@@ -674,19 +689,25 @@ class Why:
 
     def _present(self, at: Nanos) -> Generator[None, None, PresentStates]:
         most = MOST_SNAPSHOTS if self._most_links == MOST_LINKS else ALL_LINKS
-        return PresentStates(self._causes, (yield from self._world_at(at)), most)
+        return PresentStates(self.causes, (yield from self._world_at(at)), most)
 
     # ------------------------------------------------------------------ the chain
 
     def _answer(self, question: str, at: Nanos, state: MessageText, since: Nanos | None, first: Cause | None) -> Asking:
         # What it is lasts since then.
         first = covered(first, Cover.LEVEL if first is not None and first.link.time == since else None)
-        log, effect = self.log, ChainLink(at if since is None else since, question.partition(".")[0], state)
-        chain = Chain(
-            effect, Place(at, LAST), first, is_whole=log.is_whole, is_owed=first is None and not (since is None and log.is_whole)
-        )
+        effect = ChainLink(at if since is None else since, question.partition(".")[0], state)
+
+        def is_whole(moment: Nanos) -> bool:
+            there = self.causes.of(moment)
+            return there is not None and there.log.is_whole
+
+        is_owed = first is None and since is not None
+        chain = Chain(effect, Place(at, LAST), first, is_whole=is_whole, is_owed=is_owed)
         while not chain.is_followed and len(chain) < self._most_links:
             chain.go_on()
             yield
         is_complete = chain.is_followed and not chain.is_cut
-        return Answer(question, at, state, since, tuple(chain.links), is_complete, log.begin, chain.is_cut, broken=chain.broken)
+        return Answer(
+            question, at, state, since, tuple(chain.links), is_complete, self.log.begin, chain.is_cut, broken=chain.broken
+        )

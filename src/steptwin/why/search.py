@@ -17,9 +17,10 @@ from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.world.inputs import Bytes, Download
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
-from steptwin.simulation.world.snapshotlog import ACTED, MOVED, LoggedSnapshot
+from steptwin.simulation.world.snapshotlog import ACTED, MOVED, LoggedSnapshot, happenings
 from steptwin.statements import StatementHook
 from steptwin.why import points
+from steptwin.why.lacking import HAPPENED, Found
 from steptwin.why.log import in_parts, levels_of, on_timed_lines
 from steptwin.why.replayed import TimeSeries, watch_truth
 from steptwin.why.states import rest_of
@@ -39,13 +40,14 @@ class Asked(NamedTuple):
     moving: frozenset[str]
     """Those that also change between events."""
     flip: Callable[[Mapping[str, TimeSeries], Nanos], Nanos | None]
+    happenings: frozenset[str] = frozenset()
+    """Those that are asked about, by their names in `steptwin.simulation.world.snapshotlog.happenings`, instead of a signal."""
 
 
-class Found(NamedTuple):
-    """``since``: the last change, None if there was none since ``known_from``."""
-
-    since: Nanos | None
-    known_from: Nanos
+def happened(text: str) -> Asked:
+    """When one of some happenings was last; they are written with commas."""
+    names = frozenset(text.removeprefix(HAPPENED).split(", "))
+    return Asked(text, frozenset(), frozenset(), frozenset(), lambda noted, at: points.since(noted[text], at), names)
 
 
 class Snapshots(Protocol):
@@ -61,8 +63,7 @@ class Snapshots(Protocol):
     def inputs_from(self, number: int) -> Collection[RecordedInput]: ...
 
 
-Searching: TypeAlias = Generator[None, None, Found]
-FoundChange: TypeAlias = Generator[None, None, "Nanos | None"]
+Searching: TypeAlias = Generator[None, None, Mapping[str, Found]]
 
 
 class LastChanges:
@@ -80,33 +81,37 @@ class LastChanges:
         self._written: dict[tuple[str, str, tuple[str, ...]], bool] = {}
         """Whether statements may write a point, by controller, point and the texts of its programs."""
 
-    def before(self, asked: Asked, moment: Nanos) -> Searching:
-        """The last change before ``moment``, that of a state, in parts."""
+    def before(self, asked: Collection[Asked], moment: Nanos) -> Searching:
+        """The last changes before ``moment``, that of a state, in parts; by text. Those searched together are run again once."""
         snapshots = self._snapshots
         if snapshots.branch != self._branch:
             self._branch = snapshots.branch
             self._known.clear()
-        until, found = self._known.get(asked.text, (snapshots.begin, Found(None, snapshots.begin)))
-        if found.since is not None and not snapshots.begin <= found.since <= moment:
-            until, found = snapshots.begin, Found(None, snapshots.begin)
-        if until < moment:
-            try:
-                found = yield from self._search(asked, until, moment, found)
-            finally:
-                self._world = None
-                self._values.clear()
-            self._known[asked.text] = moment, found
-        return found
+        unknown: dict[Nanos, dict[str, Asked]] = defaultdict(dict)
+        for one in asked:
+            until, found = self._known.get(one.text, (snapshots.begin, Found(None, snapshots.begin)))
+            if found.since is not None and not snapshots.begin <= found.since <= moment:
+                until, found = snapshots.begin, Found(None, snapshots.begin)
+            self._known[one.text] = until, found
+            if until < moment:
+                unknown[until][one.text] = one
+        try:
+            for until, ones in unknown.items():
+                yield from self._search(ones, until, moment)
+        finally:
+            self._world = None
+            self._values.clear()
+        return {one.text: self._known[one.text][1] for one in asked}
 
-    def _search(self, asked: Asked, lower: Nanos, upper: Nanos, before: Found) -> Searching:
-        """Between two moments, from the later one back; ``before``: what is known of the time before the earlier one."""
+    def _search(self, asked: dict[str, Asked], lower: Nanos, upper: Nanos) -> Generator[None, None, None]:
+        """Between two moments, from the later one back."""
         snapshots, after = self._snapshots, self._snapshots.state_at(upper)
         tried, parts = 0, 0
-        while after.snapshot.now > lower:
+        while asked and after.snapshot.now > lower:
             first, changes = after, False
             for _ in range(max(1, tried)):
                 before_it = snapshots.state_at(first.snapshot.now - 1)
-                if not changes and self._may_change(asked, before_it, first):
+                if not changes and any(self._may_change(one, before_it, first) for one in asked.values()):
                     if first is not after:
                         break  # what is after it does not change
                     changes = True
@@ -115,26 +120,22 @@ class LastChanges:
                     break
             tried += 1
             if changes:
-                since: Nanos | None = None
-                run = self._run(asked, first, after.snapshot.now)
-                while True:
-                    try:
-                        next(run)
-                    except StopIteration as end:
-                        since = end.value
-                        break
+                found: dict[str, Nanos] = {}
+                for _ in self._run(asked.values(), first, after.snapshot.now, found):
                     parts += 1
                     if parts > MOST_PARTS:
-                        run.close()
-                        return Found(None, after.snapshot.now)
+                        self._known |= {text: (upper, Found(None, after.snapshot.now)) for text in asked}
+                        return
                     yield
-                if since is not None:
-                    return Found(since, since)
+                self._known |= {text: (upper, Found(since, since)) for text, since in found.items()}
+                asked = {text: one for text, one in asked.items() if text not in found}
             after = first
-        return before
+        self._known |= {text: (upper, self._known[text][1]) for text in asked}
 
     def _may_change(self, asked: Asked, state: LoggedSnapshot, after: LoggedSnapshot) -> bool:
         """Whether something that is asked about may change between two states, one after the other."""
+        if any(name in asked.happenings for _, name in after.changed):
+            return True
         if any(name in asked.edges for controller, subject in after.changed for name in (subject, f"{controller}.{subject}")):
             return True
         if any(self._may_take_another(name, state, after) for name in asked.signals - asked.edges - asked.moving):
@@ -210,22 +211,25 @@ class LastChanges:
         world.restore(state.snapshot)
         return world
 
-    def _run(self, asked: Asked, state: LoggedSnapshot, end: Nanos) -> FoundChange:
-        """The last change from a state to a moment."""
-        snapshots = self._snapshots
+    def _run(
+        self, asked: Collection[Asked], state: LoggedSnapshot, end: Nanos, found: dict[str, Nanos]
+    ) -> Generator[None, None, None]:
+        """Run from a state to a moment, and add the last changes to ``found``."""
         world = self._at(state)
-        inputs = list(snapshots.inputs_from(state.inputs))
-        if asked.moving:
-            series: TimeSeries = []
-            world.start("why", partial(watch_truth, world, asked.text, series), is_external=True)
-            for _ in in_parts(world, inputs, end):
-                yield
-            return series[-1][0] if len(series) > 1 else None
+        inputs = list(self._snapshots.inputs_from(state.inputs))
+        is_replaced = any(isinstance(one.what, Download | Bytes) for one in inputs)
         with ExitStack() as stack:
-            noted = _Noted(world, asked, stack, is_replaced=any(isinstance(one.what, Download | Bytes) for one in inputs))
+            flips: dict[str, Callable[[], Nanos | None]] = {}
+            for one in asked:
+                if one.moving:
+                    series: TimeSeries = []
+                    world.start("why", partial(watch_truth, world, one.text, series), is_external=True)
+                    flips[one.text] = lambda series=series: series[-1][0] if len(series) > 1 else None
+                else:
+                    flips[one.text] = partial(one.flip, _Noted(world, one, stack, is_replaced=is_replaced).series, end)
             for _ in in_parts(world, inputs, end):
                 yield
-        return asked.flip(noted.series, end)
+        found |= {text: since for text, flip in flips.items() if (since := flip()) is not None}
 
 
 class _Noted:
@@ -235,7 +239,10 @@ class _Noted:
         levels = levels_of(world) if asked.edges else {}
         self._subscribers: dict[str, list[_Subscriber]] = defaultdict(list)
         self.series: dict[str, TimeSeries] = {name: [(world.now, levels.get(name, 0.0))] for name in asked.edges}
-        if asked.edges:
+        self._asked = asked
+        if asked.happenings:
+            self.series[asked.text] = [(world.now, 0.0)]
+        if asked.edges or asked.happenings:
             world.trace.subscribers.append(self._take)
             stack.callback(world.trace.subscribers.remove, self._take)
         for name in asked.signals:
@@ -250,6 +257,9 @@ class _Noted:
             stack.callback(world.trace.subscribers.remove, self._take)
 
     def _take(self, record: TraceRecord) -> None:
+        if self._asked.happenings and not self._asked.happenings.isdisjoint(happenings(record)):
+            series = self.series[self._asked.text]
+            points.note_value(series, record.time, len(series))
         if record.kind == "edge":
             series = self.series.get(record.subject) or self.series.get(f"{record.controller}.{record.subject}")
             if series is not None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from steptwin.controller import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.conveyortable import RUN
 from steptwin.simulation.scheduler.trace import TraceRecord
@@ -43,6 +42,8 @@ class WorkpieceCauses:
     def last(self, workpiece: str, what: str, change: Change) -> FoundCause:
         """The last event of a kind of a workpiece before a change."""
         event = self._log.last_event(workpiece, change.time, change.order, what)
+        if event is None:
+            self._log.lack()
         return None if event is None else covered(self.event(event), Cover.ACTION)
 
     def event(self, event: Change) -> Cause:
@@ -86,7 +87,9 @@ class WorkpieceCauses:
                 return self.event(below)
         if what in (*COMES, FALLS):
             lasts = next((one for one in self._log.events_before(workpiece, event) if self._what(one) not in STAYS), None)
-            if lasts is not None and self._what(lasts) in (PUSHED, FALLS):
+            if lasts is None:
+                self._log.lack()
+            elif self._what(lasts) in (PUSHED, FALLS):
                 return covered(self.event(lasts), Cover.ACTION)
         # What takes a workpiece from an element, or lets go of it there, acts.
         actor = str(getattr(record.value, "values", {}).get("cup", owner))
@@ -109,8 +112,7 @@ class WorkpieceCauses:
         sources, how = list(self._all.sources(PinName(belt, RUN))), HAS_ACTED_SINCE(name=belt)
         found = self._all.last(sources, change.time, how, change.order)
         if found is None and sources:
-            begin: Nanos = self._log.begin
-            found = self._all.first(sources[0], self._log.level(sources[0], begin), Place(begin), how)
+            found = self._all.first(sources[0], how)
         return covered(found, Cover.ACTION)
 
 

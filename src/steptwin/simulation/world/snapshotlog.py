@@ -79,6 +79,16 @@ ACTED: Changed = ("", "")
 """A script acted, or something came from outside."""
 
 
+def happenings(record: TraceRecord) -> Iterator[str]:
+    """Names of what happened by a record: the subject of an event, its axis, and what happened to a workpiece; a fault."""
+    if record.kind == "fault":
+        yield f"fault {record.subject}"
+    elif record.kind == "event":
+        facts = dict(record.facts)
+        yield f"event {facts.get('what', record.subject)}"
+        yield f"event of axis {facts.get('axis')}"
+
+
 class LoggedSnapshot(NamedTuple):
     snapshot: SimulationSnapshot
     inputs: int
@@ -177,6 +187,7 @@ class ChangedSince:
             self._names.add((record.controller, record.subject))
         elif record.kind in _MOTIONS:
             self._names.add((record.controller, MOVED))
+        self._names.update((record.controller, name) for name in happenings(record))
 
     def _act(self, script: str, what: ExternalInput) -> None:
         self._names.add(ACTED)
