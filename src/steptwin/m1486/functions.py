@@ -61,7 +61,13 @@ _NAMED = (
     AuxiliaryFunction(
         FULLSTEP, "Fullstep", "after a forced stop the motor goes on to a full step", "a forced stop ends where it ends"
     ),
-    AuxiliaryFunction(RECOVER, "Recover", "the program goes on after Kill or LIMIT", "Kill and LIMIT stop the program", _LIMIT),
+    AuxiliaryFunction(
+        RECOVER,
+        "Recover",
+        "the program goes on after Kill or LIMIT",
+        "Kill stops the program until C, LIMIT until it is high",
+        _LIMIT,
+    ),
     AuxiliaryFunction(FULLSTEPSS, "Fullstepss", "a seek stops on a multiple of 4 full steps", "a seek stops on any microstep"),
     AuxiliaryFunction(
         REPORT, "Report", "sends 7FH when the input buffer is empty, 7EH when three bytes are free", "sends neither"

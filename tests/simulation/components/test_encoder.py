@@ -61,3 +61,29 @@ def test_an_encoder_on_the_load_is_behind_the_play(mount: str, counts: int) -> N
 def test_an_encoder_does_not_follow_its_own_axis() -> None:
     with pytest.raises(WorldError, match="follows = 'x' is its own axis: an encoder is on it anyway"):
         World.from_toml(TEXT + 'follows = "x"\n')
+
+
+Y = '[[axis]]\nname = "y"\ndrive = "m.M2"\n'
+BELT = '[[conveyor]]\nname = "belt"\nspeed = 100.0\nlength = 1000.0\n'
+REEL = '[[dcmotor]]\nname = "reel"\nspeed = 100.0\n'
+
+
+@pytest.mark.parametrize(
+    ("encoder", "turned"),
+    [
+        (None, ""),
+        ("counts_per_rev = 1000", ""),
+        ('follows = "y"', Y),
+        ('follows = "belt"\ncounts_per_unit = 10', BELT),
+        ('follows = "reel"\ncounts_per_rev = 400', REEL),
+    ],
+)
+def test_whatever_turns_an_encoder_it_slips_at_the_input_that_reads_it(encoder: str | None, turned: str) -> None:
+    text = TEXT.replace("[axis.encoder]\n", "" if encoder is None else f"[axis.encoder]\n{encoder}\n") + turned
+    counts: list[list[float]] = []
+    for fault in ("", '[[fault]]\nkind = "slip"\nmachine = "m"\ncounts = 40\nat_s = 1.0\n'):
+        world = World.from_toml(text + fault)
+        world.run(until=3.0)
+        counts.append([world.mic488["m"].axis[number].encoder for number in (1, 2)])
+    sound, slipped = counts
+    assert slipped == [sound[0] + 40, sound[1]]

@@ -16,6 +16,9 @@ class ToyBody:
     def __init__(self, shafts: Iterable[AxisLoad] = ()) -> None:
         self.shafts = list(shafts)
 
+    def slip(self, axis: int, counts: int, now: Nanos) -> None:
+        raise AssertionError("a toy lacks this")
+
     def lacks(self, kind: FaultKind) -> str | None:
         if kind.needs is not None or kind.occasion is Occasion.SAVE:
             return "is a toy"

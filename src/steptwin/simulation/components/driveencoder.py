@@ -99,5 +99,4 @@ def _fit(axis: BuiltAxis, spec: EncoderSpec, turned: Turned, context: ElementCon
         return
     reader.gear_encoder(number, counts.numerator, counts.denominator, now)
     axis.scheduler.add_part(DriveEncoder(axis.scheduler, encoder, turned.drive), (turned.name,))
-    axis.mechanism.read(encoder)
     context.objects.turned.add(controller)

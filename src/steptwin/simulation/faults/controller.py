@@ -36,10 +36,6 @@ class AxisLoad(Protocol):
         """Move the shaft ``pulses`` behind a drive with positive pulses (negative: ahead)."""
         ...
 
-    def slip(self, counts: int, now: Nanos) -> None:
-        """Let the encoder slip by ``counts`` on the shaft."""
-        ...
-
 
 class Body(Protocol):
     """The parts of a controller that can fail, besides its pins."""
@@ -55,6 +51,10 @@ class Body(Protocol):
     @property
     def outputs(self) -> Collection[str]:
         """Pins with a level that may stick, as those of welded contacts; a line that is both is among the inputs, too."""
+        ...
+
+    def slip(self, axis: int, counts: int, now: Nanos) -> None:
+        """Let the encoder that an axis reads slip by ``counts``, whatever turns it."""
         ...
 
     def lacks(self, kind: FaultKind) -> str | None:

@@ -67,7 +67,7 @@ ENCODER_SLIPS = Message("simulation.encoder-slips", "the encoder of M{axis} slip
 def _slip(active: ActiveFault, controller: FaultyController, now: Nanos) -> None:
     axis, counts = _axis(active), int(active.fault.number("counts"))
     controller.report(active, now, ENCODER_SLIPS(axis=axis, counts=counts))
-    controller.body.shafts[axis - 1].slip(counts, now)
+    controller.body.slip(axis, counts, now)
 
 
 NO_SUPPLY = Message("simulation.no-supply-for", "no supply for {time:g} s")

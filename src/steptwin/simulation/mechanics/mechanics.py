@@ -107,7 +107,6 @@ class Mechanism(Stateful):
 
     FIXED: ClassVar[tuple[str, ...]] = (
         "_encoders",
-        "_others",
         "_name",
         "_power",
         "_revision",
@@ -158,7 +157,6 @@ class Mechanism(Stateful):
         self.number = number
         self.build = build
         self._encoders: list[EncoderBuild] = []
-        self._others: list[EncoderBuild] = []
         """Encoders of its axis that it does not turn."""
         self._coupled = False
         """Whether the encoders were coupled to a trajectory instead of the drive."""
@@ -503,10 +501,6 @@ class Mechanism(Stateful):
             self._simple = False
         self._turn_encoders(now)
 
-    def read(self, encoder: EncoderBuild) -> None:
-        """Let an encoder that something else turns slip as one of its own does."""
-        self._others.append(encoder)
-
     @property
     def may_turn(self) -> set[str]:
         """Controllers whose encoders it may turn without an event of theirs."""
@@ -570,12 +564,6 @@ class Mechanism(Stateful):
         self._simple = False
         behind = self.trajectory(now).field(now) - rotor
         self._renew(self._drive, now, MechanicalState(rotor, build.load_at(rotor, load), stalled, behind))
-        self._scheduler.notify(self.controller)
-
-    def slip(self, counts: int, now: Nanos) -> None:
-        """Let the encoders slip by ``counts`` on their shaft."""
-        for encoder in (*self._encoders, *self._others):
-            encoder.device.turn_encoder(encoder.axis, counts, now)
         self._scheduler.notify(self.controller)
 
     # Revisions of a drive are not restored, so the state only holds whether the trajectory belongs to the drive's present plan.

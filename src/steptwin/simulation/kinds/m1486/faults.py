@@ -26,6 +26,9 @@ class M1486Body:
         self._chip = chip
         self.shafts = list(shafts)
 
+    def slip(self, axis: int, counts: int, now: Nanos) -> None:
+        """There is no encoder: `lacks` says so."""
+
     def lacks(self, kind: FaultKind) -> str | None:
         if kind.parameter("axis") is not None and not self.shafts:
             return "has no shaft: an M1486 has one where a world has its [[axis]]"

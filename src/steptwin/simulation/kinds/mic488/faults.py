@@ -31,10 +31,7 @@ class EncoderShaft:
 
     def lose(self, pulses: int, now: Nanos) -> None:
         counts = self._device.axes[self._axis - 1].encoder.counts(pulses)
-        self.slip(-round(counts), now)
-
-    def slip(self, counts: int, now: Nanos) -> None:
-        self._device.turn_encoder(self._axis, counts, now)
+        self._device.turn_encoder(self._axis, -round(counts), now)
 
 
 class Mic488Body:
@@ -49,6 +46,9 @@ class Mic488Body:
         self._unit = unit
         self._line = line
         self.shafts: list[AxisLoad] = [EncoderShaft(device, axis.number) for axis in device.axes]
+
+    def slip(self, axis: int, counts: int, now: Nanos) -> None:
+        self._device.turn_encoder(axis, counts, now)
 
     def lacks(self, kind: FaultKind) -> str | None:
         if kind.needs is not Need.MODBUS_MASTER or any(register.key == "M_STATUS" for register in self._device.registers):
