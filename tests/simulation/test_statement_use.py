@@ -19,6 +19,10 @@ def pin(name: str) -> Resource:
     return Resource(ResourceKind.PIN, name)
 
 
+def origin(number: int | str) -> Resource:
+    return Resource(ResourceKind.ORIGIN, str(number))
+
+
 def value(name: str) -> Resource:
     return Resource(ResourceKind.VALUE, name)
 
@@ -63,28 +67,28 @@ WBC_USES = [
     StatementUse((pin("AIN2"), value("$D4")), (value("x"),)),
     StatementUse((pin("IN5"),), (pin("OUT3"),)),
     StatementUse((value("x"),), (pin("OUT2"),), lasts=True),
-    StatementUse((value("x"),), (axis(2),)),
+    StatementUse((value("x"),), (axis(2),), acts_by=(origin(2),)),
     StatementUse((), (axis(4),)),
-    StatementUse((), (ANY_AXIS,)),
+    StatementUse((), (ANY_AXIS,), acts_by=(origin(""),)),
     StatementUse((pin("IN1"),), governs=range(7, 10)),  # IF: up to its ENDIF
     StatementUse((ANY_PIN,), (ANY_PIN,)),
     StatementUse(),
     StatementUse((), (axis(3), value("AccM3")), keeps=True),
     StatementUse(),
-    StatementUse((axis(1), value("x")), governs=range(12, 13), is_loop=True),
+    StatementUse((axis(1), origin(1), value("x")), governs=range(12, 13), is_loop=True),
     StatementUse((value("x"),), waits=True),
-    StatementUse((axis(1), value("x")), governs=range(12, 13), is_loop=True),  # ENDWHILE
+    StatementUse((axis(1), origin(1), value("x")), governs=range(12, 13), is_loop=True),  # ENDWHILE
     StatementUse((axis(2),), waits=True),
     StatementUse((ANY_AXIS,), waits=True),
     StatementUse(jumps=17),
     StatementUse((), (ANY_AXIS, ANY_PIN, PROGRAM)),
     StatementUse((), (ANY_AXIS, ANY_PIN, PROGRAM)),
-    StatementUse((pin("IN6"),), waits=True, governs=range(20, 22)),  # an interrupt: up to its RETURN
+    StatementUse((pin("IN6"),), waits=True, governs=range(20, 22), acts_by=(value("CFGINT_IN6"),)),  # up to its RETURN
     StatementUse((), (value("x"),)),
     StatementUse(),
-    StatementUse((axis(3),), waits=True, governs=range(23, 24)),
+    StatementUse((axis(3),), waits=True, governs=range(23, 24), acts_by=(value("CFGINT_M3"),)),
     StatementUse(),
-    StatementUse((), waits=True, governs=range(25, 27)),
+    StatementUse((), waits=True, governs=range(25, 27), acts_by=(value("CFGINT_MODBUS"),)),
     StatementUse((), (value("x"),)),
     StatementUse(),
     StatementUse((), (ANY_AXIS, ANY_PIN, PROGRAM)),  # the end
@@ -106,6 +110,7 @@ def test_statements_of_wbc() -> None:
         ("T", StatementUse((value("variable"),), (ANY_PIN, *SIGNALS), keeps=True)),
         ("T40", StatementUse(writes=SIGNALS)),
         ("T41", StatementUse()),
+        ("C42", StatementUse(writes=(PROGRAM,))),  # LIMIT that is low holds it
         ("T80", StatementUse(writes=(value("flag80"),), keeps=True)),
         ("!12", StatementUse((value("variable"), value("register10")), (pin("B1"), pin("B2")))),
         ("?12", StatementUse((pin("B1"), pin("B2")), (value("variable"),))),
@@ -124,9 +129,9 @@ def test_statements_of_wbc() -> None:
         ("U1", StatementUse(waits=True)),
         ("I3H1", StatementUse((pin("B3"),), governs=range(1 << 16))),
         ("W100", StatementUse(waits=True)),
-        ("R", StatementUse((axis(1),), (axis(1), *SIGNALS), waits=True, acts_by=(value("distance"),))),
-        (")4", StatementUse((axis(1), pin("B4")), (axis(1), *SIGNALS), waits=True)),
-        ("(4", StatementUse((axis(1), pin("B4")), (axis(1), *SIGNALS), waits=True)),
+        ("R", StatementUse((axis(1),), (axis(1), *SIGNALS, PROGRAM), waits=True, acts_by=(value("distance"),))),
+        (")4", StatementUse((axis(1), pin("B4")), (axis(1), *SIGNALS, PROGRAM), waits=True)),
+        ("(4", StatementUse((axis(1), pin("B4")), (axis(1), *SIGNALS, PROGRAM), waits=True)),
         ("V300", StatementUse()),
         ("@7", StatementUse()),
     ],

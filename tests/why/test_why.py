@@ -420,6 +420,8 @@ def test_a_jump_and_an_interrupt_lead_to_what_they_depend_on() -> None:
         "line 16 `INT_IN2:` decided",
         "cell.IN2 became 1",
         "from outside: sets cell.IN2 = 1",
+        "line 2 `CFGINT_IN2 = RIS` was executed",
+        "the program started",
     ]
     assert [link.text for link in world.why("OUT3").links[1:]] == ["line 9 `OUT3 = ON` was executed", "the program started"]
 
@@ -662,6 +664,8 @@ def test_a_count_leads_to_the_interrupt_in_which_it_is_made(counts: World) -> No
         "c.IN1 became 1",
         "go became 1, a contact of c.IN1",
         "script hand: presses go",
+        "line 3 `CFGINT_IN1 = RIS` was executed",
+        "the program started",
     ]
 
 

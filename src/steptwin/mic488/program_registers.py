@@ -461,6 +461,7 @@ ACCESS: Mapping[str, RegisterFamily] = complete_access(
             _axis_reader(lambda axis, at: axis.encoder_counts(at)),
             _axis_writer(_set_encoder),
             _axis_tendency(_encoder_intervals),
+            quiet=False,
         ),
         "XENC": RegisterFamily(_axis_reader(_xenc), tendency=_axis_tendency(_encoder_intervals)),
         **{name: _timer(name) for name in TIMER_PERIODS},

@@ -19,7 +19,7 @@ from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
 from steptwin.why import points
 from steptwin.why.answer import ChainLink, Cover
-from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing, unknown
+from steptwin.why.chain import Cause, FoundCause, Place, covered, unknown
 from steptwin.why.controllers import acted
 from steptwin.why.log import JAMS, LAST, OF_MECHANICS, Change, words_of
 
@@ -27,7 +27,6 @@ GIVES_POWER = Message("why.gives-power", ", which gives {axis} its power")
 BEGAN_TO_MOVE = Message("why.began-to-move", "{axis} began to move")
 STOPPED = Message("why.stopped", "{axis} stopped")
 MOTION_ENDED = Message("why.motion-ended", "the motion of {axis} ended, which began at {time:.6f} s")
-NOTHING_HAS_COMMANDED = Message("why.nothing-has-commanded", "nothing has commanded {axis} to move")
 STOPPED_AT_SOFT_LIMIT = Message("why.stopped-at-soft-limit", "{axis} stopped at its soft limit {limit}")
 BRAKES_NS: Nanos = SECOND // 10
 """How much later than a load stands its brake may have closed (`steptwin.simulation.components.brake`)."""
@@ -87,8 +86,39 @@ class AxisCauses:
                 found = self._turned(controller, record.subject, plan) or found
             return covered(found, Cover.MOTION)
 
-        besides = partial(self.settings, controller, record.subject, place.time, names)
+        def besides() -> Iterator[Cause]:
+            yield from self.settings(controller, record.subject, place.time, names)
+            for one in self._all.controllers.acts_by(controller, plan, record.subject):
+                found = self._acted_by(controller, record.subject, one, plan)
+                if found is not None:
+                    yield found
+
         return Cause(ChainLink(place.time, controller, text), place, planned, cover, besides)
+
+    def _acted_by(self, controller: str, axis: str, one: Resource, plan: Change) -> FoundCause:
+        """Cause of something by which the command of a plan acts."""
+        if one.kind is ResourceKind.ORIGIN:
+            return self.origin(controller, axis, plan.time, plan.order)
+        is_noted = self._log.points.series(f"{controller}.{one.name}") is not None
+        if is_noted:
+            return self._all.controllers.register(controller, one.name, None, plan.time, plan.order)
+        return self._all.controllers.written(controller, one.name, plan.time, plan.order)
+
+    def origin(self, controller: str, axis: str, until: Nanos, before: int = LAST) -> FoundCause:
+        """The last change of the coordinate of an axis without a motion by a moment, before an order."""
+        change = self._log.last_origin(controller, axis, until, before)
+        wanted = Resource(ResourceKind.ORIGIN, axis)
+        found = None if change is None else self._all.controllers.in_controller(controller, change, wanted, f"M{axis}_POS_ACT")
+        return covered(found, Cover.LEVEL)
+
+    def coordinate(self, controller: str, axis: str, until: Nanos) -> FoundCause:
+        """Cause of the coordinate that an axis has at a moment: its motion, or who wrote it since; both, where it moved on."""
+        motion, origin = self.motion(controller, axis, until), self.origin(controller, axis, until)
+        motion = motion and self._rests(controller, axis, motion, until)
+        if motion is None or origin is None or (motion.cover is None and motion.place < origin.place):
+            return origin or motion
+        first, other = (motion, origin) if motion.place > origin.place else (origin, motion)
+        return first._replace(along=(*first.along, other._replace(cover=Cover.MOTION)))
 
     def settings(self, controller: str, axis: str, until: Nanos, names: Collection[str] = SETTINGS) -> Iterator[Cause]:
         """Who gave an axis the settings that it has at a moment, as far as they have changed."""
@@ -142,17 +172,32 @@ class AxisCauses:
         if event is not None and not (is_unpowered and power is not None and power.place > Place(event.time, event.order)):
             return self.rotor_event(axis, event)
         if is_unpowered and power is not None:
-            return self._let_go(axis, power, until if since is None else min(until, since + BRAKES_NS))
+            let_go = self._let_go(axis, power, until if since is None else min(until, since + BRAKES_NS))
+            return let_go if is_off else self._regained(axis, let_go, power, motion)
         lost = self._lost_by_fault(axis, until, before, LOSES_PULSES)
         if motion is None and lost is None:
-            return self.ignored(controller, number, until, before)
+            return self._all.attempts.last(controller, number, until, before)
+        motion = motion and self._rests(controller, number, motion, until, before)
         is_last = lost is not None and (motion is None or (motion.cover is None and lost.place > motion.place))
         return lost if is_last else motion
 
-    def power(self, axis: str, until: Nanos) -> FoundCause:
-        """The last change by a moment of the output that gives the motor of an axis power; None for one that always has some."""
+    def _rests(self, controller: str, number: str, motion: Cause, until: Nanos, before: int = LAST) -> Cause:
+        """A motion that may be over, along with later commands that moved nothing."""
+        if motion.cover is not None:
+            return motion
+        later = self._all.attempts.last(controller, number, until, before, motion.place.time)
+        return motion if later is None else later._replace(along=(*later.along, covered(motion, Cover.LEVEL), *motion.along))
+
+    def _regained(self, axis: str, found: Cause, power: Cause, motion: FoundCause) -> Cause:
+        """That a motor has power again, along with the loss of it, during which its motion went on, and with that motion."""
+        lost = self.power(axis, power.place.time, power.place.order)
+        return found._replace(along=(*found.along, *(one for one in (lost, motion) if one is not None)))
+
+    def power(self, axis: str, until: Nanos, before: int = LAST) -> FoundCause:
+        """The last change by a moment, before an order, of the output that gives the motor of an axis power; None for one that
+        always has some."""
         signal = self._power_of(axis)
-        found = self._all.last((signal,), until, GIVES_POWER(axis=axis)) if signal else None
+        found = self._all.last((signal,), until, GIVES_POWER(axis=axis), before) if signal else None
         if signal and found is None and not self._log.level(signal, until):  # it has never had any
             found = self._all.first(signal, GIVES_POWER(axis=axis))
         return covered(found, Cover.MOTION)
@@ -176,24 +221,6 @@ class AxisCauses:
         blocked = self._lost_by_fault(axis, error.time, error.order, IS_BLOCKED, LOSES_PULSES, since=begun)
         held = [one for one in (None if is_motion else found, blocked) if one is not None]
         return covered(max(held, key=lambda one: one.place, default=None), Cover.MOTION)
-
-    def unmoved(self, controller: str, number: str, until: Nanos) -> FoundCause:
-        """Reason why an axis of a controller has not moved by a moment."""
-        if self.motion(controller, number, until) is not None:
-            return None
-        ignored = self.ignored(controller, number, until)
-        if ignored is not None or not self._log.never_happened(f"event of axis {number}"):
-            return ignored
-        text = NOTHING_HAS_COMMANDED(axis=f"{controller}.M{number}")
-        return Cause(ChainLink(0, controller, text), Place(0), nothing, Cover.LEVEL)
-
-    def ignored(self, controller: str, number: str, until: Nanos, before: int = LAST) -> FoundCause:
-        """The last event about an axis that never moved: a command that its controller ignored."""
-        event = self._log.last_axis_event(controller, number, until, before)
-        if event is None:
-            self._log.never_happened(f"event of axis {number}")
-            return None
-        return covered(self._all.controllers.axis_event(controller, event, Place(event.time, event.order)), Cover.LEVEL)
 
     def slipped(self, axis: str, until: Nanos, subjects: Collection[str] = OF_MECHANICS) -> FoundCause:
         """The last event by a moment after which the rotor of an axis is elsewhere than counted; its motion, if there is none."""

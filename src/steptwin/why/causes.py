@@ -17,6 +17,7 @@ from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
 from steptwin.why.answer import ChainLink, Cover, since_before
+from steptwin.why.attempts import Attempts
 from steptwin.why.axes import AxisCauses
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing, unknown
 from steptwin.why.controllers import ControllerCauses, acted
@@ -58,7 +59,7 @@ class Causes:
         self.parts: dict[str, TerminalComponent] = {
             name: part for kind, parts in built.items() if ELEMENTS[kind].terminals is not None for name, part in parts.items()
         }
-        self.axes, self.programs = AxisCauses(self), ProgramCauses(self)
+        self.axes, self.attempts, self.programs = AxisCauses(self), Attempts(self), ProgramCauses(self)
         self.controllers, self.elements = ControllerCauses(self), ElementCauses(self)
         self.workpieces = WorkpieceCauses(self)
 

@@ -45,8 +45,9 @@ class ControllerCauses:
 
     def at_moment(self, controller: str, time: Nanos, wanted: Resource | None, point: str = "") -> FoundCause:
         """Cause of a change in a controller that no record shows; ``point``: of that point of it."""
-        group = self._log.group(controller)
-        found = self.in_controller(controller, Change(time, 0.0, group, self._log.position(group, time), LAST), wanted, point)
+        group, order = self._log.group(controller), self._log.points.order_of(f"{controller}.{point}", time)
+        change = Change(time, 0.0, group, self._log.position(group, time), LAST if order is None else order)
+        found = self.in_controller(controller, change, wanted, point)
         if found is None and wanted is not None:
             return self._all.axes.motion(controller, wanted.name, time)
         return found
@@ -63,7 +64,7 @@ class ControllerCauses:
         if wanted is None or wanted.kind is not ResourceKind.AXIS:
             return None
         event = self._log.last_axis_event(controller, wanted.name, change.time)
-        if event is None or event.time < change.time or self._pin_of(controller, event) is None:
+        if event is None or event.time < change.time or event.order > change.order or self._pin_of(controller, event) is None:
             return None
         return self.axis_event(controller, event, Place(event.time, min(event.order, change.order), -1))
 
@@ -109,6 +110,52 @@ class ControllerCauses:
         act = next((act for act in self._log.acts_at(change.time, change.order) if _changes(act, controller)), None)
         return None if act is None else acted(act)
 
+    def acts_by(self, controller: str, plan: Change, axis: str) -> Sequence[Resource]:
+        """The things by which the command of a plan of an axis acts, besides its value."""
+        index = self._statement_at(controller, plan, Resource(ResourceKind.AXIS, axis))
+        if index is not None:
+            return self._all.programs.use(controller, index).acts_by
+        found, registers = self.commanded(controller, plan, None), self._world.kind(controller).registers
+        if found is None or registers is None:
+            return ()
+        return [
+            one for name, use in registers.uses(axis).items() if _name_of(name).search(found.link.text) for one in use.acts_by
+        ]
+
+    def register(self, controller: str, name: str, wanted: Resource | None, until: Nanos, before: int = LAST) -> FoundCause:
+        """The last change of a register of a controller by a moment, before an order, as far as its values are noted."""
+        signal = f"{controller}.{name}"
+        since = None if self._log.points.series(signal) is None else self._log.since(signal, until)
+        if since is None:
+            return None
+        there = self._all.of(since)
+        if there is not self._all:
+            return None if there is None else there.controllers.register(controller, name, wanted, since)
+        group = self._log.group(controller)
+        change = Change(since, 0.0, group, self._log.position(group, since), before if since == until else LAST)
+        return covered(self.in_controller(controller, change, wanted, name), Cover.LEVEL)
+
+    def written(self, controller: str, name: str, until: Nanos, before: int = LAST) -> FoundCause:
+        """The last request or action by a moment, before an order, that wrote a register of a controller."""
+        on, pattern, group = self._world.objects.line_of.get(controller), _name_of(name), self._log.group(controller)
+        if on is None:
+            acts = (act for act in self._log.acts_before(until, before) if _changes(act, controller) and _names(act, name))
+            act = next(acts, None)
+            return None if act is None else covered(acted(act), Cover.LEVEL)
+        last = self._log.position(group, until)
+        for position in range(last - 1, max(-1, last - MOST_LOOKED_BACK), -1):
+            record, order = self._log.records[group][position], self._log.order(group, position)
+            if record.kind == "frame" and order < before and self._is_for(controller, record, order):
+                found = self._frame(record, order)
+                if pattern.search(found.link.text):
+                    return covered(found, Cover.LEVEL)
+        return None
+
+    def _is_for(self, controller: str, record: TraceRecord, order: int) -> bool:
+        """Whether a frame is a request that may change a controller."""
+        on = self._world.objects.line_of.get(controller)
+        return on is not None and record.controller == on[0].name and on[1] in self._log.requests.get(order, ())
+
     def of_program(self, controller: str, change: StateChange) -> FoundCause:
         """Cause of a change of the state of a program."""
         group = self._log.group(controller)
@@ -128,7 +175,15 @@ class ControllerCauses:
         is_first = event is self._log.begins[controller][0] and self._log.is_whole
         link = ChainLink(event.time, controller, words_of(self._log.record(event)))
         before = nothing if found is None and is_first else lambda: found
-        return Cause(link, Place(event.time, event.order), before, Cover.PROGRAM)
+        lost = None if supply is None else self._lost(f"{supply}.good", event)
+        besides = tuple if lost is None else lambda: [lost]
+        return Cause(link, Place(event.time, event.order), before, Cover.PROGRAM, besides)
+
+    def _lost(self, good: str, event: Change) -> FoundCause:
+        """The last loss of a supply, by its signal, before it fed a controller again."""
+        changes = (one for one in reversed(self._log.changes.get(good, ())) if (one.time, one.order) < (event.time, event.order))
+        off = next((one for one in changes if not one.value and not self._log.is_first(good, one)), None)
+        return None if off is None else covered(self._all.change(good, off), Cover.LEVEL)
 
     def _no_supply(self, controller: str, event: Change) -> FoundCause:
         """The last fault before an event that took the supply of a controller."""
@@ -150,7 +205,7 @@ class ControllerCauses:
         found: list[tuple[TraceRecord, int]] = []
         for position in range(self._log.position(group, here.time)):
             record, order = self._log.records[group][position], self._log.order(group, position)
-            if record.kind == "frame" and record.controller == on[0].name and on[1] in self._log.requests.get(order, ()):
+            if record.kind == "frame" and self._is_for(controller, record, order):
                 lines = "".join(record.data().decode("ascii", "replace").split(" ")).upper().split("\r")
                 found += [(record, order)] * lines.count(here.location.text.upper())
         done = executed.locations[:index].count(here.location) if self._log.is_whole else len(found)
@@ -178,18 +233,12 @@ class ControllerCauses:
         """A request or another action that reached a controller at the moment of a change, after the order ``since``: the last
         that names the point that changed, or the last of all."""
         found: list[Cause] = []
-        on = self._world.objects.line_of.get(controller)
         for order, record in self._log.at(change.group, change.time):
             if order < since:
                 break
             if order >= change.order:
                 continue
-            if (
-                on is not None
-                and record.kind == "frame"
-                and record.controller == on[0].name
-                and on[1] in self._log.requests.get(order, ())
-            ):
+            if record.kind == "frame" and self._is_for(controller, record, order):
                 found.append(self._frame(record, order))
             elif record.controller == controller and record.kind == "input" and not self._is_of_pin(record, order):
                 found.append(self._input(record, order))
@@ -199,8 +248,9 @@ class ControllerCauses:
         """Cause of an act of the controller itself: an input, or the end of what an earlier statement began."""
         inputs: list[tuple[int, str]] = []
         event: tuple[int, TraceRecord] | None = None
+        supply = self._world.objects.supplied.get(controller)
         for order, record in self._log.at(change.group, change.time):
-            if order >= change.order or record.controller != controller:
+            if order >= change.order or not (record.controller == controller or ("element", supply) in record.facts):
                 continue
             if record.kind == "edge" and self._is_input(PinName(controller, record.subject)):
                 inputs.append((order, f"{controller}.{record.subject}"))
@@ -224,6 +274,9 @@ class ControllerCauses:
         if event is None:
             return self._all.fault(controller, change) or self._ended(controller, change.time, wanted) or before()
         order, record = event
+        begin = next((one for one in self._log.begins.get(controller, ()) if one.order == order), None)
+        if begin is not None:
+            return self.begun(controller, begin)
         element = str(facts.get("element"))
         if record.subject == POSITION_ERROR and of is not None:
             before = partial(self._not_followed, controller, change._replace(order=order), of)
@@ -257,8 +310,7 @@ class ControllerCauses:
             record = records[position]
             if record.kind == "frame" and record.controller == on[0].name:
                 order = self._log.order(change.group, position)
-                is_for_it = on[1] in self._log.requests.get(order, ())
-                return covered(self._frame(record, order), Cover.FRAME) if is_for_it else None
+                return covered(self._frame(record, order), Cover.FRAME) if self._is_for(controller, record, order) else None
         return None
 
     def _earlier(self, controller: str, time: Nanos, wanted: Resource | None) -> FoundCause:
@@ -322,7 +374,7 @@ def _matches(writes: Sequence[Resource], wanted: Resource | None) -> bool:
 
 
 def _names(act: Act, meaning: str) -> bool:
-    """Whether an action writes what a request is about."""
+    """Whether an action writes what a request is about, or a register with this name."""
     match act.what:
         case do.Write(values):
             return any(_name_of(name).search(meaning) for _, name, _ in values)

@@ -133,6 +133,8 @@ class CauseLog:
         self.executed = {name: ExecutedStatements(name) for name in world.controllers}
         self.plans: dict[tuple[str, str], list[Change]] = defaultdict(list)
         """Moments and positions of the plans of an axis, by controller and number."""
+        # Moments at which an axis got another coordinate without a motion, in the same way.
+        self.origins: dict[tuple[str, str], list[Change]] = defaultdict(list)
         self.faults: dict[str, list[Change]] = defaultdict(list)
         """Moments at which faults began or ended, by controller or element."""
         self.mechanics: dict[str, list[Change]] = defaultdict(list)
@@ -172,7 +174,7 @@ class CauseLog:
             for signal, held in parts.faults.held(owner).items():
                 self._holds[signal].append(Hold(began.get(held.fault, self.begin), held))
         self._built = {group: len(records) for group, records in self.records.items()}
-        self.points = points.NotedPoints(world)
+        self.points = points.NotedPoints(world, lambda: self._order + 7)
         world.trace.subscribers.append(self._take)
         world.act_subscribers.append(self._act)
         parts.faults.act_subscribers.append(self._fault_acted)
@@ -243,6 +245,8 @@ class CauseLog:
                 self.changes[signal].append(Change(record.time, record.level(), group, len(records), order))
             case "plan":
                 self.plans[record.controller, record.subject].append(Change(record.time, 0.0, group, len(records), order))
+            case "coordinate":
+                self.origins[record.controller, record.subject].append(Change(record.time, 0.0, group, len(records), order))
             case "frame":
                 if changed := self.frames.changes(record):
                     self.requests[order] = changed
@@ -405,6 +409,11 @@ class CauseLog:
     def last_axis_event(self, controller: str, axis: str, until: Nanos, before: int = LAST) -> Change | None:
         """The last event of a controller about an axis by a moment, before an order."""
         return _last(self.axis_events.get((controller, axis), ()), until, before)
+
+    def last_origin(self, controller: str, axis: str, until: Nanos, before: int = LAST) -> Change | None:
+        """When an axis last got another coordinate without a motion by a moment, before an order; not at the beginning."""
+        found = _last(self.origins.get((controller, axis), ()), until, before)
+        return None if found is None or (self.is_whole and found.time == self.begin) else found
 
     def last_begin(self, controller: str, until: Nanos, before: int) -> Change | None:
         """When a program last began anew by a moment, before an order, if it was not there from the beginning: an event of

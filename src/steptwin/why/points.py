@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import TypeAlias
 
@@ -27,8 +27,10 @@ class NotedPoints:
     """Notes the changes of all such points of ``world`` from now on: after each event of their controller, and after each
     statement of which `executes` is notified."""
 
-    def __init__(self, world: Simulation) -> None:
+    def __init__(self, world: Simulation, order: Callable[[], int]) -> None:
+        """``order``: that of a change after what was noted last (`steptwin.why.log.Change`)."""
         self._world = world
+        self.order = order
         self._readers = {owner: _Reader(self, world, owner) for owner in world.controllers}
         self._noted = self._looks = 0
         for owner, reader in self._readers.items():
@@ -50,6 +52,11 @@ class NotedPoints:
             for owner, reader in self._readers.items():
                 self._world.objects.scheduler_of[owner].unsubscribe(reader)
             self._readers.clear()
+
+    def order_of(self, name: str, time: Nanos) -> int | None:
+        """The order of the event after which a point took the value of a moment; None where that is not known."""
+        owner, _, path = name.partition(".")
+        return self._readers[owner].orders.get((path, time)) if owner in self._readers else None
 
     def series(self, name: str) -> Sequence[TimedValue] | None:
         """The values of a point, ``table.M1_ACC`` or ``table.USER_REGISTER[12]:real``, the first one from the beginning on; None
@@ -81,6 +88,8 @@ class _Reader:
         rows = (_memory(world, owner, f"{path}[0]") for path, point in points.items() if point is None)
         memory = next((row for row in rows if row is not None), None)
         self.cells = None if memory is None else _Cells(memory, now)
+        self.orders: dict[tuple[str, Nanos], int] = {}
+        """Those of the changes after events, by point and moment."""
         self._keeping: Nanos | None = None
         """Time of the last statement that may have changed a kept value and after which the values were not read."""
 
@@ -99,6 +108,7 @@ class _Reader:
         changed = self._others.changed(now)
         for path, value in changed.items():
             note_value(self.points[path], now, float(value))
+            self.orders[path, now] = self._all.order()
         self._all.looked(noted + len(changed))
 
     def _look_at_kept(self, now: Nanos) -> int:

@@ -13,9 +13,9 @@ from steptwin.simulation.kinds.programs import Resource, ResourceKind, Statement
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.why.answer import ChainLink
 from steptwin.why.causes import IS, Causes
+from steptwin.why.programs import WAITS
 from steptwin.why.sentences import statement
 
-WAITS = Message("why.waits", "{controller} waits at {statement}")
 WAITS_FOR_A_TIME = Message("why.waits-for-a-time", "it waits for a time only")
 DEPENDS_ON = Message("why.depends-on", "it depends on {name}")
 IS_NOT_SET = Message("why.is-not-set", "{name} is {value:g}: nothing has set it")
@@ -50,6 +50,14 @@ class PresentStates:
             if one not in seen:
                 seen.add(one)
                 waiting += yield from (self._signal(one, waits) if isinstance(one, str) else self._resource(*one))
+
+    def disabled(self, controller: str, wanted: Resource) -> Iterator[ChainLink]:
+        """The switches that are off of the interrupts that change something, and who set them."""
+        programs = self._world.programs[controller]
+        for use in self._causes.programs.interrupts(controller, wanted):
+            for switch in use.acts_by:
+                if not programs.read(switch.name, self._at):
+                    yield from self._switch(controller, switch)
 
     def waits(self, controller: str, use: StatementUse) -> bool:
         """Whether a program waits at a statement that it has executed last, which may be over if it is a wait for a time."""
@@ -98,8 +106,26 @@ class PresentStates:
             elif motion is not None:
                 yield motion.link
             return (yield from self.motion(controller, resource.name))
-        yield ChainLink(self._at, controller, self._value(controller, resource))
-        return ()
+        if resource.kind is not ResourceKind.ORIGIN:
+            yield ChainLink(self._at, controller, self._value(controller, resource))
+        return (yield from self.interrupts(controller, resource))
+
+    def interrupts(self, controller: str, wanted: Resource) -> _Links:
+        """The switches of the interrupts that change something, and who set them. Returns their events."""
+        events: list[_Asked] = []
+        for use in self._causes.programs.interrupts(controller, wanted):
+            events += ((controller, one) for one in use.reads)
+            for switch in use.acts_by:
+                yield from self._switch(controller, switch)
+        return events
+
+    def _switch(self, controller: str, switch: Resource) -> Iterator[ChainLink]:
+        """The switch of an interrupt, and who set it."""
+        yield ChainLink(self._at, controller, self._value(controller, switch))
+        last = self._log.last_executed(controller, self._at)
+        written = self._causes.programs.resource(controller, switch, last + 1, self._at)
+        if written is not None:
+            yield written.link
 
     def _value(self, controller: str, resource: Resource) -> MessageText:
         programs, at = self._world.programs[controller], self._at
@@ -122,8 +148,8 @@ class PresentStates:
         log, programs, at = self._log, self._causes.programs, self._at
         if owner not in self._world.controllers or self._causes.drivers(signal, at):
             return ()
-        supply = f"{self._world.objects.supplied.get(owner, '')}.good"
-        if log.has(supply) and not log.level(supply, at):
+        supply = programs.supply_off(owner, at)
+        if supply is not None:
             return [supply]
         held = programs.held(owner, at)
         if held is not None:
@@ -132,15 +158,18 @@ class PresentStates:
             if by is not None:
                 yield by.link
             return ()
-        index = log.last_executed(owner, at)
-        if index < 0 or not programs.leads_to(owner, index, Resource(ResourceKind.PIN, pin)):
+        index, wanted = log.last_executed(owner, at), Resource(ResourceKind.PIN, pin)
+        if owner in self._world.programs and not (index >= 0 and programs.leads_to(owner, index, wanted)):
+            return (yield from self.interrupts(owner, wanted))
+        if index < 0:
             return ()
         here, use = log.executed[owner][index], programs.use(owner, index)
         against = None if use.reads else programs.decided_against(owner, Resource(ResourceKind.PIN, pin), at)
         if against is not None:
             yield against.link
-            return [(owner, one) for one in programs.use(owner, (against.place.number - 2) // 3).reads]
+            reads = [(owner, one) for one in programs.use(owner, (against.place.number - 2) // 3).reads]
+            return [*reads, *(yield from self.interrupts(owner, wanted))]
         if not use.waits or at - here.time <= self._world.programs[owner].statement_time:
             return ()
         yield ChainLink(at, owner, WAITS(controller=owner, statement=statement(log, here)))
-        return [(owner, one) for one in use.reads]
+        return [*((owner, one) for one in use.reads), *(yield from self.interrupts(owner, wanted))]

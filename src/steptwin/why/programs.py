@@ -12,15 +12,17 @@ from steptwin.simulation.kinds.programs import ProgramState, Resource, ResourceK
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing, unknown
 from steptwin.why.log import LAST, MOST_LOOKED_BACK, Change, Executed
-from steptwin.why.programstates import OVER
+from steptwin.why.programstates import OVER, StateChange
 from steptwin.why.sentences import statement
 
 WAS_EXECUTED = Message("why.was-executed", "{statement} was executed")
 WAS_IN_EXECUTION = Message("why.was-in-execution", "{statement} was in execution before")
+WAITS = Message("why.waits", "{controller} waits at {statement}")
 ENDED = Message("why.ended", "{statement} ended")
 DID_NOT_WAIT = Message("why.did-not-wait", "{statement} did not wait: {levels}")
 DECIDED = Message("why.decided", "{statement} decided")
 FARTHER = Message("why.farther", "the last {most} statements did not decide it: those before were not searched")
+NEVER_SET = Message("why.never-set", "nothing has set {name}")
 NOT_STARTED = Message("why.not-started", "nothing has started the program")
 HELD = {
     ProgramState.STOPPED: Message("why.program-is-stopped", "the program is stopped{where}"),
@@ -89,17 +91,56 @@ class ProgramCauses:
         if index is None or not self._log.is_of_present_text(executed[index]):
             return None
         here, place = executed[index], Place(executed[index].time, executed[index].order, 3 * index + 2)
-        last = covered(max(self._read(controller, index, place), key=lambda one: one.place, default=None), Cover.LEVEL)
-        link = ChainLink(here.time, controller, DECIDED(statement=statement(self._log, here)))
-        return Cause(link, place, self._all.at_begin if last is None else lambda: last, Cover.LEVEL)
+        link, reads = (
+            ChainLink(here.time, controller, DECIDED(statement=statement(self._log, here))),
+            self._all_read(controller, index, place),
+        )
+        before = (lambda: reads[0]) if reads else self._all.at_begin
+        besides = lambda: (*reads[1:], *self._unchanged(controller, index, place))  # noqa: E731
+        return Cause(link, place, before, Cover.LEVEL, besides)
 
     def leads_to(self, controller: str, index: int, wanted: Resource) -> bool:
-        """Whether the program can still come from an executed statement to one that changes something."""
+        """Whether the program can still come from an executed statement to one that changes something, without an interrupt."""
         location, programs = self._log.executed[controller][index].location, self._world.programs[controller]
         if not self._log.is_of_present_text(self._log.executed[controller][index]):
             return False
         numbers = programs.reached(location.text, (location.number,))
-        return any(wanted in programs.use(StatementLocation(location.text, number)).writes for number in numbers)
+        others = [one for one in self._handlers(controller, location.text) if location.number not in one]
+        return any(
+            wanted in programs.use(StatementLocation(location.text, number)).writes
+            for number in numbers
+            if not any(number in handler for handler in others)
+        )
+
+    def before(self, controller: str, wanted: Resource, at: Nanos) -> FoundCause:
+        """Cause for which no statement has changed something by a moment: the program is held, has decided against it, or waits
+        before it; None if that is not known."""
+        if controller not in self._world.programs or not self.is_written(controller, wanted):
+            return None
+        held = self.held(controller, at) or self.decided_against(controller, wanted, at)
+        index = self._log.last_executed(controller, at)
+        if held is not None or index < 0 or not self.use(controller, index).waits or not self.leads_to(controller, index, wanted):
+            return held
+        found, here = self.statement(controller, index), self._log.executed[controller][index]
+        text = WAITS(controller=controller, statement=statement(self._log, here))
+        besides = partial(self._unchanged, controller, index, found.place)
+        return found._replace(link=ChainLink(here.time, controller, text), cover=Cover.WAIT, besides=besides)
+
+    def is_of_interrupt(self, controller: str, index: int) -> bool:
+        """Whether an executed statement stands in an interrupt."""
+        executed = self._log.executed[controller][index]
+        if not self._log.is_of_present_text(executed):
+            return False
+        return any(executed.location.number in one for one in self._handlers(controller, executed.location.text))
+
+    def interrupts(self, controller: str, wanted: Resource) -> Iterator[StatementUse]:
+        """The interrupts in which a statement changes something."""
+        programs = self._world.programs[controller]
+        for text in programs.texts:
+            for handler in self._handlers(controller, text):
+                uses = [programs.use(StatementLocation(text, number)) for number in handler]
+                if any(wanted in use.writes for use in uses[1:]):
+                    yield uses[0]
 
     def statement(self, controller: str, index: int) -> Cause:
         """A statement was executed."""
@@ -114,7 +155,8 @@ class ProgramCauses:
         """Values that an executed statement makes others of, or acts by."""
         use, here = self.use(controller, index), self._log.executed[controller][index]
         for one in (*(use.reads if use.writes and not use.waits else ()), *use.acts_by):
-            value = None if one in use.writes else self.resource(controller, one, index, here.time, here.order)
+            is_written = one in use.writes or one.kind is ResourceKind.ORIGIN  # that of its motion
+            value = None if is_written else self.resource(controller, one, index, here.time, here.order)
             if value is not None and not (one in use.acts_by and self._is_just_before(controller, index, value)):
                 yield value._replace(cover=Cover.LEVEL)
 
@@ -240,8 +282,30 @@ class ProgramCauses:
         if how is ENDED:
             return Cause(link, place, partial(self._of_wait, controller, index, place), Cover.PROGRAM)
         led = cache(partial(self._of_decision, controller, index, place))
-        besides = lambda: [one for one in led()[1:] if one is not None]  # noqa: E731
+
+        def besides() -> Iterator[Cause]:
+            yield from (one for one in led()[1:] if one is not None)
+            yield from self._unchanged(controller, index, place)
+            if use.waits and use.governs:  # an interrupt that was enabled
+                enabled = [self.resource(controller, one, index, place.time, place.order) for one in use.acts_by]
+                yield from (one for one in enabled if one is not None)
+
         return Cause(link, place, lambda: led()[0], Cover.PROGRAM, besides)
+
+    def _unchanged(self, controller: str, index: int, place: Place) -> Iterator[Cause]:
+        """What a condition reads and has had its value from the beginning."""
+        time, order, number = place
+        for one in self.use(controller, index).reads if self._log.is_whole else ():
+            name = f"{controller}.{one.name}"
+            if one.name and self.resource(controller, one, index, time, order) is None:
+                is_pin = one.kind is ResourceKind.PIN and self._log.since(name, time) is None
+                is_value = one.kind is ResourceKind.VALUE and self._is_variable(controller, one.name)
+                text = self._all.state(name, time) if is_pin else NEVER_SET(name=one.name) if is_value else None
+                if text is not None:
+                    yield Cause(ChainLink(time, controller, text), Place(time, order, number - 1), nothing)
+
+    def _is_variable(self, controller: str, name: str) -> bool:
+        return name in self._world.programs[controller].variables(self._world.now)
 
     def _did_not_wait(self, controller: str, index: int) -> Cause:
         """A wait for something that was there already: for that, or for what led to the wait, whichever came later."""
@@ -266,14 +330,19 @@ class ProgramCauses:
                 yield cause
 
     def _of_decision(self, controller: str, index: int, place: Place) -> Sequence[FoundCause]:
-        """Change by which what a condition reads has had its value since; of one that was evaluated for the first time, what led
-        to that, if it came later."""
-        last = covered(max(self._read(controller, index, place), key=lambda cause: cause.place, default=None), Cover.LEVEL)
+        """The changes by which what a condition reads has had its values since; of one that is new, also what led to it, if that
+        came later."""
+        reads = self._all_read(controller, index, place)
         is_new = not self.use(controller, index).waits and self._executed_before(controller, index) is None
-        if last is not None and not is_new:
-            return (last,)
+        if reads and not is_new:
+            return reads
         led = self._of_statement(controller, index)
-        return (led, last) if last is None or (led is not None and led.place > last.place) else (last,)
+        return (led, *reads) if not reads or (led is not None and led.place > reads[0].place) else reads
+
+    def _all_read(self, controller: str, index: int, place: Place) -> Sequence[Cause]:
+        """The last changes of what a condition reads, the latest one first."""
+        found = sorted(self._read(controller, index, place), key=lambda one: one.place, reverse=True)
+        return [one._replace(cover=Cover.LEVEL) for one in found]
 
     def _of_wait(self, controller: str, index: int, place: Place) -> FoundCause:
         """Change that a statement waited for, which came while it did, at most `LONGEST_REACTION_NS` before its end. A wait for a
@@ -309,6 +378,8 @@ class ProgramCauses:
                 return self._all.lasting(read, time, self._all.last(read, time, before=before), before)
             case ResourceKind.AXIS:
                 return self._all.axes.motion(controller, resource.name, time, before=before)
+            case ResourceKind.ORIGIN:
+                return self._all.axes.origin(controller, resource.name, time, before)
             case ResourceKind.VALUE:
                 written = self._register(controller, resource, time, before)
                 if written is not None:
@@ -323,16 +394,7 @@ class ProgramCauses:
     def _register(self, controller: str, resource: Resource, time: Nanos, before: int) -> FoundCause:
         """The last change of a register of a controller that a program has a name for, by a moment, before an order."""
         point = self._world.programs[controller].point(resource.name)
-        is_noted = point is not None and self._log.points.series(f"{controller}.{point}") is not None
-        since = self._log.since(f"{controller}.{point}", time) if is_noted else None
-        if point is None or since is None:
-            return None
-        there = self._all.of(since)
-        if there is not self._all:
-            return None if there is None else there.programs.resource(controller, resource, 0, since)
-        group = self._log.group(controller)
-        change = Change(since, 0.0, group, self._log.position(group, since), before if since == time else LAST)
-        return covered(self._all.controllers.in_controller(controller, change, resource, point), Cover.LEVEL)
+        return None if point is None else self._all.controllers.register(controller, point, resource, time, before)
 
     def held(self, controller: str, at: Nanos, before: int = LAST) -> FoundCause:
         """Since when, and by what, the program of a controller is not executed at a moment, before an order; None if it is."""
@@ -340,8 +402,11 @@ class ProgramCauses:
         if change is None or change.state is ProgramState.RUNS:
             return None
         if change.order < 0:
-            text = NOT_STARTED() if self._log.is_whole else HELD[change.state](where="")
-            return Cause(ChainLink(change.time, controller, text), Place(change.time), self._all.at_begin, Cover.LEVEL)
+            is_off = self.supply_off(controller, at) is not None
+            text = HELD[ProgramState.SHUT_DOWN if is_off else change.state](where="")
+            is_stopped = self._log.is_whole and not is_off and change.state is ProgramState.STOPPED
+            link, place = ChainLink(change.time, controller, NOT_STARTED() if is_stopped else text), Place(change.time)
+            return Cause(link, place, self._all.at_begin, Cover.LEVEL, partial(self._holding, controller, change))
         where = ""
         index = self._log.last_executed(controller, change.time)
         if change.state is not ProgramState.STOPPED and index >= 0:
@@ -349,7 +414,26 @@ class ProgramCauses:
         text = HELD[change.state](where=where)
         link = ChainLink(change.time, controller, text)
         by = partial(self._all.controllers.of_program, controller, change)
-        return Cause(link, Place(change.time, change.order), by, Cover.LEVEL)
+        return Cause(link, Place(change.time, change.order), by, Cover.LEVEL, partial(self._holding, controller, change))
+
+    def _holding(self, controller: str, change: StateChange) -> Iterator[Cause]:
+        """The level of the input that holds a program in its state."""
+        pin = self._world.programs[controller].holding.get(change.state)
+        if pin is None:
+            return
+        signal, place = f"{controller}.{pin}", Place(change.time, change.order)
+        came = self._all.last((signal,), change.time, before=change.order)
+        if came is not None:
+            yield covered(came, Cover.LEVEL) or came
+        elif self._log.is_whole:
+            yield Cause(
+                ChainLink(change.time, controller, self._all.state(signal, change.time)), place._replace(number=-1), nothing
+            )
+
+    def supply_off(self, controller: str, at: Nanos) -> str | None:
+        """The signal of the supply of a controller that does not feed it at a moment."""
+        good = f"{self._world.objects.supplied.get(controller, '')}.good"
+        return good if self._log.has(good) and not self._log.level(good, at) else None
 
     def _resumed(self, controller: str, since: int, until: Executed) -> FoundCause:
         """The end of a pause in a program after an order, before a statement."""

@@ -27,7 +27,8 @@ from steptwin.why.chain import Cause, Chain, FoundCause, Place, covered
 from steptwin.why.lacking import HAPPENED
 from steptwin.why.lacking import Lacking as Before
 from steptwin.why.log import LAST, MOST_NOTED, OF_MECHANICS, CauseLog, in_parts
-from steptwin.why.presentstates import WAITS, PresentStates
+from steptwin.why.presentstates import PresentStates
+from steptwin.why.programs import WAITS
 from steptwin.why.replayed import ReplayedSignals, TimeSeries, watch_truth, watch_value
 from steptwin.why.search import Asked, happened
 from steptwin.why.sentences import statement
@@ -83,6 +84,12 @@ class _Level:
 
     def version(self) -> object:
         return None
+
+
+def _led_to(effect: Cause) -> Cause | None:
+    """The causes of something that is asked for itself."""
+    found = [covered(one, Cover.LEVEL) or one for one in (effect.before(), *effect.besides()) if one is not None]
+    return found[0]._replace(along=(*found[0].along, *found[1:])) if found else None
 
 
 def _text_of(question: str) -> str:
@@ -353,6 +360,14 @@ class Why:
         owner, _, rest = name.partition(".")
         return owner in self.log.world.axes and rest in SLIPS
 
+    def _is_coordinate(self, name: str) -> bool:
+        """Whether a signal is the position of an axis as its controller counts it, which is not always that of its motor."""
+        owner, _, rest = name.lower().partition(".")
+        if owner not in self.log.world.controllers or self.log.world.kind(owner).registers is None:
+            return False  # what it counts is never set
+        is_moving = self._is_signal(name) and self.log.world.signal(name).continuous
+        return is_moving and "pos" in rest and not rest.startswith("enc")
+
     def _point(self, name: str) -> LivePoint | None:
         """The point of a controller with this name; None for what is none."""
         owner, _, rest = name.partition(".")
@@ -401,7 +416,10 @@ class Why:
         by_hand = self.causes.controllers.variable_set(controller, name, at)
         last = max((one for one in (written, by_hand) if one is not None), key=lambda one: one.place, default=None)
         state = IS_NUMBER(name=text, value=other.programs[controller].variables(at).get(name, 0.0))
-        return (yield from self._answer(text, at, state, None if last is None else last.place.time, last))
+        present, wanted = (yield from self._present(at)), Resource(ResourceKind.VALUE, name)
+        came = written is not None and self.causes.programs.is_of_interrupt(controller, written.place.number // 3)
+        states = [] if came else list(present.disabled(controller, wanted))
+        return self._after(states, (yield from self._answer(text, at, state, None if last is None else last.place.time, last)))
 
     def _registers(self, name: str) -> Iterator[str]:
         """Meanings of a name of a program language for each controller with a program: ``table.USER_REGISTER[10]:real`` for
@@ -543,6 +561,8 @@ class Why:
         axis = _AXIS.match(rest)
         is_of_axis = axis is not None or (self._is_signal(signal) and world.signal(signal).continuous)
         wanted = Resource(ResourceKind.AXIS, (axis and axis[1]) or "") if is_of_axis else None
+        if wanted is not None and self._is_coordinate(signal):
+            return causes.axes.coordinate(owner, wanted.name or "1", time)
         found = causes.controllers.at_moment(owner, time, wanted, rest)
         if found is None or wanted is None or "vel" not in rest.lower():
             return found
@@ -563,7 +583,8 @@ class Why:
             since = self.log.before(is_value).since if since is None else since
             if self._is_of_rotor(full):
                 changed = None if since is None else covered(self._of_unrecorded(full, since), Cover.LEVEL)
-            elif self._point(signal) is None:  # what left it where it is may have come a moment after it was there
+            elif self._point(signal) is None or self._is_coordinate(full):
+                # What left it where it is may have come a moment after it was there.
                 changed = covered(self._of_unrecorded(full, at, since), Cover.LEVEL) or self._ignored((full,), at)
             else:
                 changed = self._ignored((full,), at) if since is None else self._changed((full,), since)
@@ -583,8 +604,11 @@ class Why:
         index, held = log.last_executed(controller, at), causes.programs.held(controller, at)
         if held is not None:
             since = held.link.time if held.place.order >= 0 else None
-            first = held if since is None else covered(held.before(), Cover.LEVEL)
-            return (yield from self._answer(controller, at, PROGRAM_IS(controller=controller, held=held.link.text), since, first))
+            first = held if since is None else _led_to(held)
+            supply, present = causes.programs.supply_off(controller, at), (yield from self._present(at))
+            states = list(present.of([supply])) if supply is not None and since is None else []
+            state = PROGRAM_IS(controller=controller, held=held.link.text)
+            return self._after(states, (yield from self._answer(controller, at, state, since, first)))
         if index < 0 and log.is_whole:
             raise Misuse(NOTHING_EXECUTED_YET(controller=controller, at=at / SECOND))
         if index < 0:
@@ -622,7 +646,9 @@ class Why:
 
     def _after(self, states: Sequence[ChainLink], answer: Answer) -> Answer:
         """An answer after present states."""
-        links = tuple(dict.fromkeys((*states, *answer.links)))
+        known = {(link.subject, link.text) for link in states}
+        later = (link for link in answer.links if (link.subject, link.text) not in known)
+        links = tuple(dict.fromkeys((*states, *later)))
         is_all = len(links) <= self._most_links and (self._most_links != MOST_LINKS or len(states) < MOST_SNAPSHOTS)
         return answer._replace(links=links[: self._most_links], is_complete=answer.is_complete and is_all)
 
@@ -658,8 +684,11 @@ class Why:
             drive = self.log.world.axes[owner].spec.drive if owner in self.log.world.axes else (owner, rest)
             axis = _AXIS.match(f"{drive[1]}.")
             moves = name == f"{owner}.position" or (self._is_signal(name) and self.log.world.signal(name).continuous)
-            if drive[0] in self.log.world.controllers and axis is not None and (moves or rest.lower().endswith("status")):
-                return self.causes.axes.unmoved(drive[0], axis[1] or "1", at)
+            controller = self.log.world.controllers.get(drive[0])
+            is_only = moves and controller is not None and len(controller.axes) == 1
+            number = axis[1] or "1" if axis is not None else "1" if is_only else ""
+            if controller is not None and number and (moves or rest.lower().endswith("status")):
+                return self.causes.attempts.unmoved(drive[0], number, at)
         return None
 
     def _resting(self, signals: Sequence[str], at: Nanos) -> Resting:

@@ -18,6 +18,7 @@ from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss
 from steptwin.optionalmethods import OptionalMethods
 from steptwin.simulation.kinds.links import LINK_KEYS, LineSpec
+from steptwin.simulation.kinds.programs import WriteUse
 from steptwin.simulation.mechanics.mechanics import EncoderReader
 from steptwin.simulation.mechanics.scale import DriveScale, GivenScale
 from steptwin.simulation.scheduler.scheduler import Scheduler
@@ -226,6 +227,10 @@ class NamedRegisters(ABC, Generic[M]):
     @abstractmethod
     def execute(self, controller: M, pdu: bytes, now: Nanos, /) -> bytes:
         """The answer to a PDU that reaches the controller without a line."""
+
+    def uses(self, axis: str, /) -> Mapping[str, WriteUse]:
+        """The registers whose write moves an axis (by its number) and acts by something else, too."""
+        return {}
 
     @abstractmethod
     def ended_by(self, controller: M, pdu: bytes, /) -> tuple[int, ...]:

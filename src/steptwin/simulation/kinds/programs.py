@@ -46,6 +46,8 @@ class ResourceKind(enum.Enum):
     PIN = "pin"
     AXIS = "axis"
     """By its number; empty: any axis."""
+    ORIGIN = "origin"
+    """The zero of the coordinate of an axis, by its number."""
     VALUE = "value"
     """A variable or register of the program."""
     PROGRAM = "program"
@@ -76,6 +78,16 @@ class StatementUse(NamedTuple):
     """Values by which it acts, besides those that it reads, such as the distance of a move."""
     keeps: bool = False
     """Whether it may change a point of the controller without an event of that (`steptwin.points.LivePoint.is_kept`)."""
+
+
+class WriteUse(NamedTuple):
+    """Things by which a written register of a controller acts, besides its value."""
+
+    acts_by: tuple[Resource, ...] = ()
+    """Registers have their names in the data sheet."""
+    mode: str = ""
+    """The register that is not 0 while a written value is only kept, until `trigger` is written; empty if it never is."""
+    trigger: str = ""
 
 
 class GivenCommand(NamedTuple):
@@ -153,6 +165,11 @@ class Programs(Protocol):
 
     @property
     def state(self) -> ProgramState: ...
+
+    @property
+    def holding(self) -> Mapping[ProgramState, str]:
+        """The inputs whose level holds a program in a state."""
+        ...
 
     def given(self, number: int) -> GivenCommand | None:
         """Command for which a hook was called, at that moment, where `location` knows none; None where nothing is given so."""

@@ -163,6 +163,10 @@ class ChipPrograms:
         there = (StatementLocation(TEXT, one) for one in found if text.commands[one] == stored.command)
         return next(there, None)
 
+    @property
+    def holding(self) -> Mapping[ProgramState, str]:
+        return {ProgramState.LIMITED: "LIMIT"}
+
     def given(self, number: int) -> GivenCommand | None:
         stored = decode(self._chip.memory.fetch(number))
         return None if stored is None else GivenCommand(str(stored.command), use_of(stored.command))

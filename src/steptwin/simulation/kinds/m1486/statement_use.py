@@ -78,7 +78,8 @@ _RESOURCES: Mapping[ChipState, Callable[[ChipCommand], Iterable[Resource]]] = co
         ChipState.CARRY: _always(_value(f"flag{CARRY}")),
         ChipState.DISTANCE: _always(),  # what a move acts by
         # Neither pins nor axes, nor what a program calculates with.
-        **dict.fromkeys((ChipState.FUNCTIONS, ChipState.SETTINGS, ChipState.HELD), _always()),
+        **dict.fromkeys((ChipState.FUNCTIONS, ChipState.SETTINGS), _always()),
+        ChipState.HELD: _always(Resource(ResourceKind.PROGRAM, "")),
         **dict.fromkeys((ChipState.LOOPS, ChipState.CALL, ChipState.SENDING), _always()),
         **dict.fromkeys((ChipState.LISTENING, ChipState.MEMORY), _always()),
     },

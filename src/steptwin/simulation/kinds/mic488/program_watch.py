@@ -119,6 +119,8 @@ class ProgramWatch:
     def _awaited(self, now: Nanos, number: int) -> Iterable[str]:
         """The inputs, axes and values that decide how long a statement waits."""
         for resource in dict.fromkeys(use_of(self.program.steps, number).reads):
+            if resource.kind is ResourceKind.ORIGIN:
+                continue  # that of an axis that is there, too
             if resource.kind is not ResourceKind.AXIS:
                 yield resource.name or "inputs"
             elif resource.name:

@@ -91,6 +91,10 @@ class WbcPrograms:
     def state(self) -> ProgramState:
         return _STATES[self._device.program.state]
 
+    @property
+    def holding(self) -> Mapping[ProgramState, str]:
+        return {}
+
     def given(self, number: int) -> GivenCommand | None:
         return None  # statements come from texts only
 

@@ -9,7 +9,7 @@ from steptwin.simulation.kinds.programs import Resource, ResourceKind, Statement
 from steptwin.wbc import steps as s
 
 _PINS = frozenset({"OUT", "IN", "AIN"})
-_OF_AXIS = frozenset({"M", "STATM", "VACTM", "POSM", "ACCM", "DECM", "VMAXM", "LIMLM", "LIMRM", "ENC", "XENC", "CFGINT_M"})
+_OF_AXIS = frozenset({"M", "STATM", "VACTM", "POSM", "ACCM", "DECM", "VMAXM", "LIMLM", "LIMRM", "ENC", "XENC"})
 _ANY_AXIS = Resource(ResourceKind.AXIS, "")
 _ANY_PIN = Resource(ResourceKind.PIN, "")
 _PROGRAM = Resource(ResourceKind.PROGRAM, "")
@@ -29,6 +29,7 @@ def use_of(steps: Sequence[s.ProgramStep], number: int) -> StatementUse:
         governs=_governed(steps, number),
         is_loop=isinstance(step, s.WhileStep | s.EndWhileStep),
         jumps=step.target if isinstance(step, s.JumpStep) else None,
+        acts_by=tuple(_acted_by(step)),
         keeps=keeps,
     )
 
@@ -43,6 +44,17 @@ def _acted_on(effect: s.StepEffect) -> Iterable[Resource]:
     if effect.everything:
         yield _ANY_PIN
         yield _PROGRAM
+
+
+def _acted_by(step: s.ProgramStep) -> Iterable[Resource]:
+    """The coordinates in which a step gives a position, of a row those of the axes that it moves; the switch of an interrupt."""
+    match step:
+        case s.InterruptStep(event=event):
+            yield Resource(ResourceKind.VALUE, f"CFGINT_{event.name}")
+        case s.MotionStep(keyword="PABS", axis=axis):
+            yield Resource(ResourceKind.ORIGIN, str(axis))
+        case s.RowMotionStep(keyword=keyword) if keyword != "MOVELIN_REL":
+            yield Resource(ResourceKind.ORIGIN, "")
 
 
 def _awaited(step: s.ProgramStep) -> Iterable[Resource]:
@@ -77,11 +89,11 @@ def _return_after(steps: Sequence[s.ProgramStep], number: int) -> int:
 
 def _set_by(step: s.SetStep) -> tuple[tuple[Resource, ...], bool]:
     """Resources that SET changes, and whether they are only kept."""
-    (target,) = _operands((step.target,))
+    targets = tuple(_operands((step.target,)))
     if isinstance(step.target, s.Variable) or not ACCESS[step.target.row.key].quiet:
-        return (target, *_pins_of_axis(step.target)), False
+        return (*targets, *_pins_of_axis(step.target)), False
     register = Resource(ResourceKind.VALUE, step.target.name)
-    return (target,) if target == register else (target, register), True
+    return tuple(dict.fromkeys((*targets, register))), True
 
 
 def _pins_of_axis(target: s.AssignmentTarget) -> Iterable[Resource]:
@@ -101,5 +113,7 @@ def _operands(values: Iterable[s.ValueSource]) -> Iterable[Resource]:
                 yield _ANY_PIN
             case s.RegisterOperand(row=row) if row.key in _OF_AXIS:
                 yield Resource(ResourceKind.AXIS, str(value.number))
+                if row.key == "POSM":
+                    yield Resource(ResourceKind.ORIGIN, str(value.number))
             case s.RegisterOperand():
                 yield Resource(ResourceKind.VALUE, value.name)

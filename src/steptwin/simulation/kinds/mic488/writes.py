@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from steptwin.controller import Nanos
 from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.registermap import DataType
+from steptwin.mic488.registers import MOTION_REGISTERS
 from steptwin.mic488.values import encoded, halted, named
 from steptwin.mic488.writes import permitted
 from steptwin.simulation.kinds.kind import NamedRegisters, NewValues
+from steptwin.simulation.kinds.programs import Resource, ResourceKind, WriteUse
 from steptwin.wire.pdu import (
     MAX_WRITTEN_REGISTERS,
     ModbusException,
@@ -16,6 +20,9 @@ from steptwin.wire.pdu import (
     decode_request,
     encode_request,
 )
+
+MODE = "AXIS_CTR_MODE"
+"""TRIGGER while it is not 0: values of motion registers wait for their trigger register (MIC-16)."""
 
 
 class Mic488Registers(NamedRegisters[Mic488Device]):
@@ -48,6 +55,15 @@ class Mic488Registers(NamedRegisters[Mic488Device]):
 
     def execute(self, device: Mic488Device, pdu: bytes, now: Nanos) -> bytes:
         return device.execute(pdu, now)
+
+    def uses(self, axis: str) -> Mapping[str, WriteUse]:
+        found = {f"M{axis}_JOG_{way}": WriteUse((Resource(ResourceKind.VALUE, "JOG_SPEED"),)) for way in ("PLUS", "MINUS")}
+        for key in MOTION_REGISTERS:
+            register, trigger = f"M{axis}_{key}", f"AXIS_{key}_TRIG"
+            origin = (Resource(ResourceKind.ORIGIN, axis),) if key == "POS_ABS" else ()
+            found[register] = WriteUse(origin, MODE, trigger)
+            found[trigger] = WriteUse((Resource(ResourceKind.VALUE, MODE), Resource(ResourceKind.VALUE, register), *origin))
+        return found
 
     def ended_by(self, device: Mic488Device, pdu: bytes) -> tuple[int, ...]:
         try:

@@ -1,0 +1,80 @@
+"""Commands to axes that moved nothing: ignored, refused, or kept for a trigger that has not come."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+from steptwin.controller import Nanos
+from steptwin.messages import Message
+from steptwin.simulation.kinds.programs import Resource, ResourceKind, WriteUse
+from steptwin.why import points
+from steptwin.why.answer import ChainLink, Cover
+from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing
+from steptwin.why.log import LAST
+
+NOTHING_HAS_COMMANDED = Message("why.nothing-has-commanded", "nothing has commanded {axis} to move")
+WAITS_FOR_TRIGGER = Message("why.waits-for-trigger", "{register} waits for {trigger}, as {mode} is {value:g}")
+
+
+class Attempts:
+    """Finds the commands by which an axis has not moved. ``causes`` has the causes of everything else."""
+
+    def __init__(self, causes: Any) -> None:  # Causes, which imports this module
+        self._all = causes
+        self._log = causes.log
+        self._world = causes.log.world
+
+    def last(self, controller: str, number: str, until: Nanos, before: int = LAST, after: Nanos = -1) -> FoundCause:
+        """The last one by a moment, before an order, along with the others. ``after``: what was ignored before is over."""
+        ignored = self._ignored(controller, number, until, before)
+        later = [] if ignored is None or (after >= 0 and not self._is_later(controller, number, ignored, after)) else [ignored]
+        found = sorted((*later, *self._kept(controller, number, until, before)), key=lambda one: one.place)
+        return found[-1]._replace(along=tuple(found[:-1])) if found else None
+
+    def _is_later(self, controller: str, number: str, ignored: Cause, after: Nanos) -> bool:
+        """Whether an event is no end of a motion that began meanwhile."""
+        plans = self._log.plans_in_force(controller, number, ignored.place.time, ignored.place.order)
+        return ignored.place.time > after and all(plan.time <= after for plan in plans)
+
+    def unmoved(self, controller: str, number: str, until: Nanos) -> FoundCause:
+        """Reason why an axis of a controller has not moved by a moment."""
+        if self._all.axes.motion(controller, number, until) is not None:
+            return None
+        found = self.last(controller, number, until)
+        found = found or self._all.programs.before(controller, Resource(ResourceKind.AXIS, number), until)
+        if found is not None or not self._log.never_happened(f"event of axis {number}"):
+            return found
+        text = NOTHING_HAS_COMMANDED(axis=f"{controller}.M{number}")
+        return Cause(ChainLink(0, controller, text), Place(0), nothing, Cover.LEVEL)
+
+    def _ignored(self, controller: str, number: str, until: Nanos, before: int) -> FoundCause:
+        """The last event about an axis, such as a command that its controller ignored."""
+        event = self._log.last_axis_event(controller, number, until, before)
+        if event is None:
+            self._log.never_happened(f"event of axis {number}")
+            return None
+        return covered(self._all.controllers.axis_event(controller, event, Place(event.time, event.order)), Cover.LEVEL)
+
+    def _kept(self, controller: str, number: str, until: Nanos, before: int) -> Iterator[Cause]:
+        """Written registers whose values wait for a trigger."""
+        registers = self._world.kind(controller).registers
+        for register, use in ({} if registers is None else registers.uses(number)).items():
+            series = self._log.points.series(f"{controller}.{use.mode}")
+            if series is None or not points.level(series, until):
+                continue
+            written = self._all.controllers.written(controller, register, until, before)
+            mode = 0.0 if written is None else points.level(series, written.place.time)
+            if written is None or not mode:
+                continue
+            came = self._all.controllers.written(controller, use.trigger, until, before)
+            if came is None or came.place < written.place:
+                yield self._waits(controller, register, use, mode, written)
+
+    def _waits(self, controller: str, register: str, use: WriteUse, mode: float, written: Cause) -> Cause:
+        text = WAITS_FOR_TRIGGER(register=f"{controller}.{register}", trigger=use.trigger, mode=use.mode, value=mode)
+        time, order, number = written.place
+        by = partial(self._all.controllers.register, controller, use.mode, None, time, order)
+        besides = lambda: [one for one in (by(),) if one is not None]  # noqa: E731
+        return Cause(ChainLink(time, controller, text), Place(time, order, number + 1), lambda: written, Cover.LEVEL, besides)
