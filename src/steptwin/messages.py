@@ -45,6 +45,11 @@ class MessageText(str):
         """The message as JSON."""
         return {"text": str(self)} if self.id is None else {"text": str(self), "id": self.id, "values": self.values}
 
+    def message(self, name: str) -> MessageText | None:
+        """The message among its values with a name; None where there is none."""
+        value: Any = self.values.get(name)
+        return MessageText(value["text"], value.get("id"), value.get("values")) if isinstance(value, Mapping) else None
+
 
 class Message:
     """A sentence with places for values, as in `str.format`; a list is shown with commas between its members, ``{lines:\n}``

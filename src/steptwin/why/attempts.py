@@ -29,7 +29,11 @@ class Attempts:
     def last(self, controller: str, number: str, until: Nanos, before: int = LAST, after: Nanos = -1) -> FoundCause:
         """The last one by a moment, before an order, along with the others. ``after``: what was ignored before is over."""
         ignored = self._ignored(controller, number, until, before)
+        registers = self._world.kind(controller).registers
+        names = () if registers is None else registers.uses(number)
+        refused = self._all.controllers.refused(controller, names, until, before, after)
         later = [] if ignored is None or (after >= 0 and not self._is_later(controller, number, ignored, after)) else [ignored]
+        later += [] if refused is None else [refused]
         found = sorted((*later, *self._kept(controller, number, until, before)), key=lambda one: one.place)
         return found[-1]._replace(along=tuple(found[:-1])) if found else None
 

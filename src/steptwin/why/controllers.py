@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -30,8 +31,11 @@ FROM_OUTSIDE = Message("why.from-outside", "from outside: {what}")
 STOPPED_WHERE = Message("why.stopped-where", "{event}: {level}")
 NOT_ENABLED = "drive-off"
 """Event of an axis that ignored a command because it is not enabled."""
+HOMED = "homed"
+"""Event of an axis that is at its home position."""
 POSITION_ERROR = "position-error"
 """Event of an axis that did not reach its position."""
+REFUSED = Message("why.refused", "{request}: refused, {reason}")
 REQUEST = Message("why.request", "request: {meaning}")
 
 
@@ -73,6 +77,8 @@ class ControllerCauses:
         record = self._log.record(event)
         if record.subject == NOT_ENABLED:
             return f"{controller}.M{dict(record.facts)['axis']}_EN"
+        if record.subject == HOMED:
+            return self._home_pin(controller, event, str(dict(record.facts)["axis"]))
         values = words_of(self._log.record(event)).values
         axes: Any = getattr(getattr(self._world.controllers[controller], "config", None), "axes", ())
         if not axes or "limit" not in values:
@@ -80,6 +86,16 @@ class ControllerCauses:
         number = getattr(axes[int(values["axis"]) - 1], f"in_{values['limit']}".lower(), -1)
         pin = f"{controller}.IN{number + 1}"
         return pin if self._log.has(pin) else None
+
+    def _home_pin(self, controller: str, event: Change, axis: str) -> str | None:
+        """The pin of the switch on which an axis stood already when it was homed."""
+        on: list[str] = []
+        for switch in self._world.kind(controller).end_switches(self._world.controller(controller)):
+            pin = f"{controller}.{switch.pin}"
+            since = self._log.since(pin, event.time)
+            if str(switch.axis) == axis and self._log.level(pin, event.time) == switch.active and since != event.time:
+                on.append(pin)
+        return on[0] if len(on) == 1 else None
 
     def axis_event(self, controller: str, event: Change, place: Place) -> Cause:
         """An event about an axis, such as a stop by a limit switch that came or was there already, or an ignored command."""
@@ -152,9 +168,28 @@ class ControllerCauses:
         return None
 
     def _is_for(self, controller: str, record: TraceRecord, order: int) -> bool:
-        """Whether a frame is a request that may change a controller."""
+        """Whether a frame is a request that may change a controller, and was not refused."""
+        return self._is_to(controller, record, order) and order not in self._log.frames.refused
+
+    def _is_to(self, controller: str, record: TraceRecord, order: int) -> bool:
+        """Whether a frame asks a controller for a change."""
         on = self._world.objects.line_of.get(controller)
-        return on is not None and record.controller == on[0].name and on[1] in self._log.requests.get(order, ())
+        return on is not None and record.controller == on[0].name and on[1] in self._log.frames.requests.get(order, ())
+
+    def refused(self, controller: str, names: Collection[str], until: Nanos, before: int = LAST, after: Nanos = -1) -> FoundCause:
+        """The last refused request by a moment, before an order and after another moment, that would have written one of these
+        registers of a controller."""
+        patterns = [_name_of(name) for name in names]
+        for order, (request, reason) in reversed(self._log.frames.refused.items()):
+            if request.time > until or order >= before or not self._is_to(controller, request, order):
+                continue
+            if request.time <= after:
+                return None
+            found = self._frame(request, order)
+            if any(pattern.search(found.link.text) for pattern in patterns):
+                text = REFUSED(request=found.link.text, reason=reason)
+                return covered(found._replace(link=replace(found.link, text=text)), Cover.LEVEL)
+        return None
 
     def of_program(self, controller: str, change: StateChange) -> FoundCause:
         """Cause of a change of the state of a program."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from typing import NamedTuple
 
 from steptwin.simulation.kinds.lines import TrafficLog
 from steptwin.simulation.kinds.registry import line_kinds
@@ -12,11 +13,24 @@ from steptwin.wire.frameline import FrameLine
 from steptwin.wire.slave import FrameDirection
 
 
+class Refused(NamedTuple):
+    """A request that was refused, and the reason that its answer gave."""
+
+    request: TraceRecord
+    reason: str
+
+
 class Frames:
     """The frames of the lines of a world in words."""
 
     def __init__(self, world: Simulation) -> None:
         self._read: list[FrameLine] = []
+        self._asked: dict[tuple[str, str], tuple[int, TraceRecord]] = {}
+        """The last request of each client, with its order, by line."""
+        self.requests: dict[int, Collection[int]] = {}
+        """Addresses of the controllers that a frame may change, by its order."""
+        self.refused: dict[int, Refused] = {}
+        """By the order of the request."""
         self.traffic: dict[str, TrafficLog] = {
             spec.name: line_kinds()[spec.kind].traffic_log(world.lines[spec.name], "", self._read.append)
             for spec in world.spec.lines
@@ -31,8 +45,14 @@ class Frames:
             return "; ".join(one.meaning for one in self._read)
         return record.data().decode("ascii", "backslashreplace")
 
-    def changes(self, record: TraceRecord) -> Collection[int]:
-        """The addresses of the controllers that a frame may change, if it is a request. It is asked when the frame comes: its
-        client may leave."""
+    def take(self, record: TraceRecord, order: int) -> None:
+        """Note a frame when it comes: its client may leave."""
         client, _, direction = record.subject.rpartition("/")
-        return self.traffic[record.controller].changes(client, record.data()) if direction == FrameDirection.IN.value else ()
+        traffic, data = self.traffic[record.controller], record.data()
+        if direction == FrameDirection.IN.value:
+            self._asked[record.controller, client] = order, record
+            if changed := traffic.changes(client, data):
+                self.requests[order] = changed
+        elif (reason := traffic.refusal(client, data)) is not None and (record.controller, client) in self._asked:
+            asked, request = self._asked[record.controller, client]
+            self.refused[asked] = Refused(request, reason)

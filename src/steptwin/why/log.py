@@ -9,7 +9,7 @@ import sys
 from array import array
 from bisect import bisect_left, bisect_right
 from collections import defaultdict
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from itertools import takewhile
 from typing import NamedTuple
@@ -133,22 +133,20 @@ class CauseLog:
         self.executed = {name: ExecutedStatements(name) for name in world.controllers}
         self.plans: dict[tuple[str, str], list[Change]] = defaultdict(list)
         """Moments and positions of the plans of an axis, by controller and number."""
-        # Moments at which an axis got another coordinate without a motion, in the same way.
         self.origins: dict[tuple[str, str], list[Change]] = defaultdict(list)
+        """Moments at which an axis got another coordinate without a motion, by controller and number."""
         self.faults: dict[str, list[Change]] = defaultdict(list)
         """Moments at which faults began or ended, by controller or element."""
         self.mechanics: dict[str, list[Change]] = defaultdict(list)
         """Events of `OF_MECHANICS` by axis or collision, and jams of pushers."""
         self.axis_events: dict[tuple[str, str], list[Change]] = defaultdict(list)
-        """Events of controllers about an axis, by its number."""
+        """Events of controllers about an axis, by its number, and about none."""
         self.given: dict[tuple[str, StatementLocation], StatementUse] = {}
         """Uses of commands that came over a line by themselves; their locations have their code instead of a text, and a negative
         number."""
         self.begins: dict[str, list[Change]] = defaultdict(list)
         """Events of `BEGINS` by controller, whose program began anew."""
         self.frames = Frames(world)
-        self.requests: dict[int, Collection[int]] = {}
-        """Addresses of the controllers that a frame may change, by its order."""
         self.events: dict[str, list[Change]] = defaultdict(list)
         """Events of workpieces: all, and by the workpiece and by the element."""
         self.movers: dict[tuple[str, Nanos], tuple[str, ...]] = {}
@@ -248,16 +246,16 @@ class CauseLog:
             case "coordinate":
                 self.origins[record.controller, record.subject].append(Change(record.time, 0.0, group, len(records), order))
             case "frame":
-                if changed := self.frames.changes(record):
-                    self.requests[order] = changed
+                self.frames.take(record, order)
                 for name in self._timed.get(record.controller, ()):
                     self.points.executes(name, record.time, keeps=True)
             case "event" if record.subject in (*OF_MECHANICS, WORKPIECE):
                 self._note_event(record, Change(record.time, 0.0, group, len(records), order))
             case "event" if record.subject in BEGINS:
                 self.begins[record.controller].append(Change(record.time, 0.0, group, len(records), order))
-            case "event" if (axis := dict(record.facts).get("axis")) is not None:
-                self.axis_events[record.controller, str(axis)].append(Change(record.time, 0.0, group, len(records), order))
+            case "event":
+                axis = str(dict(record.facts).get("axis", ""))
+                self.axis_events[record.controller, axis].append(Change(record.time, 0.0, group, len(records), order))
             case "fault":
                 self.faults[record.controller].append(Change(record.time, 0.0, group, len(records), order))
                 self._note_holds(record.controller, record.time)

@@ -83,6 +83,7 @@ class PastQuestions:
             trial = yield from self._without_fault(name, answer)
             if trial is not None:
                 tried[name] = trial
+        answer = yield from self._with_held(answer)
         lacking = yield from self._settled(lambda known: known.why.lacking(question, at))
         answer = answer._replace(links=tuple(dict.fromkeys((*lacking, *_with(answer.links, tried.values())))))
         if not try_without:
@@ -120,6 +121,18 @@ class PastQuestions:
         around = 0 if self._is_near(name, answer) else STANDS_NS
         trial = yield from trying_without(self._snapshots, link, answer, self._most, around=around)
         return trial if trial.effect is Effect.OTHERWISE else None
+
+    def _with_held(self, answer: Answer) -> Asking:
+        """An answer with what holds the programs that could have changed what it is about since."""
+        links = answer.links
+        for controller in (yield from self._settled(lambda known: known.holding(answer))):
+            held = yield from self._settled(lambda known, controller=controller: self._answer(known, controller, answer.at))
+            time, text = answer.at if held.since is None else held.since, held.state.message("held")
+            known = {(link.subject, link.text) for link in links}
+            if text is not None and (controller, text) not in known:
+                every = (ChainLink(time, controller, text), *held.links)
+                links = _between(links, [link for link in every if (link.subject, link.text) not in known])
+        return answer._replace(links=links)
 
     def _answer(self, known: _Known, question: str, at: Nanos) -> Asking:
         """The answer, cut where something lacks."""
@@ -233,6 +246,11 @@ class _Known:
         yield
         return self.why.fault_link(name, until)
 
+    def holding(self, answer: Answer) -> Generator[None, None, Sequence[str]]:
+        """See `Why.holding`."""
+        yield
+        return self.why.holding(answer)
+
     def running(self, moment: Nanos) -> Generator[None, None, None]:
         """Note what happened up to a moment."""
         self._go_on(moment)
@@ -253,13 +271,18 @@ class _Known:
         return moment if moment < log.begin and snapshots.state_at(moment)[0].now < log.begin else None
 
 
-def _with(links: Sequence[ChainLink], trials: Iterable[Trial]) -> tuple[ChainLink, ...]:
-    """Links with those of trials, each before the first one that was earlier."""
+def _between(links: Sequence[ChainLink], others: Iterable[ChainLink]) -> tuple[ChainLink, ...]:
+    """Links with others, each before the first one that was earlier."""
     found = list(links)
-    for trial in trials:
-        place = next((number for number, link in enumerate(found) if link.time < trial.link.time), len(found))
-        found.insert(place, replace(trial.link, text=WITHOUT_IT(what=trial.link.text, state=trial.text)))
+    for other in others:
+        place = next((number for number, link in enumerate(found) if link.time < other.time), len(found))
+        found.insert(place, other)
     return tuple(found)
+
+
+def _with(links: Sequence[ChainLink], trials: Iterable[Trial]) -> tuple[ChainLink, ...]:
+    """Links with those of trials."""
+    return _between(links, (replace(one.link, text=WITHOUT_IT(what=one.link.text, state=one.text)) for one in trials))
 
 
 def first_span(world: Simulation) -> Nanos:

@@ -151,7 +151,9 @@ class PresentStates:
         supply = programs.supply_off(owner, at)
         if supply is not None:
             return [supply]
-        held = programs.held(owner, at)
+        held = programs.stands(owner, at)
+        if held is not None and not programs.may_write(owner, pin):
+            return ()
         if held is not None:
             yield held.link if held.place.order >= 0 or log.is_whole else replace(held.link, time=at)
             by = held.before()

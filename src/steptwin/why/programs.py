@@ -7,11 +7,12 @@ from functools import cache, partial
 from typing import Any
 
 from steptwin.controller import MILLISECOND, Nanos
+from steptwin.datasheet import EventSeverity
 from steptwin.messages import Message
 from steptwin.simulation.kinds.programs import ProgramState, Resource, ResourceKind, StatementLocation, StatementUse
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing, unknown
-from steptwin.why.log import LAST, MOST_LOOKED_BACK, Change, Executed
+from steptwin.why.log import LAST, MOST_LOOKED_BACK, Change, Executed, words_of
 from steptwin.why.programstates import OVER, StateChange
 from steptwin.why.sentences import statement
 
@@ -72,6 +73,12 @@ class ProgramCauses:
                     return True
         return False
 
+    def may_write(self, controller: str, point: str) -> bool:
+        """Whether a program of a controller may change a point: of an output, whether a statement does."""
+        if point in self._world.controllers[controller].pins():
+            return self.is_written(controller, Resource(ResourceKind.PIN, point))
+        return bool(self._world.programs[controller].texts)
+
     def decided_against(self, controller: str, wanted: Resource, at: Nanos) -> FoundCause:
         """The last evaluation by a moment of a condition that decides whether a statement that changes something is executed."""
         programs, governing = self._world.programs[controller], set[StatementLocation]()
@@ -104,7 +111,10 @@ class ProgramCauses:
         location, programs = self._log.executed[controller][index].location, self._world.programs[controller]
         if not self._log.is_of_present_text(self._log.executed[controller][index]):
             return False
-        numbers = programs.reached(location.text, (location.number,))
+        numbers = set(programs.reached(location.text, (location.number,)))
+        following = [one for one in programs.after(location.text).get(location.number, ()) if one in numbers]
+        if location.number not in programs.reached(location.text, following):
+            numbers.discard(location.number)  # it is executed, and does not come again
         others = [one for one in self._handlers(controller, location.text) if location.number not in one]
         return any(
             wanted in programs.use(StatementLocation(location.text, number)).writes
@@ -117,7 +127,7 @@ class ProgramCauses:
         before it; None if that is not known."""
         if controller not in self._world.programs or not self.is_written(controller, wanted):
             return None
-        held = self.held(controller, at) or self.decided_against(controller, wanted, at)
+        held = self.stands(controller, at) or self.decided_against(controller, wanted, at)
         index = self._log.last_executed(controller, at)
         if held is not None or index < 0 or not self.use(controller, index).waits or not self.leads_to(controller, index, wanted):
             return held
@@ -429,6 +439,30 @@ class ProgramCauses:
             yield Cause(
                 ChainLink(change.time, controller, self._all.state(signal, change.time)), place._replace(number=-1), nothing
             )
+
+    def stands(self, controller: str, at: Nanos) -> FoundCause:
+        """As `held`; of a program that was never started the attempt to start it, if there was one."""
+        held = self.held(controller, at)
+        if held is None or held.place.order >= 0:
+            return held
+        event = self._log.last_axis_event(controller, "", at)
+        sheet = self._world.kind(controller).datasheet(self._world.controller(controller))
+        alarms = {one.code for one in sheet.events if one.severity is EventSeverity.ALARM}
+        if event is None or self._log.record(event).subject not in alarms:
+            return held
+        place = Place(event.time, event.order)
+        by = partial(self._all.controllers.commanded, controller, event, None)
+        link = ChainLink(event.time, controller, words_of(self._log.record(event)))
+        return Cause(link, place, by, Cover.LEVEL, partial(self._started_by, controller, event))
+
+    def _started_by(self, controller: str, event: Change) -> Iterator[Cause]:
+        """The registers by which a start acts."""
+        registers = self._world.kind(controller).registers
+        for use in () if registers is None else registers.uses("").values():
+            for one in use.acts_by:
+                found = self._all.controllers.register(controller, one.name, None, event.time, event.order)
+                if found is not None:
+                    yield found
 
     def supply_off(self, controller: str, at: Nanos) -> str | None:
         """The signal of the supply of a controller that does not feed it at a moment."""

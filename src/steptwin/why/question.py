@@ -272,6 +272,7 @@ class Why:
         state = IS_NUMBER(name=asked, value=value) if is_bare else IS_TRUE(name=asked) if value else IS_FALSE(name=asked)
         signals = tuple(canonical.values())
         first = self.causes.lasting(signals, at, None if since is None else self._changed(signals, since))
+        first = self._with_refused(signals, at, since, first)
         if first is not None or since is not None:
             return (yield from self._answer(text, at, state, since, first))
         resting = (yield from self._resting(signals, at)) or self._held(signals, at) or self._ignored(signals, at)
@@ -281,6 +282,16 @@ class Why:
         says_more = resting is not None or len(states) > len(signals)
         says_more |= any(self.causes.drivers(name, at) or self.causes.undriven(name) is not None for name in signals)
         return self._after(states if says_more else [], answer)
+
+    def _with_refused(self, signals: Iterable[str], at: Nanos, since: Nanos | None, first: FoundCause) -> FoundCause:
+        """A cause along with the requests that would have written one of these registers since, and were refused."""
+        for name in signals:
+            owner, _, rest = name.partition(".")
+            if owner in self.log.world.controllers and self.log.world.kind(owner).registers is not None:
+                refused = self.causes.controllers.refused(owner, (rest,), at, after=-1 if since is None else since)
+                if refused is not None:
+                    first = refused if first is None else first._replace(along=(*first.along, refused))
+        return first
 
     def lacking(self, question: str, at: Nanos) -> Lacking:
         """Lines of a question that begins with ``not`` and is true: the present values of what would have to be otherwise, with
@@ -318,6 +329,41 @@ class Why:
             ahead = BECOMES_TRUE(time=found[0] / SECOND) if found else ONLY_FROM_OUTSIDE(time=LONGEST_AHEAD_NS / SECOND)
             links.append(ChainLink(at, "", ahead))
         return tuple(dict.fromkeys(links))
+
+    def holding(self, answer: Answer) -> Sequence[str]:
+        """The controllers whose programs are held, and could else have changed what an answer is about since. `asking` comes
+        first."""
+        text, log, programs = _text_of(answer.question), self.log, self.causes.programs
+        if self._is_script(text) or _without_not(text) in log.world.controllers:
+            return ()
+        found: dict[str, None] = {}
+        for controller, wanted in self._changeable(text, answer.at):
+            held, index = programs.held(controller, answer.at), log.last_executed(controller, answer.at)
+            if held is None or index < 0 or not programs.leads_to(controller, index, wanted):
+                continue
+            is_later = answer.since is not None and (held.place.order < 0 or held.place.time > answer.since)
+            if is_later or wanted.kind is ResourceKind.AXIS:
+                found[controller] = None
+        return tuple(found)
+
+    def _changeable(self, text: str, at: Nanos) -> Iterator[tuple[str, Resource]]:
+        """What programs can change of what is asked for: outputs that drive it, axes, variables."""
+        variable = self._variable(text)
+        if variable is not None:
+            yield variable[0], Resource(ResourceKind.VALUE, variable[1])
+            return
+        world = self.log.world
+        names = [self._canonical(name) for name in parse_condition(self._named(_without_not(text))).names()]
+        for name in self._behind(names, at):
+            owner, _, rest = name.partition(".")
+            axis = _AXIS.match(rest)
+            if owner in world.axes and rest == "position":
+                drive = world.axes[owner].spec.drive
+                yield drive[0], Resource(ResourceKind.AXIS, drive[1].removeprefix("M"))
+            elif owner in world.programs and rest in world.controllers[owner].pins():
+                yield owner, Resource(ResourceKind.PIN, rest)
+            elif owner in world.programs and axis is not None:
+                yield owner, Resource(ResourceKind.AXIS, axis[1] or "1")
 
     def _going_on(self, other: Simulation, controller: str, at: Nanos) -> Lacking:
         """When a program that waits goes on by itself."""
@@ -604,7 +650,7 @@ class Why:
         index, held = log.last_executed(controller, at), causes.programs.held(controller, at)
         if held is not None:
             since = held.link.time if held.place.order >= 0 else None
-            first = held if since is None else _led_to(held)
+            first = causes.programs.stands(controller, at) if since is None else _led_to(held)
             supply, present = causes.programs.supply_off(controller, at), (yield from self._present(at))
             states = list(present.of([supply])) if supply is not None and since is None else []
             state = PROGRAM_IS(controller=controller, held=held.link.text)
@@ -672,8 +718,8 @@ class Why:
         programs = self.causes.programs
         for name in self._behind(signals, at):
             owner, _, pin = name.partition(".")
-            if owner in self.log.world.programs and not self.causes.drivers(name, at):
-                held = programs.held(owner, at)
+            if owner in self.log.world.programs and not self.causes.drivers(name, at) and programs.may_write(owner, pin):
+                held = programs.stands(owner, at)
                 found.append(held or programs.decided_against(owner, Resource(ResourceKind.PIN, pin), at))
         return max((one for one in found if one is not None), key=lambda one: one.place, default=None)
 

@@ -78,6 +78,9 @@ class ToyTrafficLog:
     def changes(self, client: str, data: bytes) -> Collection[int]:
         return self._units
 
+    def refusal(self, client: str, data: bytes) -> str | None:
+        return None
+
 
 POSITION = Point(
     path="position",

@@ -229,7 +229,8 @@ class NamedRegisters(ABC, Generic[M]):
         """The answer to a PDU that reaches the controller without a line."""
 
     def uses(self, axis: str, /) -> Mapping[str, WriteUse]:
-        """The registers whose write moves an axis (by its number) and acts by something else, too."""
+        """The registers whose write moves an axis (by its number), or starts the program (without one), and acts by something
+        else, too."""
         return {}
 
     @abstractmethod

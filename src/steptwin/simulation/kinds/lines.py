@@ -79,6 +79,10 @@ class TrafficLog(FrameSubscriber, Protocol):
         """The addresses of the controllers that a request or characters of a program may change."""
         ...
 
+    def refusal(self, client: str, data: bytes) -> str | None:
+        """The reason that an answer gives for a request that was refused; None for another answer."""
+        ...
+
 
 class LineEndPoint(Stateful):
     """The connection of one program. ``received``: pieces not fetched yet, with their moments."""

@@ -39,6 +39,9 @@ class ChipTrafficLog:
     def changes(self, client: str, data: bytes) -> Collection[int]:
         return self._line.chain.chips
 
+    def refusal(self, client: str, data: bytes) -> str | None:
+        return None  # a chip executes what it receives
+
     def recorded(self, record: TraceRecord) -> None:
         """A chip announces the byte that it sends."""
         if record.kind == "event" and record.subject == "upload":

@@ -9,7 +9,7 @@ from steptwin.mic488.framelog import FrameLog
 from steptwin.simulation.kinds.mic488.line import ModbusBus
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.wire.frameline import FrameLine
-from steptwin.wire.pdu import WRITES
+from steptwin.wire.pdu import EXCEPTION_NAMES, REFUSED, WRITES
 from steptwin.wire.slave import FrameCallback, FrameDirection
 
 
@@ -43,6 +43,10 @@ class ModbusTrafficLog:
         if function not in WRITES:
             return ()
         return (unit,) if unit in self._line.units else self._line.units
+
+    def refusal(self, client: str, data: bytes) -> str | None:
+        pdu = data[7:] if self._is_tcp(client, data) else data[1:-2]
+        return EXCEPTION_NAMES.get(pdu[1], "") if len(pdu) > 1 and pdu[0] & REFUSED else None
 
     def unframed(self, now: Nanos, client: str, count: int) -> None:
         self._log.unframed(now, self._prefix + client, count)

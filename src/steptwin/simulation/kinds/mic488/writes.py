@@ -57,6 +57,9 @@ class Mic488Registers(NamedRegisters[Mic488Device]):
         return device.execute(pdu, now)
 
     def uses(self, axis: str) -> Mapping[str, WriteUse]:
+        if not axis:
+            banks = tuple(Resource(ResourceKind.VALUE, name) for name in ("PROG_BANK_SEL", "POS_BANK_SEL"))
+            return {"PROGRAM_CTRL": WriteUse(banks)}
         found = {f"M{axis}_JOG_{way}": WriteUse((Resource(ResourceKind.VALUE, "JOG_SPEED"),)) for way in ("PLUS", "MINUS")}
         for key in MOTION_REGISTERS:
             register, trigger = f"M{axis}_{key}", f"AXIS_{key}_TRIG"
