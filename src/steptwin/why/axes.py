@@ -198,8 +198,8 @@ class AxisCauses:
         always has some."""
         signal = self._power_of(axis)
         found = self._all.last((signal,), until, GIVES_POWER(axis=axis), before) if signal else None
-        if signal and found is None and not self._log.level(signal, until):  # it has never had any
-            found = self._all.first(signal, GIVES_POWER(axis=axis))
+        if signal and found is None and (not self._log.level(signal, until) or self._log.before(signal).since is not None):
+            found = self._all.first(signal, GIVES_POWER(axis=axis))  # since before the log, or it has never had any
         return covered(found, Cover.MOTION)
 
     def _let_go(self, axis: str, power: Cause, until: Nanos) -> Cause:
