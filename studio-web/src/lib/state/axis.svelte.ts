@@ -133,7 +133,8 @@ export class AxisState {
 
   /** Of the interval that held at a moment; the first one before there was any. */
   indexAt(time_ns: bigint): number {
-    let [low, high] = [0, this.intervals.length];
+    let low = 0;
+    let high = this.intervals.length;
     while (low < high) {
       const middle = (low + high) >> 1;
       if ((this.intervals[middle] as Interval).from_ns <= time_ns) low = middle + 1;

@@ -36,9 +36,13 @@ const whole = (segment: Segment, position: number): number => {
 };
 const endOf = (segment: Segment): number | null => (isArc(segment) ? segment.end_s : segment[0]);
 
-function along([, anchor, c0, c1, c2, c3]: Polynomial, t: number): Motion {
-  const u = t - anchor;
-  return { position: c0 + u * (c1 + u * (c2 + u * c3)), velocity: c1 + u * (2 * c2 + u * 3 * c3) };
+/** Numbers are read one by one: a pattern would make a list of them for each picture. */
+function along(its: Polynomial, t: number): Motion {
+  const u = t - its[1];
+  return {
+    position: its[2] + u * (its[3] + u * (its[4] + u * its[5])),
+    velocity: its[3] + u * (2 * its[4] + u * 3 * its[5]),
+  };
 }
 
 function onArc({ way, course: [centre, radius, angle, turn] }: Arc, t: number): Motion {

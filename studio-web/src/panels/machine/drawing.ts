@@ -14,6 +14,8 @@ const ROOM = 0.06;
 const ORDER_MS = 120;
 /** It is not known whether a part is seen. */
 const NEITHER = 2;
+/** Places are whole micrometres: the browser puts other numbers on the heap, two for each part that moves. */
+const UM_PER_MM = 1000;
 /** A turn that is seen. */
 const TURN = 1e-6;
 
@@ -50,6 +52,7 @@ export class Drawing {
   private readonly moves: SVGTransform[] = [];
   private isSeen = new Uint8Array();
   private turns = new Float64Array();
+  /** [um] */
   private spots = new Float64Array();
   /** Of the stage, the workpieces of which have parts. */
   private revision = -1;
@@ -77,6 +80,7 @@ export class Drawing {
     this.frame = [left - room, top - room, width + 2 * room, height + 2 * room];
     svg.setAttribute("viewBox", this.frame.join(" "));
     this.all = create("g", svg);
+    this.all.transform.baseVal.appendItem(this.scaled(1 / UM_PER_MM));
     this.order = new Order(stage, view);
     this.renew();
     this.named = namedOf(stage);
@@ -112,8 +116,8 @@ export class Drawing {
       if (!isThere) continue;
       if (this.hasTurned(n) || this.versions.get(n) !== stage.lines.get(n)?.version)
         this.outline(n, this.parts[n] as SVGGElement);
-      const x = spotX(this.view, stage.places, n * POSE + 9);
-      const y = spotY(this.view, stage.places, n * POSE + 9);
+      const x = Math.round(spotX(this.view, stage.places, n * POSE + 9) * UM_PER_MM);
+      const y = Math.round(spotY(this.view, stage.places, n * POSE + 9) * UM_PER_MM);
       if (this.spots[2 * n] === x && this.spots[2 * n + 1] === y) continue;
       this.spots[2 * n] = x;
       this.spots[2 * n + 1] = y;
@@ -176,10 +180,17 @@ export class Drawing {
   private part({ material }: Solid, n: number): SVGGElement {
     const part = create("g", this.all);
     this.moves[n] = part.transform.baseVal.appendItem(this.svg.createSVGTransform());
+    part.transform.baseVal.appendItem(this.scaled(UM_PER_MM));
     this.spots.fill(NaN, 2 * n, 2 * n + 2);
     for (const light of LIGHTS) create("path", part, light);
     if (material === "piece") create("title", part);
     return part;
+  }
+
+  private scaled(by: number): SVGTransform {
+    const made = this.svg.createSVGTransform();
+    made.setScale(by, by);
+    return made;
   }
 
   private hasTurned(n: number): boolean {
@@ -224,6 +235,7 @@ export class Drawing {
       right = Math.max(right, x);
       top = Math.min(top, this.spots[2 * n + 1] as number);
     }
-    this.labels.get(name)?.setAttribute("transform", `translate(${((left + right) / 2).toFixed(1)} ${top.toFixed(1)})`);
+    const [x, y] = [(left + right) / 2 / UM_PER_MM, top / UM_PER_MM];
+    this.labels.get(name)?.setAttribute("transform", `translate(${x.toFixed(1)} ${y.toFixed(1)})`);
   }
 }
