@@ -3,6 +3,7 @@ import type { Solid } from "../lib/scene/builder";
 import { meshOf } from "../lib/scene/faces";
 import type { Piece } from "../lib/scene/pieces";
 import { colourOf } from "../lib/scene/looks";
+import { terminalOf } from "../lib/scene/names";
 import { palettesOf, pictureOf } from "../lib/scene/picture";
 import { Stage } from "../lib/scene/stage";
 import { STEP_NS, Trace } from "../lib/scene/trace";
@@ -20,11 +21,8 @@ type Theme = keyof typeof PALETTES;
 const stageOf = ({ scene, elements, axes }: Machine, pieces: readonly Piece[] = []) =>
   new Stage(scene, { elements, mechanics: axes } as unknown as Model, pieces);
 
-/** The name under which the level of a pin is known: terminals of elements are in lower case. */
-function nameOf(pin: string, { elements }: Machine): string {
-  const owner = elements.find(({ name }) => pin.startsWith(`${name}.`))?.name;
-  return owner === undefined ? pin : owner + pin.slice(owner.length).toLowerCase();
-}
+/** The name under which the level of a pin is known. */
+const nameOf = (pin: string, { elements }: Machine) => terminalOf(pin, elements) ?? pin;
 
 /** Levels of all pins and stalls that solids show, by what knows values by their names. */
 function levelsOf(machine: Machine, valueOf: (name: string) => number | null) {

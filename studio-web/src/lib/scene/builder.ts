@@ -34,12 +34,11 @@ export interface Solid {
   line?: { signal: string | null; on: number; end: Vector | null };
 }
 
-/** Whether a solid has the shape of another one. */
-export function isLike({ size, prism }: Solid, other: Solid | undefined): boolean {
-  if (other === undefined || (prism === null) !== (other.prism === null)) return false;
-  if (prism?.ends.some((end, k) => end !== other.prism?.ends[k])) return false;
-  return size.every((one, k) => one === other.size[k]) && prism?.axis === other.prism?.axis;
-}
+/** Another text for each shape. */
+export const shapeOf = ({ size, prism }: Solid): string => JSON.stringify([size, prism]);
+
+/** A solid that stands, and always looks as its material does. */
+export const PLAIN = { prism: null, color: null, slide: null, shown: null, pin: null, isCarried: false } as const;
 
 type Frame = Scene["frames"][number];
 type Look = Partial<Omit<Solid, "frame" | "at" | "size">>;
@@ -82,11 +81,7 @@ export class Builder {
 
   /** A cylinder about `axis`: 0 along, 1 across, 2 up. */
   rod(at: Vector, axis: number, length: number, diameter: number, material: Material, look: Look = {}): void {
-    const size: Vector = [
-      axis === 0 ? length : diameter,
-      axis === 1 ? length : diameter,
-      axis === 2 ? length : diameter,
-    ];
+    const size = [0, 1, 2].map((k) => (k === axis ? length : diameter)) as unknown as Vector;
     const about = this.vector(unit(axis, 1)).findIndex((one) => one !== 0);
     const towards: Vector = about === 0 ? [0, 1, 0] : [1, 0, 0];
     this.box(at, size, material, { prism: { axis: about, corners: ROUND, towards, ends: EVEN }, ...look });
@@ -107,7 +102,6 @@ export class Builder {
 
   /** In the directions of the frame. */
   add(at: Vector, size: Vector, material: Material, look: Look = {}): void {
-    const nothing = { prism: null, color: null, slide: null, shown: null, pin: null, isCarried: false };
-    this.put({ ...nothing, element: this.frame.name, frame: this.place, at, size, material, ...look });
+    this.put({ ...PLAIN, element: this.frame.name, frame: this.place, at, size, material, ...look });
   }
 }

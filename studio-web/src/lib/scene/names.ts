@@ -13,3 +13,9 @@ export function namedOf({ solids, aids }: Stage): Map<string, readonly number[]>
   });
   return found;
 }
+
+/** The value of a pin of a description, where that is a terminal of an element: these are in lower case. */
+export function terminalOf(pin: string, elements: readonly { name: string }[]): string | null {
+  const owner = elements.find(({ name }) => pin.startsWith(`${name}.`))?.name;
+  return owner === undefined ? null : owner + pin.slice(owner.length).toLowerCase();
+}

@@ -2,7 +2,7 @@ import { facesOf } from "./faces";
 import { colourOf, DARK, lookOf, type Levels } from "./looks";
 import { POSE } from "./poses";
 import type { Stage } from "./stage";
-import { frameOf, Order, spotX, spotY, type View } from "./view";
+import { Order, pageOf, placeAlong, type View } from "./view";
 
 /** Values of properties of app.css, `--ink`: `#16191d`. */
 export type Palette = ReadonlyMap<string, string>;
@@ -26,8 +26,6 @@ function mixed(first: string, share: number, second: string): string {
   return `#${channel(0)}${channel(1)}${channel(2)}`;
 }
 
-/** Around what is in it, as a share of the longer side. */
-const ROOM = 0.06;
 const escaped = (text: string) => text.replace(/[&<>"]/g, (one) => `&#${one.charCodeAt(0)};`);
 
 /** A scene at one moment as the text of an SVG whose longer side has `width` pixels; with a title as a picture of its own, on paper. */
@@ -39,10 +37,8 @@ export function pictureOf(
   width: number,
   title: string | null = null,
 ): string {
-  const [left, top, wide, tall] = frameOf(view, stage.extent);
-  const room = ROOM * Math.max(wide, tall);
-  const pixel = (Math.max(wide, tall) + 2 * room) / width;
-  const frame = [left - room, top - room, wide + 2 * room, tall + 2 * room] as const;
+  const frame = pageOf(view, stage.extent);
+  const pixel = Math.max(frame[2], frame[3]) / width;
   const colour = (property: string) => palette.get(property) ?? "#000000";
   const [paper, line] = [colour("--paper"), mixed(colour("--ink"), 0.55, colour("--paper"))];
   const order = new Order(stage, view);
@@ -65,7 +61,7 @@ export function pictureOf(
     const paths = lights
       .filter(([data]) => data)
       .map(([data, one]) => `<path d="${data}" fill="${isLine ? "none" : one}"/>`);
-    const place = `translate(${spotX(view, stage.places, n * POSE + 9).toFixed(2)} ${spotY(view, stage.places, n * POSE + 9).toFixed(2)})`;
+    const place = `translate(${placeAlong(view.right, stage.places, n * POSE).toFixed(2)} ${(-placeAlong(view.up, stage.places, n * POSE)).toFixed(2)})`;
     const thick = look === "interrupted" || isLine ? ` stroke-width="${(2.5 * pixel).toFixed(3)}"` : "";
     const faint = look === "light" ? ' opacity="0.3"' : "";
     const name = n < stage.fixed ? solid.element : (stage.pieces.names[n - stage.fixed] ?? "");

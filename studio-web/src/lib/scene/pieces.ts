@@ -1,5 +1,5 @@
 import type { Hello } from "../protocol/connection";
-import type { Solid } from "./builder";
+import { PLAIN, type Solid } from "./builder";
 import { copyPose, directionOf, POSE, shift, turn, type Poses, type Scene } from "./poses";
 import { partsOf } from "./shapes";
 
@@ -57,19 +57,7 @@ export class Pieces {
       const frame = frames.findIndex(({ name }) => name === piece.on);
       return partsOf({ ...piece, shape }).map((part): [number, Solid] => [
         n,
-        {
-          ...{
-            element: piece.on ?? "",
-            frame,
-            isCarried: true,
-            slide: null,
-            shown: null,
-            pin: null,
-            material: "piece",
-          },
-          ...part,
-          color: part.color ?? color,
-        },
+        { ...PLAIN, ...part, element: piece.on ?? "", frame, isCarried: true, material: "piece", color: part.color ?? color }, // prettier-ignore
       ]);
     });
     this.of = parts.map(([n]) => n);

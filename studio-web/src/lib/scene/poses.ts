@@ -4,7 +4,8 @@ export type Scene = Description["scene"];
 
 /** Numbers of a pose: a turn as a matrix of 3 × 3, row by row, then a place [mm]. */
 export const POSE = 12;
-const PLACE = 9;
+/** Number of the first one of its place. */
+export const PLACE = 9;
 const AXES = "xyz";
 const SIGNS: Readonly<Record<string, number>> = { "+": 1, "-": -1 };
 

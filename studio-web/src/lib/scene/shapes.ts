@@ -57,9 +57,9 @@ const SHAPES: Readonly<Record<string, readonly Section[]>> = {
 
 /** The solids of a box, of an upright cylinder, or of what is turned within one: about z, or the side beside two equal ones.
  * `isDown`: what is above is at the lower end. */
-export function partsOf({ size, diameter, height, shape }: Shaped, isDown = false): Part[] {
-  const whole: Vector = size === null ? [diameter ?? 0, diameter ?? 0, height ?? 0] : (size as unknown as Vector);
-  const sections = SHAPES[shape ?? (size === null ? "cylinder" : "")];
+export function partsOf(its: Shaped, isDown = false): Part[] {
+  const whole = extentOf(its);
+  const sections = SHAPES[its.shape ?? (its.size === null ? "cylinder" : "")];
   if (sections === undefined) return [{ at: [0, 0, 0], size: whole, prism: null, color: null }];
   const axis = axisOf(whole);
   const [long, sign] = [whole[axis] as number, isDown ? -1 : 1];
@@ -70,11 +70,17 @@ export function partsOf({ size, diameter, height, shape }: Shaped, isDown = fals
     at[a] = beside[0] * (whole[a] as number);
     at[b] = beside[1] * (whole[b] as number);
     const wide = Math.max(lower, upper);
-    const its = whole.map((one, k) => one * (k === axis ? to - from : wide)) as unknown as Vector;
+    const size = whole.map((one, k) => one * (k === axis ? to - from : wide)) as unknown as Vector;
     const ends = [lower / wide, upper / wide] as const;
     const prism = { axis, corners: ROUND, towards: unit(axis === 0 ? 1 : 0, 1), ends: isDown ? ([ends[1], ends[0]] as const) : ends }; // prettier-ignore
-    return { at: at as unknown as Vector, size: its, prism, color };
+    return { at: at as unknown as Vector, size, prism, color };
   });
+}
+
+/** Along x, y and z; of something that is not there nothing. */
+export function extentOf(its: Shaped | undefined): Vector {
+  const across = its?.diameter ?? 0;
+  return (its?.size as Vector | undefined) ?? [across, across, its?.height ?? 0];
 }
 
 export function axisOf([x, y, z]: Vector): number {

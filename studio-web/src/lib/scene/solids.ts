@@ -2,7 +2,7 @@ import type { Element, Mechanics, Model } from "../state/model";
 import { between, Builder, plus, times, unit, type Solid, type Vector } from "./builder";
 import { beam, gripper, nest, vacuum } from "./handling";
 import { directionOf, type Scene } from "./poses";
-import { axisOf, partsOf } from "./shapes";
+import { axisOf, extentOf, partsOf } from "./shapes";
 
 /** What there is besides an element, and what it is besides its frame. */
 interface Known {
@@ -274,14 +274,6 @@ function shaft(build: Builder, known: Known): void {
 function carriage(build: Builder, { element }: Known): void {
   const { width, carriage: long } = railAlong(build, element);
   build.box([0, 0, 0.9 * width], [0.8 * long, 2 * width, 0.5 * width], "moving", { isCarried: true });
-}
-
-type Body = Scene["bodies"][number];
-
-function extentOf(body: Body | undefined): Vector {
-  if (body === undefined) return [0, 0, 0];
-  const { size, diameter, height } = body;
-  return (size as Vector | null) ?? [diameter ?? 0, diameter ?? 0, height ?? 0];
 }
 
 /** What lies on something that turns shows where that does, and else who looks. */

@@ -4,7 +4,7 @@ import type { Scene } from "./poses";
 import { Stage } from "./stage";
 import type { Solid } from "./builder";
 import { facesOf } from "./faces";
-import { frameOf, Order, spotX, spotY, VIEWS, type ViewName } from "./view";
+import { frameOf, Order, placeAlong, VIEWS, type ViewName } from "./view";
 
 type Box = readonly [name: string, at: readonly number[], size: readonly number[], on?: string];
 
@@ -58,7 +58,7 @@ test("what turns is drawn turned, and stands where its carrier has it", () => {
   stage.poses.values[0] = 90;
   stage.update();
   const { places } = stage;
-  expect([spotX(VIEWS.top, places, 9), spotY(VIEWS.top, places, 9)]).toEqual([10, -100]);
+  expect([placeAlong(VIEWS.top.right, places, 0), placeAlong(VIEWS.top.up, places, 0)]).toEqual([10, 100]);
   const [solid] = stage.solids;
   if (solid === undefined) throw new Error("no solid");
   expect(facesOf(solid, places, 0, VIEWS.top)).toEqual({ front: "", side: "", top: "M-5.00 -10.00L-5.00 10.00L5.00 10.00L5.00 -10.00Z" }); // prettier-ignore

@@ -1,4 +1,5 @@
 import { dot, type Vector } from "./builder";
+import { PLACE } from "./poses";
 import type { Extent, Stage } from "./stage";
 
 /** A parallel view: where right, up, and towards who looks are in space. */
@@ -30,6 +31,16 @@ export function frameOf({ right, up }: View, { low, high }: Extent): [number, nu
   const reach = (direction: Vector) => dot(direction.map(Math.abs) as unknown as Vector, half);
   const [wide, tall] = [reach(right), reach(up)];
   return [dot(right, middle) - wide, -dot(up, middle) - tall, 2 * wide, 2 * tall];
+}
+
+/** As a share of the longer side. */
+const ROOM = 0.06;
+
+/** As `frameOf`, with room around what is in it. */
+export function pageOf(view: View, extent: Extent): [number, number, number, number] {
+  const [left, top, wide, tall] = frameOf(view, extent);
+  const room = ROOM * Math.max(wide, tall);
+  return [left - room, top - room, wide + 2 * room, tall + 2 * room];
 }
 
 /** Of a direction that is nearly in the picture. */
@@ -132,17 +143,8 @@ export class Order {
   }
 }
 
-/** Where a middle is in a picture. */
-export function spotX(view: View, numbers: Numbers, at: number): number {
-  return dotAt(view.right, numbers, at);
-}
-
-export function spotY(view: View, numbers: Numbers, at: number): number {
-  return -dotAt(view.up, numbers, at);
-}
-
-type Numbers = Float64Array | Float32Array;
-
-function dotAt(direction: Vector, numbers: Numbers, at: number): number {
+/** How far the place of a pose is along a direction. */
+export function placeAlong(direction: Vector, numbers: Float64Array, pose: number): number {
+  const at = pose + PLACE;
   return direction[0] * (numbers[at] as number) + direction[1] * (numbers[at + 1] as number) + direction[2] * (numbers[at + 2] as number); // prettier-ignore
 }

@@ -1,16 +1,14 @@
 import { isAid } from "../../lib/scene/aids";
-import { isLike, type Solid } from "../../lib/scene/builder";
+import { shapeOf, type Solid } from "../../lib/scene/builder";
 import { facesOf } from "../../lib/scene/faces";
 import { colourOf, lookOf, type Levels, type Look } from "../../lib/scene/looks";
 import { namedOf } from "../../lib/scene/names";
 import { POSE } from "../../lib/scene/poses";
 import type { Stage } from "../../lib/scene/stage";
-import { frameOf, Order, spotX, spotY, type View } from "../../lib/scene/view";
+import { Order, pageOf, placeAlong, type View } from "../../lib/scene/view";
 
 const SVG = "http://www.w3.org/2000/svg";
 const LIGHTS = ["front", "side", "top"] as const;
-/** Of the picture, around what is in it. */
-const ROOM = 0.06;
 const ORDER_MS = 120;
 /** It is not known whether a part is seen. */
 const NEITHER = 2;
@@ -47,7 +45,7 @@ export class Drawing {
   private readonly parts: SVGGElement[] = [];
   /** How each of them looks. */
   private readonly painted: string[] = [];
-  private solids: readonly Solid[] = [];
+  private readonly shapes: string[] = [];
   /** Placing of each, without a text for a picture. */
   private readonly moves: SVGTransform[] = [];
   private isSeen = new Uint8Array();
@@ -75,9 +73,7 @@ export class Drawing {
     private readonly view: View,
   ) {
     svg.replaceChildren();
-    const [left, top, width, height] = frameOf(view, stage.extent);
-    const room = ROOM * Math.max(width, height);
-    this.frame = [left - room, top - room, width + 2 * room, height + 2 * room];
+    this.frame = pageOf(view, stage.extent);
     svg.setAttribute("viewBox", this.frame.join(" "));
     this.all = create("g", svg);
     this.all.transform.baseVal.appendItem(this.scaled(1 / UM_PER_MM));
@@ -116,8 +112,8 @@ export class Drawing {
       if (!isThere) continue;
       if (this.hasTurned(n) || this.versions.get(n) !== stage.lines.get(n)?.version)
         this.outline(n, this.parts[n] as SVGGElement);
-      const x = Math.round(spotX(this.view, stage.places, n * POSE + 9) * UM_PER_MM);
-      const y = Math.round(spotY(this.view, stage.places, n * POSE + 9) * UM_PER_MM);
+      const x = Math.round(placeAlong(this.view.right, stage.places, n * POSE) * UM_PER_MM);
+      const y = Math.round(placeAlong(this.view.up, stage.places, n * POSE) * -UM_PER_MM);
       if (this.spots[2 * n] === x && this.spots[2 * n + 1] === y) continue;
       this.spots[2 * n] = x;
       this.spots[2 * n + 1] = y;
@@ -148,7 +144,7 @@ export class Drawing {
     const { stage, parts } = this;
     const { solids } = stage;
     while (parts.length > solids.length) parts.pop()?.remove();
-    this.moves.length = this.painted.length = parts.length;
+    this.moves.length = this.painted.length = this.shapes.length = parts.length;
     this.isSeen = new Uint8Array(solids.length).fill(NEITHER);
     this.turns = grown(this.turns, 9 * solids.length);
     this.spots = grown(this.spots, 2 * solids.length);
@@ -158,9 +154,10 @@ export class Drawing {
       part.dataset["element"] = solid.element;
       this.paint(n, solid.material, false);
       if (n >= stage.fixed) (part.lastChild as Element).textContent = stage.pieces.names[n - stage.fixed] ?? "";
-      if (!isLike(solid, this.solids[n])) this.turns.fill(NaN, 9 * n, 9 * n + 9);
+      const shape = shapeOf(solid);
+      if (this.shapes[n] !== shape) this.turns.fill(NaN, 9 * n, 9 * n + 9);
+      this.shapes[n] = shape;
     }
-    this.solids = solids;
     this.revision = stage.revision;
     this.ordered_ms = -ORDER_MS;
   }

@@ -1,3 +1,4 @@
+import { terminalOf } from "../../lib/scene/names";
 import type { Element } from "../../lib/state/model";
 
 /** Levels of pins of controllers and of terminals of elements, by the names that descriptions give them. */
@@ -12,16 +13,11 @@ export function levelsOf(
   pins: (pin: string) => number | null,
   values: (name: string) => number | null,
 ): Levels {
-  /** Its name as a value, where it is a terminal of an element. */
-  const terminalOf = (pin: string): string | null => {
-    const owner = elements.find(({ name }) => pin.startsWith(`${name}.`))?.name;
-    return owner === undefined ? null : owner + pin.slice(owner.length).toLowerCase();
-  };
   return {
     of: (pin) => {
-      const terminal = terminalOf(pin);
+      const terminal = terminalOf(pin, elements);
       return terminal === null ? pins(pin) : values(terminal);
     },
-    nameOf: (pin) => terminalOf(pin) ?? pin.slice(pin.indexOf(".") + 1),
+    nameOf: (pin) => terminalOf(pin, elements) ?? pin.slice(pin.indexOf(".") + 1),
   };
 }

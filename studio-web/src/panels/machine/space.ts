@@ -25,7 +25,7 @@ import {
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { toCreasedNormals } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import { isAid } from "../../lib/scene/aids";
-import type { Solid } from "../../lib/scene/builder";
+import { shapeOf, type Solid } from "../../lib/scene/builder";
 import { facetsOf } from "../../lib/scene/faces";
 import { colourOf, DARK, lookOf, type Look } from "../../lib/scene/looks";
 import { namedOf } from "../../lib/scene/names";
@@ -300,7 +300,7 @@ export class Space {
   }
 
   private shapesOf(solid: Solid): readonly [BufferGeometry, BufferGeometry] {
-    const name = JSON.stringify([solid.size, solid.prism]);
+    const name = shapeOf(solid);
     const found = this.geometries.get(name);
     if (found !== undefined) return found;
     const shape = geometryOf(solid);
