@@ -132,3 +132,12 @@ def test_an_axis_that_follows_its_encoder_is_told_once() -> None:
     world.run(for_=2.0)
     told = [event.text for event in watch.happened if event.text.startswith("M2 ")]
     assert told == ["M2 on", "M2 follows its encoder", "M2 off"]
+
+
+def test_a_loop_whose_passes_are_no_longer_executed_goes_on_like_this() -> None:
+    world = World.from_toml(dedent(WORLD), {"first.prg": b"MAIN:\nDELAY 1\nJUMP MAIN\n"}, name="w.toml")
+    watch = ProgramWatch(world.mic488["t"].device, world.objects.scheduler_of["t"], "t")
+    world.run(for_=100.0)
+    *passes, last = [event.text for event in watch.happened]
+    assert {*passes} == {"waits 1 s"}
+    assert last == "the loop goes on like this"

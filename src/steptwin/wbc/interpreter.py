@@ -485,11 +485,15 @@ class Interpreter(Stateful):
         """Variables, then constants, as the statement in execution at ``now`` finds them."""
         return self.cells if self._resting is None else self._resting.next_visit(self.after(now))[1].values()
 
+    @property
+    def resting_loop(self) -> RestingLoop | None:
+        """The loop in which nothing can change, and whose passes are therefore not executed one by one."""
+        return None if self.waiting else self._resting
+
     def waits_since(self, now: Nanos) -> Nanos | None:
         """Since when the step in execution waits, for a condition or for the end of a DELAY; None if it does not, or if that is
         not known, as of a DELAY that an interrupt was in."""
-        is_in_loop = self._resting is not None and not self.waiting
-        if self.began is None or is_in_loop or not (self.running and (self.waiting or self.not_before > now)):
+        if self.began is None or self.resting_loop is not None or not (self.running and (self.waiting or self.not_before > now)):
             return None
         step, since = self.began
         return since if step == self.place(now) else None

@@ -23,6 +23,7 @@ from steptwin.state import Plain
 from steptwin.wbc import steps as s
 from steptwin.wbc.controller import RegisterReader
 from steptwin.wbc.real import real_text
+from steptwin.wbc.resting import RestingLoop
 
 _FOLLOWS = (AxisStatus.POSITION, AxisStatus.REACHED)
 """Statuses of an axis that follows its encoder."""
@@ -69,6 +70,8 @@ class ProgramWatch:
         self.program = next(iter(device.program.banks.programs.values()))
         """The one that was executed last."""
         self._axes = [(axis.status, axis.revision, axis.velocity_p) for axis in device.axes]
+        self._resting: RestingLoop | None = None
+        """The loop of which that was reported."""
         self._following: set[int] = set()
         """Axes that were reported to follow their encoders."""
         device.program.interpreter.add_hook(self._begins)
@@ -163,6 +166,12 @@ class ProgramWatch:
     def update(self, now: Nanos) -> None:
         """Report what the present statement has done, and the motions that axes have begun or ended."""
         self._finish()
+        loop = self.device.program.interpreter.resting_loop
+        if loop is not None and loop is not self._resting and self.happened:
+            last = self.happened[-1]
+            if last.code in ("delay", "wait") and last.time > now - 2 * loop.period:
+                self._emit(now, "rest", "the loop goes on like this", self._statement[1])
+        self._resting = loop
         for index, axis in enumerate(self.device.axes):
             known = self._axes[index]
             if index in self._following and axis.control.is_following and axis.status in _FOLLOWS:
