@@ -20,7 +20,7 @@ export interface Sample {
 /** Of an axis of which nothing is known: it may move. */
 const UNKNOWN = new Trajectory({ start_ns: "0", base: NaN, final: NaN, segments: [] });
 /** Intervals and samples kept of each axis. */
-const KEPT = 5000;
+const KEPT = 2000;
 
 type OfKind<K extends SubjectEvent["kind"]> = Extract<SubjectEvent, { kind: K }>;
 

@@ -6,7 +6,7 @@ interface PinEdges {
 }
 
 /** Edges kept of one pin. */
-const KEPT = 5000;
+const KEPT = 2000;
 
 export class Edges {
   private readonly pins = new Map<string, PinEdges>();

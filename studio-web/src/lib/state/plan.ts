@@ -58,15 +58,22 @@ function onArc({ way, course: [centre, radius, angle, turn] }: Arc, t: number): 
 export class Trajectory {
   readonly start_ns: bigint;
   /** Ends of its segments, in seconds after the start. */
-  readonly corners_s: readonly number[];
+  get corners_s(): readonly number[] {
+    return [0, ...this.segments.map(endOf).filter((end) => end !== null)];
+  }
   /** When it stands again; null where it never does. */
   readonly end_ns: bigint | null;
   private readonly segments: readonly Segment[];
 
-  constructor(private readonly plan: Plan) {
+  // Thousands are kept: nothing else of the plan is.
+  private readonly base: number;
+  private readonly final: number;
+
+  constructor(plan: Plan) {
     this.start_ns = BigInt(plan.start_ns);
+    this.base = plan.base;
+    this.final = plan.final;
     this.segments = plan.segments as readonly Segment[];
-    this.corners_s = [0, ...this.segments.map(endOf).filter((end) => end !== null)];
     const last = this.segments.at(-1);
     const end = last === undefined ? 0 : endOf(last);
     this.end_ns = end === null ? null : this.start_ns + BigInt(Math.ceil(end * 1e9));
@@ -78,7 +85,7 @@ export class Trajectory {
 
   /** `t` in seconds after the start; before it, as at the start. */
   atSeconds(t: number): Motion {
-    const { base, final } = this.plan;
+    const { base, final } = this;
     const from = Math.max(t, 0);
     for (const segment of this.segments) {
       const end = endOf(segment);
@@ -93,10 +100,9 @@ export class Trajectory {
   counted(now_ns: bigint): number {
     const t = Math.max(Number(now_ns - this.start_ns) / 1e9, 0);
     const index = this.segments.findIndex((segment) => (endOf(segment) ?? Infinity) > t);
-    if (index >= 0)
-      return this.plan.base + whole(this.segments[index] as Segment, this.atSeconds(t).position - this.plan.base);
+    if (index >= 0) return this.base + whole(this.segments[index] as Segment, this.atSeconds(t).position - this.base);
     const last = this.segments.at(-1);
-    return this.plan.base + (last === undefined ? Math.round(this.plan.final) : whole(last, this.plan.final));
+    return this.base + (last === undefined ? Math.round(this.final) : whole(last, this.final));
   }
 
   isMoving(now_ns: bigint): boolean {
