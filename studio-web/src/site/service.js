@@ -20,7 +20,9 @@ async function store() {
     await Promise.all(Object.entries(FILES).map(([file, integrity]) => add(cache, new URL(file, SCOPE), integrity)));
   } catch (error) {
     await caches.delete(NAME);
-    for (const page of await pages()) page.postMessage({ failed: error.message });
+    // Where another version is stored, that one stays.
+    if (self.registration.active === null)
+      for (const page of await pages()) page.postMessage({ failed: error.message });
     throw error;
   }
 }
