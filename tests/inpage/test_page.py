@@ -29,6 +29,16 @@ SECONDS = 1.0
 LOADING_MS = 120_000
 
 
+FAILED_UPDATE = """async () => {
+  const ready = await navigator.serviceWorker.ready;
+  await ready.update();
+  const worker = ready.installing ?? ready.waiting;
+  if (worker === null) return "redundant";
+  return new Promise((done) => worker.addEventListener("statechange", () => done(worker.state)));
+}"""
+"""What becomes of a newer version."""
+
+
 class Demo:
     """The demo in its page, loaded once for all tests, and what the browser complains about or asks elsewhere."""
 
@@ -221,6 +231,36 @@ def test_the_panels_ask_the_twin_as_a_master_and_a_terminal_do(demo: Demo) -> No
     expect(page.get_by_role("log", name="What went over chips")).to_contain_text("←")
 
 
+def test_a_breakpoint_stops_the_world_and_a_browser_without_room_is_named(demo: Demo) -> None:
+    page = demo.page
+    expect(time_of(page)).to_contain_text("live", timeout=LOADING_MS)
+    show(page, "Program")
+    page.get_by_label("Text", exact=True).select_option("steptwin:///table/program-0.prg")
+    text = page.get_by_role("textbox", name="Text of demo.prg")
+    page.evaluate("() => { Storage.prototype.setItem = () => { throw new DOMException('full', 'QuotaExceededError'); }; }")
+    text.click()
+    page.keyboard.press("Control+Home")
+    page.keyboard.insert_text("// no room\n")
+    expect(page.get_by_text("The browser has no room for this text")).to_be_visible()
+    button(page, "As in the twin").click()
+    expect(text).not_to_contain_text("no room")
+    expect(page.get_by_text("The browser has no room for this text")).to_have_count(0)
+    expect(text.locator("span[class^=tok-]").first).to_be_visible(timeout=LOADING_MS)
+
+    line = text.get_by_text("infeed = OFF")
+    line.click()
+    page.keyboard.press("F9")
+    stands = page.get_by_label("Where the debugger stands")
+    expect(stands).to_contain_text("breakpoint")
+    expect(page.get_by_role("list", name="Call stack").get_by_role("listitem").first).to_have_text("MAIN line 29")
+    expect(time_of(page)).to_contain_text("paused")
+    line.click()
+    page.keyboard.press("F9")
+    expect(page.get_by_role("list", name="Breakpoints")).to_have_count(0)
+    button(page, "Continue").click()
+    expect(time_of(page)).to_contain_text("live")
+
+
 def until(page: Page, condition: Callable[[], bool], what: str) -> None:
     """Wait while bytes of the page pass."""
     for _ in range(1000):
@@ -309,9 +349,17 @@ def test_a_link_to_the_machine_opens_another_twin_in_another_tab(demo: Demo, mon
     expect(other.get_by_role("status").first).not_to_contain_text("being loaded", timeout=LOADING_MS)
     expect(time_of(other)).to_contain_text(re.compile(r"paused.*[1-9]\.\d+ s", re.DOTALL))
 
-    # A newer version is offered, and does not begin under a twin.
+    # A newer version for which the browser has no room is left out, and this one stays.
     demo.context.set_offline(False)
     monkeypatch.setattr(Handler, "is_newer", True)
+    origin = demo.page.evaluate("location.origin")
+    storage = demo.context.new_cdp_session(demo.page)
+    storage.send("Storage.overrideQuotaForOrigin", {"origin": origin, "quotaSize": 1})
+    assert demo.page.evaluate(FAILED_UPDATE) == "redundant"
+    storage.send("Storage.overrideQuotaForOrigin", {"origin": origin})
+    expect(demo.page.get_by_title("can be opened without a network")).to_be_visible()
+
+    # One that is stored is offered, and does not begin under a twin.
     demo.page.evaluate("async () => { await (await navigator.serviceWorker.ready).update() }")
     button(demo.page, "New version").click()
     expect(demo.page.get_by_text("1 are open")).to_be_visible()

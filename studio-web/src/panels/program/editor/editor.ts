@@ -21,7 +21,7 @@ import { EditorView, drawSelection, highlightActiveLine, keymap } from "@codemir
 import type { OpenLink } from "../../../lib/protocol/backend";
 import { saidBy, sentence, type Inner, type Said } from "../../../text";
 import { breakpoints, handlersOf, marksAre, type GutterEvents, type Mark } from "./breakpoints";
-import { Documents, OpenText, textOf, type Finding } from "./documents";
+import { between, Documents, OpenText, textOf, type Finding } from "./documents";
 import { runningLine, runsAt } from "./running";
 import { look } from "./theme";
 import { semanticColours } from "./tokens";
@@ -193,8 +193,8 @@ export class ProgramEditor {
   }
 
   replace(file: OpenText, text: string): void {
-    const { state } = file;
-    this.documents.updateFile(file.uri, { changes: { from: 0, to: state.doc.length, insert: textOf(text) } });
+    this.documents.updateFile(file.uri, { changes: between(file.state.doc, textOf(text)) });
+    file.twinHas(file.inTwin); // a line that both have is the same one, whatever was typed before
   }
 
   goTo(line: number, column: number): void {
