@@ -15,7 +15,7 @@ class Found(NamedTuple):
 
 
 NEVER = Found(None, 0)
-HAPPENED = "happened: "
+HAPPENED, EXECUTED = "happened: ", "executed: "
 """Before what is no signal and no condition."""
 
 

@@ -5,6 +5,7 @@ A running world does not note this. Its past is run again with the inputs that i
 
 from __future__ import annotations
 
+import json
 import sys
 from array import array
 from bisect import bisect_left, bisect_right
@@ -31,7 +32,7 @@ from steptwin.simulation.world.snapshotlog import SLICE_NS, replay
 from steptwin.statements import StatementHook
 from steptwin.why import points
 from steptwin.why.frames import Frames
-from steptwin.why.lacking import HAPPENED, NEVER, Found, Lacking
+from steptwin.why.lacking import EXECUTED, HAPPENED, NEVER, Found, Lacking
 from steptwin.why.movers import movers
 from steptwin.why.programstates import ProgramStates
 from steptwin.why.roots import Act
@@ -430,6 +431,20 @@ class CauseLog:
         if last is None:
             self.lack_faults()
         return last
+
+    def last_of(self, controller: str, locations: Collection[StatementLocation], before: int) -> int | None:
+        """The number of the last one of some statements that was executed before a number."""
+        executed = self.executed[controller].locations
+        return next((one for one in range(before - 1, -1, -1) if executed[one] in locations), None)
+
+    def executed_before(self, controller: str, locations: Collection[StatementLocation]) -> Nanos | None:
+        """When one of some statements was last executed before the log, as far as that is known."""
+        if any(one.number < 0 for one in locations):  # it came over a line: none like it is known before
+            self.lack()
+        locations = [one for one in locations if one.number >= 0]
+        if not self.begin or not locations:
+            return None
+        return self.before(f"{EXECUTED}{json.dumps([controller, *sorted(locations)])}").since
 
     def never_happened(self, *names: str) -> bool:
         """Whether none of `steptwin.simulation.world.snapshotlog.happenings` was before the log. If one was, that decides."""

@@ -169,7 +169,8 @@ class PresentStates:
         against = None if use.reads else programs.decided_against(owner, Resource(ResourceKind.PIN, pin), at)
         if against is not None:
             yield against.link
-            reads = [(owner, one) for one in programs.use(owner, (against.place.number - 2) // 3).reads]
+            there = self._causes.of(against.place.time) or self._causes
+            reads = [(owner, one) for one in there.programs.use(owner, (against.place.number - 2) // 3).reads]
             return [*reads, *(yield from self.interrupts(owner, wanted))]
         if not use.waits or at - here.time <= self._world.programs[owner].statement_time:
             return ()

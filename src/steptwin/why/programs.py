@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from functools import cache, partial
 from typing import Any
 
@@ -12,7 +12,7 @@ from steptwin.messages import Message
 from steptwin.simulation.kinds.programs import ProgramState, Resource, ResourceKind, StatementLocation, StatementUse
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing, unknown
-from steptwin.why.log import LAST, MOST_LOOKED_BACK, Change, Executed, words_of
+from steptwin.why.log import LAST, Change, Executed, words_of
 from steptwin.why.programstates import OVER, StateChange
 from steptwin.why.sentences import statement
 
@@ -90,11 +90,12 @@ class ProgramCauses:
                 for number, use in enumerate(uses)
                 if not use.waits and any(one in use.governs for one in writing)
             }
-        executed, latest = self._log.executed[controller], self._log.last_executed(controller, at)
-        recent = range(latest, max(-1, latest - MOST_LOOKED_BACK), -1) if governing else ()
-        index = next((one for one in recent if executed.locations[one] in governing), None)
-        if index is None and governing and len(recent) < MOST_LOOKED_BACK:
-            self._log.lack()
+        executed = self._log.executed[controller]
+        index = self._log.last_of(controller, governing, self._log.last_executed(controller, at) + 1)
+        before = self._log.executed_before(controller, governing) if index is None else None
+        if before is not None:
+            there = self._all.of(before)
+            return None if there is None else there.programs.decided_against(controller, wanted, before)
         if index is None or not self._log.is_of_present_text(executed[index]):
             return None
         here, place = executed[index], Place(executed[index].time, executed[index].order, 3 * index + 2)
@@ -190,27 +191,29 @@ class ProgramCauses:
             decided = self._of_statement(controller, index)
             since = Place(here.time) if decided is None else decided.place
         else:
-            last = self._log.executed[controller][before]
-            since = Place(last.time, last.order, 3 * before + 2)
+            since = before
         found = [cause for one in reads if (cause := self.resource(controller, one, index, here.time, here.order))]
         changed = max((cause for cause in found if cause.place > since), key=lambda cause: cause.place, default=None)
         if changed is not None:
             return covered(changed, Cover.LEVEL)
         return self._of_statement(controller, index) if decided is None else decided
 
-    def _executed_before(self, controller: str, index: int) -> int | None:
-        """The number of the execution of a statement before this one."""
-        locations = self._log.executed[controller].locations
-        here = locations[index]
-        before = range(index - 1, max(-1, index - MOST_LOOKED_BACK), -1)
-        found = next((one for one in before if locations[one] == here), None)
-        if found is None and len(before) == index:
-            self._log.lack()
-        return found
+    def _executed_before(self, controller: str, index: int) -> Place | None:
+        """The execution of a statement before this one."""
+        here = (self._log.executed[controller].locations[index],)
+        before = self._log.last_of(controller, here, index)
+        if before is not None:
+            last = self._log.executed[controller][before]
+            return Place(last.time, last.order, 3 * before + 2)
+        since = self._log.executed_before(controller, here)
+        return None if since is None else Place(since, LAST)
 
     def decides_in_loop(self, controller: str, index: int) -> Sequence[Resource]:
         """Resources that the conditions read that were evaluated since a statement was executed before; none without a loop."""
-        before = self._executed_before(controller, index)
+        here = (self._log.executed[controller].locations[index],)
+        before = self._log.last_of(controller, here, index)
+        if before is None and self._log.executed_before(controller, here) is not None:
+            self._log.lack()
         uses = [] if before is None else [self.use(controller, one) for one in range(before, index)]
         return list(dict.fromkeys(read for use in uses if use.governs or use.is_loop for read in use.reads))
 
@@ -394,12 +397,23 @@ class ProgramCauses:
                 written = self._register(controller, resource, time, before)
                 if written is not None:
                     return written
-                for earlier in range(index - 1, max(-1, index - MOST_LOOKED_BACK), -1):
-                    if resource in self.use(controller, earlier).writes:
-                        return covered(self.statement(controller, earlier), Cover.LEVEL)
-                if index < MOST_LOOKED_BACK and self.is_written(controller, resource):
-                    self._log.lack()
+                writing = self._writing(controller, resource)
+                earlier = self._log.last_of(controller, writing, index)
+                if earlier is not None:
+                    return covered(self.statement(controller, earlier), Cover.LEVEL)
+                since = self._log.executed_before(controller, writing)
+                there = None if since is None else self._all.of(since)
+                if since is not None and there is not None:
+                    number = there.log.last_executed(controller, since) + 1
+                    return there.programs.resource(controller, resource, number, since)
         return None
+
+    def _writing(self, controller: str, resource: Resource) -> Collection[StatementLocation]:
+        """The statements that change something."""
+        programs = self._world.programs[controller]
+        every = (StatementLocation(text, one) for text in programs.texts for one in range(len(programs.statements(text))))
+        given = (location for (owner, location), use in self._log.given.items() if owner == controller and resource in use.writes)
+        return {*(one for one in every if resource in programs.use(one).writes), *given}
 
     def _register(self, controller: str, resource: Resource, time: Nanos, before: int) -> FoundCause:
         """The last change of a register of a controller that a program has a name for, by a moment, before an order."""

@@ -24,13 +24,13 @@ from steptwin.why import points
 from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Cover
 from steptwin.why.causes import FAULT, IS, Causes
 from steptwin.why.chain import Cause, Chain, FoundCause, Place, covered
-from steptwin.why.lacking import HAPPENED
+from steptwin.why.lacking import EXECUTED, HAPPENED
 from steptwin.why.lacking import Lacking as Before
 from steptwin.why.log import LAST, MOST_NOTED, OF_MECHANICS, CauseLog, in_parts
 from steptwin.why.presentstates import PresentStates
 from steptwin.why.programs import WAITS
 from steptwin.why.replayed import ReplayedSignals, TimeSeries, watch_truth, watch_value
-from steptwin.why.search import Asked, happened
+from steptwin.why.search import Asked, executed, happened
 from steptwin.why.sentences import statement
 from steptwin.why.states import Interval, StatesOnTheWay, is_constant, rest_of
 
@@ -227,6 +227,8 @@ class Why:
         text = _text_of(question)
         if text.startswith(HAPPENED):
             return happened(text)
+        if text.startswith(EXECUTED):
+            return executed(text)
         if not text or self._is_script(text):
             return None
         if _without_not(text) in self.log.world.controllers or self._variable(text) is not None:

@@ -3,6 +3,7 @@ an edge of it are passed over."""
 
 from __future__ import annotations
 
+import json
 from collections import defaultdict
 from collections.abc import Callable, Collection, Generator, Iterator, Mapping
 from contextlib import ExitStack
@@ -20,7 +21,7 @@ from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
 from steptwin.simulation.world.snapshotlog import ACTED, MOVED, LoggedSnapshot, happenings
 from steptwin.statements import StatementHook
 from steptwin.why import points
-from steptwin.why.lacking import HAPPENED, Found
+from steptwin.why.lacking import EXECUTED, HAPPENED, Found
 from steptwin.why.log import in_parts, levels_of, on_timed_lines
 from steptwin.why.replayed import TimeSeries, watch_truth
 from steptwin.why.states import rest_of
@@ -42,12 +43,22 @@ class Asked(NamedTuple):
     flip: Callable[[Mapping[str, TimeSeries], Nanos], Nanos | None]
     happenings: frozenset[str] = frozenset()
     """Those that are asked about, by their names in `steptwin.simulation.world.snapshotlog.happenings`, instead of a signal."""
+    statements: tuple[str, frozenset[StatementLocation]] | None = None
+    """The controller and its statements that are asked about, instead of a signal."""
 
 
 def happened(text: str) -> Asked:
     """When one of some happenings was last; they are written with commas."""
     names = frozenset(text.removeprefix(HAPPENED).split(", "))
     return Asked(text, frozenset(), frozenset(), frozenset(), lambda noted, at: points.since(noted[text], at), names)
+
+
+def executed(text: str) -> Asked:
+    """When one of some statements was last executed."""
+    controller, *locations = json.loads(text.removeprefix(EXECUTED))
+    statements = controller, frozenset(StatementLocation(*one) for one in locations)
+    nothing = frozenset[str]()
+    return Asked(text, nothing, nothing, nothing, lambda noted, at: points.since(noted[text], at), nothing, statements)
 
 
 class Snapshots(Protocol):
@@ -134,7 +145,7 @@ class LastChanges:
 
     def _may_change(self, asked: Asked, state: LoggedSnapshot, after: LoggedSnapshot) -> bool:
         """Whether something that is asked about may change between two states, one after the other."""
-        if any(name in asked.happenings for _, name in after.changed):
+        if asked.statements is not None or any(name in asked.happenings for _, name in after.changed):
             return True
         if any(name in asked.edges for controller, subject in after.changed for name in (subject, f"{controller}.{subject}")):
             return True
@@ -240,8 +251,17 @@ class _Noted:
         self._subscribers: dict[str, list[_Subscriber]] = defaultdict(list)
         self.series: dict[str, TimeSeries] = {name: [(world.now, levels.get(name, 0.0))] for name in asked.edges}
         self._asked = asked
-        if asked.happenings:
+        if asked.happenings or asked.statements is not None:
             self.series[asked.text] = [(world.now, 0.0)]
+        if asked.statements is not None:
+            controller, statements = asked.statements
+            programs = world.programs[controller]
+            hook = self._hook(programs, statements)
+            is_given = controller in world.objects.line_of
+            programs.add_hook(hook, None if is_replaced or is_given else statements)
+            stack.callback(programs.remove_hook, hook)
+            if any(programs.location(number) in statements for number in programs.begun(world.now)):
+                self.series[asked.text].append((world.now, 1.0))
         if asked.edges or asked.happenings:
             world.trace.subscribers.append(self._take)
             stack.callback(world.trace.subscribers.remove, self._take)
@@ -255,6 +275,17 @@ class _Noted:
         if self._timed and self._subscribers and not asked.edges:
             world.trace.subscribers.append(self._take)
             stack.callback(world.trace.subscribers.remove, self._take)
+
+    def _hook(self, programs: Programs, statements: Collection[StatementLocation]) -> StatementHook:
+        """Notes when they are executed, or a command that came over a line, which may do the same."""
+        series = self.series[self._asked.text]
+
+        def hook(now: Nanos, number: int) -> None:
+            location = programs.location(number)
+            if location in statements or (location is None and programs.given(number) is not None):
+                series.append((now, len(series)))
+
+        return hook
 
     def _take(self, record: TraceRecord) -> None:
         if self._asked.happenings and not self._asked.happenings.isdisjoint(happenings(record)):
