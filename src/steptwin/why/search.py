@@ -231,15 +231,19 @@ class LastChanges:
         is_replaced = any(isinstance(one.what, Download | Bytes) for one in inputs)
         with ExitStack() as stack:
             flips: dict[str, Callable[[], Nanos | None]] = {}
+            noted: list[_Noted] = []
             for one in asked:
                 if one.moving:
                     series: TimeSeries = []
                     world.start("why", partial(watch_truth, world, one.text, series), is_external=True)
                     flips[one.text] = lambda series=series: series[-1][0] if len(series) > 1 else None
                 else:
-                    flips[one.text] = partial(one.flip, _Noted(world, one, stack, is_replaced=is_replaced).series, end)
+                    noted.append(_Noted(world, one, stack, is_replaced=is_replaced))
+                    flips[one.text] = partial(one.flip, noted[-1].series, end)
             for _ in in_parts(world, inputs, end):
                 yield
+            for each in noted:
+                each.look(end)
         found |= {text: since for text, flip in flips.items() if (since := flip()) is not None}
 
 
@@ -286,6 +290,12 @@ class _Noted:
                 series.append((now, len(series)))
 
         return hook
+
+    def look(self, now: Nanos) -> None:
+        """Note what the last statement before a moment has changed."""
+        for subscribers in self._subscribers.values():
+            for one in subscribers:
+                one.look(now)
 
     def _take(self, record: TraceRecord) -> None:
         if self._asked.happenings and not self._asked.happenings.isdisjoint(happenings(record)):
