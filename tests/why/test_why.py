@@ -39,7 +39,7 @@ def test_statement_wait_contact_and_script() -> None:
         "1.011000 s cell cell.OUT1 became 1",
         "1.011000 s cell line 4 `lamp = ON` was executed",
         "1.011000 s cell line 3 `WAIT start = ON` ended",
-        "1.000000 s cell cell.IN1 became 1",
+        "1.000000 s cell cell.IN1 became 1, which the filter of the input lets in after 10 ms",
         "1.000000 s go go became 1, a contact of cell.IN1",
         "1.000000 s operator script operator: presses go",
     ]
@@ -412,13 +412,13 @@ def test_a_jump_and_an_interrupt_lead_to_what_they_depend_on() -> None:
     assert [link.text for link in world.why("OUT1").links[1:]] == [
         "line 13 `OUT1 = ON` was executed",
         "line 4 `IF IN1 = ON` decided",
-        "cell.IN1 became 1",
+        "cell.IN1 became 1, which the filter of the input lets in after 10 ms",
         "from outside: sets cell.IN1 = 1",
     ]
     assert [link.text for link in world.why("OUT2").links[1:]] == [
         "line 17 `OUT2 = ON` was executed",
         "line 16 `INT_IN2:` decided",
-        "cell.IN2 became 1",
+        "cell.IN2 became 1, which the filter of the input lets in after 10 ms",
         "from outside: sets cell.IN2 = 1",
         "line 2 `CFGINT_IN2 = RIS` was executed",
         "the program started",
@@ -661,7 +661,7 @@ def test_a_count_leads_to_the_interrupt_in_which_it_is_made(counts: World) -> No
         "line 5 `$R0 = n` was executed",
         "line 15 `n = n + 1` was executed",
         "line 14 `INT_IN1:` decided",
-        "c.IN1 became 1",
+        "c.IN1 became 1, which the filter of the input lets in after 10 ms",
         "go became 1, a contact of c.IN1",
         "script hand: presses go",
         "line 3 `CFGINT_IN1 = RIS` was executed",

@@ -60,9 +60,13 @@ class Inputs(Stateful):
         if active == self.filtered[number]:
             self._pending.pop(number, None)
         else:
-            self._pending[number] = now + FILTER_NS[self._settings[number].filter]
+            self._pending[number] = now + self.filter_ns(number)
         self._due = min(self._pending.values(), default=None)
         return True
+
+    def filter_ns(self, number: int) -> Nanos:
+        """How long a level must last until registers show it."""
+        return FILTER_NS[self._settings[number].filter]
 
     def deadline(self) -> Nanos | None:
         return self._due

@@ -11,6 +11,7 @@ from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message, MessageText
 from steptwin.motion.divisions import profile_of
 from steptwin.simulation.components.brake import RELEASED, BrakeSpec
+from steptwin.simulation.components.load import ACTS, LoadSpec
 from steptwin.simulation.components.touch import JAM
 from steptwin.simulation.faults.kinds_physics import IS_BLOCKED, LOSES_PULSES
 from steptwin.simulation.kinds.programs import Resource, ResourceKind
@@ -21,7 +22,7 @@ from steptwin.why import points
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, covered, unknown
 from steptwin.why.controllers import acted
-from steptwin.why.log import JAMS, LAST, OF_MECHANICS, Change, words_of
+from steptwin.why.log import FALL, JAMS, LAST, OF_MECHANICS, Change, words_of
 
 GIVES_POWER = Message("why.gives-power", ", which gives {axis} its power")
 BEGAN_TO_MOVE = Message("why.began-to-move", "{axis} began to move")
@@ -82,9 +83,7 @@ class AxisCauses:
 
         def planned() -> FoundCause:
             found = self._all.controllers.in_controller(controller, plan, Resource(ResourceKind.AXIS, record.subject))
-            if found is None or found.place.time < plan.time:
-                found = self._turned(controller, record.subject, plan) or found
-            return covered(found, Cover.MOTION)
+            return covered(self.followed(controller, record.subject, plan.time, plan.order, found), Cover.MOTION)
 
         def besides() -> Iterator[Cause]:
             yield from self.settings(controller, record.subject, place.time, names)
@@ -160,7 +159,8 @@ class AxisCauses:
         plan = max(self._log.plans_in_force(controller, number, until, before), default=None)
         began = -1 if plan is None else plan.time
         events = list(self._of_rotor(axis, until, before))
-        lasting = [one for one in events if one.time >= began or (is_held and self.holds_rotor(one, events))]
+        led = [one for one in events if one.time >= began or (is_held and self.holds_rotor(one, events))]
+        lasting = [one for one in led if self._log.record(one).subject != FALL or _begins(self._log.record(one))]
         event = max(lasting, key=lambda one: (one.time, one.order), default=None)
         if event is None:
             self._log.never_happened(*EVENTS_OF_ROTORS)
@@ -169,7 +169,7 @@ class AxisCauses:
         if power is not None and is_unpowered:
             plans = self._log.plans_in_force(controller, number, until if is_off else power.link.time)
             is_unpowered = built.mechanism.build.coasts_unpowered or any(self._end(one)[0] > power.link.time for one in plans)
-        if event is not None and not (is_unpowered and power is not None and power.place > Place(event.time, event.order)):
+        if event is not None and not (is_unpowered and power is not None and self._is_after(power, event)):
             return self.rotor_event(axis, event)
         if is_unpowered and power is not None:
             let_go = self._let_go(axis, power, until if since is None else min(until, since + BRAKES_NS))
@@ -192,6 +192,12 @@ class AxisCauses:
         """That a motor has power again, along with the loss of it, during which its motion went on, and with that motion."""
         lost = self.power(axis, power.place.time, power.place.order)
         return found._replace(along=(*found.along, *(one for one in (lost, motion) if one is not None)))
+
+    def _is_after(self, power: Cause, event: Change) -> bool:
+        """Whether a change of power comes after an event of a rotor: what falls by it is recorded before it."""
+        if self._log.record(event).subject == FALL:
+            return power.place.time > event.time
+        return power.place > Place(event.time, event.order)
 
     def power(self, axis: str, until: Nanos, before: int = LAST) -> FoundCause:
         """The last change by a moment, before an order, of the output that gives the motor of an axis power; None for one that
@@ -287,10 +293,49 @@ class AxisCauses:
         controller, name = self._world.axes[axis].spec.drive
         wanted = Resource(ResourceKind.AXIS, name.removeprefix("M"))
         motion = self.motion(controller, wanted.name, event.time, axis)
-        if begins and motion is not None and motion.place.time == event.time:  # recorded after what it leads to at once
-            return motion._replace(place=min(motion.place, Place(event.time, event.order, -1)))
         command = None if begins else self._all.controllers.commanded(controller, event, wanted)
-        return command or self.moved(axis, event.time, event.order, is_held=begins)
+        if command is not None:
+            return command
+        falls = self._log.record(event).subject == FALL
+        found: list[FoundCause] = list(self._that_load(axis, event, falls=falls)) if begins else []
+        if begins and motion is not None and motion.place.time == event.time:  # recorded after what it leads to at once
+            found.append(motion._replace(place=min(motion.place, Place(event.time, event.order, -1))))
+        else:
+            current = self._without_current(axis, event) if falls else None
+            found.append(current or self.moved(axis, event.time, event.order, is_held=begins))
+        first, *others = sorted((one for one in found if one is not None), key=lambda one: one.place, reverse=True) or (None,)
+        return None if first is None else first._replace(along=(*first.along, *others))
+
+    def _that_load(self, axis: str, event: Change, *, falls: bool) -> Iterator[Cause]:
+        """The loads and brakes that an axis stalls or falls by at an event, as they changed last: those that act, or do not act
+        any more since that moment; and of a fall those that let go."""
+        for name, spec in self._all.specs.items():
+            if not isinstance(spec, LoadSpec | BrakeSpec) or spec.axis != axis:
+                continue
+            is_brake = isinstance(spec, BrakeSpec)
+            signal = f"{name}.{(RELEASED if is_brake else ACTS).lower()}"
+            change = self._log.last_change(signal, event.time, event.order)
+            if change is None:
+                self._log.lack()
+            level = self._log.first_levels.get(signal, 0.0) if change is None else change.value
+            counts = bool(level) is (falls or not is_brake) or (change is not None and change.time == event.time)
+            if counts and change is not None:
+                yield covered(self._all.change(signal, change), Cover.LEVEL) or self._all.change(signal, change)
+            elif counts and (is_brake or getattr(spec, "when", None)):
+                yield self._all.first(signal)._replace(cover=Cover.LEVEL)
+
+    def _without_current(self, axis: str, event: Change) -> FoundCause:
+        """The last that took the current of a motor by an event: its power, or its controller."""
+        controller, name = self._world.axes[axis].spec.drive
+        signals = [one for one in (self._power_of(axis), f"{controller}.{name}_EN") if one and self._log.has(one)]
+        off = [one for one in signals if not self._log.level(one, event.time)]
+        self._log.lack()
+        found = self._all.last(off, event.time, GIVES_POWER(axis=axis))
+        if found is None and off:
+            found = self._all.first(off[0], GIVES_POWER(axis=axis))
+        if found is not None:  # a change of the same moment is recorded after what it leads to
+            found = found._replace(place=min(found.place, Place(event.time, event.order, -1)))
+        return covered(found, Cover.LEVEL)
 
     def _lost_by_fault(self, axis: str, until: Nanos, before: int, *kinds: Message, since: Nanos = 0) -> FoundCause:
         """The last fault by a moment, before an order, that was reported as one of ``kinds`` at an axis and was not over before
@@ -310,26 +355,61 @@ class AxisCauses:
         self._log.lack_faults()
         return None
 
-    def _turned(self, controller: str, number: str, plan: Change) -> FoundCause:
-        """The thing that turned the encoder that an axis follows by the moment of a plan: another axis, a motor, a hand."""
-        for axis in self._world.axes.values():
-            if axis.spec.drive != (controller, f"M{number}"):
-                continue
-            follows = getattr(axis.spec.encoder, "follows", None)
-            if follows is not None and follows in self._world.axes:
-                return self.moved(follows, plan.time, plan.order)
-            if follows in self._all.parts:
-                return self._all.elements.of_element(follows, "", plan.time)
-        acts = self._log.acts_before(plan.time, plan.order)
+    def counted(self, controller: str, number: str, until: Nanos, before: int = LAST, index: int | None = None) -> FoundCause:
+        """The last by a moment, before an order, that changed what the counter of an encoder shows: what turned it, or the
+        statement before ``index`` that wrote it."""
+        end = self._log.last_executed(controller, until) + 1 if index is None else index
+        written = self._all.programs.written(controller, Resource(ResourceKind.ENCODER, number), end)
+        turned = self._turned(controller, number, until, before) or self._turned_by_drive(controller, number, until, before)
+        if written is None or (turned is not None and turned.cover is Cover.MOTION and turned.link.time == turned.place.time):
+            return turned or written
+        return max((one for one in (written, turned) if one is not None), key=lambda one: one.place)
+
+    def followed(self, controller: str, number: str, time: Nanos, before: int, found: FoundCause) -> FoundCause:
+        """What turned the encoder that an axis follows, unless a cause at the moment is ``found``."""
+        inputs = self._world.kind(controller).encoders
+        is_over = found is None or found.place.time < time
+        if inputs is None or not number or not is_over or not inputs.is_followed(self._world.controller(controller), int(number)):
+            return found
+        return self._turned(controller, number, time, before) or found
+
+    def _turned(self, controller: str, number: str, until: Nanos, before: int) -> FoundCause:
+        """The thing other than its own axis that turned an encoder last by a moment: another axis, a belt, a motor, a hand."""
         turned = (
             act
-            for act in acts
-            if isinstance(act.what, do.Turn) and (act.what.controller, act.what.axis) == (controller, int(number))
+            for act in self._log.acts_before(until, before)
+            if isinstance(act.what, do.Turn) and (act.what.controller, str(act.what.axis)) == (controller, number)
         )
-        act = next(turned, None)
-        if act is None:
+        found = [covered(acted(act), Cover.LEVEL) for act in turned][:1]
+        if not found:
             self._log.lack()
-        return None if act is None else acted(act)
+        axis = self._driven(controller, number)
+        follows = None if axis is None else getattr(self._world.axes[axis].spec.encoder, "follows", None)
+        if follows is not None and follows in self._world.axes:
+            found.append(self.moved(follows, until, before))
+        elif follows is not None:
+            found.append(self._all.workpieces.turns(follows, Change(until, 0.0, -1, 0, before)))
+        return max((one for one in found if one is not None), key=lambda one: one.place, default=None)
+
+    def _turned_by_drive(self, controller: str, number: str, until: Nanos, before: int) -> FoundCause:
+        """The motion of its own axis that turned an encoder last; None for one that something else, or nothing, turns."""
+        axis = self._driven(controller, number)
+        if axis is not None:
+            is_own = getattr(self._world.axes[axis].spec.encoder, "follows", None) is None
+            return self.moved(axis, until, before) if is_own else None
+        acts = self._log.acts_before(until, before)
+        coupled = (act.what for act in acts if isinstance(act.what, do.Couple) and act.what.controller == controller)
+        coupling = next((what.coupling for what in coupled if str(what.axis) == number), None)
+        inputs = self._world.kind(controller).encoders
+        if coupling is None and inputs is not None:
+            found = inputs.to_json(self._world.controller(controller), self._world.now)
+            coupling = next((str(one["turned_by"]) for one in found if str(one["axis"]) == number), None)
+        return self.motion(controller, number, until, before=before) if coupling == do.COUPLINGS[0] else None
+
+    def _driven(self, controller: str, number: str) -> str | None:
+        """The name of the axis that a controller drives; None for one without mechanics."""
+        axes = self._world.axes.items()
+        return next((name for name, axis in axes if axis.spec.drive == (controller, f"M{number}")), None)
 
     def _end(self, plan: Change) -> tuple[float, Nanos]:
         """When the motion of a plan ends, which may be never; of several at once, the one planned last."""
@@ -342,4 +422,4 @@ class AxisCauses:
 def _begins(record: TraceRecord) -> bool:
     """Whether a rotor does not follow its motion from an event on."""
     facts = dict(record.facts)
-    return facts.get("what") == JAMS[0] or any(facts.get(one) is True for one in ("stalled", "pushes", "touches"))
+    return facts.get("what") == JAMS[0] or any(facts.get(one) is True for one in ("stalled", "pushes", "touches", "falls"))

@@ -16,12 +16,14 @@ from steptwin.simulation.kinds.programs import Resource, ResourceKind
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
+from steptwin.simulation.world.actions import is_release
 from steptwin.why.answer import ChainLink, Cover, since_before
 from steptwin.why.attempts import Attempts
 from steptwin.why.axes import AxisCauses
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing, unknown
 from steptwin.why.controllers import ControllerCauses, acted
 from steptwin.why.elements import ElementCauses, inputs
+from steptwin.why.holding import HoldingCauses
 from steptwin.why.lacking import NEVER
 from steptwin.why.log import LAST, CauseLog, Change, sets
 from steptwin.why.programs import ProgramCauses
@@ -62,6 +64,7 @@ class Causes:
         self.axes, self.attempts, self.programs = AxisCauses(self), Attempts(self), ProgramCauses(self)
         self.controllers, self.elements = ControllerCauses(self), ElementCauses(self)
         self.workpieces = WorkpieceCauses(self)
+        self.holding = HoldingCauses(self)
 
     def of(self, moment: Nanos) -> Causes | None:
         """Causes of what was at a moment; None as long as nothing of it is noted."""
@@ -136,6 +139,9 @@ class Causes:
         fault = self.fault(owner, change, None if owner in self.parts else terminal)
         if fault is not None:
             return fault
+        cleared = self._cleared(signal, change)
+        if cleared is not None:
+            return cleared
         if owner in self.parts:
             return self.elements.of_inputs(owner, change)
         if owner in self._world.controllers:
@@ -157,6 +163,14 @@ class Causes:
                     link = self.fault_link(record)
                     return Cause(link, Place(record.time, change.order, -1), self.of_fault(record, order))
         return None
+
+    def _cleared(self, signal: str, change: Change) -> FoundCause:
+        """The action at the moment of a change that cleared the fault which had held a signal."""
+        hold = self.log.hold(signal, change.time - 1)
+        held = None if hold is None else hold.held
+        acts = self.log.acts_at(change.time, change.order) if held is not None else ()
+        act = next((act for act in acts if held is not None and act.what == do.ClearFault(held.fault)), None)
+        return None if act is None else acted(act)
 
     def fault_link(self, record: TraceRecord) -> ChainLink:
         """Link of a record of a fault."""
@@ -245,6 +259,8 @@ class Causes:
         for act in self.log.acts_at(change.time, change.order):
             match act.what:
                 case do.Press(button) | do.Release(button) if button == name:
+                    if is_release(act.by):  # who pressed it was before the log
+                        self.log.lack()
                     return acted(act)
         earlier = self.log.last_change(name, change.time - 1)
         if earlier is not None and change.time - earlier.time < SECOND:
@@ -260,15 +276,18 @@ class Causes:
         part = self.parts.get(owner)
         if part is not None and terminal.upper() in inputs(part):
             return list(self.sources(PinName(owner, terminal.upper())))
+        followed = [one for one in self.elements.behind(signal) if self.log.has(one)]
+        if part is not None and followed and terminal.upper() not in part.block.outputs:
+            return followed
         if part is not None:
             found = [source for name in inputs(part) for source in self._held_or_sources(owner, name, at)]
             return [*found, *self._unwired(owner, part)]
-        return list(self.sources(PinName(owner, terminal))) if owner in self._world.controllers else []
+        return list(self.sources(PinName(owner, terminal))) or followed if owner in self._world.controllers else []
 
     def _unwired(self, owner: str, part: TerminalComponent) -> Iterator[str]:
         """The input without which an element does nothing, if nothing is wired to it."""
         first = next(iter(inputs(part)), FEED)
-        if first != FEED and not any(self.sources(PinName(owner, first))):
+        if first != FEED and not self.elements.followed(owner) and not any(self.sources(PinName(owner, first))):
             yield f"{owner}.{first.lower()}"
 
     def _held_or_sources(self, owner: str, terminal: str, at: Nanos) -> Iterator[str]:

@@ -23,7 +23,7 @@ from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing
 from steptwin.why.log import LAST, MOST_LOOKED_BACK, Change, words_of
 from steptwin.why.programstates import StateChange
 from steptwin.why.roots import Act, Sent
-from steptwin.why.sentences import describe_input
+from steptwin.why.sentences import SETS_A_FAULT, describe_input
 
 CLIENT = Message("why.client", "client {client}: {meaning}")
 SCRIPT = Message("why.script", "script {name}: {what}")
@@ -39,6 +39,10 @@ REFUSED = Message("why.refused", "{request}: refused, {reason}")
 REQUEST = Message("why.request", "request: {meaning}")
 
 
+_AXIS = re.compile(r"(?:M|ENC)(\d+)[._]|moving$", re.IGNORECASE)
+"""A point that a motion changes; the group is the number of its axis, none where the controller has one only."""
+
+
 class ControllerCauses:
     """Finds the causes of changes in controllers. ``causes`` has those of everything else."""
 
@@ -51,7 +55,11 @@ class ControllerCauses:
         """Cause of a change in a controller that no record shows; ``point``: of that point of it."""
         group, order = self._log.group(controller), self._log.points.order_of(f"{controller}.{point}", time)
         change = Change(time, 0.0, group, self._log.position(group, time), LAST if order is None else order)
+        if wanted is not None and wanted.kind is ResourceKind.ENCODER:
+            return self.commanded(controller, change, wanted, point) or self._all.axes.counted(controller, wanted.name, time)
         found = self.in_controller(controller, change, wanted, point)
+        if wanted is not None and wanted.kind is ResourceKind.AXIS:
+            found = self._all.axes.followed(controller, wanted.name, time, LAST, found)
         if found is None and wanted is not None:
             return self._all.axes.motion(controller, wanted.name, time)
         return found
@@ -408,6 +416,14 @@ def _matches(writes: Sequence[Resource], wanted: Resource | None) -> bool:
     return any(one.kind is wanted.kind and (one.name in ("", wanted.name) or not wanted.name) for one in writes)
 
 
+def axis_of(point: str) -> Resource | None:
+    """The axis or encoder of a point of a controller, by its path; None for another one."""
+    found = _AXIS.match(point)
+    if found is None:
+        return None
+    return Resource(ResourceKind.ENCODER if "enc" in point.lower() else ResourceKind.AXIS, found[1] or "")
+
+
 def _names(act: Act, meaning: str) -> bool:
     """Whether an action writes what a request is about, or a register with this name."""
     match act.what:
@@ -441,6 +457,6 @@ def _changes(act: Act, controller: str) -> bool:
 
 
 def acted(act: Act) -> Cause:
-    what = describe_input(act.what)
-    text = SCRIPT(name=act.script, what=what) if act.script else FROM_OUTSIDE(what=what)
-    return Cause(ChainLink(act.time, act.script or "outside", text, act), Place(act.time, act.order), nothing)
+    what = describe_input(act.what) if not act.fault else SETS_A_FAULT(name=act.fault)
+    text = SCRIPT(name=act.by, what=what) if act.by else FROM_OUTSIDE(what=what)
+    return Cause(ChainLink(act.time, act.by or "outside", text, act), Place(act.time, act.order), nothing)

@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
 from typing import Any
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message
+from steptwin.simulation.components.brake import BrakeSpec
+from steptwin.simulation.components.gantry import GantrySpec
+from steptwin.simulation.components.load import LoadSpec
 from steptwin.simulation.components.logic import TerminalComponent
 from steptwin.simulation.kinds.programs import Resource, ResourceKind
 from steptwin.simulation.logic.expression import parse_condition, parse_expression
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
-from steptwin.why.answer import Cover
+from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.axes import EVENTS_OF_ROTORS, POSITION
-from steptwin.why.chain import Cause, FoundCause, Place, covered
-from steptwin.why.controllers import acted
+from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing
+from steptwin.why.controllers import acted, axis_of
 from steptwin.why.log import LAST, Change
 from steptwin.why.movers import FALLS, GOES_ON, PUSHED, TRAVEL
 from steptwin.why.workpieces import HAS_ACTED_SINCE
 
 FOLLOWS_AFTER = Message("why.follows-after", ", {name} follows after {delay_ms:g} ms")
+ITS_RATE_IS = Message("why.its-rate-is", "the rate of {name} is {rate:g} {unit}")
+COMES_WITH_TIME = Message("why.comes-with-time", "the time has come for {name}: {condition}")
 TIME = "time"
 """States of an element that are over at a moment and are no signal."""
 OF_WORKPIECES = ("count", "crooked", "mass")
@@ -48,7 +55,7 @@ class ElementCauses:
             return self._all.last(list(self._all.sources(PinName(name, signal.upper()))), time)
         group = self._log.group(name)
         change = Change(time, 0.0, group, self._log.position(group, time), before)
-        workpiece = None if signal == POSITION else self._all.workpieces.at(name, change)
+        workpiece = None if signal == POSITION or self._log.rates.has(name) else self._all.workpieces.at(name, change)
         if workpiece is not None:
             return workpiece
         jams = [one for one in self._all.axes.jams(name) if (one.time, one.order) < (time, before)] if signal == POSITION else []
@@ -90,11 +97,7 @@ class ElementCauses:
         workpiece = self._all.workpieces.at(name, change)
         if workpiece is not None:
             return workpiece
-        followed = (
-            self.of_followed(name, change)
-            if not sources or name in self._spatial or getattr(self._all.specs[name], "rate", None)
-            else None
-        )
+        followed = self.of_followed(name, change)
         if followed is not None and all(followed.place > Place(one.time, one.order) for one, _ in last):
             return followed
         acts = Cover.ACTION if type(part).deadline is not TerminalComponent.deadline else None
@@ -120,12 +123,22 @@ class ElementCauses:
         if name in self._spatial or getattr(spec, "pushes", False):
             return self._moved_in_space(name, spec)
         when, of, rate = (getattr(spec, one, None) for one in ("when", "of", "rate"))
-        axes = [getattr(spec, one, None) for one in ("axis", "other")] if not (when or of or rate) else []
+        acts_on_axis = isinstance(spec, BrakeSpec | LoadSpec)
+        axes = [getattr(spec, one, None) for one in ("axis", "other")] if not (when or of or rate or acts_on_axis) else []
         turned_by = getattr(spec, "shaft", None)
-        found = [*(parse_condition(when).names() if when else ()), *([of] if of else ())]
+        found = [*(parse_condition(when).names() if when else ()), *(parse_expression(of).names() if of else ())]
         found += parse_expression(rate).names() if rate else ()
         found += [f"{axis}.{POSITION}" for axis in axes if axis]
         return (*dict.fromkeys(one for one in found if one != TIME), *(self.followed(turned_by) if turned_by else ()))
+
+    def _condition(self, name: str) -> str:
+        """Text of the condition of an element, or of what it is over; empty for none."""
+        spec = self._all.specs.get(name)
+        return getattr(spec, "when", None) or getattr(spec, "of", None) or ""
+
+    def _is_timed(self, name: str) -> bool:
+        """Whether an element depends on the time."""
+        return TIME in re.findall(r"[\w.]+", self._condition(name))
 
     def behind(self, signal: str) -> tuple[str, ...]:
         """The signals that the element follows that has a signal, or drives a pin."""
@@ -161,19 +174,42 @@ class ElementCauses:
     def of_followed(self, name: str, change: Change) -> FoundCause:
         """The last cause by a moment of what an element follows; that of the same moment, if there is one, or of an axis that
         moves then; of a collision, along with what led its other body there."""
-        moving = self._log.movers.get((name, change.time))
-        found = {
-            signal: cause for signal in moving or self.followed(name) if (cause := self._of_signal(signal, change)) is not None
-        }
+        is_integrator = self._log.rates.has(name)
+        if is_integrator:
+            self._log.lack()  # all its rates count
+        moving = self._log.rates.drivers(name, change.time) if is_integrator else self._log.movers.get((name, change.time))
+        names = moving if is_integrator or moving else self.followed(name)
+        found = {signal: cause for signal in names or () if (cause := self._of_signal(signal, change)) is not None}
+        if isinstance(self._all.specs.get(name), GantrySpec):
+            found |= self._unmoved([signal for signal in names or () if signal not in found], change)
         best = max(found, key=lambda one: self._urgency(one, found[one], change), default=None)
+        if self._is_timed(name) and (best is None or found[best].place.time < change.time):
+            text = COMES_WITH_TIME(name=name, condition=self._condition(name))
+            place = Place(change.time, change.order, -1)
+            return Cause(ChainLink(change.time, name, text), place, nothing, along=() if best is None else (found[best],))
         if best is None:
-            return None
+            return self.rate(name, change.time) if is_integrator else None
         others: list[Cause] = []
-        for signal in self.followed(name) if hasattr(self._all.specs.get(name), "effect") else ():
+        has_parts = hasattr(self._all.specs.get(name), "effect")
+        for signal in names if is_integrator else self.followed(name) if has_parts else ():
             cause = found.get(signal) or self._of_signal(signal, change)
             if cause is not None and signal != best:
                 others.append(cause)
         return found[best]._replace(along=tuple(others))
+
+    def _unmoved(self, signals: Iterable[str], change: Change) -> dict[str, Cause]:
+        """Reasons why axes have not moved before a change."""
+        drives = {signal: self._world.axes[signal.rpartition(".")[0]].spec.drive for signal in signals}
+        unmoved = self._all.attempts.unmoved
+        found = {one: unmoved(drive[0], drive[1].removeprefix("M"), change.time) for one, drive in drives.items()}
+        return {signal: cause for signal, cause in found.items() if cause is not None}
+
+    def rate(self, name: str, until: Nanos) -> Cause:
+        """The last rate of an integrator by a moment."""
+        rate = self._log.rates.last(name, until)
+        unit = f"{self._all.specs[name].unit}/s"
+        text = ITS_RATE_IS(name=name, rate=float(rate.rate.value), unit=unit)
+        return Cause(ChainLink(rate.time, name, text), Place(rate.time), self._all.at_begin, Cover.LEVEL)
 
     def _urgency(self, signal: str, cause: Cause, change: Change) -> tuple[bool, bool, Place]:
         """The highest decides among several causes."""
@@ -186,14 +222,19 @@ class ElementCauses:
         """The last cause before a change of a signal that an element follows."""
         owner, _, rest = signal.rpartition(".")
         before = self._all.before(signal, change, change.time)
-        if before is not None:
+        at_once = self._at_once(signal, change)
+        if at_once is not None:
+            cause = at_once
+        elif before is not None:
             cause = covered(self._all.change(signal, before[0]), Cover.ACTION)
         elif signal in self._log.first_levels:
             cause = covered(self._all.first(signal), Cover.ACTION)
         elif owner in self._world.axes:
             cause = covered(self._all.axes.moved(owner, change.time, change.order), Cover.MOTION)
         elif owner in self._world.controllers:
-            cause = self._all.controllers.at_moment(owner, change.time, Resource(ResourceKind.AXIS, ""), rest)
+            point = self._world.kind(owner).point(self._world.controller(owner), rest)
+            path = rest if point is None else point.point.path
+            cause = self._all.controllers.at_moment(owner, change.time, axis_of(path) or Resource(ResourceKind.AXIS, ""), path)
         elif owner in self._log.events and rest in (PUSHED, FALLS, GOES_ON):
             cause = self._all.workpieces.last(owner, rest, change)
         elif rest == TRAVEL:
@@ -201,6 +242,18 @@ class ElementCauses:
         else:
             cause = covered(self.of_element(owner, rest, change.time, change.order), Cover.ACTION)
         return cause if cause is not None and cause.place < Place(change.time, change.order) else None
+
+    def _at_once(self, signal: str, change: Change) -> FoundCause:
+        """The change of a pin of a controller that is recorded after what it leads to at once, because elements read its level
+        before."""
+        last = self._log.last_change(signal, change.time)
+        if signal.partition(".")[0] not in self._world.controllers or last is None or last.time < change.time:
+            return None
+        here, cause = Place(change.time, change.order), self._all.change(signal, last)
+        led = cause.before() if last.order > change.order else None
+        if led is None or led.place >= here:
+            return None
+        return cause._replace(place=here._replace(number=-1), before=lambda: led)
 
 
 def inputs(part: TerminalComponent) -> list[str]:

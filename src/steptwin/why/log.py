@@ -25,6 +25,7 @@ from steptwin.simulation.kinds.programs import Programs, ProgramState, Statement
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
+from steptwin.simulation.world.actions import is_release
 from steptwin.simulation.world.inputs import Download, ExternalInput
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput
@@ -35,6 +36,7 @@ from steptwin.why.frames import Frames
 from steptwin.why.lacking import EXECUTED, HAPPENED, NEVER, Found, Lacking
 from steptwin.why.movers import movers
 from steptwin.why.programstates import ProgramStates
+from steptwin.why.rates import NotedRates
 from steptwin.why.roots import Act
 
 MOST_NOTED = 20_000_000
@@ -43,7 +45,8 @@ MOST_LOOKED_BACK = 20_000
 """Limit of the records, actions and statements that are searched for one cause."""
 LAST = sys.maxsize
 """The order of what is after all that was noted."""
-OF_MECHANICS = ("stall", "hard-stop", "collision")
+FALL = "fall"
+OF_MECHANICS = ("stall", "hard-stop", "collision", FALL)
 """Events after which the rotor of an axis does not follow its motion, or does again."""
 WORKPIECE = "workpiece"
 JAMS = ("jams", "free again")
@@ -173,7 +176,7 @@ class CauseLog:
             for signal, held in parts.faults.held(owner).items():
                 self._holds[signal].append(Hold(began.get(held.fault, self.begin), held))
         self._built = {group: len(records) for group, records in self.records.items()}
-        self.points = points.NotedPoints(world, lambda: self._order + 7)
+        self.points, self.rates = points.NotedPoints(world, lambda: self._order + 7), NotedRates(world)
         world.trace.subscribers.append(self._take)
         world.act_subscribers.append(self._act)
         parts.faults.act_subscribers.append(self._fault_acted)
@@ -319,11 +322,12 @@ class CauseLog:
     def _act(self, script: str, what: ExternalInput) -> None:
         self.world.sync_all()
         self._count()
-        act = Act(self.world.now, script, what, self._order)
+        fault = self.world.objects.faults.name_of(what.fault) if isinstance(what, do.SetFault) else ""
+        act = Act(self.world.now, script, what, self._order, self._led_by(script, what), fault)
         self.acts.append(act)
         match what:
-            case do.SetFault(fault):
-                self._fault_acts[self.world.objects.faults.name_of(fault)].append(act)
+            case do.SetFault():
+                self._fault_acts[fault].append(act)
             case Download(controller=controller):
                 self._replaced[controller] = self.world.now
                 self._keeping[controller].clear()
@@ -332,6 +336,13 @@ class CauseLog:
                 for holds in self._holds.values():
                     if (held := holds[-1].held) is not None and held.fault == name:
                         holds.append(Hold(self.world.now, None, self._order))
+
+    def _led_by(self, script: str, what: ExternalInput) -> str:
+        """The script that led to an action of another one: the one that pressed a button for some time."""
+        if not (isinstance(what, do.Release) and is_release(script)):
+            return script
+        pressed = (act.by for act in reversed(self.acts) if isinstance(act.what, do.Press) and act.what.button == what.button)
+        return next(pressed, script)
 
     def _executes(self, name: str, now: Nanos, location: StatementLocation) -> None:
         executed = self.executed[name]
@@ -424,6 +435,12 @@ class CauseLog:
     def last_change(self, signal: str, until: Nanos, before: int = LAST) -> Change | None:
         """The last change of a signal by a moment, before an order."""
         return _last(self.changes.get(signal, []), until, before)
+
+    def changes_before(self, signal: str, until: Nanos, before: int = LAST) -> Iterator[Change]:
+        """The changes of a signal by a moment, before an order, the last one first."""
+        changes = self.changes.get(signal, ())
+        last = bisect_left(changes, (until, before), key=lambda change: (change.time, change.order)) - 1
+        return (changes[index] for index in range(last, -1, -1))
 
     def last_fault(self, owner: str, until: Nanos, before: int) -> Change | None:
         """When a fault of a controller or element last began or ended by a moment, before an order."""

@@ -99,6 +99,11 @@ class PresentStates:
         """Links and signals of the thing that a statement waits for."""
         if resource.kind is ResourceKind.PIN and resource.name:
             return [f"{controller}.{resource.name}"]
+        if resource.kind is ResourceKind.ENCODER:
+            counted = self._causes.axes.counted(controller, resource.name, self._at)
+            if counted is not None:
+                yield counted.link
+            return ()
         if resource.kind is ResourceKind.AXIS:
             motion = self._causes.axes.motion(controller, resource.name, self._at)
             if motion is None and self._log.is_whole:

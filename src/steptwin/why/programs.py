@@ -33,6 +33,7 @@ HELD = {
     ProgramState.SHUT_DOWN: Message("why.program-is-shut-down", "the controller is off or shut down{where}"),
 }
 WHERE = Message("why.where", " at {statement}")
+FILTERED = Message("why.filtered", ", which the filter of the input lets in after {ms:g} ms")
 GOES_ON = Message("why.program-goes-on", "the program goes on")
 PROGRAM_STARTED = Message("why.program-started", "the program started")
 LONGEST_REACTION_NS: Nanos = 510 * MILLISECOND
@@ -379,7 +380,9 @@ class ProgramCauses:
         pins = [f"{controller}.{one.name}" for one in reads if one.kind is ResourceKind.PIN and one.name]
         came += others
         if not came and len(pins) == 1 and self._log.since(pins[0], place.time) is None:  # a filter lets it in later
-            return covered(self._all.first(pins[0]), Cover.LEVEL)
+            pin = pins[0].removeprefix(f"{controller}.")
+            lasts = self._world.kind(controller).filter_of(self._world.controllers[controller], pin)
+            return covered(self._all.first(pins[0], FILTERED(ms=lasts / MILLISECOND) if lasts else None), Cover.LEVEL)
         return covered(max(came, key=lambda cause: cause.place, default=None), Cover.WAIT)
 
     def resource(self, controller: str, resource: Resource, index: int, time: Nanos, before: int = LAST) -> FoundCause:
@@ -388,25 +391,45 @@ class ProgramCauses:
             case ResourceKind.PIN:
                 every = [name for name in self._log.first_levels if name.startswith(f"{controller}.")]
                 read = [f"{controller}.{resource.name}"] if resource.name else every
-                return self._all.lasting(read, time, self._all.last(read, time, before=before), before)
+                last = self._all.last(read, time, before=before)
+                return self._all.lasting(read, time, self._seen(controller, resource.name, time, before) or last, before)
             case ResourceKind.AXIS:
                 return self._all.axes.motion(controller, resource.name, time, before=before)
             case ResourceKind.ORIGIN:
                 return self._all.axes.origin(controller, resource.name, time, before)
+            case ResourceKind.ENCODER:
+                return self._all.axes.counted(controller, resource.name, time, before, index)
             case ResourceKind.VALUE:
-                written = self._register(controller, resource, time, before)
-                if written is not None:
-                    return written
-                writing = self._writing(controller, resource)
-                earlier = self._log.last_of(controller, writing, index)
-                if earlier is not None:
-                    return covered(self.statement(controller, earlier), Cover.LEVEL)
-                since = self._log.executed_before(controller, writing)
-                there = None if since is None else self._all.of(since)
-                if since is not None and there is not None:
-                    number = there.log.last_executed(controller, since) + 1
-                    return there.programs.resource(controller, resource, number, since)
+                return self._register(controller, resource, time, before) or self.written(controller, resource, index)
         return None
+
+    def written(self, controller: str, resource: Resource, index: int) -> FoundCause:
+        """The last statement before one that changed something."""
+        writing = self._writing(controller, resource)
+        earlier = self._log.last_of(controller, writing, index)
+        if earlier is not None:
+            return covered(self.statement(controller, earlier), Cover.LEVEL)
+        since = self._log.executed_before(controller, writing)
+        there = None if since is None else self._all.of(since)
+        if since is not None and there is not None:
+            number = there.log.last_executed(controller, since) + 1
+            return there.programs.resource(controller, resource, number, since)
+        return None
+
+    def _seen(self, controller: str, pin: str, time: Nanos, before: int) -> FoundCause:
+        """The last change of an input that its filter has let in by a moment; None without a filter or such a change."""
+        signal, controllers = f"{controller}.{pin}", self._world.controllers
+        lasts = self._world.kind(controller).filter_of(controllers[controller], pin)
+        later: Nanos | None = None
+        for change in self._log.changes_before(signal, time, before) if lasts else ():
+            if (time if later is None else later) - change.time >= lasts:
+                return self._all.change(signal, change, FILTERED(ms=lasts / MILLISECOND))
+            later = change.time
+        begin, level = self._log.begin, self._log.first_levels.get(signal, 0.0)
+        if level and self._log.is_whole and (time if later is None else later) - begin < lasts:
+            return self._all.first(signal, FILTERED(ms=lasts / MILLISECOND))
+        last = self._all.last((signal,), time, FILTERED(ms=lasts / MILLISECOND)) if lasts and later is None else None
+        return last if last is not None and last.place.time <= time - lasts else None
 
     def _writing(self, controller: str, resource: Resource) -> Collection[StatementLocation]:
         """The statements that change something."""

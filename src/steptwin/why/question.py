@@ -22,8 +22,10 @@ from steptwin.simulation.world.snapshot import RecordedInput
 from steptwin.simulation.world.snapshotlog import outside_past
 from steptwin.why import points
 from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Cover
+from steptwin.why.axes import POSITION
 from steptwin.why.causes import FAULT, IS, Causes
 from steptwin.why.chain import Cause, Chain, FoundCause, Place, covered
+from steptwin.why.controllers import axis_of
 from steptwin.why.lacking import EXECUTED, HAPPENED
 from steptwin.why.lacking import Lacking as Before
 from steptwin.why.log import LAST, MOST_NOTED, OF_MECHANICS, CauseLog, in_parts
@@ -37,6 +39,8 @@ from steptwin.why.states import Interval, StatesOnTheWay, is_constant, rest_of
 MOST_SNAPSHOTS = 5
 """Limit of the signals whose present levels are shown of what a program waits for."""
 
+VALUE = "value"
+"""The signal of an integrator that is what it has in it."""
 WHY_NOT = "not "
 """Beginning of a question for what a condition lacks."""
 LONGEST_AHEAD_NS: Nanos = 60 * SECOND
@@ -46,8 +50,6 @@ SWITCH = "switch"
 """The type of a point that is 0 or 1."""
 SLIPS = {"stalled": ("stall",), "lost": OF_MECHANICS}
 """Signals of an axis that its rotor has, with the events between which they stand."""
-_AXIS = re.compile(r"(?:M|ENC)(\d+)[._]|moving$", re.IGNORECASE)
-"""A point that a motion changes; the group is the number of its axis, none where the controller has one only."""
 
 Asking: TypeAlias = Generator[None, None, Answer]
 """In parts: after each of them something else can be done, or the question be given up by `close`."""
@@ -98,6 +100,19 @@ def _text_of(question: str) -> str:
 
 def _without_not(text: str) -> str:
     return text.removeprefix(WHY_NOT).strip()
+
+
+def _given(cause: Cause) -> Cause:
+    return cause
+
+
+def _along(first: Cause | None, others: Sequence[Cause]) -> Cause | None:
+    """A cause along with others, of which each is there once."""
+    every = [one for one in (first, *others) if one is not None]
+    if not every:
+        return None
+    others = [one for one in every[1:] if one.link != every[0].link]
+    return every[0]._replace(along=(*every[0].along, *others))
 
 
 def _note_when(world: Simulation, condition: str, found: list[Nanos]) -> do.Steps:
@@ -276,8 +291,19 @@ class Why:
         first = self.causes.lasting(signals, at, None if since is None else self._changed(signals, since))
         first = self._with_refused(signals, at, since, first)
         if first is not None or since is not None:
+            first = _along(first, list(self.causes.holding.of(self._deciding(asked, canonical, at), at, since)))
             return (yield from self._answer(text, at, state, since, first))
-        resting = (yield from self._resting(signals, at)) or self._held(signals, at) or self._ignored(signals, at)
+        waited = (*signals, *self._awaited(signals, at))
+        resting = (yield from self._resting(waited, at)) or self._held(signals, at)
+        resting = resting or (yield from self._standing(signals, at))
+        if self.log.is_whole:  # otherwise it is not known what was before
+            decides = self._deciding(asked, canonical, at)
+            holding = self.causes.holding.of((*decides, *self._awaited(decides, at)), at, None)
+            resting = _along(resting, list(holding))
+        else:
+            behind = self._behind((*signals, *self._awaited(signals, at)), at)
+            if any(self.log.rates.has(name.partition(".")[0]) for name in behind) or self.causes.holding.depends(behind):
+                self.log.lack()
         answer = yield from self._answer(text, at, state, None, resting)
         present, named = (yield from self._present(at)), [name for name in signals if self.log.has(name)]
         states = [link for name in named for link in present.of([name])]
@@ -294,6 +320,19 @@ class Why:
                 if refused is not None:
                     first = refused if first is None else first._replace(along=(*first.along, refused))
         return first
+
+    def _deciding(self, asked: str, canonical: Mapping[str, str], at: Nanos) -> tuple[str, ...]:
+        """The signals of a condition without whose values it would be otherwise; none where some are not noted."""
+        signals = tuple(canonical.values())
+        if len(signals) < 2 or not all(map(self.log.is_recorded, signals)):
+            return signals if len(signals) < 2 else ()
+
+        def value(name: str) -> float:
+            return self.log.level(canonical[name], at)
+
+        node = parse_condition(asked).in_unit("", self._unit)
+        parts = deciding(node, value, wanted=not node.value(value))
+        return tuple(dict.fromkeys(canonical[name] for one in parts for name in one.names()))
 
     def lacking(self, question: str, at: Nanos) -> Lacking:
         """Lines of a question that begins with ``not`` and is true: the present values of what would have to be otherwise, with
@@ -358,14 +397,14 @@ class Why:
         names = [self._canonical(name) for name in parse_condition(self._named(_without_not(text))).names()]
         for name in self._behind(names, at):
             owner, _, rest = name.partition(".")
-            axis = _AXIS.match(rest)
+            axis = axis_of(rest)
             if owner in world.axes and rest == "position":
                 drive = world.axes[owner].spec.drive
                 yield drive[0], Resource(ResourceKind.AXIS, drive[1].removeprefix("M"))
             elif owner in world.programs and rest in world.controllers[owner].pins():
                 yield owner, Resource(ResourceKind.PIN, rest)
             elif owner in world.programs and axis is not None:
-                yield owner, Resource(ResourceKind.AXIS, axis[1] or "1")
+                yield owner, axis._replace(name=axis.name or "1")
 
     def _going_on(self, other: Simulation, controller: str, at: Nanos) -> Lacking:
         """When a program that waits goes on by itself."""
@@ -606,10 +645,10 @@ class Why:
             return causes.controllers.at_moment(drive[0], time, Resource(ResourceKind.AXIS, drive[1].removeprefix("M")))
         if owner not in world.controllers:
             return causes.elements.of_element(owner, rest, time)
-        axis = _AXIS.match(rest)
-        is_of_axis = axis is not None or (self._is_signal(signal) and world.signal(signal).continuous)
-        wanted = Resource(ResourceKind.AXIS, (axis and axis[1]) or "") if is_of_axis else None
-        if wanted is not None and self._is_coordinate(signal):
+        wanted = axis_of(rest)
+        if wanted is None and self._is_signal(signal) and world.signal(signal).continuous:
+            wanted = Resource(ResourceKind.AXIS, "")
+        if wanted is not None and wanted.kind is ResourceKind.AXIS and self._is_coordinate(signal):
             return causes.axes.coordinate(owner, wanted.name or "1", time)
         found = causes.controllers.at_moment(owner, time, wanted, rest)
         if found is None or wanted is None or "vel" not in rest.lower():
@@ -633,9 +672,13 @@ class Why:
                 changed = None if since is None else covered(self._of_unrecorded(full, since), Cover.LEVEL)
             elif self._point(signal) is None or self._is_coordinate(full):
                 # What left it where it is may have come a moment after it was there.
-                changed = covered(self._of_unrecorded(full, at, since), Cover.LEVEL) or self._ignored((full,), at)
+                is_moved = full.partition(".")[0] in self.causes.parts and since is not None
+                moment = since if is_moved and since is not None else at
+                changed = covered(self._of_unrecorded(full, moment, since), Cover.LEVEL) or self._ignored((full,), at)
             else:
+                is_turned = (axis_of(full.partition(".")[2]) or (None,))[0] is ResourceKind.ENCODER
                 changed = self._ignored((full,), at) if since is None else self._changed((full,), since)
+                changed = self._of_unrecorded(full, at) if changed is None and is_turned else changed
             return (yield from self._answer(signal, at, state, since, changed))
         since: Nanos | None = at
         if isinstance(standing, SignalOf) and is_constant(standing, at):
@@ -678,11 +721,14 @@ class Why:
         last = max(changed, key=lambda cause: cause.link.time, default=None)
         pins = [f"{controller}.{resource.name}" for resource in use.reads if resource.kind is ResourceKind.PIN and resource.name]
         resting = ((yield from self._resting(pins, at)) or self._held(pins, at)) if last is None else None
+        holding = [one for pin in pins for one in self.causes.holding.of((pin,), at, self.log.since(pin, at))]
         first = (
             covered(last, Cover.LEVEL)
             or resting
             or causes.programs.statement(controller, index)._replace(cover=Cover.WAIT, besides=lambda: others)
         )
+        standing = (yield from self._standing(pins, at)) if last is None and resting is None else None
+        first = _along(first, [*(() if standing is None else (standing, *standing.along)), *holding])
         answer = yield from self._answer(controller, at, WAITS(controller=controller, statement=text), since, first)
         return self._after(links, answer)
 
@@ -710,6 +756,16 @@ class Why:
                 waiting += (*self.causes.drivers(name, at), *self.causes.elements.behind(name))
         return seen
 
+    def _awaited(self, signals: Iterable[str], at: Nanos) -> Iterator[str]:
+        """The pins for which programs wait before they change signals, or those that drive them."""
+        programs = self.causes.programs
+        for name in self._behind(signals, at):
+            owner, _, pin = name.partition(".")
+            index = self.log.last_executed(owner, at) if owner in self.log.world.programs else -1
+            if index >= 0 and programs.leads_to(owner, index, Resource(ResourceKind.PIN, pin)):
+                reads = programs.use(owner, index).reads if programs.use(owner, index).waits else ()
+                yield from (f"{owner}.{one.name}" for one in reads if one.kind is ResourceKind.PIN and one.name)
+
     def _axes_of(self, signals: Iterable[str], at: Nanos) -> set[str]:
         """The axes whose position or switch is among signals, or drives one of them."""
         return {name.partition(".")[0] for name in self._behind(signals, at)} & set(self.log.world.axes)
@@ -730,11 +786,11 @@ class Why:
         for name in signals:
             owner, _, rest = name.partition(".")
             drive = self.log.world.axes[owner].spec.drive if owner in self.log.world.axes else (owner, rest)
-            axis = _AXIS.match(f"{drive[1]}.")
+            axis = axis_of(f"{drive[1]}.")
             moves = name == f"{owner}.position" or (self._is_signal(name) and self.log.world.signal(name).continuous)
             controller = self.log.world.controllers.get(drive[0])
             is_only = moves and controller is not None and len(controller.axes) == 1
-            number = axis[1] or "1" if axis is not None else "1" if is_only else ""
+            number = axis.name or "1" if axis is not None else "1" if is_only else ""
             if controller is not None and number and (moves or rest.lower().endswith("status")):
                 return self.causes.attempts.unmoved(drive[0], number, at)
         return None
@@ -750,6 +806,36 @@ class Why:
         other, name = (yield from self._world_at(at)), f"{axis}.position"
         text = IS_IN_UNIT(name=name, value=other.read(name), unit=other.signal(name).unit)
         return Cause(ChainLink(at, axis, text), Place(at, LAST, -1), lambda: covered(cause, Cover.LEVEL))
+
+    def _standing(self, signals: Sequence[str], at: Nanos) -> Resting:
+        """The places of axes and values of integrators that nothing has moved, on which signals depend, and of the signals
+        themselves. None if there are none."""
+        behind = self._behind(signals, at)
+        owners = {name.partition(".")[0] for name in behind}
+        names = [f"{axis}.{POSITION}" for axis in sorted(owners & set(self.log.world.axes))]
+        names += [f"{owner}.{VALUE}" for owner in sorted(owners) if self.log.rates.has(owner)]
+        names += [
+            one for one in signals if not self.log.has(one) and self._is_signal(one) and self.log.world.signal(one).continuous
+        ]
+        if not names:
+            return self._ignored(signals, at)
+        other, found = (yield from self._world_at(at)), list[Cause]()
+        for number, name in enumerate(dict.fromkeys(names)):
+            unit, value = other.signal(name).unit, other.read(name)
+            text = IS_IN_UNIT(name=name, value=value, unit=unit) if unit else IS_NUMBER(name=name, value=value)
+            place = Place(at, LAST, -1 - number)
+            cause = self._of_standing(name, at)
+            before = self.causes.at_begin if cause is None else partial(_given, cause)
+            found.append(Cause(ChainLink(at, name.partition(".")[0], text), place, before))
+        return _along(found[0], found[1:])
+
+    def _of_standing(self, name: str, at: Nanos) -> FoundCause:
+        """Cause for which a quantity has a value that it has from the beginning."""
+        if name.partition(".")[0] in self.log.world.axes:
+            return self._ignored((name,), at)
+        if self.log.rates.has(name.partition(".")[0]):
+            return self.causes.elements.rate(name.partition(".")[0], at)
+        return covered(self._of_unrecorded(name, at), Cover.LEVEL)
 
     def _is_script(self, name: str) -> bool:
         """Whether it is the name of a script, and of no signal."""

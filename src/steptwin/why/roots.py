@@ -9,12 +9,16 @@ from steptwin.simulation.world.inputs import ExternalInput
 
 
 class Act(NamedTuple):
-    """An action of a script; from outside if ``script`` is empty. ``order``: as that of a `steptwin.why.log.Change`."""
+    """An action of a script; from outside if ``script`` is empty. ``order``: as that of a `steptwin.why.log.Change`. ``by``: the
+    script of the description that led to it, as that which presses a button for some time releases it. ``fault``: the name that
+    the fault got that it sets."""
 
     time: Nanos
     script: str
     what: ExternalInput
     order: int
+    by: str
+    fault: str = ""
 
 
 class SetFault(NamedTuple):

@@ -104,12 +104,18 @@ class _RunWithout:
             world.perform(do.ClearFault(root.name))
             self.is_without = True
         act = root if isinstance(root, Act) else root.by if isinstance(root, SetFault) else None
-        if act is not None and act.script:
-            world.leave_out(partial(self._is_left_out, world, act))
+        fault = root.name if isinstance(root, SetFault) else "" if act is None else act.fault
+        if fault:  # others keep the names that they have
+            world.objects.faults.reserved.add(fault)
+        if fault or (act is not None and act.script):
+            world.leave_out(partial(self._is_left_out, world, act, do.ClearFault(fault)))
         return world
 
-    def _is_left_out(self, world: Simulation, act: Act, script: str, step: do.Step) -> bool:
-        is_left_out = (world.now, script, step) == act[:3]
+    def _is_left_out(self, world: Simulation, act: Act | None, clears: do.ClearFault, script: str, step: do.Step) -> bool:
+        is_left_out = act is not None and (world.now, script, step) == act[:3]
+        if step == clears and clears.name in world.objects.faults.reserved:
+            world.objects.faults.reserved.remove(clears.name)
+            return True
         self.is_without |= is_left_out
         return is_left_out
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
@@ -58,7 +59,18 @@ class WorkpieceCauses:
             before = nothing
         else:
             before = partial(self._of_event, event, record)
-        return Cause(ChainLink(event.time, str(facts["element"]), text), Place(event.time, event.order), before)
+        link = ChainLink(event.time, str(facts["element"]), text)
+        return Cause(link, Place(event.time, event.order), before, besides=partial(self._came, event, record))
+
+    def _came(self, event: Change, record: TraceRecord) -> Iterator[Cause]:
+        """The event by which a workpiece came to where it is pushed."""
+        facts = dict(record.facts)
+        earlier = self._log.events_before(str(facts["workpiece"]), event) if facts["what"] == PUSHED else ()
+        came = next((one for one in earlier if self._what(one) in COMES), None)
+        if came is None and facts["what"] == PUSHED:
+            self._log.lack()
+        if came is not None:
+            yield self.event(came)._replace(cover=Cover.LEVEL)
 
     def _is_fed(self, event: Change, record: TraceRecord) -> bool:
         """Whether a workpiece comes into the world by the clock of a feeder."""
@@ -109,11 +121,28 @@ class WorkpieceCauses:
         axis = getattr(self._all.specs.get(belt), "axis", None)
         if axis is not None:
             return covered(self._all.axes.moved(axis, change.time, change.order), Cover.MOTION)
-        sources, how = list(self._all.sources(PinName(belt, RUN))), HAS_ACTED_SINCE(name=belt)
-        found = self._all.last(sources, change.time, how, change.order)
-        if found is None and sources:
-            found = self._all.first(sources[0], how)
-        return covered(found, Cover.ACTION)
+        return covered(self._switched(belt, change, runs=True), Cover.ACTION)
+
+    def turns(self, drive: str, change: Change) -> FoundCause:
+        """The thing by which a belt or motor has come to where it is at a moment: what moves it, along with what ended that."""
+        found = self.travel(drive, change)
+        stopped = covered(self._switched(drive, change, runs=False), Cover.ACTION)
+        is_over = found is not None and stopped is not None and stopped.place > found.place
+        return found._replace(along=(stopped,)) if is_over else found
+
+    def _switched(self, drive: str, change: Change, *, runs: bool) -> FoundCause:
+        """The last change before another one of the output that lets a belt or motor run, which let it, or did so no longer; if
+        there was none, its level from the beginning."""
+        how = HAS_ACTED_SINCE(name=drive)
+        for signal in self._all.sources(PinName(drive, RUN)):
+            for one in self._log.changes_before(signal, change.time, change.order):
+                if bool(one.value) is runs:
+                    return self._all.change(signal, one, how)
+            self._log.lack()
+            if runs:
+                level = self._log.level(signal, self._log.begin)
+                return self._all.first(signal, (None if level else self._all.undriven(signal)) or how)
+        return None
 
 
 def _moves(act: Act, record: TraceRecord) -> bool:

@@ -81,8 +81,8 @@ class Brake(TerminalComponent):
             wait = self._spec.release_time if is_on else self._spec.apply_time
             self._due = None if is_on is self._is_released else now + wait
             self._move(now)
+        self.block.put(RELEASED, float(self.is_open))  # before what it leads to
         self._mechanism.brake(0.0 if self.is_open else self._spec.torque * self.share, now)
-        self.block.put(RELEASED, float(self.is_open))
 
     @property
     def is_open(self) -> bool:

@@ -141,8 +141,8 @@ class FurtherLoad(TerminalComponent):
         if self._curve is not None:
             self._curve.update(now)
         self._share = self.factor * self._own_share(now)
+        self.block.put(ACTS, float(self._share > 0.0))  # before what it leads to
         self._axis.mechanism.burden(self.block.name, self._whole.times(self._share), now)
-        self.block.put(ACTS, float(self._share > 0.0))
         self._due = None if self._condition is None else self._condition.change(now)
 
     def _own_share(self, now: Nanos) -> float:

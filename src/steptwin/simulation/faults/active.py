@@ -207,6 +207,7 @@ class Faults(Stateful):
     FIXED: ClassVar[tuple[str, ...]] = (
         "_found",
         "act_subscribers",
+        "reserved",
         "controllers",
         "elements",
         "has_supplies",
@@ -225,6 +226,8 @@ class Faults(Stateful):
         self.sinks: list[RecordSink] = []
         self.acts: dict[str, FaultActs] = {}
         self.act_subscribers: list[ActSubscriber] = []
+        self.reserved: set[str] = set()
+        """Names that no fault gets that has none: of faults that are left out of a run."""
         self.controllers: dict[str, Failing] = {}
         """Controllers prepared for faults of physics."""
         self.elements: dict[str, FailingElement] = {}
@@ -311,7 +314,7 @@ class Faults(Stateful):
         """The name that a fault has if it is set now."""
         kind, number = fault.kind.name, 1
         name = fault.name or kind
-        while not fault.name and self.find(name) is not None:
+        while not fault.name and (self.find(name) is not None or name in self.reserved):
             number += 1
             name = f"{kind}-{number}"
         return name

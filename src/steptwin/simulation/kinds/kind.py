@@ -200,6 +200,10 @@ class EncoderInputs(ABC, Generic[M]):
         """Counts of each axis and what turns its encoder, as plain data."""
 
     @abstractmethod
+    def is_followed(self, controller: M, axis: int, /) -> bool:
+        """Whether an axis goes where its encoder says."""
+
+    @abstractmethod
     def couple(self, controller: M, axis: int, coupling: str, now: Nanos, /) -> None:
         """Choose what turns the shaft of an axis without mechanics: one of `steptwin.simulation.script.steps.COUPLINGS`."""
 
@@ -363,6 +367,10 @@ class ControllerKind(OptionalMethods, ABC, Generic[S, M, V]):
     def ends_motion(self, controller: M, axis: int, /) -> str | None:
         """The input that ends the present motion of an axis (from 1); empty if it has none; None for a motion that needs none."""
         return None
+
+    def filter_of(self, controller: M, pin: str, /) -> Nanos:
+        """How long a level must last at an input, ns, before programs of the controller see it."""
+        return 0
 
     def would_end_seek(self, controller: M, pin: str, /) -> bool:
         """Whether a seek of an input (`steptwin.simulation.script.control.Seek`) would end without any motion now."""

@@ -48,6 +48,8 @@ class ResourceKind(enum.Enum):
     """By its number; empty: any axis."""
     ORIGIN = "origin"
     """The zero of the coordinate of an axis, by its number."""
+    ENCODER = "encoder"
+    """The counter of an encoder, by the number of its axis, which something else may turn."""
     VALUE = "value"
     """A variable or register of the program."""
     PROGRAM = "program"

@@ -107,7 +107,8 @@ def _downloading(controller: str) -> str:
     return f"download {controller}"
 
 
-def _is_release(script: str) -> bool:
+def is_release(script: str) -> bool:
+    """Whether it is the name of the script that ends a press of limited duration."""
     return script.startswith(_RELEASE)
 
 
@@ -191,7 +192,7 @@ def _halt(model: Model, given: Halt) -> Action:
 
 
 def _end_scripts(model: Model, given: EndScripts) -> Action:
-    return lambda scripts: scripts.end_described(_is_release)
+    return lambda scripts: scripts.end_described(is_release)
 
 
 def _request(model: Model, step: do.Request) -> Action:

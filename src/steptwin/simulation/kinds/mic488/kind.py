@@ -18,6 +18,7 @@ from steptwin.mic488.device import Mic488Device
 from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.inputs import index_input
+from steptwin.mic488.position_control import PositionControl
 from steptwin.mic488.present import empty_banks, state_of, statement_of
 from steptwin.mic488.program_banks import load
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE
@@ -77,6 +78,9 @@ class Mic488Encoders(EncoderInputs[Mic488Device]):
 
     def to_json(self, device: Mic488Device, now: Nanos) -> list[dict[str, object]]:
         return [{"axis": a.number, "counts": a.encoder_counts(now), "turned_by": a.encoder.coupling.value} for a in device.axes]
+
+    def is_followed(self, device: Mic488Device, axis: int) -> bool:
+        return device.axes[axis - 1].config.pos_ctrl_mode == PositionControl.ENCFOLLOW
 
     def couple(self, device: Mic488Device, axis: int, coupling: str, now: Nanos) -> None:
         device.couple_encoder(axis, Coupling(coupling), now)
@@ -170,6 +174,10 @@ class Mic488Kind(ControllerKind[Mic488Spec, Mic488Device, Mic488View]):
             return None
         number = index_input(axis - 1) if homing.leg == homing.TO_INDEX else homing.sensor
         return "" if number == NO_INPUT else f"IN{number + 1}"
+
+    def filter_of(self, device: Mic488Device, pin: str) -> Nanos:
+        number = pin.removeprefix("IN")
+        return device.inputs.filter_ns(int(number) - 1) if number.isdecimal() and pin != number else 0
 
     def scale(self, given: GivenScale, device: Mic488Device, axis: int) -> DriveScale:
         its = device.axes[axis - 1]

@@ -124,7 +124,9 @@ class ProgramWatch:
         for resource in dict.fromkeys(use_of(self.program.steps, number).reads):
             if resource.kind is ResourceKind.ORIGIN:
                 continue  # that of an axis that is there, too
-            if resource.kind is not ResourceKind.AXIS:
+            if resource.kind is ResourceKind.ENCODER:
+                yield f"ENC{resource.name}"
+            elif resource.kind is not ResourceKind.AXIS:
                 yield resource.name or "inputs"
             elif resource.name:
                 yield f"M{resource.name}"

@@ -174,6 +174,8 @@ _POINTS = {
     "LIMLM": "M{}_POSLIM_L",
     "LIMRM": "M{}_POSLIM_R",
     "STATM": "M{}_STATUS",
+    "ENC": "ENC{}_IMP",
+    "XENC": "ENC{}_XPOS",
 }
 """Registers of the controller, by the registers of the language."""
 

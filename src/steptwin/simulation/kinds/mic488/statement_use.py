@@ -9,7 +9,8 @@ from steptwin.simulation.kinds.programs import Resource, ResourceKind, Statement
 from steptwin.wbc import steps as s
 
 _PINS = frozenset({"OUT", "IN", "AIN"})
-_OF_AXIS = frozenset({"M", "STATM", "VACTM", "POSM", "ACCM", "DECM", "VMAXM", "LIMLM", "LIMRM", "ENC", "XENC"})
+_OF_AXIS = frozenset({"M", "STATM", "VACTM", "POSM", "ACCM", "DECM", "VMAXM", "LIMLM", "LIMRM"})
+_OF_ENCODER = frozenset({"ENC", "XENC"})
 _ANY_AXIS = Resource(ResourceKind.AXIS, "")
 _ANY_PIN = Resource(ResourceKind.PIN, "")
 _PROGRAM = Resource(ResourceKind.PROGRAM, "")
@@ -115,5 +116,7 @@ def _operands(values: Iterable[s.ValueSource]) -> Iterable[Resource]:
                 yield Resource(ResourceKind.AXIS, str(value.number))
                 if row.key == "POSM":
                     yield Resource(ResourceKind.ORIGIN, str(value.number))
+            case s.RegisterOperand(row=row) if row.key in _OF_ENCODER:
+                yield Resource(ResourceKind.ENCODER, str(value.number))
             case s.RegisterOperand():
                 yield Resource(ResourceKind.VALUE, value.name)

@@ -1,0 +1,107 @@
+"""The causes by which levels stay as they are: inputs that changed since, without which gates, relays and timers would change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, TypeVar
+
+from steptwin.controller import Nanos
+from steptwin.simulation.components.gate import Gate
+from steptwin.simulation.components.relay import COIL, NC, Relay
+from steptwin.simulation.components.timer import IN, PULSE, Timer
+from steptwin.simulation.scheduler.wires import PinName
+from steptwin.why.answer import Cover
+from steptwin.why.chain import Cause, covered
+
+T = TypeVar("T")
+_DECISIVE: Mapping[str, float] = {"and": 0.0, "nand": 0.0, "or": 1.0, "nor": 1.0}
+"""Level of one input of a gate that decides alone, by kind."""
+
+
+class HoldingCauses:
+    """Finds them. ``causes`` has those of everything else."""
+
+    def __init__(self, causes: Any) -> None:  # Causes, which imports this module
+        self._all = causes
+        self._log = causes.log
+        self._world = causes.log.world
+
+    def depends(self, signals: Iterable[str]) -> bool:
+        """Whether one of these signals is made of others alone."""
+        parts = (self._all.parts.get(name.partition(".")[0]) for name in signals)
+        return any(isinstance(part, Gate | Relay | Timer) for part in parts)
+
+    def of(self, signals: Iterable[str], at: Nanos, since: Nanos | None) -> Iterator[Cause]:
+        """The last changes after ``since`` of what keeps signals as they are at a moment; None: since the beginning."""
+        floor = -1 if since is None else since
+        waiting, seen = list(signals), set[str]()
+        while waiting:
+            name = waiting.pop()
+            if name in seen:
+                continue
+            seen.add(name)
+            behind = self._keeping(name, at, floor)
+            if floor < self._log.begin and (behind is None or self.depends((name,))):
+                self._log.lack()  # it may have changed before the log, but after that
+            waiting += behind or ()
+            is_leaf = behind is None and self._log.has(name) and name.partition(".")[0] not in self._world.axes
+            changed = self._log.since(name, at) if is_leaf else None
+            if changed is not None and changed > floor:
+                cause = covered(self._all.last((name,), at), Cover.LEVEL)
+                if cause is not None:
+                    yield cause
+
+    def _keeping(self, signal: str, at: Nanos, floor: Nanos) -> list[str] | None:
+        """The signals that keep another one as it is at a moment; empty where a fault or a delay does; None for one that is not
+        made of others alone."""
+        owner, _, terminal = signal.partition(".")
+        if self._log.hold(signal, at) is not None:
+            return []
+        if owner in self._world.controllers:
+            return self._sources(PinName(owner, terminal), at, floor) or None
+        level = bool(self._log.level(signal, at))
+        match self._all.parts.get(owner):
+            case Gate() as gate:
+                return self._of_gate(owner, gate, at, floor)
+            case Relay():
+                return self._following(PinName(owner, COIL), level is (terminal.upper() != NC), at, floor)
+            case Timer(kind=kind) if kind != PULSE:
+                return self._following(PinName(owner, IN), level, at, floor)
+        return None
+
+    def _of_gate(self, owner: str, gate: Gate, at: Nanos, floor: Nanos) -> list[str]:
+        """The sources of the inputs of a gate without whose levels its output would be another."""
+        inputs = [PinName(owner, name) for name in gate.block.levels if name not in gate.block.outputs]
+        levels = {one: self._level(one, at) for one in inputs}
+        if gate.kind in _DECISIVE and _DECISIVE[gate.kind] in levels.values():
+            inputs = [one for one in inputs if levels[one] == _DECISIVE[gate.kind]]
+            inputs = self._enough([(one, list(self._all.sources(one))) for one in inputs], at, floor)
+        return [source for one in inputs for source in self._sources(one, at, floor)]
+
+    def _following(self, target: PinName, level: bool, at: Nanos, floor: Nanos) -> list[str]:
+        """The sources of an input that an output follows after a delay; none while that lasts."""
+        return self._sources(target, at, floor) if self._level(target, at) == float(level) else []
+
+    def _sources(self, target: PinName, at: Nanos, floor: Nanos) -> list[str]:
+        """The sources of an input that keep it as it is: of several contacts, those that are enough for its level."""
+        sources, circuit = list(self._all.sources(target)), self._world.objects.circuits.get(target)
+        if circuit is None or len(sources) < 2:
+            return sources
+        decisive = 0.0 if circuit.in_series else 1.0
+        found = [one for one in sources if self._log.level(one, at) == decisive] or sources
+        return self._enough([(one, [one]) for one in found], at, floor) if found is not sources else found
+
+    def _enough(self, found: Sequence[tuple[T, Sequence[str]]], at: Nanos, floor: Nanos) -> list[T]:
+        """Those of several, of which each is enough, that have been so for as long as what they keep; otherwise all."""
+        lasting = [one for one, signals in found if all((self._log.since(name, at) or -1) <= floor for name in signals)]
+        return lasting or [one for one, _ in found]
+
+    def _level(self, target: PinName, at: Nanos) -> float:
+        """The level of an input of an element at a moment."""
+        levels = [self._log.level(source, at) for source in self._all.sources(target)]
+        circuit = self._world.objects.circuits.get(target)
+        if circuit is not None:
+            return float((all if circuit.in_series else any)(levels))
+        wire = self._world.objects.scheduler_of[target.controller].wire_to(target)
+        level = levels[0] if levels else 0.0
+        return level if wire is None else wire.transmitted(level)
