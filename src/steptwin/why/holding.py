@@ -35,13 +35,14 @@ class HoldingCauses:
         """The last changes after ``since`` of what keeps signals as they are at a moment; None: since the beginning."""
         floor = -1 if since is None else since
         waiting, seen = list(signals), set[str]()
+        unchanged = waiting[0] if since is not None and len(waiting) == 1 else None
         while waiting:
             name = waiting.pop()
             if name in seen:
                 continue
             seen.add(name)
             behind = self._keeping(name, at, floor)
-            if floor < self._log.begin and (behind is None or self.depends((name,))):
+            if name != unchanged and floor < self._log.begin and (behind is None or self.depends((name,))):
                 self._log.lack()  # it may have changed before the log, but after that
             waiting += behind or ()
             is_leaf = behind is None and self._log.has(name) and name.partition(".")[0] not in self._world.axes

@@ -296,14 +296,12 @@ class Why:
         waited = (*signals, *self._awaited(signals, at))
         resting = (yield from self._resting(waited, at)) or self._held(signals, at)
         resting = resting or (yield from self._standing(signals, at))
-        if self.log.is_whole:  # otherwise it is not known what was before
+        behind = self._behind(waited, at)
+        is_kept = any(self.log.rates.has(name.partition(".")[0]) for name in behind) or self.causes.holding.depends(behind)
+        if is_kept and self.log.is_whole:  # otherwise it is not known what was before
             decides = self._deciding(asked, canonical, at)
             holding = self.causes.holding.of((*decides, *self._awaited(decides, at)), at, None)
             resting = _along(resting, list(holding))
-        else:
-            behind = self._behind((*signals, *self._awaited(signals, at)), at)
-            if any(self.log.rates.has(name.partition(".")[0]) for name in behind) or self.causes.holding.depends(behind):
-                self.log.lack()
         answer = yield from self._answer(text, at, state, None, resting)
         present, named = (yield from self._present(at)), [name for name in signals if self.log.has(name)]
         states = [link for name in named for link in present.of([name])]
