@@ -38,7 +38,7 @@ class Computer:
     find: Callable[[str], DeviceAddress]
     """The address in a text."""
     line: Callable[[DeviceAddress], str | Endpoint] = lambda address: address.place
-    """What the driver of a device opens as its line: the address of the line, or a serial port."""
+    """Line that the driver of a device opens: its address, or a serial port."""
 
 
 @dataclass(slots=True)

@@ -14,7 +14,7 @@ from steptwin.errors import Misuse
 from steptwin.messages import Message
 
 PREFIX = "webserial"
-"""Of the names of ports, which are their addresses."""
+"""Beginning of the names of ports, which are their addresses."""
 UNKNOWN_PORT = Message(
     "inpage.unknown-port",
     "{place}: the page has no such port; it has {names}. From a page only ports that were chosen are reached",
@@ -23,7 +23,7 @@ NO_THREADS = Message("inpage.no-threads", "{place}: a page has no threads")
 
 
 class SerialPage(Protocol):
-    """What the page does with a port, by its number. It answers with what `SerialPorts` takes."""
+    """Page that opens, writes and closes ports by their numbers; it answers with calls of `SerialPorts`."""
 
     def openPort(self, number: int, baud: int) -> None: ...  # noqa: N802  as the page names it
 

@@ -366,7 +366,7 @@ class AxisCauses:
         return max((one for one in (written, turned) if one is not None), key=lambda one: one.place)
 
     def followed(self, controller: str, number: str, time: Nanos, before: int, found: FoundCause) -> FoundCause:
-        """What turned the encoder that an axis follows, unless a cause at the moment is ``found``."""
+        """Cause that turned the encoder which an axis follows, unless one at the moment is ``found``."""
         inputs = self._world.kind(controller).encoders
         is_over = found is None or found.place.time < time
         if inputs is None or not number or not is_over or not inputs.is_followed(self._world.controller(controller), int(number)):

@@ -199,7 +199,7 @@ class CauseLog:
         return not self.begin
 
     def lack(self) -> None:
-        """What was before the log decides, if anything was."""
+        """Note that something before the log decides, if anything was there."""
         if self.begin:
             self.lacking.lack(self.begin)
 
@@ -471,7 +471,7 @@ class CauseLog:
         return found == NEVER
 
     def lack_faults(self) -> None:
-        """What faults did before the log decides, if they did something."""
+        """Note that something which faults did before the log decides, if they did anything."""
         if any(acts.first <= self.begin for acts in self.world.objects.faults.acts.values()):
             self.lack()
 

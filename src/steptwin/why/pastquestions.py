@@ -146,7 +146,7 @@ class PastQuestions:
         return answer._replace(is_cut=is_cut, known_from=known_from, is_complete=answer.is_complete and not begins)
 
     def _settled(self, ask: Callable[[_Known], Generator[None, None, _T]]) -> Generator[None, None, _T]:
-        """What is found, when nothing lacks for it that can be had."""
+        """Result when nothing lacks for it that can be had."""
         while True:
             self._lacking.begin()
             found = yield from ask(self._logs[0])

@@ -307,7 +307,7 @@ class ProgramCauses:
         return Cause(link, place, lambda: led()[0], Cover.PROGRAM, besides)
 
     def _unchanged(self, controller: str, index: int, place: Place) -> Iterator[Cause]:
-        """What a condition reads and has had its value from the beginning."""
+        """Causes for all that a condition reads and that has had its value from the beginning."""
         time, order, number = place
         for one in self.use(controller, index).reads if self._log.is_whole else ():
             name = f"{controller}.{one.name}"

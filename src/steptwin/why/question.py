@@ -386,7 +386,7 @@ class Why:
         return tuple(found)
 
     def _changeable(self, text: str, at: Nanos) -> Iterator[tuple[str, Resource]]:
-        """What programs can change of what is asked for: outputs that drive it, axes, variables."""
+        """Resources that are asked for and that programs can change, with their controllers: driving outputs, axes, variables."""
         variable = self._variable(text)
         if variable is not None:
             yield variable[0], Resource(ResourceKind.VALUE, variable[1])
