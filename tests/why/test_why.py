@@ -74,13 +74,11 @@ def test_what_an_element_delays(element: str, output: str, text: str) -> None:
 
 
 def test_a_wait_for_ever_shows_what_it_depends_on() -> None:
-    assert shown(waits(), "cell")[:7] == [
+    assert shown(waits(), "cell")[:5] == [
         "cell waits at line 5 `WAIT IN2 = ON`, since 1.012000 s (at 5 s)",
         "5.000000 s cell cell.IN2 is 0 from the beginning, driven by both.out",
         "5.000000 s both both.out is 0 from the beginning, driven by guard.no and cell.OUT3",
-        "5.000000 s guard guard.no is 1 since 1.021000 s, driven by cell.OUT1",
         "5.000000 s cell cell.OUT3 is 0 from the beginning, which no statement of its program sets",
-        "5.000000 s cell cell.OUT1 is 1 since 1.011000 s",
         "1.012000 s cell line 5 `WAIT IN2 = ON` was executed",
     ]
 

@@ -50,6 +50,8 @@ class Attempts:
         found = found or self._all.programs.before(controller, Resource(ResourceKind.AXIS, number), until)
         if found is not None or not self._log.never_happened(f"event of axis {number}"):
             return found
+        if controller in self._world.objects.line_of:
+            self._log.lack()  # a request may have been refused before the log
         text = NOTHING_HAS_COMMANDED(axis=f"{controller}.M{number}")
         return Cause(ChainLink(0, controller, text), Place(0), nothing, Cover.LEVEL)
 
@@ -69,12 +71,24 @@ class Attempts:
             if series is None or not points.level(series, until):
                 continue
             written = self._all.controllers.written(controller, register, until, before)
+            if written is None:
+                self._log.lack()  # it may have been written before the log
             mode = 0.0 if written is None else points.level(series, written.place.time)
             if written is None or not mode:
                 continue
-            came = self._all.controllers.written(controller, use.trigger, until, before)
-            if came is None or came.place < written.place:
+            if not self._has_come(controller, use, written.place, until, before):
                 yield self._waits(controller, register, use, mode, written)
+
+    def _has_come(self, controller: str, use: WriteUse, written: Place, until: Nanos, before: int) -> bool:
+        """Whether the trigger of a register has been written for its axis since that was written."""
+        series = self._log.points.series(f"{controller}.{use.trigger}")
+        came = self._all.controllers.written(controller, use.trigger, until, before)
+        while came is not None and came.place > written:
+            time, order, _ = came.place
+            if series is None or int(points.level(series, time)) & use.bit:
+                return True
+            came = self._all.controllers.written(controller, use.trigger, time, order)
+        return False
 
     def _waits(self, controller: str, register: str, use: WriteUse, mode: float, written: Cause) -> Cause:
         text = WAITS_FOR_TRIGGER(register=f"{controller}.{register}", trigger=use.trigger, mode=use.mode, value=mode)

@@ -10,6 +10,7 @@ from typing import Any
 from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message, MessageText
 from steptwin.motion.divisions import profile_of
+from steptwin.motion.profile import Profile
 from steptwin.simulation.components.brake import RELEASED, BrakeSpec
 from steptwin.simulation.components.load import ACTS, LoadSpec
 from steptwin.simulation.components.touch import JAM
@@ -27,6 +28,7 @@ from steptwin.why.log import FALL, JAMS, LAST, OF_MECHANICS, Change, words_of
 GIVES_POWER = Message("why.gives-power", ", which gives {axis} its power")
 BEGAN_TO_MOVE = Message("why.began-to-move", "{axis} began to move")
 STOPPED = Message("why.stopped", "{axis} stopped")
+BEGAN_TO_BRAKE = Message("why.began-to-brake", "{axis} began to brake")
 MOTION_ENDED = Message("why.motion-ended", "the motion of {axis} ended, which began at {time:.6f} s")
 STOPPED_AT_SOFT_LIMIT = Message("why.stopped-at-soft-limit", "{axis} stopped at its soft limit {limit}")
 BRAKES_NS: Nanos = SECOND // 10
@@ -76,8 +78,10 @@ class AxisCauses:
         elif not profile.segments:
             text, names = STOPPED(axis=shown), ()
         elif profile.end is not None and profile.end <= until:
-            text, place = MOTION_ENDED(axis=shown, time=plan.time / SECOND), max(place, Place(profile.end))
-            names = ()
+            text = STOPPED(axis=shown) if _brakes(profile) else MOTION_ENDED(axis=shown, time=plan.time / SECOND)
+            place, names = max(place, Place(profile.end)), ()
+        elif _brakes(profile):
+            text, cover = BEGAN_TO_BRAKE(axis=shown), Cover.MOTION
         else:
             text, cover = BEGAN_TO_MOVE(axis=shown), Cover.MOTION
 
@@ -91,8 +95,18 @@ class AxisCauses:
                 found = self._acted_by(controller, record.subject, one, plan)
                 if found is not None:
                     yield found
+            earlier = self._braked(controller, plan, mechanics) if _brakes(profile) else None
+            if earlier is not None:
+                yield earlier
 
         return Cause(ChainLink(place.time, controller, text), place, planned, cover, besides)
+
+    def _braked(self, controller: str, plan: Change, mechanics: str) -> FoundCause:
+        """The motion that was under way when a plan that only brakes began."""
+        axis = self._log.record(plan).subject
+        earlier = max(self._log.plans_in_force(controller, axis, plan.time, plan.order), default=None)
+        is_over = earlier is None or self._end(earlier)[0] <= plan.time
+        return None if is_over else covered(self.motion(controller, axis, plan.time, mechanics, plan.order), Cover.MOTION)
 
     def _acted_by(self, controller: str, axis: str, one: Resource, plan: Change) -> FoundCause:
         """Cause of something by which the command of a plan acts."""
@@ -160,7 +174,7 @@ class AxisCauses:
         began = -1 if plan is None else plan.time
         events = list(self._of_rotor(axis, until, before))
         led = [one for one in events if one.time >= began or (is_held and self.holds_rotor(one, events))]
-        lasting = [one for one in led if self._log.record(one).subject != FALL or _begins(self._log.record(one))]
+        lasting = [one for one in led if _begins(self._log.record(one)) or self._has_left_it(one, since)]
         event = max(lasting, key=lambda one: (one.time, one.order), default=None)
         if event is None:
             self._log.never_happened(*EVENTS_OF_ROTORS)
@@ -180,6 +194,10 @@ class AxisCauses:
         motion = motion and self._rests(controller, number, motion, until, before)
         is_last = lost is not None and (motion is None or (motion.cover is None and lost.place > motion.place))
         return lost if is_last else motion
+
+    def _has_left_it(self, event: Change, since: Nanos | None) -> bool:
+        """Whether the end of an event of a rotor may have left it where it stands since a moment."""
+        return self._log.record(event).subject != FALL and (since is None or event.time <= since)
 
     def _rests(self, controller: str, number: str, motion: Cause, until: Nanos, before: int = LAST) -> Cause:
         """A motion that may be over, along with later commands that moved nothing."""
@@ -417,6 +435,15 @@ class AxisCauses:
         if not profile.segments:
             return plan.time, plan.time
         return math.inf if profile.end is None else profile.end, plan.time
+
+
+def _brakes(profile: Profile) -> bool:
+    """Whether a motion gets slower from its beginning on and never faster, until it stands."""
+    begins = (0.0, *(one.end_s for one in profile.segments))
+    slowing = [
+        abs(one.velocity(begin)) - abs(one.velocity(one.end_s)) for begin, one in zip(begins, profile.segments, strict=False)
+    ]
+    return not slowing or (profile.end is not None and slowing[0] > 0.0 and min(slowing) >= 0.0)
 
 
 def _begins(record: TraceRecord) -> bool:

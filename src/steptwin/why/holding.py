@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 
 from steptwin.controller import Nanos
 from steptwin.simulation.components.gate import Gate
+from steptwin.simulation.components.latch import RESET, SET, Latch
 from steptwin.simulation.components.relay import COIL, NC, Relay
 from steptwin.simulation.components.timer import IN, PULSE, Timer
 from steptwin.simulation.scheduler.wires import PinName
@@ -78,6 +79,25 @@ class HoldingCauses:
             inputs = [one for one in inputs if levels[one] == _DECISIVE[gate.kind]]
             inputs = self._enough([(one, list(self._all.sources(one))) for one in inputs], at, floor)
         return [source for one in inputs for source in self._sources(one, at, floor)]
+
+    def deciding(self, signal: str, drivers: Sequence[str], at: Nanos) -> Sequence[str]:
+        """Those of the drivers of a signal that have a part in its level at a moment: not all inputs of a gate or latch have."""
+        owner = signal.partition(".")[0]
+        part = self._all.parts.get(owner)
+        if not isinstance(part, Gate | Latch) or self._log.hold(signal, at) is not None:
+            return drivers
+        levels = {name: self._level(PinName(owner, name), at) for name in part.block.levels if name not in part.block.outputs}
+        if isinstance(part, Latch):
+            # One that is on decides; else the other one, which would change it.
+            changes = RESET if self._log.level(signal, at) else SET
+            keeps = SET if changes == RESET else RESET
+            inputs = [keeps] if levels[keeps] else [changes]
+        elif part.kind in _DECISIVE and _DECISIVE[part.kind] in levels.values():
+            inputs = [name for name, level in levels.items() if level == _DECISIVE[part.kind]]
+        else:
+            return drivers
+        own = {source for name in inputs for source in (*self._all.sources(PinName(owner, name)), f"{owner}.{name.lower()}")}
+        return [one for one in drivers if one in own]
 
     def _following(self, target: PinName, level: bool, at: Nanos, floor: Nanos) -> list[str]:
         """The sources of an input that an output follows after a delay; none while that lasts."""

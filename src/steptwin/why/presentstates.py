@@ -93,7 +93,8 @@ class PresentStates:
         owner = name.partition(".")[0]
         yield ChainLink(self._at, owner, self._causes.state(name, self._at))
         others = () if owner == waits else (yield from self._not_written(name))
-        return (*self._causes.drivers(name, self._at), *others)
+        drivers = self._causes.drivers(name, self._at)
+        return (*self._causes.holding.deciding(name, drivers, self._at), *others)
 
     def _resource(self, controller: str, resource: Resource) -> _Links:
         """Links and signals of the thing that a statement waits for."""

@@ -315,7 +315,9 @@ class Why:
             owner, _, rest = name.partition(".")
             if owner in self.log.world.controllers and self.log.world.kind(owner).registers is not None:
                 refused = self.causes.controllers.refused(owner, (rest,), at, after=-1 if since is None else since)
-                if refused is not None:
+                if refused is None and owner in self.log.world.objects.line_of and (since is None or since < self.log.begin):
+                    self.log.lack()
+                elif refused is not None:
                     first = refused if first is None else first._replace(along=(*first.along, refused))
         return first
 

@@ -90,6 +90,8 @@ class WriteUse(NamedTuple):
     mode: str = ""
     """The register that is not 0 while a written value is only kept, until `trigger` is written; empty if it never is."""
     trigger: str = ""
+    bit: int = 0
+    """The bit of the value of `trigger` that chooses this register."""
 
 
 class GivenCommand(NamedTuple):

@@ -64,7 +64,7 @@ class Mic488Registers(NamedRegisters[Mic488Device]):
         for key in MOTION_REGISTERS:
             register, trigger = f"M{axis}_{key}", f"AXIS_{key}_TRIG"
             origin = (Resource(ResourceKind.ORIGIN, axis),) if key == "POS_ABS" else ()
-            found[register] = WriteUse(origin, MODE, trigger)
+            found[register] = WriteUse(origin, MODE, trigger, 1 << int(axis) - 1)
             found[trigger] = WriteUse((Resource(ResourceKind.VALUE, MODE), Resource(ResourceKind.VALUE, register), *origin))
         return found
 
