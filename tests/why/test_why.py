@@ -545,6 +545,7 @@ def test_a_motion_that_ended_and_not_the_one_that_is_planned_behind_the_wait_for
         "line 4 `WAITPOS` ended",
         f"the motion of c.M1 ended, which began at {began[1]:.6f} s",
         "line 3 `PABS M1 200` was executed",
+        "the program started",
     ]
 
 

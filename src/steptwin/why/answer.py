@@ -16,7 +16,7 @@ FROM_THE_BEGINNING = Message("why.from-the-beginning", "from the beginning")
 
 WITHOUT = Message("why.without", "the run again without each of its roots:")
 
-MOST_LINKS = 8
+MOST_LINKS = 12
 """Limit of the links of an answer, unless all are asked for."""
 ALL_LINKS = 1000
 """Limit where all are asked for."""

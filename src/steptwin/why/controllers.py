@@ -197,6 +197,8 @@ class ControllerCauses:
             if any(pattern.search(found.link.text) for pattern in patterns):
                 text = REFUSED(request=found.link.text, reason=reason)
                 return covered(found._replace(link=replace(found.link, text=text)), Cover.LEVEL)
+        if after < self._log.begin and controller in self._world.objects.line_of:
+            self._log.lack()  # a request may have been refused before
         return None
 
     def of_program(self, controller: str, change: StateChange) -> FoundCause:

@@ -739,12 +739,11 @@ class Why:
         return any(hold is not None for hold in holds)
 
     def _after(self, states: Sequence[ChainLink], answer: Answer) -> Answer:
-        """An answer after present states."""
+        """An answer after present states, which take no place of its causes."""
         known = {(link.subject, link.text) for link in states}
-        later = (link for link in answer.links if (link.subject, link.text) not in known)
-        links = tuple(dict.fromkeys((*states, *later)))
-        is_all = len(links) <= self._most_links and (self._most_links != MOST_LINKS or len(states) < MOST_SNAPSHOTS)
-        return answer._replace(links=links[: self._most_links], is_complete=answer.is_complete and is_all)
+        later = [link for link in answer.links if (link.subject, link.text) not in known]
+        is_all = self._most_links != MOST_LINKS or len(states) < MOST_SNAPSHOTS
+        return answer._replace(links=tuple(dict.fromkeys((*states, *later))), is_complete=answer.is_complete and is_all)
 
     def _behind(self, signals: Iterable[str], at: Nanos) -> set[str]:
         """Signals, and those that drive one of them."""
