@@ -127,6 +127,8 @@ class AxisCauses:
     def coordinate(self, controller: str, axis: str, until: Nanos) -> FoundCause:
         """Cause of the coordinate that an axis has at a moment: its motion, or who wrote it since; both, where it moved on."""
         motion, origin = self.motion(controller, axis, until), self.origin(controller, axis, until)
+        if origin is None and (motion is None or motion.place.time < self._log.begin):
+            self._log.lack()  # it may have been written since, before the log
         motion = motion and self._rests(controller, axis, motion, until)
         if motion is None or origin is None or (motion.cover is None and motion.place < origin.place):
             return origin or motion
@@ -401,7 +403,7 @@ class AxisCauses:
         found = [covered(acted(act), Cover.LEVEL) for act in turned][:1]
         if not found:
             self._log.lack()
-        axis = self._driven(controller, number)
+        axis = self.driven(controller, number)
         follows = None if axis is None else getattr(self._world.axes[axis].spec.encoder, "follows", None)
         if follows is not None and follows in self._world.axes:
             found.append(self.moved(follows, until, before))
@@ -411,7 +413,7 @@ class AxisCauses:
 
     def _turned_by_drive(self, controller: str, number: str, until: Nanos, before: int) -> FoundCause:
         """The motion of its own axis that turned an encoder last; None for one that something else, or nothing, turns."""
-        axis = self._driven(controller, number)
+        axis = self.driven(controller, number)
         if axis is not None:
             is_own = getattr(self._world.axes[axis].spec.encoder, "follows", None) is None
             return self.moved(axis, until, before) if is_own else None
@@ -424,7 +426,7 @@ class AxisCauses:
             coupling = next((str(one["turned_by"]) for one in found if str(one["axis"]) == number), None)
         return self.motion(controller, number, until, before=before) if coupling == do.COUPLINGS[0] else None
 
-    def _driven(self, controller: str, number: str) -> str | None:
+    def driven(self, controller: str, number: str) -> str | None:
         """The name of the axis that a controller drives; None for one without mechanics."""
         axes = self._world.axes.items()
         return next((name for name, axis in axes if axis.spec.drive == (controller, f"M{number}")), None)

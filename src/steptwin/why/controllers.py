@@ -20,7 +20,7 @@ from steptwin.simulation.script.control import Halt
 from steptwin.simulation.world.inputs import Download, See, SetVariable
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing
-from steptwin.why.log import LAST, MOST_LOOKED_BACK, Change, words_of
+from steptwin.why.log import LAST, MOST_LOOKED_BACK, Change, Executed, words_of
 from steptwin.why.programstates import StateChange
 from steptwin.why.roots import Act, Sent
 from steptwin.why.sentences import SETS_A_FAULT, describe_input
@@ -112,7 +112,10 @@ class ControllerCauses:
 
         def before() -> FoundCause:
             led = self.commanded(controller, event, wanted) or self._asked_before(controller, event)
-            return led or self._earlier(controller, event.time, wanted)
+            led = led or self._earlier(controller, event.time, wanted)
+            axes, name = self._all.axes, wanted.name
+            was_moving = led is None and name and axes.is_moving(controller, name, event.time - 1)
+            return axes.motion(controller, name, event.time - 1, axes.driven(controller, name) or "") if was_moving else led
 
         def besides() -> Iterator[Cause]:
             came = None if pin is None else covered(self._all.last((pin,), place.time, before=place.order), Cover.LEVEL)
@@ -256,6 +259,17 @@ class ControllerCauses:
         done = executed.locations[:index].count(here.location) if self._log.is_whole else len(found)
         record, order = found[min(done, len(found) - 1)] if found else (None, 0)
         return None if record is None or order > here.order else covered(self._frame(record, order), Cover.FRAME)
+
+    def came(self, controller: str, here: Executed, event: Change) -> FoundCause:
+        """The first frame between a statement and an event that has a line with whose command the reason of the event begins."""
+        group, reason = self._log.group(controller), str(dict(self._log.record(event).facts).get("why", ""))
+        for position in range(self._log.position(group, here.time - 1), event.position):
+            record, order = self._log.records[group][position], self._log.order(group, position)
+            if record.kind == "frame" and here.order < order < event.order and self._is_for(controller, record, order):
+                lines = record.data().decode("ascii", "replace").upper().replace(" ", "").split("\r")
+                if any(line and reason.startswith(f"{line} ") for line in lines):
+                    return self._frame(record, order)
+        return None
 
     def variable_set(self, controller: str, name: str, until: Nanos) -> FoundCause:
         """The last action by a moment that set a variable of a program."""

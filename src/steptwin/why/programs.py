@@ -463,6 +463,25 @@ class ProgramCauses:
         by = partial(self._all.controllers.of_program, controller, change)
         return Cause(link, Place(change.time, change.order), by, Cover.LEVEL, partial(self._holding, controller, change))
 
+    def ended(self, controller: str, index: int, at: Nanos) -> FoundCause:
+        """The alarm by a moment with which a program was ended after the statement that it executed last; None if none was."""
+        here = self._log.executed[controller][index]
+        for event in reversed(self._log.axis_events.get((controller, ""), ())):
+            if event.order < here.order:
+                break
+            record = self._log.record(event)
+            if event.time <= at and dict(record.facts).get("stops") is True:
+                link = ChainLink(event.time, controller, words_of(record))
+                led = partial(self._of_alarm, controller, index, event)
+                return Cause(link, Place(event.time, event.order), led, Cover.LEVEL)
+        return None
+
+    def _of_alarm(self, controller: str, index: int, event: Change) -> FoundCause:
+        """The line that came after the statement and had to wait for it, if the alarm is about that; else the statement."""
+        last = covered(self.statement(controller, index), Cover.WAIT)
+        came = self._all.controllers.came(controller, self._log.executed[controller][index], event)
+        return last if came is None else covered(came._replace(along=() if last is None else (last,)), Cover.WAIT)
+
     def _holding(self, controller: str, change: StateChange) -> Iterator[Cause]:
         """The level of the input that holds a program in its state."""
         pin = self._world.programs[controller].holding.get(change.state)

@@ -709,6 +709,10 @@ class Why:
         here = executed[index]
         use = causes.programs.use(controller, index)
         text, since = statement(log, here), None if log.is_in_progress(here) else here.time
+        ended = causes.programs.ended(controller, index, at)
+        if ended is not None:
+            state = PROGRAM_IS(controller=controller, held=ended.link.text)
+            return (yield from self._answer(controller, at, state, ended.link.time, _led_to(ended)))
         present = yield from self._present(at)
         links = list(present.awaited(controller))
         if not present.waits(controller, use) or at - here.time <= log.world.programs[controller].statement_time:
@@ -716,17 +720,15 @@ class Why:
             first = covered(causes.programs.statement(controller, index), Cover.PROGRAM)
             return self._after(links, (yield from self._answer(controller, at, state, since, first)))
         found = {one: cause for one in use.reads if (cause := causes.programs.resource(controller, one, index, at))}
-        others = [cause._replace(cover=Cover.LEVEL) for one, cause in found.items() if not self._is_held(controller, one, at)]
+        waiting = causes.programs.statement(controller, index)
+        known = {one: cause for one, cause in found.items() if cause.place < waiting.place}
+        others = [cause._replace(cover=Cover.LEVEL) for one, cause in known.items() if not self._is_held(controller, one, at)]
         changed = [cause for cause in found.values() if cause.link.time > here.time]
         last = max(changed, key=lambda cause: cause.link.time, default=None)
         pins = [f"{controller}.{resource.name}" for resource in use.reads if resource.kind is ResourceKind.PIN and resource.name]
         resting = ((yield from self._resting(pins, at)) or self._held(pins, at)) if last is None else None
         holding = [one for pin in pins for one in self.causes.holding.of((pin,), at, self.log.since(pin, at))]
-        first = (
-            covered(last, Cover.LEVEL)
-            or resting
-            or causes.programs.statement(controller, index)._replace(cover=Cover.WAIT, besides=lambda: others)
-        )
+        first = covered(last, Cover.LEVEL) or resting or waiting._replace(cover=Cover.WAIT, besides=lambda: others)
         standing = (yield from self._standing(pins, at)) if last is None and resting is None else None
         first = _along(first, [*(() if standing is None else (standing, *standing.along)), *holding])
         answer = yield from self._answer(controller, at, WAITS(controller=controller, statement=text), since, first)
