@@ -29,6 +29,7 @@ GIVES_POWER = Message("why.gives-power", ", which gives {axis} its power")
 BEGAN_TO_MOVE = Message("why.began-to-move", "{axis} began to move")
 STOPPED = Message("why.stopped", "{axis} stopped")
 BEGAN_TO_BRAKE = Message("why.began-to-brake", "{axis} began to brake")
+MOTION_CHANGED = Message("why.motion-changed", "the motion of {axis} changed, which began at {time:.6f} s")
 MOTION_ENDED = Message("why.motion-ended", "the motion of {axis} ended, which began at {time:.6f} s")
 STOPPED_AT_SOFT_LIMIT = Message("why.stopped-at-soft-limit", "{axis} stopped at its soft limit {limit}")
 BRAKES_NS: Nanos = SECOND // 10
@@ -78,12 +79,15 @@ class AxisCauses:
         elif not profile.segments:
             text, names = STOPPED(axis=shown), ()
         elif profile.end is not None and profile.end <= until:
-            text = STOPPED(axis=shown) if _brakes(profile) else MOTION_ENDED(axis=shown, time=plan.time / SECOND)
-            place, names = max(place, Place(profile.end)), ()
+            began, place = self._began(controller, plan), max(place, Place(profile.end))
+            text = STOPPED(axis=shown) if _brakes(profile) else MOTION_ENDED(axis=shown, time=began / SECOND)
+            names = ()
         elif _brakes(profile):
             text, cover = BEGAN_TO_BRAKE(axis=shown), Cover.MOTION
         else:
-            text, cover = BEGAN_TO_MOVE(axis=shown), Cover.MOTION
+            began, cover = self._began(controller, plan), Cover.MOTION
+            is_new = began == plan.time
+            text = BEGAN_TO_MOVE(axis=shown) if is_new else MOTION_CHANGED(axis=shown, time=began / SECOND)
 
         def planned() -> FoundCause:
             found = self._all.controllers.in_controller(controller, plan, Resource(ResourceKind.AXIS, record.subject))
@@ -95,18 +99,39 @@ class AxisCauses:
                 found = self._acted_by(controller, record.subject, one, plan)
                 if found is not None:
                     yield found
-            earlier = self._braked(controller, plan, mechanics) if _brakes(profile) else None
-            if earlier is not None:
-                yield earlier
+            if self._shortened(controller, plan) is not None:
+                going_on = self.motion(controller, record.subject, plan.time, mechanics, plan.order)
+                if going_on is not None:
+                    yield covered(going_on, Cover.MOTION) or going_on
 
         return Cause(ChainLink(place.time, controller, text), place, planned, cover, besides)
 
-    def _braked(self, controller: str, plan: Change, mechanics: str) -> FoundCause:
-        """The motion that was under way when a plan that only brakes began."""
+    def _shortened(self, controller: str, plan: Change) -> Change | None:
+        """The plan of the motion under way that another one takes no farther: that ends it, or makes it in another way; None for
+        a plan with a target of its own."""
         axis = self._log.record(plan).subject
-        earlier = max(self._log.plans_in_force(controller, axis, plan.time, plan.order), default=None)
-        is_over = earlier is None or self._end(earlier)[0] <= plan.time
-        return None if is_over else covered(self.motion(controller, axis, plan.time, mechanics, plan.order), Cover.MOTION)
+        before = next(iter(self._log.plans_in_force(controller, axis, plan.time, plan.order)), None)
+        if before is None:
+            return None
+        profile, other = profile_of(self._log.record(plan).plan()), profile_of(self._log.record(before).plan())
+        is_over = not other.segments or (other.end is not None and other.end <= plan.time)
+        if is_over or profile.start < plan.time or profile.end is None or other.start >= plan.time:
+            return None
+        way = other.segments[-1].direction
+        farthest = math.inf if other.end is None else (other.base + other.final_p - profile.base) * way
+        # Rounding may give a pulse more.
+        return before if -1 <= profile.final_p * way <= farthest + 1 else None
+
+    def _began(self, controller: str, plan: Change) -> Nanos:
+        """When the motion began that a plan makes or ends."""
+        shortened = self._shortened(controller, plan)
+        if shortened is not None:
+            return self._began(controller, shortened)
+        record = self._log.record(plan)
+        began = profile_of(record.plan()).start
+        there = self._all.of(began) if self._log.was_before(plan) else None
+        earlier = None if there is None else next(iter(there.log.plans_in_force(controller, record.subject, began)), None)
+        return began if there is None or earlier is None else there.axes._began(controller, earlier)
 
     def _acted_by(self, controller: str, axis: str, one: Resource, plan: Change) -> FoundCause:
         """Cause of something by which the command of a plan acts."""
@@ -120,6 +145,8 @@ class AxisCauses:
     def origin(self, controller: str, axis: str, until: Nanos, before: int = LAST) -> FoundCause:
         """The last change of the coordinate of an axis without a motion by a moment, before an order."""
         change = self._log.last_origin(controller, axis, until, before)
+        if change is None:
+            self._log.never_happened(f"coordinate of axis {axis}")
         wanted = Resource(ResourceKind.ORIGIN, axis)
         found = None if change is None else self._all.controllers.in_controller(controller, change, wanted, f"M{axis}_POS_ACT")
         return covered(found, Cover.LEVEL)

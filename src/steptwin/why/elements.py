@@ -179,7 +179,12 @@ class ElementCauses:
             self._log.lack()  # all its rates count
         moving = self._log.rates.drivers(name, change.time) if is_integrator else self._log.movers.get((name, change.time))
         names = moving if is_integrator or moving else self.followed(name)
-        found = {signal: cause for signal in names or () if (cause := self._of_signal(signal, change)) is not None}
+        found: dict[str, Cause] = {}
+        for signal in names or ():
+            since = self._log.rates.since(name, signal, change.time) if is_integrator else change.time
+            cause = self._of_signal(signal, change, since)
+            if cause is not None:
+                found[signal] = cause
         if isinstance(self._all.specs.get(name), GantrySpec):
             found |= self._unmoved([signal for signal in names or () if signal not in found], change)
         best = max(found, key=lambda one: self._urgency(one, found[one], change), default=None)
@@ -192,7 +197,7 @@ class ElementCauses:
         others: list[Cause] = []
         has_parts = hasattr(self._all.specs.get(name), "effect")
         for signal in names if is_integrator else self.followed(name) if has_parts else ():
-            cause = found.get(signal) or self._of_signal(signal, change)
+            cause = found.get(signal) or (None if is_integrator else self._of_signal(signal, change, change.time))
             if cause is not None and signal != best:
                 others.append(cause)
         return found[best]._replace(along=tuple(others))
@@ -218,8 +223,9 @@ class ElementCauses:
         moves = drive is not None and self._all.axes.is_moving(drive[0], drive[1].removeprefix("M"), change.time)
         return cause.place.time == change.time, moves, cause.place
 
-    def _of_signal(self, signal: str, change: Change) -> FoundCause:
-        """The last cause before a change of a signal that an element follows."""
+    def _of_signal(self, signal: str, change: Change, since: Nanos) -> FoundCause:
+        """The last cause before a change of a signal that an element follows, and that has its value since a moment; if that is
+        not known, since the change."""
         owner, _, rest = signal.rpartition(".")
         before = self._all.before(signal, change, change.time)
         at_once = self._at_once(signal, change)
@@ -240,7 +246,8 @@ class ElementCauses:
         elif rest == TRAVEL:
             cause = self._all.workpieces.travel(owner, change)
         else:
-            cause = covered(self.of_element(owner, rest, change.time, change.order), Cover.ACTION)
+            order = change.order if since == change.time else LAST
+            cause = covered(self.of_element(owner, rest, since, order), Cover.ACTION)
         return cause if cause is not None and cause.place < Place(change.time, change.order) else None
 
     def _at_once(self, signal: str, change: Change) -> FoundCause:

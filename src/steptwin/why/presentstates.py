@@ -9,17 +9,18 @@ from typing import TypeAlias
 from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message, MessageText
 from steptwin.motion.divisions import profile_of
-from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementUse
+from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementLocation, StatementUse
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.why.answer import ChainLink
 from steptwin.why.causes import IS, Causes
 from steptwin.why.programs import WAITS
-from steptwin.why.sentences import statement
+from steptwin.why.sentences import statement, statement_at
 
 WAITS_FOR_A_TIME = Message("why.waits-for-a-time", "it waits for a time only")
 DEPENDS_ON = Message("why.depends-on", "it depends on {name}")
 IS_NOT_SET = Message("why.is-not-set", "{name} is {value:g}: nothing has set it")
 IS_STILL = Message("why.is-still", "{name} is {value:g} since {time:.6f} s")
+OF_INTERRUPT = Message("why.of-interrupt", "{statement} is executed by an interrupt that is off")
 ANY_PIN = Message("why.any-pin", "any pin")
 NO_AXIS_HAS_MOVED = Message("why.no-axis-has-moved", "no axis has moved until {time:g} s")
 MOVES_WITHOUT_END = Message("why.moves-without-end", "{axis} moves without end")
@@ -53,11 +54,17 @@ class PresentStates:
 
     def disabled(self, controller: str, wanted: Resource) -> Iterator[ChainLink]:
         """The switches that are off of the interrupts that change something, and who set them."""
+        for use, writing in self._causes.programs.interrupts(controller, wanted):
+            yield from self._disabled(controller, use, writing)
+
+    def _disabled(self, controller: str, use: StatementUse, writing: StatementLocation) -> Iterator[ChainLink]:
+        """The switches of an interrupt that are off, who set them, and the statement that is not executed therefore."""
         programs = self._world.programs[controller]
-        for use in self._causes.programs.interrupts(controller, wanted):
-            for switch in use.acts_by:
-                if not programs.read(switch.name, self._at):
-                    yield from self._switch(controller, switch)
+        off = [switch for switch in use.acts_by if not programs.read(switch.name, self._at)]
+        if off:
+            yield ChainLink(self._at, controller, OF_INTERRUPT(statement=statement_at(programs, writing)))
+        for switch in off:
+            yield from self._switch(controller, switch)
 
     def waits(self, controller: str, use: StatementUse) -> bool:
         """Whether a program waits at a statement that it has executed last, which may be over if it is a wait for a time."""
@@ -117,9 +124,13 @@ class PresentStates:
         return (yield from self.interrupts(controller, resource))
 
     def interrupts(self, controller: str, wanted: Resource) -> _Links:
-        """The switches of the interrupts that change something, and who set them. Returns their events."""
+        """The switches of the interrupts that change something, and who set them. Returns the events of those that are on."""
         events: list[_Asked] = []
-        for use in self._causes.programs.interrupts(controller, wanted):
+        for use, writing in self._causes.programs.interrupts(controller, wanted):
+            disabled = list(self._disabled(controller, use, writing))
+            if disabled:
+                yield from disabled
+                continue
             events += ((controller, one) for one in use.reads)
             for switch in use.acts_by:
                 yield from self._switch(controller, switch)

@@ -145,14 +145,15 @@ class ProgramCauses:
             return False
         return any(executed.location.number in one for one in self._handlers(controller, executed.location.text))
 
-    def interrupts(self, controller: str, wanted: Resource) -> Iterator[StatementUse]:
-        """The interrupts in which a statement changes something."""
+    def interrupts(self, controller: str, wanted: Resource) -> Iterator[tuple[StatementUse, StatementLocation]]:
+        """The interrupts in which a statement changes something, each with the first such statement."""
         programs = self._world.programs[controller]
         for text in programs.texts:
             for handler in self._handlers(controller, text):
-                uses = [programs.use(StatementLocation(text, number)) for number in handler]
-                if any(wanted in use.writes for use in uses[1:]):
-                    yield uses[0]
+                places = [StatementLocation(text, number) for number in handler]
+                writing = next((one for one in places[1:] if wanted in programs.use(one).writes), None)
+                if writing is not None:
+                    yield programs.use(places[0]), writing
 
     def statement(self, controller: str, index: int) -> Cause:
         """A statement was executed."""

@@ -504,7 +504,8 @@ class Why:
         last = max((one for one in (written, by_hand) if one is not None), key=lambda one: one.place, default=None)
         state = IS_NUMBER(name=text, value=other.programs[controller].variables(at).get(name, 0.0))
         present, wanted = (yield from self._present(at)), Resource(ResourceKind.VALUE, name)
-        came = written is not None and self.causes.programs.is_of_interrupt(controller, written.place.number // 3)
+        there = None if written is None else self.causes.of(written.place.time)  # it may be numbered in the log of another moment
+        came = there is not None and written is not None and there.programs.is_of_interrupt(controller, written.place.number // 3)
         states = [] if came else list(present.disabled(controller, wanted))
         return self._after(states, (yield from self._answer(text, at, state, None if last is None else last.place.time, last)))
 

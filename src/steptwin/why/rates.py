@@ -49,6 +49,11 @@ class NotedRates:
         the way in which that went last."""
         return tuple(self._of[name].drivers(until))
 
+    def since(self, name: str, signal: str, until: Nanos) -> Nanos:
+        """Since when a signal of the rate of an integrator has the value that it has just before a moment; the moment itself for
+        one that changes until then, or has that value since before anything was noted."""
+        return self._of[name].since(signal, until)
+
     def last(self, name: str, until: Nanos) -> NotedRate:
         """The rate with which the value of an integrator changed last before a moment."""
         return self._of[name].last(until)[0]
@@ -90,6 +95,17 @@ class _OfIntegrator:
                     return one, end
                 end = one.time
         return self._noted[0], until
+
+    def since(self, signal: str, until: Nanos) -> Nanos:
+        before = [one for one in self._noted if one.time < until]
+        value = before[-1].lines[signal].value if before else None
+        since = until
+        for one in reversed(before):
+            line = one.lines[signal]
+            if line.slope or line.value != value:
+                return since
+            since = one.time
+        return until
 
     def drivers(self, until: Nanos) -> Iterator[str]:
         rate, end = self.last(until)

@@ -7,6 +7,7 @@ from typing import Any
 
 from steptwin.diagnostics import visible
 from steptwin.messages import Message, MessageText
+from steptwin.simulation.kinds.programs import Programs, StatementLocation
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.script.control import Halt
 from steptwin.simulation.world.inputs import Bytes, Download, ExternalInput, SetVariable
@@ -75,7 +76,11 @@ def statement(log: CauseLog, executed: Executed) -> MessageText:
         return GIVEN(code=executed.location.text)
     if not log.is_of_present_text(executed):
         return REPLACED_STATEMENT()
-    programs, location = log.world.programs[executed.controller], executed.location
+    return statement_at(log.world.programs[executed.controller], executed.location)
+
+
+def statement_at(programs: Programs, location: StatementLocation) -> MessageText:
+    """As `statement`, of a present text."""
     found, source = programs.statements(location.text)[location.number], programs.texts[location.text]
     text = visible(source.text[found.start : found.end].strip())
     return LINE(line=found.line, code=text) if text else END_OF_PROGRAM()

@@ -80,9 +80,12 @@ ACTED: Changed = ("", "")
 
 
 def happenings(record: TraceRecord) -> Iterator[str]:
-    """Names of what happened by a record: the subject of an event, its axis, and what happened to a workpiece; a fault."""
+    """Names of what happened by a record: the subject of an event, its axis, and what happened to a workpiece; a fault; another
+    coordinate of an axis."""
     if record.kind == "fault":
         yield f"fault {record.subject}"
+    elif record.kind == "coordinate":
+        yield f"coordinate of axis {record.subject}"
     elif record.kind == "event":
         facts = dict(record.facts)
         yield f"event {facts.get('what', record.subject)}"
