@@ -86,8 +86,7 @@ class AxisCauses:
             text, cover = BEGAN_TO_BRAKE(axis=shown), Cover.MOTION
         else:
             began, cover = self._began(controller, plan), Cover.MOTION
-            is_new = began == plan.time
-            text = BEGAN_TO_MOVE(axis=shown) if is_new else MOTION_CHANGED(axis=shown, time=began / SECOND)
+            text = _under_way(shown, began, plan.time)
 
         def planned() -> FoundCause:
             found = self._all.controllers.in_controller(controller, plan, Resource(ResourceKind.AXIS, record.subject))
@@ -99,12 +98,17 @@ class AxisCauses:
                 found = self._acted_by(controller, record.subject, one, plan)
                 if found is not None:
                     yield found
-            if self._shortened(controller, plan) is not None:
-                going_on = self.motion(controller, record.subject, plan.time, mechanics, plan.order)
-                if going_on is not None:
-                    yield covered(going_on, Cover.MOTION) or going_on
+            yield from self._going_on(controller, plan, mechanics)
 
         return Cause(ChainLink(place.time, controller, text), place, planned, cover, besides)
+
+    def _going_on(self, controller: str, plan: Change, mechanics: str) -> Iterator[Cause]:
+        """The motion that a plan takes no farther."""
+        is_shortened = self._shortened(controller, plan) is not None
+        axis = self._log.record(plan).subject
+        found = self.motion(controller, axis, plan.time, mechanics, plan.order) if is_shortened else None
+        if found is not None:
+            yield found._replace(cover=Cover.MOTION)
 
     def _shortened(self, controller: str, plan: Change) -> Change | None:
         """The plan of the motion under way that another one takes no farther: that ends it, or makes it in another way; None for
@@ -210,8 +214,10 @@ class AxisCauses:
         is_off = power is not None and not self._log.level(self._power_of(axis), until)
         is_unpowered = power is not None and (is_off or motion is None or motion.link.time < power.link.time)
         if power is not None and is_unpowered:
-            plans = self._log.plans_in_force(controller, number, until if is_off else power.link.time)
-            is_unpowered = built.mechanism.build.coasts_unpowered or any(self._end(one)[0] > power.link.time for one in plans)
+            there = self._all if is_off else self._all.of(power.link.time) or self._all
+            plans = there.log.plans_in_force(controller, number, until if is_off else power.link.time)
+            ends = [there.axes._end(one)[0] for one in plans]
+            is_unpowered = built.mechanism.build.coasts_unpowered or any(end > power.link.time for end in ends)
         if event is not None and not (is_unpowered and power is not None and self._is_after(power, event)):
             return self.rotor_event(axis, event)
         if is_unpowered and power is not None:
@@ -464,6 +470,11 @@ class AxisCauses:
         if not profile.segments:
             return plan.time, plan.time
         return math.inf if profile.end is None else profile.end, plan.time
+
+
+def _under_way(axis: str, began: Nanos, planned: Nanos) -> MessageText:
+    """A motion that goes on, in words; ``planned``: when it was planned as it is."""
+    return BEGAN_TO_MOVE(axis=axis) if began == planned else MOTION_CHANGED(axis=axis, time=began / SECOND)
 
 
 def _brakes(profile: Profile) -> bool:
