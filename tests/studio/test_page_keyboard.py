@@ -53,7 +53,7 @@ def test_inputs_registers_time_and_frames(studio: Studio) -> None:
     until(lambda: studio.master.real(studio.master.words(10036, 2)) == 123.0, "the master reads it")
 
     go(page, "Frames")
-    enter(page, "Function code and data (hex)", "05 07 D0 FF 00")
+    enter(page, "Function code and data (hex), or what is read", "05 07 D0 FF 00")
     until(lambda: studio.master.status(1) == 1, "the request has enabled the drive")
 
     go(page, "Time")
