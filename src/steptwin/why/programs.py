@@ -197,7 +197,9 @@ class ProgramCauses:
         found = [cause for one in reads if (cause := self.resource(controller, one, index, here.time, here.order))]
         changed = max((cause for cause in found if cause.place > since), key=lambda cause: cause.place, default=None)
         if changed is not None:
-            return covered(changed, Cover.LEVEL)
+            moves = any(one.kind is ResourceKind.AXIS for one in use.writes)  # when it was executed matters, too
+            led = self._of_statement(controller, index) if moves else None
+            return changed._replace(cover=Cover.LEVEL, along=(*changed.along, *(() if led is None else (led,))))
         return self._of_statement(controller, index) if decided is None else decided
 
     def _executed_before(self, controller: str, index: int) -> Place | None:
