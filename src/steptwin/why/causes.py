@@ -73,7 +73,7 @@ class Causes:
     @property
     def at_begin(self) -> Callable[[], FoundCause]:
         """The end of a chain at the beginning of the log."""
-        return nothing if self.log.is_whole else unknown
+        return nothing if self.log.reaches_begin() else unknown
 
     def change(self, signal: str, change: Change, how: MessageText | None = None) -> Cause:
         """A signal took its value."""

@@ -220,7 +220,7 @@ class ControllerCauses:
         found = acted(act) if act is not None else self._no_supply(controller, event)
         if found is None and supply is not None:
             found = self._all.elements.at_element(supply, event)
-        is_first = event is self._log.begins[controller][0] and self._log.is_whole
+        is_first = event is self._log.begins[controller][0] and self._log.reaches_begin()
         link = ChainLink(event.time, controller, words_of(self._log.record(event)))
         before = nothing if found is None and is_first else lambda: found
         lost = None if supply is None else self._lost(f"{supply}.good", event)
@@ -256,7 +256,7 @@ class ControllerCauses:
             if record.kind == "frame" and self._is_for(controller, record, order):
                 lines = "".join(record.data().decode("ascii", "replace").split(" ")).upper().split("\r")
                 found += [(record, order)] * lines.count(here.location.text.upper())
-        done = executed.locations[:index].count(here.location) if self._log.is_whole else len(found)
+        done = executed.locations[:index].count(here.location) if self._log.reaches_begin() else len(found)
         record, order = found[min(done, len(found) - 1)] if found else (None, 0)
         return None if record is None or order > here.order else covered(self._frame(record, order), Cover.FRAME)
 

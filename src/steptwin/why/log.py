@@ -192,9 +192,8 @@ class CauseLog:
                     self._executes(name, self.begin, location)
             programs.add_hook(self._hook(name, programs))
 
-    @property
-    def is_whole(self) -> bool:
-        """Whether it has everything since the beginning of the world. Where it has not, what was before is lacking."""
+    def reaches_begin(self) -> bool:
+        """Whether it has everything since the beginning of the world; where it has not, what was before is noted as lacking."""
         self.lack()
         return not self.begin
 
@@ -423,7 +422,7 @@ class CauseLog:
     def last_origin(self, controller: str, axis: str, until: Nanos, before: int = LAST) -> Change | None:
         """When an axis last got another coordinate without a motion by a moment, before an order; not at the beginning."""
         found = _last(self.origins.get((controller, axis), ()), until, before)
-        return None if found is None or (self.is_whole and found.time == self.begin) else found
+        return None if found is None or (self.reaches_begin() and found.time == self.begin) else found
 
     def last_begin(self, controller: str, until: Nanos, before: int) -> Change | None:
         """When a program last began anew by a moment, before an order, if it was not there from the beginning: an event of
@@ -496,7 +495,7 @@ class CauseLog:
 
     def is_in_progress(self, executed: Executed) -> bool:
         """Whether a statement was in execution when the log began, after the beginning of the world."""
-        return executed == self.executed[executed.controller][0] and not self.is_whole
+        return executed == self.executed[executed.controller][0] and not self.reaches_begin()
 
     def since(self, signal: str, until: Nanos) -> Nanos | None:
         """Since when a signal has the level of a moment; None: from the beginning."""

@@ -114,7 +114,7 @@ class PresentStates:
             return ()
         if resource.kind is ResourceKind.AXIS:
             motion = self._causes.axes.motion(controller, resource.name, self._at)
-            if motion is None and self._log.is_whole:
+            if motion is None and self._log.reaches_begin():
                 yield ChainLink(self._at, controller, NO_AXIS_HAS_MOVED(time=self._at / SECOND))
             elif motion is not None:
                 yield motion.link
@@ -155,7 +155,11 @@ class PresentStates:
             return DEPENDS_ON(name=resource.name or ANY_PIN())
         written = self._causes.programs.resource(controller, resource, self._log.last_executed(controller, at) + 1, at)
         if written is None:
-            return IS_NOT_SET(name=resource.name, value=value) if self._log.is_whole else IS(signal=resource.name, value=value)
+            return (
+                IS_NOT_SET(name=resource.name, value=value)
+                if self._log.reaches_begin()
+                else IS(signal=resource.name, value=value)
+            )
         return IS_STILL(name=resource.name, value=value, time=written.place.time / SECOND)
 
     def _not_written(self, signal: str) -> _Links:
@@ -172,7 +176,7 @@ class PresentStates:
         if held is not None and not programs.may_write(owner, pin):
             return ()
         if held is not None:
-            yield held.link if held.place.order >= 0 or log.is_whole else replace(held.link, time=at)
+            yield held.link if held.place.order >= 0 or log.reaches_begin() else replace(held.link, time=at)
             by = held.before()
             if by is not None:
                 yield by.link

@@ -312,7 +312,7 @@ class ProgramCauses:
     def _unchanged(self, controller: str, index: int, place: Place) -> Iterator[Cause]:
         """Causes for all that a condition reads and that has had its value from the beginning."""
         time, order, number = place
-        for one in self.use(controller, index).reads if self._log.is_whole else ():
+        for one in self.use(controller, index).reads if self._log.reaches_begin() else ():
             name = f"{controller}.{one.name}"
             if one.name and self.resource(controller, one, index, time, order) is None:
                 is_pin = one.kind is ResourceKind.PIN and self._log.since(name, time) is None
@@ -429,7 +429,7 @@ class ProgramCauses:
                 return self._all.change(signal, change, FILTERED(ms=lasts / MILLISECOND))
             later = change.time
         begin, level = self._log.begin, self._log.first_levels.get(signal, 0.0)
-        if level and self._log.is_whole and (time if later is None else later) - begin < lasts:
+        if level and self._log.reaches_begin() and (time if later is None else later) - begin < lasts:
             return self._all.first(signal, FILTERED(ms=lasts / MILLISECOND))
         last = self._all.last((signal,), time, FILTERED(ms=lasts / MILLISECOND)) if lasts and later is None else None
         return last if last is not None and last.place.time <= time - lasts else None
@@ -454,7 +454,7 @@ class ProgramCauses:
         if change.order < 0:
             is_off = self.supply_off(controller, at) is not None
             text = HELD[ProgramState.SHUT_DOWN if is_off else change.state](where="")
-            is_stopped = self._log.is_whole and not is_off and change.state is ProgramState.STOPPED
+            is_stopped = self._log.reaches_begin() and not is_off and change.state is ProgramState.STOPPED
             link, place = ChainLink(change.time, controller, NOT_STARTED() if is_stopped else text), Place(change.time)
             return Cause(link, place, self._all.at_begin, Cover.LEVEL, partial(self._holding, controller, change))
         where = ""
@@ -494,7 +494,7 @@ class ProgramCauses:
         came = self._all.last((signal,), change.time, before=change.order)
         if came is not None:
             yield covered(came, Cover.LEVEL) or came
-        elif self._log.is_whole:
+        elif self._log.reaches_begin():
             yield Cause(
                 ChainLink(change.time, controller, self._all.state(signal, change.time)), place._replace(number=-1), nothing
             )
@@ -549,7 +549,7 @@ class ProgramCauses:
 
     def _started(self, controller: str) -> FoundCause:
         """The statement that was executed first."""
-        if not self._log.is_whole:
+        if not self._log.reaches_begin():
             return None
         first = self._log.executed[controller][0]
         return Cause(ChainLink(first.time, controller, PROGRAM_STARTED()), Place(first.time, first.order), nothing, Cover.PROGRAM)

@@ -298,7 +298,7 @@ class Why:
         resting = resting or (yield from self._standing(signals, at))
         behind = self._behind(waited, at)
         is_kept = any(self.log.rates.has(name.partition(".")[0]) for name in behind) or self.causes.holding.depends(behind)
-        if is_kept and self.log.is_whole:  # otherwise it is not known what was before
+        if is_kept and self.log.reaches_begin():  # otherwise it is not known what was before
             decides = self._deciding(asked, canonical, at)
             holding = self.causes.holding.of((*decides, *self._awaited(decides, at)), at, None)
             resting = _along(resting, list(holding))
@@ -701,7 +701,7 @@ class Why:
             states = list(present.of([supply])) if supply is not None and since is None else []
             state = PROGRAM_IS(controller=controller, held=held.link.text)
             return self._after(states, (yield from self._answer(controller, at, state, since, first)))
-        if index < 0 and log.is_whole:
+        if index < 0 and log.reaches_begin():
             raise Misuse(NOTHING_EXECUTED_YET(controller=controller, at=at / SECOND))
         if index < 0:
             state = NOTHING_EXECUTED_SINCE(controller=controller, begin=log.begin / SECOND)
@@ -865,7 +865,7 @@ class Why:
 
         def is_whole(moment: Nanos) -> bool:
             there = self.causes.of(moment)
-            return there is not None and there.log.is_whole
+            return there is not None and there.log.reaches_begin()
 
         is_owed = first is None and since is not None
         chain = Chain(effect, Place(at, LAST), first, is_whole=is_whole, is_owed=is_owed)
