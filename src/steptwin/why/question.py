@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -11,7 +10,6 @@ from typing import TypeAlias
 from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message, MessageText
-from steptwin.points import LivePoint
 from steptwin.simulation.kinds.programs import Resource, ResourceKind
 from steptwin.simulation.logic.condition import Signal, SignalCondition
 from steptwin.simulation.logic.expression import deciding, parse_condition
@@ -28,7 +26,8 @@ from steptwin.why.chain import Cause, Chain, FoundCause, Place, covered
 from steptwin.why.controllers import axis_of
 from steptwin.why.lacking import EXECUTED, HAPPENED
 from steptwin.why.lacking import Lacking as Before
-from steptwin.why.log import LAST, MOST_NOTED, OF_MECHANICS, CauseLog, in_parts
+from steptwin.why.log import LAST, MOST_NOTED, CauseLog, in_parts
+from steptwin.why.names import SLIPS, QuestionNames
 from steptwin.why.presentstates import PresentStates
 from steptwin.why.programs import WAITS
 from steptwin.why.replayed import ReplayedSignals, TimeSeries, watch_truth, watch_value
@@ -46,10 +45,6 @@ WHY_NOT = "not "
 LONGEST_AHEAD_NS: Nanos = 60 * SECOND
 """How far ahead it is tried whether a condition becomes true by itself."""
 
-SWITCH = "switch"
-"""The type of a point that is 0 or 1."""
-SLIPS = {"stalled": ("stall",), "lost": OF_MECHANICS}
-"""Signals of an axis that its rotor has, with the events between which they stand."""
 
 Asking: TypeAlias = Generator[None, None, Answer]
 """In parts: after each of them something else can be done, or the question be given up by `close`."""
@@ -145,10 +140,6 @@ DOES_NOT_GO_ON = Message(
 FORM_OF_A_QUESTION = Message(
     "why.form-of-a-question", "a question is a signal, a condition, or a controller: table.OUT3, 'table.OUT3 == 0', table"
 )
-AMBIGUOUS_NAME = Message("why.ambiguous-name", "{name} is of {controllers}: ask with the controller, such as {example}")
-VARIABLE_OF_A_PROGRAM = Message(
-    "why.variable-of-a-program", "{name} is a variable of the program of {controller}: ask about it alone, not in a condition"
-)
 NOTHING_EXECUTED_YET = Message(
     "why.nothing-executed-yet", "{controller} has executed no statement until {at:g} s: ask about one of its signals"
 )
@@ -178,6 +169,7 @@ class Why:
         self.end = end
         self.log = CauseLog(make(), most, before)
         self._others = others
+        self.names = QuestionNames(self.log)
         self.causes = Causes(self.log, others)
         self._on_the_way = StatesOnTheWay(self.log.world)
         self._replayed = ReplayedSignals(make, self._inputs)
@@ -213,9 +205,9 @@ class Why:
         yield from self.running()
         if _without_not(text) in self.log.world.controllers:
             return (yield from self._wait(_without_not(text), moment))
-        if self._is_script(text):
+        if self.names.is_script(text):
             return (yield from self._script(text, moment))
-        variable = self._variable(text)
+        variable = self.names.variable(text)
         if variable is not None:
             return (yield from self._of_variable(text, *variable, moment))
         return (yield from self._condition(text, moment))
@@ -244,26 +236,26 @@ class Why:
             return happened(text)
         if text.startswith(EXECUTED):
             return executed(text)
-        if not text or self._is_script(text):
+        if not text or self.names.is_script(text):
             return None
-        if _without_not(text) in self.log.world.controllers or self._variable(text) is not None:
+        if _without_not(text) in self.log.world.controllers or self.names.variable(text) is not None:
             return None
-        text = self._named(text)
+        text = self.names.named(text)
         names = tuple(dict.fromkeys(parse_condition(text).names()))
         is_bare = len(names) == 1 and text == names[0]
         moving = {name for name in names if not self.log.has(name) and self.log.world.signal(name).continuous}
-        if (is_bare and self._takes_values_between(text)) or "idle" in names:
+        if (is_bare and self.names.takes_values_between(text)) or "idle" in names:
             return None
-        canonical = {name: self._canonical(name) for name in names}
+        canonical = {name: self.names.canonical(name) for name in names}
         edges = frozenset(full for full in canonical.values() if self._has_edges(full))
         # Elements know their signals by the names in the question only.
-        signals = {name: full if full in edges or self._is_signal(full) else name for name, full in canonical.items()}
+        signals = {name: full if full in edges or self.names.is_signal(full) else name for name, full in canonical.items()}
 
         def flip(noted: Mapping[str, TimeSeries], at: Nanos) -> Nanos | None:
             series = {name: noted[signal] for name, signal in signals.items()}
             if is_bare:
                 return points.since(series[text], at)
-            condition = SignalCondition(text, lambda name: _Level(partial(points.level, series[name]), self._unit(name)))
+            condition = SignalCondition(text, lambda name: _Level(partial(points.level, series[name]), self.names.unit(name)))
             times = {time for one in series.values() for time in points.changes(one, -1, at)}
             return _last_flip(condition, times, at)
 
@@ -275,12 +267,12 @@ class Why:
         return self.log.has(signal) or (owner in self.log.world.controllers and pin in self.log.world.controllers[owner].pins())
 
     def _condition(self, text: str, at: Nanos) -> Asking:
-        asked = self._named(text)
+        asked = self.names.named(text)
         found = tuple(dict.fromkeys(parse_condition(asked).names()))
         is_bare = asked == found[0] if len(found) == 1 else False
-        if is_bare and self._takes_values_between(asked):
+        if is_bare and self.names.takes_values_between(asked):
             return (yield from self._moving(asked, at))
-        canonical = {name: self._canonical(name) for name in found}
+        canonical = {name: self.names.canonical(name) for name in found}
         if all(self.log.is_recorded(name) for name in canonical.values()):
             value, since = self._from_log(asked, canonical, at, is_bare=is_bare)
         else:
@@ -330,7 +322,7 @@ class Why:
         def value(name: str) -> float:
             return self.log.level(canonical[name], at)
 
-        node = parse_condition(asked).in_unit("", self._unit)
+        node = parse_condition(asked).in_unit("", self.names.unit)
         parts = deciding(node, value, wanted=not node.value(value))
         return tuple(dict.fromkeys(canonical[name] for one in parts for name in one.names()))
 
@@ -344,23 +336,23 @@ class Why:
         other = yield from self._world_at(at)
         if _without_not(text) in other.programs:
             return (yield from self._going_on(other, _without_not(text), at))
-        condition = self._named(_without_not(text))
-        node = parse_condition(condition).in_unit("", self._unit)
+        condition = self.names.named(_without_not(text))
+        node = parse_condition(condition).in_unit("", self.names.unit)
 
         def value(name: str) -> float:
-            return other.read(name) if self._is_signal(name) else self.log.level(name, at)
+            return other.read(name) if self.names.is_signal(name) else self.log.level(name, at)
 
         if node.value(value):
             return ()
         links: list[ChainLink] = []
         for name in dict.fromkeys(name for one in deciding(node, value, wanted=True) for name in one.names()):
-            full, unit = self._canonical(name), self._unit(name)
+            full, unit = self.names.canonical(name), self.names.unit(name)
             if self.log.is_recorded(full):
                 links += PresentStates(self.causes, other, ALL_LINKS).of([full])
             else:
                 text = IS_IN_UNIT(name=name, value=value(name), unit=unit) if unit else IS_NUMBER(name=name, value=value(name))
                 links.append(ChainLink(at, name.partition(".")[0], text))
-        if all(map(self._is_signal, node.names())):
+        if all(map(self.names.is_signal, node.names())):
             found: list[Nanos] = []
             other.start("why", partial(_note_when, other, condition, found), is_external=True)
             for _ in in_parts(other, (), at + LONGEST_AHEAD_NS):
@@ -375,7 +367,7 @@ class Why:
         """The controllers whose programs are held, and could else have changed what an answer is about since. `asking` comes
         first."""
         text, log, programs = _text_of(answer.question), self.log, self.causes.programs
-        if self._is_script(text) or _without_not(text) in log.world.controllers:
+        if self.names.is_script(text) or _without_not(text) in log.world.controllers:
             return ()
         found: dict[str, None] = {}
         for controller, wanted in self._changeable(text, answer.at):
@@ -389,12 +381,12 @@ class Why:
 
     def _changeable(self, text: str, at: Nanos) -> Iterator[tuple[str, Resource]]:
         """Resources that are asked for and that programs can change, with their controllers: driving outputs, axes, variables."""
-        variable = self._variable(text)
+        variable = self.names.variable(text)
         if variable is not None:
             yield variable[0], Resource(ResourceKind.VALUE, variable[1])
             return
         world = self.log.world
-        names = [self._canonical(name) for name in parse_condition(self._named(_without_not(text))).names()]
+        names = [self.names.canonical(name) for name in parse_condition(self.names.named(_without_not(text))).names()]
         for name in self._behind(names, at):
             owner, _, rest = name.partition(".")
             axis = axis_of(rest)
@@ -433,68 +425,6 @@ class Why:
             yield
         return other
 
-    def _takes_values_between(self, name: str) -> bool:
-        """Whether a quantity changes between events, but not from one level to the other as ``moving`` at the end of a motion."""
-        if self.log.has(name) or not self.log.world.signal(name).continuous:
-            return False
-        if self._is_of_rotor(name) and name.endswith(".stalled"):
-            return False
-        point = self._point(name)
-        return point is None or point.point.type != SWITCH
-
-    def _is_of_rotor(self, name: str) -> bool:
-        """Whether a signal stands between the events of a rotor, also while its axis moves."""
-        owner, _, rest = name.partition(".")
-        return owner in self.log.world.axes and rest in SLIPS
-
-    def _is_coordinate(self, name: str) -> bool:
-        """Whether a signal is the position of an axis as its controller counts it, which is not always that of its motor."""
-        owner, _, rest = name.lower().partition(".")
-        if owner not in self.log.world.controllers or self.log.world.kind(owner).registers is None:
-            return False  # what it counts is never set
-        is_moving = self._is_signal(name) and self.log.world.signal(name).continuous
-        return is_moving and "pos" in rest and not rest.startswith("enc")
-
-    def _point(self, name: str) -> LivePoint | None:
-        """The point of a controller with this name; None for what is none."""
-        owner, _, rest = name.partition(".")
-        world = self.log.world
-        return world.kind(owner).point(world.controller(owner), rest) if owner in world.controllers else None
-
-    def _named(self, text: str) -> str:
-        """The condition with names that leave out their controller in full, where there is only one that has it."""
-        world = self.log.world
-        for name in dict.fromkeys(parse_condition(text).names()):
-            if not self._has(name):
-                having = [controller for controller in world.controllers if self._has(f"{controller}.{name}")]
-                full = [f"{controller}.{name}" for controller in having] or list(self._registers(name))
-                if len(full) > 1:
-                    owners = [one.partition(".")[0] for one in full]
-                    raise Misuse(AMBIGUOUS_NAME(name=name, controllers=" and ".join(owners), example=full[0]))
-                if not full:
-                    self._refuse_variable(name)
-                    world.signal(name)
-                text = re.sub(rf"(?<![\w.$]){re.escape(name)}(?![\w.])", full[0], text)
-        return text
-
-    def _refuse_variable(self, name: str) -> None:
-        """Raises `Misuse` for a variable of a program in a condition: its values are not noted."""
-        variable = self._variable(name)
-        if variable is not None:
-            raise Misuse(VARIABLE_OF_A_PROGRAM(name=name, controller=variable[0]))
-
-    def _variable(self, text: str) -> tuple[str, str] | None:
-        """The controller and the name of a variable of its program; None for what is none. Raises `Misuse` for one of several."""
-        world = self.log.world
-        found = [(name, text.removeprefix(f"{name}.")) for name in world.programs]
-        found = [one for one in found if one[1] in world.programs[one[0]].variables(world.now)]
-        if not found or self._has(text):
-            return None
-        if len(found) > 1:
-            owners = " and ".join(name for name, _ in found)
-            raise Misuse(AMBIGUOUS_NAME(name=text, controllers=owners, example=".".join(found[0])))
-        return found[0]
-
     def _of_variable(self, text: str, controller: str, name: str, at: Nanos) -> Asking:
         """The statement, or somebody, that wrote a variable last."""
         other = yield from self._world_at(at)
@@ -509,51 +439,13 @@ class Why:
         states = [] if came else list(present.disabled(controller, wanted))
         return self._after(states, (yield from self._answer(text, at, state, None if last is None else last.place.time, last)))
 
-    def _registers(self, name: str) -> Iterator[str]:
-        """Meanings of a name of a program language for each controller with a program: ``table.USER_REGISTER[10]:real`` for
-        ``$R10``, also with the controller before it."""
-        owner, dot, rest = name.rpartition(".")
-        for controller, programs in self.log.world.programs.items():
-            point = programs.point(rest) if not dot or controller == owner else None
-            if point is not None and self._is_signal(f"{controller}.{point}"):
-                yield f"{controller}.{point}"
-
-    def _has(self, name: str) -> bool:
-        """Whether there is a signal with this name, or a contact."""
-        return self.log.has(name) or self._is_signal(name)
-
-    def _is_signal(self, name: str) -> bool:
-        try:
-            self.log.world.signal(name)
-        except Misuse:
-            return False
-        return True
-
-    def _unit(self, name: str) -> str:
-        """Contacts have none."""
-        return self.log.world.signal(name).unit if self._is_signal(name) else ""
-
-    def _canonical(self, name: str) -> str:
-        if self.log.has(name):
-            return name
-        owner, _, rest = name.partition(".")
-        world = self.log.world
-        if owner in world.controllers:
-            point = (
-                None
-                if self.log.is_recorded(f"{owner}.{rest.upper()}")
-                else world.kind(owner).point(world.controller(owner), rest)
-            )
-            return f"{owner}.{rest.upper() if point is None else point.point.path}"
-        return f"{owner}.{rest.lower()}"
-
     def _from_log(self, text: str, canonical: dict[str, str], at: Nanos, *, is_bare: bool) -> tuple[float, Nanos | None]:
         """The value at a moment, and when it became so."""
         log = self.log
         if is_bare:
             (name,) = canonical.values()
             return log.level(name, at), log.since(name, at)
-        condition = SignalCondition(text, lambda name: _Level(partial(log.level, canonical[name]), self._unit(name)))
+        condition = SignalCondition(text, lambda name: _Level(partial(log.level, canonical[name]), self.names.unit(name)))
         times = {time for name in canonical.values() for time in log.changes_in(name, -1, at)}
         return float(condition.holds(at)), _last_flip(condition, times, at)
 
@@ -608,14 +500,16 @@ class Why:
                 else:
                     levels[name] = log.level(full, begin)
             else:
-                at_rest = SignalCondition(text, lambda name, levels=levels: _Level(lambda now: levels[name], self._unit(name)))
+                at_rest = SignalCondition(
+                    text, lambda name, levels=levels: _Level(lambda now: levels[name], self.names.unit(name))
+                )
                 self._replayed.remember(text, interval, float(at_rest.holds(begin)))
 
     def _level_in(self, interval: Interval, recorded: Mapping[str, str], watched: Mapping[str, str], name: str) -> Signal:
         """A signal of a condition in an interval."""
         if name in recorded:
-            return _Level(partial(self.log.level, recorded[name]), self._unit(name))
-        return _Level(partial(self._replayed.level, watched[name], interval), self._unit(name))
+            return _Level(partial(self.log.level, recorded[name]), self.names.unit(name))
+        return _Level(partial(self._replayed.level, watched[name], interval), self.names.unit(name))
 
     def _changed(self, signals: Sequence[str], time: Nanos) -> Cause | None:
         """Cause of a change of one of these signals at a moment."""
@@ -647,9 +541,9 @@ class Why:
         if owner not in world.controllers:
             return causes.elements.of_element(owner, rest, time)
         wanted = axis_of(rest)
-        if wanted is None and self._is_signal(signal) and world.signal(signal).continuous:
+        if wanted is None and self.names.is_signal(signal) and world.signal(signal).continuous:
             wanted = Resource(ResourceKind.AXIS, "")
-        if wanted is not None and wanted.kind is ResourceKind.AXIS and self._is_coordinate(signal):
+        if wanted is not None and wanted.kind is ResourceKind.AXIS and self.names.is_coordinate(signal):
             return causes.axes.coordinate(owner, wanted.name or "1", time)
         found = causes.controllers.at_moment(owner, time, wanted, rest)
         if found is None or wanted is None or "vel" not in rest.lower():
@@ -661,17 +555,17 @@ class Why:
         """Cause of a quantity that changes all the time: the motion, or since when it stands."""
         world = self.log.world
         other = yield from self._world_at(at)
-        value, full = other.read(signal), self._canonical(signal)
+        value, full = other.read(signal), self.names.canonical(signal)
         unit = world.signal(signal).unit
         state = IS_IN_UNIT(name=signal, value=value, unit=unit) if unit else IS(signal=signal, value=f"{value:.6g}")
         standing = other.signal(signal)
         is_value = f"{signal} == {value!r}"
-        if isinstance(standing, SignalOf) and (self._is_of_rotor(full) or rest_of(standing, at) is not None):
+        if isinstance(standing, SignalOf) and (self.names.is_of_rotor(full) or rest_of(standing, at) is not None):
             _, since = yield from self._from_run(is_value, {signal: full}, at, is_bare=False)
             since = self.log.before(is_value).since if since is None else since
-            if self._is_of_rotor(full):
+            if self.names.is_of_rotor(full):
                 changed = None if since is None else covered(self._of_unrecorded(full, since), Cover.LEVEL)
-            elif self._point(signal) is None or self._is_coordinate(full):
+            elif self.names.point(signal) is None or self.names.is_coordinate(full):
                 # What left it where it is may have come a moment after it was there.
                 is_moved = full.partition(".")[0] in self.causes.parts and since is not None
                 moment = since if is_moved and since is not None else at
@@ -738,7 +632,7 @@ class Why:
     def _is_held(self, controller: str, resource: Resource, at: Nanos) -> bool:
         """Whether a fault holds a pin, or what drives it: the run without the fault proves it."""
         pin = [f"{controller}.{resource.name}"] if resource.kind is ResourceKind.PIN else []
-        holds = [self.log.hold(name, at) for name in self._behind(pin, at) if self._is_signal(name)]
+        holds = [self.log.hold(name, at) for name in self._behind(pin, at) if self.names.is_signal(name)]
         return any(hold is not None for hold in holds)
 
     def _after(self, states: Sequence[ChainLink], answer: Answer) -> Answer:
@@ -789,7 +683,7 @@ class Why:
             owner, _, rest = name.partition(".")
             drive = self.log.world.axes[owner].spec.drive if owner in self.log.world.axes else (owner, rest)
             axis = axis_of(f"{drive[1]}.")
-            moves = name == f"{owner}.position" or (self._is_signal(name) and self.log.world.signal(name).continuous)
+            moves = name == f"{owner}.position" or (self.names.is_signal(name) and self.log.world.signal(name).continuous)
             controller = self.log.world.controllers.get(drive[0])
             is_only = moves and controller is not None and len(controller.axes) == 1
             number = axis.name or "1" if axis is not None else "1" if is_only else ""
@@ -817,7 +711,9 @@ class Why:
         names = [f"{axis}.{POSITION}" for axis in sorted(owners & set(self.log.world.axes))]
         names += [f"{owner}.{VALUE}" for owner in sorted(owners) if self.log.rates.has(owner)]
         names += [
-            one for one in signals if not self.log.has(one) and self._is_signal(one) and self.log.world.signal(one).continuous
+            one
+            for one in signals
+            if not self.log.has(one) and self.names.is_signal(one) and self.log.world.signal(one).continuous
         ]
         if not names:
             return self._ignored(signals, at)
@@ -838,10 +734,6 @@ class Why:
         if self.log.rates.has(name.partition(".")[0]):
             return self.causes.elements.rate(name.partition(".")[0], at)
         return covered(self._of_unrecorded(name, at), Cover.LEVEL)
-
-    def _is_script(self, name: str) -> bool:
-        """Whether it is the name of a script, and of no signal."""
-        return any(one.name == name for one in self.log.world.spec.scripts) and not self._has(name)
 
     def _script(self, name: str, at: Nanos) -> Asking:
         """Cause for which a script waits: what its condition depends on."""
