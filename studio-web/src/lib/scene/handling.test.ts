@@ -33,10 +33,14 @@ test("jaws meet in the middle when their gripper is closed", () => {
   expect(faces(30)).toEqual([0, 0]);
 });
 
-test("the plate of a nest is below its cells, whose lines are between them", () => {
+test("lines of a nest part its cells, on a plate, or on the body that carries it", () => {
   const its = { name: "tray", cells: [3, 1], pitch: [60, 50], cell: [50, 40] };
   const solids = solidsWith([frame("tray", "nest")], { nests: [its] });
-  expect(Math.max(...solids.map(({ at, size }) => at[2] + size[2] / 2))).toBeCloseTo(0);
+  const bodies = [{ name: "desk", size: [400, 400, 20], diameter: null, height: null }];
+  const carried = solidsWith([{ ...frame("tray", "nest"), on: "desk", at: [0, 0, 20] }], { nests: [its], bodies });
+  expect(lowest(carried)).toBeCloseTo(0);
+  expect(carried).toHaveLength(solids.length - 1);
+  expect(Math.max(...solids.map(({ at, size }) => at[2] + size[2] / 2))).toBeCloseTo(0, 1);
   const lines = solids.filter(({ material, size }) => material === "mark" && size[1] === 40);
   expect(lines.map(({ at }) => at[0])).toEqual([-25, 30, 90, 145]);
 });

@@ -1,6 +1,7 @@
 import type { Element } from "../state/model";
 import { between, Builder, plus, times, unit, type Vector } from "./builder";
 import { directionOf, type Scene } from "./poses";
+import { extentOf } from "./shapes";
 
 /** What takes workpieces, holds them and sees them. */
 
@@ -35,11 +36,11 @@ export function gripper(build: Builder, element: Element): void {
 }
 
 const MOST_LINES = 40;
-/** Above the plate, so that it is seen. */
-const LINE_MM = 0.4;
+/** Lines are so high that they are seen on what carries them, and are below workpieces. */
+const LINE_MM = 0.01;
 
-/** A plate, on which lines part the cells. */
-export function nest(build: Builder, { nests }: Scene): void {
+/** Lines that part the cells, on a plate where they are not on the top face of a body or a turntable. */
+export function nest(build: Builder, { nests, bodies, frames }: Scene): void {
   const its = named(nests, build);
   if (its === undefined) return;
   const bounds = [0, 1].map((k): [number, number, number] => {
@@ -50,7 +51,11 @@ export function nest(build: Builder, { nests }: Scene): void {
   const size = bounds.map(([low, high]) => high - low) as [number, number];
   const thick = between(3, 0.05 * Math.min(...size), 15);
   const rim = 0.4 * thick;
-  build.box([middle[0], middle[1], -thick / 2 - LINE_MM], [size[0] + 2 * rim, size[1] + 2 * rim, thick], "rail");
+  const { on, at } = build.frame;
+  const body = bodies.find(({ name }) => name === on);
+  const isTurned = frames.some(({ name, joints }) => name === on && joints.some(({ turns }) => turns));
+  if ((body === undefined && !isTurned) || (at[2] as number) > extentOf(body)[2])
+    build.box([middle[0], middle[1], -thick / 2], [size[0] + 2 * rim, size[1] + 2 * rim, thick], "rail");
   if ((its.cells[0] as number) + (its.cells[1] as number) > MOST_LINES) return;
   bounds.forEach(([low, high, line], k) => {
     const count = its.cells[k] as number;
@@ -58,8 +63,8 @@ export function nest(build: Builder, { nests }: Scene): void {
       const at = n === 0 ? low : n === count ? high : (n - 0.5) * (its.pitch[k] as number);
       const [place, extent]: [Vector, Vector] =
         k === 0
-          ? [[at, middle[1], -LINE_MM / 2], [line, size[1], LINE_MM]]
-          : [[middle[0], at, -LINE_MM / 2], [size[0], line, LINE_MM]]; // prettier-ignore
+          ? [[at, middle[1], LINE_MM / 2], [line, size[1], LINE_MM]]
+          : [[middle[0], at, LINE_MM / 2], [size[0], line, LINE_MM]]; // prettier-ignore
       build.box(place, extent, "mark");
     }
   });

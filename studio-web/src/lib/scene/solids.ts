@@ -253,13 +253,14 @@ function tool(build: Builder, { drawing }: Element): void {
   }
 }
 
-/** A rod in its guide, with a roller on what lifts it. */
+/** A rod in its guide, with a roller on what lifts it; it ends where what is on it stands. */
 function follower(build: Builder, { drawing }: Element): void {
   const lift = (drawing?.length || 20) * perUnit(build);
   const wide = between(12, 0.4 * lift, 30);
-  build.box([0.4 * lift, 0, 0], [wide, 2 * wide, 2 * wide], "rail");
-  build.rod([0, 0, 0], 0, 2 * lift + wide, 0.7 * wide, "rod", { isCarried: true });
-  build.rod([-lift - wide, 0, 0], 1, 0.6 * wide, 1.2 * wide, "moving", { isCarried: true });
+  const long = lift + wide;
+  build.box([-wide / 2, 0, 0], [wide, 2 * wide, 2 * wide], "rail");
+  build.rod([-long / 2, 0, 0], 0, long, 0.7 * wide, "rod", { isCarried: true });
+  build.rod([-long, 0, 0], 1, 0.6 * wide, 1.2 * wide, "moving", { isCarried: true });
 }
 
 function shaft(build: Builder, known: Known): void {
