@@ -106,6 +106,8 @@ def test_a_pair_that_may_overlap_is_no_warning() -> None:
     text = body("head", "x", "[0, 0, 0]") + body("post", "", "[15, 0, 90]") + body("far", "", "[900, 0, 0]")
     permitted = '[[collision]]\nname = "c"\nall = true\nexcept = [["x", "post"]]\n'
     assert warnings(text + permitted) == []
+    workpieces = permitted.replace('["x", "post"]', '["x", "post"], ["head", "workpieces"]')
+    assert warnings(text + '[[nest]]\nname = "tray"\nat = [0, 0, 470]\nworkpiece = 20\nfilled = 1\n' + workpieces) == []
 
 
 def test_what_moves_without_a_known_end_is_not_judged() -> None:

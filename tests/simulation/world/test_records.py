@@ -86,6 +86,7 @@ def test_by_kind(ran: World) -> None:
 def test_by_name(ran: World) -> None:
     """A controller, an element that is recorded at its controller, what scripts do."""
     assert all(text.startswith("c ") for text in shown(ran, "c"))
+    assert not any(text.startswith(("clamp", "crash")) for text in shown(ran, "a"))
     assert shown(ran, "clamp") == ["clamp      no-air: clamp has no air"]
     assert shown(ran, "crash") == ["crash      crash: parts touch", "crash      crash: apart again"]
     assert shown(ran, "start") == ["a          start: pressed"]

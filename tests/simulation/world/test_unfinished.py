@@ -89,6 +89,17 @@ def test_inputs_that_never_changed() -> None:
     assert unchanged_inputs(world, 0) == []
 
 
+def test_an_input_that_a_program_reads_and_whose_changes_its_filter_takes_away_has_not_changed_for_it() -> None:
+    world = World.from_toml(TEXT, FILES)
+    world.run(for_=0.1)
+    world.press("start", "5 ms")
+    world.run(for_=1)
+    assert "a.IN5 (for less than its filter of 10 ms)" in unchanged_inputs(world, 0)
+    world.press("start", "15 ms")
+    world.run(for_=1)
+    assert unchanged_inputs(world, 0) == []
+
+
 def test_a_variable_is_no_pin_whatever_it_is_called() -> None:
     """`program` is a point of the controller, too, which has nothing to do with the variable of the program."""
     text = '[[mic488]]\nname = "a"\nprogram = "p"\nstart = true\n'

@@ -17,6 +17,7 @@ from steptwin.simulation.components.frames import Frames, bodies_on
 from steptwin.simulation.components.mount import Movement, to_nm
 from steptwin.simulation.components.nest import NEST
 from steptwin.simulation.components.nesttable import NestSpec
+from steptwin.simulation.components.workpieces import WORKPIECES
 from steptwin.simulation.space.bodies import OVERLAP_NM, Body, Box, Placed, contains, gap
 from steptwin.simulation.space.contacts import Pair
 from steptwin.simulation.space.frames import HERE, NM_PER_MM, Frame, Joint, Z, along
@@ -45,6 +46,7 @@ def check_overlaps(text: TomlText, objects: BuiltObjects) -> None:
         frozenset(pair)
         for collision in objects.described.of(COLLISION)
         for one, other in collision.apart_from
+        if WORKPIECES not in (one, other)
         for pair in product(*(bodies_on(frames[name], every, name) for name in (one, other)))
     }
     around = {name: swept(every[name], _present) for name in lasting}

@@ -63,7 +63,7 @@ class Selection:
 
 def names_of(record: TraceRecord) -> Iterator[str]:
     """Names of what a record is about: who reports it, the button or pin of an input, what its facts name."""
-    yield record.controller
+    yield owner_of(record.controller, record.facts)
     if record.kind == "input":
         yield record.subject
     yield from (fact for _, fact in record.facts if isinstance(fact, str))

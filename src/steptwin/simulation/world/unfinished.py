@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import zip_longest
 from typing import NamedTuple
 
-from steptwin.controller import Nanos
+from steptwin.controller import MILLISECOND, Nanos
 from steptwin.diagnostics import visible
 from steptwin.simulation.faults.active import HeldLevel
 from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementLocation
+from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.wiring import Connection, connections
 
@@ -88,9 +90,30 @@ def _drivers(simulation: Simulation) -> dict[str, list[Connection]]:
 
 
 def unchanged_inputs(simulation: Simulation, since: Nanos) -> list[str]:
-    """The inputs of controllers that something drives and that have had one level since a moment, as far as the trace is kept."""
-    changed = {(record.controller, record.subject) for record in simulation.trace.edges() if record.time > since}
-    driven = dict.fromkeys(
-        one.target for one in connections(simulation.objects) if one.target.controller in simulation.controllers
-    )
-    return [str(pin) for pin in driven if (pin.controller, pin.pin) not in changed]
+    """The inputs of controllers that something drives and that have had one level since a moment, as far as the trace is kept;
+    and those that a program reads and whose every change was shorter than their filter."""
+    changes: dict[PinName, list[Nanos]] = {}
+    for record in simulation.trace.edges():
+        if record.time > since:
+            changes.setdefault(PinName(record.controller, record.subject), []).append(record.time)
+    read = set(_read(simulation))
+    found: list[str] = []
+    for pin in dict.fromkeys(one.target for one in connections(simulation.objects)):
+        if pin.controller not in simulation.controllers:
+            continue
+        times = changes.get(pin, [])
+        lasts = simulation.kind(pin.controller).filter_of(simulation.controller(pin.controller), pin.pin)
+        if not times:
+            found.append(str(pin))
+        elif pin in read and all(end - begin < lasts for begin, end in zip_longest(*2 * [iter(times)], fillvalue=simulation.now)):
+            found.append(f"{pin} (for less than its filter of {lasts / MILLISECOND:g} ms)")
+    return found
+
+
+def _read(simulation: Simulation) -> Iterator[PinName]:
+    """The pins that statements of programs read."""
+    for name, programs in simulation.programs.items():
+        for text in programs.texts:
+            for number in range(len(programs.statements(text))):
+                reads = programs.use(StatementLocation(text, number)).reads
+                yield from (PinName(name, one.name) for one in reads if one.kind is ResourceKind.PIN)
