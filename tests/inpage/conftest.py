@@ -22,6 +22,11 @@ SITE_POLICY = POLICY.replace("script-src 'self'", "script-src 'self' 'wasm-unsaf
 class Handler(SimpleHTTPRequestHandler):
     is_newer = False
     """Whether the site has another version than it was built with."""
+    lacks = "nothing"
+    """End of the addresses of files that are not there."""
+
+    def translate_path(self, path: str) -> str:
+        return super().translate_path(f"{path}.lost" if path.endswith(self.lacks) else path)
 
     def do_GET(self) -> None:
         if not (self.is_newer and self.path.endswith("/service.js")):

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, expect
+from pages import PAGES, blocks
+from playwright.sync_api import Browser, FilePayload, Locator, Page, expect
 from pymodbus.client import ModbusTcpClient
 from studio_page import WAIT_MS, button, show
 from tests.inpage.conftest import Handler
@@ -115,17 +116,37 @@ def test_a_wrong_link_is_refused_with_what_is_wrong_in_it(address: str, browser:
         assert page.workers == []
 
     # That of the documentation is read; another one in the same tab takes its place.
-    page.goto(address + of_docs["link"]('[[mic488]]\nname = "zażółć"\n'))
+    page.goto(address + of_docs["link"]('[[mic488]]\nname = "zażółć"\n', {}))
     expect(page.locator("pre")).to_have_text('[[mic488]]\nname = "zażółć"\n')
     context.close()
 
 
-def test_descriptions_of_the_documentation_that_are_whole_have_links(of_docs: dict[str, Any]) -> None:
-    is_whole = of_docs["is_whole"]
-    assert is_whole('[[mic488]]\nname = "table"\n')
-    assert not is_whole('[[mic488]]\nname = "table"\nprogram = "a.prg"\n')  # a file is missing
-    assert not is_whole('[[mic488]]\nname = "table"\n[gateway.mqtt]\n')  # needs a service
-    assert not is_whole('[world]\nname = "empty"\n')
+@pytest.mark.parametrize(
+    ("language", "text", "whole"),
+    [
+        ("toml", '[[mic488]]\nname = "table"\n', [True]),
+        ("toml", '[[mic488]]\nname = "table"\nprogram = "a.prg"\n', [False]),  # a file is missing
+        ("toml", '[[mic488]]\nname = "table"\n[gateway.mqtt]\n', [False]),  # needs a service
+        ("toml", '[world]\nname = "empty"\n', [False]),
+        ("wbc", "NONSENSE\n", [False]),
+        ("text", "F640\n", []),
+        ("sh", "steptwin run examples/worlds/plotter/plotter.toml", [True]),  # with its program and its positions
+        ("sh", "steptwin run examples/worlds/two_stations/two_stations.toml", [False]),  # has a part
+        ("sh", "steptwin run examples/m1486/example2.m1486\nsteptwin check examples/m1486/example2.m1486", [True]),
+    ],
+)
+def test_what_is_whole_in_the_documentation_has_links(
+    of_docs: dict[str, Any], language: str, text: str, whole: list[bool]
+) -> None:
+    assert [of_docs["is_whole"](*world) for _, *world in of_docs["worlds"](language, text)] == whole
+
+
+def test_each_program_of_the_documentation_has_a_link(of_docs: dict[str, Any]) -> None:
+    programs = [block for page in PAGES for block in blocks(page) if block.language in of_docs["AROUND"]]
+    assert len(programs) > 1
+    for block in programs:
+        ((_, *world),) = of_docs["worlds"](block.language, block.code)
+        assert of_docs["is_whole"](*world), f"{block.page}:{block.line}"
 
 
 def test_all_examples_have_the_digests_of_cpython(built: Path, require_node: None) -> None:  # noqa: F811
@@ -161,6 +182,23 @@ def test_a_part_that_the_server_gives_wrongly_is_named(address: str, browser: Br
         page.goto(address)
         expect(page.get_by_role("status").first).to_contain_text(re.compile(rf"could not be loaded: .*/python/{file}: {words}"))
         context.unroute(f"**/{file}")
+    context.close()
+
+
+@pytest.mark.timeout(300)
+def test_a_page_that_could_not_be_stored_says_why_and_can_be_used(
+    address: str,
+    browser: Browser,  # noqa: F811
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(Handler, "lacks", "/licences.txt")  # the page itself does not ask for it
+    context = browser.new_context(locale="en-US")
+    page = context.new_page()
+    page.goto(address)
+    said = page.get_by_text("not offline")
+    expect(said).to_have_attribute("title", re.compile("could not be stored .*/licences.txt: 404"), timeout=LOADING_MS)
+    expect(time_of(page)).to_contain_text("live")
+    assert page.evaluate("caches.keys()") == []
     context.close()
 
 
@@ -276,17 +314,23 @@ def test_a_device_at_a_serial_port_of_the_browser_moves_to_a_target_and_nothing_
 ) -> None:
     page = demo.page
     expect(time_of(page)).to_contain_text("live", timeout=LOADING_MS)
-    twin = serve()
+    config = EXAMPLES / "mic488/pick_and_place.cfg"
+    twin = serve("--config", str(config))
     demo.serial.path = str(twin.pty)
     client = ModbusTcpClient("127.0.0.1", port=twin.tcp_port)
     assert client.connect()
     master = Master(client)
+    master.word(10000, 1)  # values in pulses: only a configuration says how many a unit has
 
     show(page, "Devices")
     button(page, "Choose a serial port…").click()
     address = page.get_by_label("Address of the device")
     expect(address).to_have_value("webserial1")
     address.fill("webserial1,baud=19200,timeout=3")  # bytes go a long way here
+    page.get_by_label("Configuration…").last.set_input_files(
+        FilePayload(name="a, b.cfg", mimeType="", buffer=config.read_bytes())
+    )
+    expect(address).to_have_value("webserial1,baud=19200,timeout=3,config=a__b.cfg")
     address.press("Enter")
     expect(button(page, "Disconnect mic488")).to_be_visible()
     assert demo.serial.bauds == [19200]
@@ -297,16 +341,16 @@ def test_a_device_at_a_serial_port_of_the_browser_moves_to_a_target_and_nothing_
     until(page, lambda: master.status(1) == 1, "the drive is on")
     page.get_by_label("Target mic488 M1").fill("30")
     button(page, "Move mic488 M1 to").click()
-    until(page, lambda: master.sample(1).position == 30.0, "the axis is at its target")
+    until(page, lambda: master.words(10020, 2) == [30 * 80, 0], "the axis is at its target")
     button(page, "Home mic488 M1").click()
     expect(page.get_by_role("alert").last).to_contain_text("need not end by itself")
     assert master.status(1) == 4  # at its target, as before
     jog = button(page, "Jog mic488 M1 +")
     jog.hover()
     page.mouse.down()
-    until(page, lambda: master.sample(1).velocity > 0, "it runs while the button is held")
+    until(page, lambda: master.words(10028, 2) != [0, 0], "it runs while the button is held")
     page.mouse.up()
-    until(page, lambda: master.sample(1).velocity == 0, "it brakes")
+    until(page, lambda: master.words(10028, 2) == [0, 0], "it brakes")
     client.close()
 
     show(page, "Devices")

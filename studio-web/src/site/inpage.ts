@@ -66,6 +66,13 @@ class PythonWorker {
     return new Promise((done, failed) => this.offered.push({ done, failed }));
   }
 
+  /** Gives the name of a configuration file in addresses, which have commas between their options. */
+  async configure(file: File): Promise<string> {
+    const config = `${file.name.replace(/\.cfg$/i, "").replace(/[^\w-]/g, "_")}.cfg`;
+    this.tell({ config, content: new Uint8Array(await file.arrayBuffer()) });
+    return config;
+  }
+
   /** All that is connected to it has lost its connection, and gets no other one. */
   end(): void {
     this.hasFailed = true;
@@ -166,7 +173,11 @@ export class InPage implements Backend {
     return new URL(await pack(found), this.root).href;
   }
 
-  readonly serial = { problem: SerialPorts.problem, choose: () => this.twin.choosePort() };
+  readonly serial = {
+    problem: SerialPorts.problem,
+    choose: () => this.twin.choosePort(),
+    configure: (file: File) => this.twin.configure(file),
+  };
 
   restart(): void {
     const ended = this.twin;

@@ -26,6 +26,8 @@ export type ToWorker =
   | ToPort
   /** A port that the user has chosen, by its number. */
   | { offer: number; what: string }
+  /** A file that the user has chosen, by the name that addresses have for it. */
+  | { config: string; content: Uint8Array }
   | { start: Task; root: string }
   | { open: number }
   | { send: string; on: number }

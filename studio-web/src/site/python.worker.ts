@@ -165,6 +165,7 @@ function take(host: Twin | Editor, message: ToWorker): void {
   if ("port" in message) {
     if (ports !== null) takeFromPort(ports, message);
   } else if ("offer" in message) offer(message.offer, message.what);
+  else if ("config" in message) python?.FS.writeFile(message.config, message.content);
   else if ("open" in message) {
     outgoing.set(message.open, new Outgoing(message.open));
     connections.open(message.open);

@@ -29,11 +29,16 @@ async function store() {
 
 async function add(cache, address, integrity) {
   // A server that is being updated has files of both versions: the digest refuses one of the other.
-  const response = await fetch(address, { integrity, cache: "no-cache" }).catch((error) => {
-    throw new Error(`${address}: ${error.message}`);
+  const response = await fetch(address, { integrity, cache: "no-cache" }).catch(async (error) => {
+    throw new Error(`${address}: ${await whyNot(address).catch(() => error.message)}`);
   });
-  if (!response.ok) throw new Error(`${address}: ${response.status} ${response.statusText}`);
   await cache.put(address, response);
+}
+
+/** Why a file was refused: browsers do not say it. */
+async function whyNot(address) {
+  const { ok, status, statusText } = await fetch(address, { method: "HEAD", cache: "no-store" });
+  return ok ? "it did not come as it was built" : `${status} ${statusText}`;
 }
 
 async function removeOthers() {

@@ -28,6 +28,8 @@ export interface SerialPorts {
   readonly problem: string | null;
   /** Asks the user for one, on a click. Gives its address; null where the user does not want to. */
   choose(): Promise<string | null>;
+  /** Takes a file for the option `config` of addresses. Gives its name there. */
+  configure(file: File): Promise<string>;
 }
 
 /** The studio behind the page: a service, or a worker of the page. What it can do is in its hello, not here. */

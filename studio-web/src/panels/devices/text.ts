@@ -8,6 +8,9 @@ export const t = texts(
     fromPage:
       "A device at a serial port of this computer. From a page an axis moves to a target, by a distance, or as long as a button is held: what would not end by itself is refused, because a page that stands still cannot stop it.",
     choosePort: "Choose a serial port…",
+    configuration: "Configuration…",
+    configurationHelp:
+      "A .cfg of the vendor's tool for the MIC488 at this address. It has the units of the axes; with DATA_TYPE = DINT nothing moves without them.",
     explained:
       "A device is connected by its address. Nothing moves by it. Before the first write its settings are kept in a file.",
     needToken:
@@ -84,6 +87,9 @@ export const t = texts(
     fromPage:
       "Urządzenie na porcie szeregowym tego komputera. Ze strony oś jedzie do celu, o odległość albo tak długo, jak trzymany jest przycisk: co nie skończyłoby się samo, jest odrzucane, bo strona, która stoi, nie może tego zatrzymać.",
     choosePort: "Wybierz port szeregowy…",
+    configuration: "Konfiguracja…",
+    configurationHelp:
+      "Plik .cfg programu producenta dla MIC488 pod tym adresem. Ma jednostki osi; przy DATA_TYPE = DINT bez nich nic się nie rusza.",
     explained:
       "Urządzenie łączy się przez adres. Nic się przy tym nie rusza. Przed pierwszym zapisem ustawienia trafiają do pliku.",
     needToken:
