@@ -73,7 +73,7 @@ def failing(name: str = "guard", at: int | None = 4 * SECOND) -> CaseResult:
             replace(NOMINAL, overdue=(5 * SECOND, "waited for x"), overdues=1),
             FaultEffect.SAFE_STOP,
             "waited for x",
-            "time-out of a script",
+            "wait of a script",
             2.0,
         ),
         (replace(NOMINAL, alarm_ns=7 * SECOND, has_alarm=True, ended=None), FaultEffect.SAFE_STOP, "an alarm", "alarm", 4.0),

@@ -187,6 +187,24 @@ def test_what_was_waited_for_in_vain_is_a_warning(tmp_path: Path) -> None:
     assert told["overdue"] == [{"time_s": 0.5, "what": "hand waited in vain for a.M1.position > 3; a.M1.position is 0 imp"}]
 
 
+def test_the_end_of_a_run_says_what_its_json_says_of_programs(tmp_path: Path) -> None:
+    """A write that is refused counts for --strict; a program that is paused does not wait."""
+    world = tmp_path / "w.toml"
+    (tmp_path / "p.prg").write_text("WAIT IN1 = ON\n")
+    steps = '[{ write = { "a.PROGRAM_CTRL" = 2 } }, { at = "500 ms" }, { write = { "a.OUT1" = 1 } }]'
+    script = f'[[script]]\nname = "hand"\nat = "100 ms"\nsteps = {steps}\n[[fault]]\nkind = "busy"\nfrom_s = 0.4\n'
+    world.write_text(f'[[mic488]]\nname = "a"\nprogram = "p.prg"\nstart = true\n{script}')
+    said = invoke("run", str(world), "--for", "1s", "--strict", code=1)
+    refused = "hand wrote a.OUT1 = 1 in vain: function 5 (05h) refused with exception 06 (device busy)"
+    assert f"warning: at 0.5 s {refused}\n" in said
+    assert "\na is paused at p.prg:1 WAIT IN1 = ON\n" in said
+    told = json.loads(invoke("run", str(world), "--for", "1s", "--json"))
+    assert told["overdue"] == [{"time_s": 0.5, "what": refused}]
+    assert told["waiting"] == [{"who": "a", "state": "paused", "what": "p.prg:1 WAIT IN1 = ON"}]
+    program = told["controllers"]["a"]["program"]
+    assert (program["state"], program["file"], program["line"]) == ("paused", "p.prg", 1)
+
+
 def test_what_is_doubtful_in_files_of_a_world_is_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     world = Path("w.toml")

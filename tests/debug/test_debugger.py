@@ -396,7 +396,7 @@ def test_the_end_of_a_program_is_where_nothing_happens_any_more() -> None:
 def test_a_wait_that_nothing_ends_is_named() -> None:
     debugger = started("n = 1\nWAIT IN1 = 1\nEND\n")
     stop = debugger.run()
-    assert (stop.reason, stop.text) == (StopReason.IDLE, "nothing will happen any more: m in line 2 waits for ever")
+    assert (stop.reason, stop.text) == (StopReason.IDLE, "nothing will happen any more: m waits for ever in line 2")
     debugger.set_value("m", "IN1", "1")
     debugger.step_over("m")
     assert line(debugger) == 3

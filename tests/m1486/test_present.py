@@ -120,13 +120,23 @@ def test_the_pins_of_the_driver_interface_follow_the_pulses() -> None:
     assert len(seen) > 4
 
 
-def test_the_next_command() -> None:
-    """The one at which the program stands; none where it waits for a host."""
+@pytest.mark.parametrize(
+    ("commands", "statement"),
+    [
+        (("w1000", "f64000", "r"), "W1000"),
+        (("z3", "f64000"), "Z3"),
+        (("f64000", "r", "w1000"), "R"),
+        (("f64000", "r", "w1000", "k"), "R"),
+        (("@1", "j1"), "J1"),
+    ],
+)
+def test_the_command_in_progress(commands: tuple[str, ...], statement: str) -> None:
+    """The one at which the program stands, which may come after a jump; none where it waits for a host."""
     bench = Bench()
-    assert state(bench).program.statement is None  # type: ignore[union-attr]
-    bench.file("w1000", "f64000", "r")
-    bench.run(ms=10)
-    assert state(bench).program.statement == "F64000"  # type: ignore[union-attr]
+    assert state(bench).program.statement is None
+    bench.file(*commands)
+    bench.run(ms=50)
+    assert state(bench).program.statement == statement
 
 
 # ---------------------------------------------------------------------- details

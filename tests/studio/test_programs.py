@@ -75,7 +75,7 @@ def test_a_text_of_a_chip_runs_only_while_it_is_what_is_stored() -> None:
     tab = studio.open()
     studio.run(200)
     text = tab.ok("program_text", controller="drum", place="program")
-    assert (text["language"], text["running"], text["line"]) == ("m1486", True, None)
+    assert (text["language"], text["running"], text["line"]) == ("m1486", True, 3)
     for step in (b"k\r", b"\\\r", b"w3000\r"):
         studio.world.apply_input(do.Send("chips", step))
     studio.run(100)

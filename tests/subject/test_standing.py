@@ -10,7 +10,7 @@ from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.files.world import World
 from steptwin.simulation.faults import read
 from steptwin.simulation.script import steps as do
-from steptwin.simulation.script.control import Enable, Move
+from steptwin.simulation.script.control import Enable, Halt, Move
 from steptwin.subject.standing import StandingKind, StandingState
 from steptwin.subject.world import WorldSubject
 
@@ -93,9 +93,39 @@ def test_a_program_that_goes_on_or_has_ended_does_not_wait(tmp_path: Path) -> No
         assert standing(subject, StandingKind.PROGRAM) == []
 
 
-def test_a_wait_says_what_the_pins_are_that_it_reads(tmp_path: Path) -> None:
-    subject, _ = of_a_program(tmp_path, "WAIT IN1 = ON", until_s=2.0)
-    assert [one.text for one in subject.standing()] == ["waits at line 1: WAIT IN1 = ON (IN1 is 0)"]
+def test_a_wait_says_what_is_there_that_it_reads(tmp_path: Path) -> None:
+    for text, said in (
+        ("WAIT IN1 = ON", "WAIT IN1 = ON (a.IN1 is 0, driven by go)"),
+        ("WAIT $I4 = 1", "WAIT $I4 = 1 ($I4 is 0)"),
+        ("WAIT ENC1 > 5", "WAIT ENC1 > 5"),  # where it is changes at any moment: the page shows that beside it
+    ):
+        subject, _ = of_a_program(tmp_path, text, until_s=2.0)
+        assert [one.text for one in subject.standing()] == [f"waits at line 1: {said}"]
+
+
+def test_a_program_that_is_paused_stands_since_then(tmp_path: Path) -> None:
+    subject, _ = of_a_program(tmp_path, "A:\nDELAY 0.7\nJUMP A", until_s=2.0)
+    subject.world.apply_input(Halt("a", program="pause"))
+    subject.world.run_to(4 * SECOND)
+    assert list(subject.standing()) == [
+        StandingState(StandingKind.PROGRAM, "a", "is paused at line 2: DELAY 0.7", 2 * SECOND, "a", 2, "program 0")
+    ]
+
+
+def test_an_alarm_of_a_program_says_where_it_is(tmp_path: Path) -> None:
+    """Of a program that an error stopped, and of one that an input holds."""
+    subject, _ = of_a_program(tmp_path, "n = 0\nx = 1 / n", until_s=2.0)
+    (one,) = subject.standing()
+    assert (one.kind, one.line, one.place) == (StandingKind.ALARM, 2, "program 0")
+    assert one.text.endswith("division by zero, at line 2: x = 1 / n")
+    text = '[[m1486]]\nname = "c"\nprogram = "c"\n[[button]]\nname = "limit"\nto = "c.LIMIT"\ncontact = "NC"\n'
+    world = World.from_toml(text, {"c": b"[\nC51\nG+\nR\nT1\n]\n"})
+    subject = WorldSubject(world)
+    world.run(for_=1.0)
+    world.press("limit")
+    world.run(for_=2.0)
+    (one,) = subject.standing()
+    assert (one.kind, one.text, one.line) == (StandingKind.ALARM, "stopped by LIMIT, at line 5: T1", 5)
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,7 @@ from steptwin.simulation.world.check import diagnose
 from steptwin.simulation.world.inputs import Bytes, Download, Leave, See, SetVariable
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshotlog import PastWorld, SnapshotLog
-from steptwin.simulation.world.unfinished import waiting
+from steptwin.simulation.world.unfinished import unfinished
 from steptwin.simulation.world.views import MechanicsView
 from steptwin.simulation.world.worldprograms import WorldPrograms
 from steptwin.wire.crc import with_crc
@@ -167,7 +167,7 @@ def do_from_outside(world: World, text: str, files: Mapping[str, bytes]) -> None
 
 def shown(world: Simulation) -> list[str]:
     """What a viewer sees of it, and what scripts wait for."""
-    return [f"stopped: {world.stopped}", *seen_of_controllers(world), *(repr(one) for one in waiting(world))]
+    return [f"stopped: {world.stopped}", *seen_of_controllers(world), *(repr(one) for one in unfinished(world))]
 
 
 def seen_of_controllers(world: Simulation) -> list[str]:

@@ -191,7 +191,7 @@ def _detection(facts: RunFacts, nominal: RunFacts) -> tuple[str, Nanos | None]:
     if facts.alarm_ns is not None and nominal.alarm_ns is None:
         found.append((facts.alarm_ns, "alarm"))
     if facts.overdue is not None and facts.overdues > nominal.overdues:
-        found.append((facts.overdue[0], "time-out of a script"))
+        found.append((facts.overdue[0], "wait of a script"))
     expected = _failed(facts.result).get(EXPECTATIONS)
     if expected is not None and expected.at_ns is not None:
         found.append((expected.at_ns, "expectation of a script"))

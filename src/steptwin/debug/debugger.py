@@ -21,11 +21,12 @@ from steptwin.debug.values import Events, FormattedValue, Location, Scope, SetPo
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.messages import Message
-from steptwin.simulation.kinds.programs import Programs, StatementLocation
+from steptwin.simulation.kinds.programs import Programs, ProgramState, StatementLocation
 from steptwin.simulation.world.inputs import ExternalInput
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import SimulationSnapshot
 from steptwin.simulation.world.snapshotlog import SnapshotLog, outside_past
+from steptwin.simulation.world.unfinished import StandingProgram, StandingPrograms
 from steptwin.subject.time import next_due
 from steptwin.why.answer import Answer
 from steptwin.why.pastquestions import PastQuestions
@@ -405,8 +406,15 @@ class Debugger:
     def _why_idle(self) -> str:
         if self.has_ended:
             return "the program has ended"
-        waiting = [f"{name} in line {stack[0].location.line}" for name in self.threads if (stack := self.stack(name))]
-        return f"nothing will happen any more: {' and '.join(waiting)} waits for ever"
+        stand = " and ".join(map(_standing, StandingPrograms(self.view)))
+        return f"nothing will happen any more: {stand}"
+
+
+def _standing(one: StandingProgram) -> str:
+    state = one.stand.state
+    is_over = state is ProgramState.STOPPED
+    text = "waits for ever" if state is ProgramState.RUNS else "runs no program" if is_over else f"is {state.value}"
+    return f"{one.controller} {text} in line {one.line}" if one.line and not is_over else f"{one.controller} {text}"
 
 
 def _finished(travel: Generator[None, None, T]) -> T:

@@ -52,7 +52,7 @@ def _variables(world: Simulation, controller: str) -> Iterator[FormattedValue]:
 
 
 def _axes(world: Simulation, controller: str) -> Iterator[FormattedValue]:
-    for axis in world.kind(controller).state(world.controller(controller), world.now).axes:
+    for axis in world.state_of(controller).axes:
         yield from _axis(axis)
 
 
@@ -84,7 +84,7 @@ def _pins(world: Simulation, controller: str) -> Iterator[FormattedValue]:
 
 
 def _controller(world: Simulation, controller: str) -> Iterator[FormattedValue]:
-    state = world.kind(controller).state(world.controller(controller), world.now)
+    state = world.state_of(controller)
     yield FormattedValue("time", f"{world.now / 1e9:.9f} s", world.now / 1e9)
     yield _status("status", state.status)
     yield FormattedValue("program", state.program.text)

@@ -51,7 +51,7 @@ class WorldRunOptions(OptionGroup):
         str | None,
         Option("Of a recording: continue from this moment, such as 2.5s. Default: its end.", metavar="TIME", flags=("--from",)),
     ] = None
-    strict: Annotated[bool, Option("Exit code 1 also for a wait that timed out.")] = False
+    strict: Annotated[bool, Option("Exit code 1 also for a wait that timed out, and a write that was refused.")] = False
     allow_outside: Annotated[bool, Option("Permit files outside the folder of the description.")] = False
 
     @property

@@ -290,11 +290,13 @@ def _ending(watch: RunWatch, ending: Ending) -> str:
     place = current_line(watch.device)
     if place is None:
         return "ended at the time limit"
+    is_paused = watch.device.program.state is ProgramState.PAUSED
     if ending.why == "waiting":
         moving = [f"M{axis.number}" for axis in watch.device.axes if axis.profile.moving(ending.at)]
         meanwhile = f", while {' and '.join(moving)} {'moves' if len(moving) == 1 else 'move'} on" if moving else ""
-        return f"the program waits for ever in line {place.line}: {place.text}{meanwhile}"
-    return f"ended at the time limit (--for sets a longer one) in line {place.line}: {place.text}"
+        return f"the program {'is paused' if is_paused else 'waits for ever'} in line {place.line}: {place.text}{meanwhile}"
+    paused = ", paused" if is_paused else ""
+    return f"ended at the time limit (--for sets a longer one){paused} in line {place.line}: {place.text}"
 
 
 def _data(ran: WbcRunResult, *, wrong: bool) -> dict[str, object]:

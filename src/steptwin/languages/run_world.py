@@ -36,14 +36,14 @@ from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.records import PROGRAM, Selection, describe, is_shown, named_in, read_selection
 from steptwin.simulation.world.references import check_step
-from steptwin.simulation.world.unfinished import unchanged_inputs, waiting
+from steptwin.simulation.world.unfinished import changes_of_pins, unchanged_inputs, unfinished, without_program
 
 USUAL_LIMIT_NS: Nanos = 60 * SECOND
 RECORDING = "session.json"
 INTERRUPTED = "Ctrl-C"
 JSON_VERSION = 1
-MOST_WAITS = 20
-"""So many waits, and inputs that never changed, are printed."""
+MOST_STANDING = 20
+"""So many things that stand still, and inputs that never changed, are printed."""
 
 Print = Callable[[str], None]
 
@@ -119,6 +119,7 @@ def _run_and_report(
     began = world.now
     before = filter(is_shown, world.trace) if began else ()  # what happens at power-on is part of the run
     known = Counter(record.controller for record in before)
+    pins = changes_of_pins(world)
     _arrange(world, options)
     properties = watch_together([read_property(text) for text in options.properties], world)
     selection = read_selection(options.shown.of, options.shown.show, named_in(world.objects))
@@ -144,7 +145,7 @@ def _run_and_report(
         _json(world, outcome, out)
     else:
         _print_happened(world, outcome, watches, selection, out)
-        _print_end(world, outcome, selection, out)
+        _print_end(world, outcome, selection, pins, out)
     for text in tables:
         out(f"\n{text}")
     report_causes(world, options.questions, out)
@@ -282,7 +283,8 @@ def _print_failures(world: World, out: Print) -> None:
         out(f"{world.failures.more} more expectations failed")
 
 
-def _print_end(world: World, outcome: WorldRunResult, selection: Selection, out: Print) -> None:
+def _print_end(world: World, outcome: WorldRunResult, selection: Selection, pins: Counter[str], out: Print) -> None:
+    """``pins``: how often they had changed when the run began."""
     out("")
     for name, axis in world.axis.items():
         lost = f"   {axis.lost} pulses lost" if axis.lost else ""
@@ -308,7 +310,7 @@ def _print_end(world: World, outcome: WorldRunResult, selection: Selection, out:
         time = f"{(world.now - outcome.began) / SECOND:g} s"
         out(f"warning: waited {time} in vain for {world.told(outcome.in_vain)}")
     if outcome.reason is None or world.failures or world.overdue:
-        _print_unfinished(world, outcome.began, selection, out)
+        _print_unfinished(world, pins, selection, out)
     for path in outcome.written:
         out(f"wrote {path}")
     out(f"digest {outcome.digest}")
@@ -321,22 +323,23 @@ def _verdict_text(verdict: Verdict) -> str:
     return f"property violated{at}, robustness {verdict.robustness:.4g}: {verdict.name}: {verdict.why}"
 
 
-def _print_unfinished(world: World, began: Nanos, selection: Selection, out: Print) -> None:
+def _print_unfinished(world: World, pins: Counter[str], selection: Selection, out: Print) -> None:
     """Print what stands still: usually that is why something did not happen."""
-    waits = [one for one in waiting(world) if one.who not in world.controllers or selection.takes_of(one.who)]
-    for one in waits[:MOST_WAITS]:
-        out(f"{one.who} waits for {one.what}")
-    if len(waits) > MOST_WAITS:
-        out(f"{len(waits) - MOST_WAITS} more wait")
-    unchanged = [pin for pin in unchanged_inputs(world, began) if selection.takes_of(pin.partition(".")[0])]
+    found = [*unfinished(world), *without_program(world)]
+    stand = [one for one in found if one.who not in world.controllers or selection.takes_of(one.who)]
+    for one in stand[:MOST_STANDING]:
+        out(str(one))
+    if len(stand) > MOST_STANDING:
+        out(f"{len(stand) - MOST_STANDING} more stand still")
+    unchanged = [pin for pin in unchanged_inputs(world, pins) if selection.takes_of(pin.partition(".")[0])]
     if unchanged:
-        shown = ", ".join(unchanged[:MOST_WAITS])
-        more = f" and {len(unchanged) - MOST_WAITS} more" if len(unchanged) > MOST_WAITS else ""
+        shown = ", ".join(unchanged[:MOST_STANDING])
+        more = f" and {len(unchanged) - MOST_STANDING} more" if len(unchanged) > MOST_STANDING else ""
         out(f"inputs that never changed: {shown}{more}")
 
 
 def _states(world: World) -> dict[str, ControllerState]:
-    return {name: world.kind(name).state(controller, world.now) for name, controller in world.controllers.items()}
+    return {name: world.state_of(name) for name in world.controllers}
 
 
 def _json(world: World, outcome: WorldRunResult, out: Print) -> None:
@@ -362,7 +365,7 @@ def _json(world: World, outcome: WorldRunResult, out: Print) -> None:
             for one in outcome.verdicts
         ],
         "measures": outcome.measures,
-        "waiting": [one._asdict() for one in waiting(world)],
+        "waiting": [one._asdict() for one in unfinished(world)],
         "overdue": [{"time_s": late.time / SECOND, "what": late.value} for late in world.overdue],
         "axes": {
             name: {"position": axis.position, "unit": axis.unit, "lost_pulses": axis.lost, "stalled": axis.stalled}

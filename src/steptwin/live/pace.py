@@ -276,8 +276,8 @@ class Pace:
     def _statements(self) -> dict[str, str]:
         """The current statements of running and paused programs, by controller."""
         world = self._live.world
-        found = {name: world.kind(name).statement(controller) for name, controller in world.controllers.items()}
-        return {name: text for name, text in found.items() if text is not None}
+        programs = {name: world.state_of(name).program for name in world.controllers}
+        return {name: f"line {one.line}: {one.statement}" for name, one in programs.items() if one.line is not None}
 
     def _save(self, wanted: command.Save) -> object:
         path = Path(wanted.file)

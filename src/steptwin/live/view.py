@@ -101,7 +101,7 @@ class LiveView:
     def _controller(self, name: str, width: int) -> list[Text]:
         world = self._live.world
         kind, controller = world.kind(name), world.controllers[name]
-        return controller_lines(name, kind.state(controller, world.now), kind.datasheet(controller), width)
+        return controller_lines(name, world.state_of(name), kind.datasheet(controller), width)
 
     def _axes(self) -> list[list[Text]]:
         """The positions of loads that can differ from the counts of their drives."""

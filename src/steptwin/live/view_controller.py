@@ -33,12 +33,12 @@ def controller_lines(name: str, state: ControllerState, sheet: Datasheet, width:
 
 
 def _program(program: StateProgram) -> Text:
-    """The current place in the program if known, else the next statement."""
+    """The current place in the program if known, else the statement that is executed or comes next."""
     if program.file is not None and program.state is not None:
         where = f"{Path(program.file).name}:{program.line}  {program.statement}"
         return Text(f"program {program.state.value}, {where}", style="cyan")
-    following = "" if program.statement is None else f"   next: {program.statement}"
-    return Text(f"program {program.text}{following}", style="dim" if program.statement is None else "cyan")
+    statement = "" if program.statement is None else f"   at: {program.statement}"
+    return Text(f"program {program.text}{statement}", style="dim" if program.statement is None else "cyan")
 
 
 def _axis(axis: StateAxis, described: AxisDescription, columns: int) -> Text:

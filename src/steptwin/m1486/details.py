@@ -11,20 +11,10 @@ from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.commands import TABLE
 from steptwin.m1486.commanduse import Setting
 from steptwin.m1486.drive import ChipDrive
-from steptwin.m1486.encoding import decode
 from steptwin.m1486.functions import CARRY, FUNCTIONS, USER_FLAGS
 from steptwin.m1486.microsteps import UNIT
 from steptwin.m1486.registers import GENERAL
-from steptwin.m1486.syntax import ChipCommand
 from steptwin.tables import complete
-
-
-def next_command(chip: M1486Chip) -> ChipCommand | None:
-    """The next command of the program; None at the end of the memory in use."""
-    if chip.program.pc == chip.memory.end:
-        return None
-    stored = decode(chip.memory.fetch(chip.program.pc))
-    return None if stored is None else stored.command
 
 
 def used_bits(chip: M1486Chip) -> int:

@@ -14,11 +14,13 @@ from steptwin.controllerstate import (
 from steptwin.datasheet import AxisDescription, Datasheet
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.datasheet import datasheet
-from steptwin.m1486.details import DETAILS, next_command
+from steptwin.m1486.details import DETAILS
 from steptwin.m1486.drive import MotionMode
+from steptwin.m1486.encoding import decode
 from steptwin.m1486.microsteps import FULL_STEP
 from steptwin.m1486.pins import LINE_PINS
 from steptwin.m1486.program import WaitReason
+from steptwin.m1486.syntax import ChipCommand
 
 _MOTIONS = {MotionMode.MOVE: "move", MotionMode.ENDLESS: "endless move", MotionMode.SEEK: "seek"}
 
@@ -36,9 +38,18 @@ def describe_program(chip: M1486Chip, now: Nanos) -> str:
         return f"waits for the end of the {_MOTIONS.get(chip.drive.motion, 'motion')}"
     if program.waiting is WaitReason.LINE:
         return f"waits until B{program.line} is {'high' if program.line_level else 'low'}"
-    if program.ready - now > program.statement_ns:
+    if program.in_progress(now) is not None:
         return f"waits {(program.ready - now) / SECOND:.3f} s more"
     return "has nothing to do" if program.is_at_end else "runs"
+
+
+def present_command(chip: M1486Chip, now: Nanos) -> ChipCommand | None:
+    """The command of the program that is in progress, or else comes next; None at the end of the memory in use."""
+    place = chip.program.in_progress(now)
+    if place is None and chip.program.pc == chip.memory.end:
+        return None
+    stored = decode(chip.memory.fetch(chip.program.pc if place is None else place))
+    return None if stored is None else stored.command
 
 
 def velocity(chip: M1486Chip, now: Nanos) -> float:
@@ -52,7 +63,7 @@ def _activity(chip: M1486Chip, now: Nanos) -> ProgramActivity:
         return ProgramActivity.STOPPED
     if program.is_held:
         return ProgramActivity.PAUSED
-    if program.waiting is not WaitReason.NOTHING or program.ready - now > program.statement_ns:
+    if program.in_progress(now) is not None:
         return ProgramActivity.WAITING
     return ProgramActivity.STOPPED if program.is_at_end else ProgramActivity.RUNNING
 
@@ -71,11 +82,11 @@ class M1486State(StateReader[M1486Chip]):
         return StateStatus(text="ok")
 
     def program(self, chip: M1486Chip, now: Nanos) -> StateProgram:
-        following = next_command(chip)
+        command = present_command(chip, now)
         return StateProgram(
             state=_activity(chip, now),
             text=describe_program(chip, now),
-            statement=None if following is None else str(following),
+            statement=None if command is None else str(command),
             variables={},
         )
 

@@ -76,6 +76,7 @@ class ProgramExecution(Stateful):
         "loop_counts",
         "loop_starts",
         "pc",
+        "place",
         "ready",
         "waiting",
     )
@@ -94,6 +95,8 @@ class ProgramExecution(Stateful):
         """The earliest moment of the next command; a reset ends a wait."""
         self.began: Nanos
         """When the last command began that did more than compute."""
+        self.place: int
+        """Where that command lies."""
         self.loop_starts: list[int]
         self.loop_counts: list[int]
         self.back: int | None
@@ -101,7 +104,7 @@ class ProgramExecution(Stateful):
 
     def reset(self, now: Nanos) -> None:
         """As after power-up, with an empty memory."""
-        self.pc = 0
+        self.pc = self.place = 0
         self.ready = self.began = now
         self.is_killed = False
         self.is_limited = False
@@ -126,6 +129,10 @@ class ProgramExecution(Stateful):
     def is_at_end(self) -> bool:
         """Whether no command is left; the present one may still wait."""
         return self.pc == self._chip.memory.end and self.waiting is WaitReason.NOTHING
+
+    def in_progress(self, now: Nanos) -> int | None:
+        """The place of the command that is not over: it waits, or takes time."""
+        return self.place if self.waiting is not WaitReason.NOTHING or self.ready - now > self.statement_ns else None
 
     def deadline(self, now: Nanos) -> Nanos | None:
         if self.waiting is not WaitReason.NOTHING or self.pc == self._chip.memory.end or self.is_held:
@@ -220,6 +227,7 @@ class ProgramExecution(Stateful):
             hook(now, place)
         self._pass(now, 1)
         self.began = now
+        self.place = place
         self.pc = compiled.following
         try:
             self.pc = compiled.effect(now)

@@ -58,12 +58,6 @@ def current_line(device: Mic488Device) -> SourceLine | None:
     )
 
 
-def statement_of(device: Mic488Device) -> str | None:
-    """The statement as text: its line and its source."""
-    line = current_line(device)
-    return None if line is None else f"line {line.line}: {line.text}"
-
-
 def empty_banks(name: str, device: Mic488Device) -> list[str]:
     """Reason and remedy for ERR at power-on, as on the device: the configuration starts a program whose bank is empty."""
     bank, table = device.config.program.prog_bank, device.config.program.pos_bank

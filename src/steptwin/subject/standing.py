@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import enum
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.controllerstate import ProgramActivity, StatusLevel
-from steptwin.diagnostics import visible
 from steptwin.jsonvalues import Moment, Sentence
 from steptwin.messages import Message, MessageText, text_of
 from steptwin.simulation.components.element import Stands
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.faults import ActiveFault, Layer
-from steptwin.simulation.kinds.programs import ResourceKind, Wait
+from steptwin.simulation.kinds.programs import ProgramState
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.world.simulation import Simulation
+from steptwin.simulation.world.unfinished import StandingProgram, StandingPrograms
 from steptwin.simulation.world.wiring import connections
 
 LEAST_NS: Nanos = SECOND
@@ -27,6 +27,7 @@ LEAST_NS: Nanos = SECOND
 
 class StandingKind(enum.Enum):
     PROGRAM = "program"
+    """It waits or is paused."""
     ALARM = "alarm"
     """The status of a controller."""
     AXIS = "axis"
@@ -51,8 +52,23 @@ class StandingState:
 WAITS_AT = Message("subject.waits-at", "waits at line {line}: {statement}")
 ALARM_WITH_PROGRAM = Message("subject.alarm-with-program", "{status}; the program is {program}")
 FAULT_IS_SET = Message("subject.fault-is-set", "fault {fault}")
-WITH_LEVELS = Message("subject.waits-with-levels", "{text} ({levels})")
-LEVEL_IS = Message("subject.level-is", "{name} is {level:g}")
+WITH_LEVELS = Message("subject.waits-with-levels", "{text} ({levels:; })")
+PAUSED_AT = Message("subject.paused-at", "is paused at line {line}: {statement}")
+ALARM_AT = Message("subject.alarm-at", "{status}, at line {line}: {statement}")
+
+
+_TOLD = {ProgramState.RUNS: WAITS_AT, ProgramState.PAUSED: PAUSED_AT}
+"""Otherwise its controller has a status that says what holds it, or the program is over."""
+
+
+def _waiting(programs: Iterable[StandingProgram]) -> Iterator[StandingState]:
+    """Programs that wait or are paused, where it is known since when."""
+    for one in programs:
+        stand, name = one.stand, one.controller
+        if stand.state in _TOLD and stand.location is not None and stand.since is not None:
+            text: MessageText = _TOLD[stand.state](line=one.line, statement=one.statement)
+            text = WITH_LEVELS(text=text, levels=list(one.levels)) if one.levels else text
+            yield StandingState(StandingKind.PROGRAM, name, text, stand.since, name, one.line, stand.location.text)
 
 
 class Standing:
@@ -60,6 +76,7 @@ class Standing:
 
     def __init__(self, world: Simulation) -> None:
         self._world = world
+        self._programs = StandingPrograms(world)
         self._changed: dict[str, Nanos] = {}
         """By a pin or terminal (``table.OUT1``), a controller or its axis (``table.M1``): its last edge or event."""
         self._around = defaultdict[str, set[str]](set)
@@ -84,30 +101,13 @@ class Standing:
     def states(self) -> Iterator[StandingState]:
         """Those of now: first what is wrong, then what waits."""
         now = self._world.now
-        found = [*self._faults(), *self._controllers(now), *self._elements(now), *self._waits(now)]
+        programs = {one.controller: one for one in self._programs}
+        found = [*self._faults(), *self._controllers(now, programs), *self._elements(now), *_waiting(programs.values())]
         return (one for one in found if one.since_ns is None or now - one.since_ns >= LEAST_NS or one.kind is StandingKind.FAULT)
 
-    # ------------------------------------------------------------------ programs and controllers
+    # ------------------------------------------------------------------ controllers
 
-    def _waits(self, now: Nanos) -> Iterator[StandingState]:
-        for name, programs in self._world.programs.items():
-            self._world.sync(name)
-            wait = programs.wait(now)
-            if wait is not None:
-                yield self._waiting(name, wait, now)
-
-    def _waiting(self, name: str, wait: Wait, now: Nanos) -> StandingState:
-        programs, (place, number) = self._world.programs[name], wait.location
-        statement = programs.statements(place)[number]
-        words = visible(programs.texts[place].text[statement.start : statement.end].strip())
-        text: MessageText = WAITS_AT(line=statement.line, statement=words)
-        reader, controller = self._world.kind(name).state, self._world.controller(name)
-        pins = [one.name for one in programs.use(wait.location).reads if one.kind is ResourceKind.PIN and one.name]
-        if pins:
-            text = WITH_LEVELS(text=text, levels=[LEVEL_IS(name=pin, level=reader.pin(controller, pin, now)) for pin in pins])
-        return StandingState(StandingKind.PROGRAM, name, text, wait.since, name, statement.line, place)
-
-    def _controllers(self, now: Nanos) -> Iterator[StandingState]:
+    def _controllers(self, now: Nanos, programs: Mapping[str, StandingProgram]) -> Iterator[StandingState]:
         for name, controller in self._world.controllers.items():
             self._world.sync(name)
             reader = self._world.kind(name).state
@@ -120,7 +120,11 @@ class Standing:
                 )
                 has_point = any(one.path == "status" for one in reader.datasheet(controller).points)
                 question = f"{name}.status" if has_point else name
-                yield StandingState(StandingKind.ALARM, name, text, self._since(now, name), question)
+                held, line, place = programs.get(name), None, None
+                if held is not None and held.stand.location is not None and held.stand.state not in _TOLD:
+                    line, place = held.line, held.stand.location.text
+                    text = ALARM_AT(status=text_of(text), line=line, statement=held.statement)
+                yield StandingState(StandingKind.ALARM, name, text, self._since(now, name), question, line, place)
             for axis in reader.datasheet(controller).axes:
                 found = reader.axis(controller, axis, now).status
                 if found.level is not StatusLevel.OK:

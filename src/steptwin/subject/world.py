@@ -192,7 +192,7 @@ class WorldSubject:
 
     def _stop(self, wanted: StopAxes) -> object:
         self._control(wanted)
-        state = self.world.kind(wanted.controller).state(self.world.controller(wanted.controller), self.world.now)
+        state = self.world.state_of(wanted.controller)
         return {"program": None if state.program.state is None else state.program.state.value}
 
     def _stop_all(self) -> object:
@@ -253,12 +253,9 @@ class WorldSubject:
         return levels if failing is None else {**levels, **{pin: held.level for pin, held in failing.held()}}
 
     def _state(self, wanted: command.ReadState) -> object:
-        controller = self.world.controller(wanted.controller)
-        self.world.sync(wanted.controller)
-        reader = self.world.kind(wanted.controller).state
         if wanted.parts is not None:
-            return reader.parts(controller, self.world.now, wanted.parts)
-        return to_json(reader(controller, self.world.now))
+            return self.world.parts_of(wanted.controller, wanted.parts)
+        return to_json(self.world.state_of(wanted.controller))
 
     def _encoders(self, wanted: command.Encoders) -> object:
         encoders = self.world.encoders(wanted.controller)

@@ -490,10 +490,13 @@ class Interpreter(Stateful):
         """The loop in which nothing can change, and whose passes are therefore not executed one by one."""
         return None if self.waiting else self._resting
 
+    def waits(self, now: Nanos) -> bool:
+        """Whether the step in execution waits, for a condition or for the end of a DELAY."""
+        return self.running and self.resting_loop is None and (self.waiting or self.not_before > now)
+
     def waits_since(self, now: Nanos) -> Nanos | None:
-        """Since when the step in execution waits, for a condition or for the end of a DELAY; None if it does not, or if that is
-        not known, as of a DELAY that an interrupt was in."""
-        if self.began is None or self.resting_loop is not None or not (self.running and (self.waiting or self.not_before > now)):
+        """Since when the step in execution waits; None if that is not known, as of a DELAY that an interrupt was in."""
+        if self.began is None or not self.waits(now):
             return None
         step, since = self.began
         return since if step == self.place(now) else None

@@ -10,7 +10,7 @@ from typing import TypeAlias
 from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message, MessageText
-from steptwin.simulation.kinds.programs import Resource, ResourceKind
+from steptwin.simulation.kinds.programs import ProgramState, Resource, ResourceKind
 from steptwin.simulation.logic.condition import Signal, SignalCondition
 from steptwin.simulation.logic.expression import deciding, parse_condition
 from steptwin.simulation.logic.signal import SignalOf
@@ -401,12 +401,12 @@ class Why:
     def _going_on(self, other: Simulation, controller: str, at: Nanos) -> Lacking:
         """When a program that waits goes on by itself."""
         programs = other.programs[controller]
-        wait, depth, found = programs.wait(at), programs.depth(), list[Nanos]()
-        if wait is None:
+        stand, depth, found = programs.stand(at), programs.depth(), list[Nanos]()
+        if stand is None or stand.state is not ProgramState.RUNS:
             return ()
 
         def hook(now: Nanos, number: int) -> None:
-            if programs.depth() <= depth and programs.location(number) != wait.location:
+            if programs.depth() <= depth and programs.location(number) != stand.location:
                 found.append(now)
 
         programs.add_hook(hook)

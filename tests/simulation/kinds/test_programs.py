@@ -138,8 +138,8 @@ def test_pins_have_their_levels_before_the_first_statement() -> None:
     texts = {"m.prg": b"WAIT IN1 = ON\nOUT1 = ON\n", "c.m1486": b"[\nO3\nT5\nC5\n]\n"}
     world = World.from_toml(WORLD + buttons, texts)
     world.run_to(SECOND)
-    waits = [programs.wait(world.now) for programs in world.programs.values()]
-    assert [(wait.location.text, wait.location.number) for wait in waits if wait] == [("program 0", 0), ("program", 0)]
+    stands = [programs.stand(world.now) for programs in world.programs.values()]
+    assert [stand and stand.location for stand in stands] == [("program 0", 0), ("program", 0)]
 
 
 def test_calls_come_back_and_loops_do_not() -> None:

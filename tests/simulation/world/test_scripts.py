@@ -307,6 +307,41 @@ def test_a_write_without_an_answer_is_told_and_the_script_goes_on() -> None:
     assert world.overdue[0].time == SECOND
 
 
+@pytest.mark.parametrize("line", ["", 'line = "bus"'], ids=["no line", "line"])
+@pytest.mark.parametrize("timing", ["off", "real"])
+def test_a_write_that_is_refused_is_told_and_the_script_goes_on(line: str, timing: str) -> None:
+    """Of the values of a step those for the controllers of which one refused."""
+    world = World.from_toml(
+        f"""
+        [[line]]
+        name = "bus"
+        timing = "{timing}"
+        [[mic488]]
+        name = "b"
+        line = "bus"
+        unit = 9
+        [[mic488]]
+        name = "a"
+        {line}
+        [[fault]]
+        kind = "busy"
+        address = "3"
+        [[script]]
+        name = "operator"
+        steps = [
+          {{ write = {{ "a.USER_REGISTER[2]" = 1, "a.USER_REGISTER[3]" = 2 }} }},
+          {{ write = {{ "a.OUT1" = 1, "b.OUT1" = 1 }} }},
+          {{ note = "after" }},
+        ]
+        """
+    )
+    world.run(for_=1)
+    (late,) = world.overdue
+    refused = "function 6 (06h) refused with exception 06 (device busy)"
+    assert late.value == f"operator wrote a.USER_REGISTER[2] = 1, a.USER_REGISTER[3] = 2 in vain: {refused}"
+    assert [record.value for record in world.trace.events("world")] == [late.value, "after"]
+
+
 @pytest.mark.parametrize("moment", [0.0, 0.001, 0.004, 0.0123, 0.02, 0.0301])
 def test_a_snapshot_between_requests_and_answers_changes_nothing(moment: float) -> None:
     steps = '{ write = { "a.M1_EN" = 1, "b.M1_EN" = 1, "a.M1_POS_ABS" = 3 } }, { until = "a.M1.status == 4" }'

@@ -22,8 +22,7 @@ class ControllerView:
     @property
     def state(self) -> ControllerState:
         """Status, program, axes, pins and details."""
-        self._sync()
-        return self._world.kind(self.name).state(self._world.controllers[self.name], self._world.now)
+        return self._world.state_of(self.name)
 
     @property
     def pins(self) -> Mapping[str, float]:

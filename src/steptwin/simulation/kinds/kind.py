@@ -12,6 +12,7 @@ from string import digits
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar
 
 from steptwin.controller import ControllerEvent, Nanos
+from steptwin.controllerstate import ControllerState
 from steptwin.errors import Misuse, Refusal
 from steptwin.messages import Message
 from steptwin.motioncontroller import MotionController
@@ -136,6 +137,10 @@ class RunningWorld(Protocol):
 
     def kind(self, name: str, /) -> AnyKind:
         """The kind of a controller."""
+        ...
+
+    def state_of(self, name: str, /) -> ControllerState:
+        """The present state of a controller."""
         ...
 
     def sync(self, name: str, /) -> Scheduler:
@@ -437,10 +442,6 @@ class ControllerKind(OptionalMethods, ABC, Generic[S, M, V]):
     @abstractmethod
     def is_idle(self, controller: M, now: Nanos, /) -> bool:
         """Whether all axes stand and no program runs."""
-
-    def statement(self, controller: M, /) -> str | None:
-        """The statement that its program is at, while one runs or is paused, as text."""
-        return None
 
     @abstractmethod
     def view(self, world: RunningWorld, name: str, controller: M, /) -> V:

@@ -10,6 +10,8 @@ from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.state import Stateful
+from steptwin.wire.pdu import REFUSED
+from steptwin.wire.rtu import encode_frame
 
 ANSWER_NS: Nanos = SECOND
 """Response time-out of writes; a common setting of masters."""
@@ -29,7 +31,19 @@ class Master(Stateful):
     """
 
     FIXED: ClassVar[tuple[str, ...]] = ("_pause", "_send")
-    __slots__ = (*FIXED, "_asking", "_free", "_pending", "_queue", "answers", "asked", "finished", "unanswered", "wanted")
+    __slots__ = (
+        *FIXED,
+        "_asking",
+        "_free",
+        "_pending",
+        "_queue",
+        "answers",
+        "asked",
+        "finished",
+        "refused",
+        "unanswered",
+        "wanted",
+    )
 
     def __init__(self, send: Callable[[bytes, Nanos], None], pause: Nanos) -> None:
         self._send = send
@@ -47,6 +61,8 @@ class Master(Stateful):
         """Number of the last request that was answered or given up."""
         self.unanswered = 0
         """Number of the last request that was given up."""
+        self.refused: tuple[int, bytes] = (0, b"")
+        """Number of the last request that was refused, and the frame that refused it."""
         self.wanted: frozenset[int] = frozenset()
         """Numbers of requests whose answers are kept in `answers` until they are taken; may be set in advance."""
         self.answers: dict[int, bytes] = {}
@@ -65,6 +81,9 @@ class Master(Stateful):
     def answered(self, data: bytes, moment: Nanos) -> None:
         """Take data from the line; it is dropped if no request is pending."""
         if self._pending is not None:
+            unit, function = self._asking[:2]
+            if data == encode_frame(unit, bytes((function | REFUSED, *data[2:3]))):
+                self.refused = self.finished + 1, data
             self._finish(data, moment + self._pause)
 
     def recall(self, is_meant: Callable[[bytes], bool], now: Nanos) -> bool:

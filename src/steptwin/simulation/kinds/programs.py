@@ -13,6 +13,7 @@ from typing import NamedTuple, Protocol
 
 from steptwin.controller import Nanos
 from steptwin.diagnostics import SourceText
+from steptwin.messages import MessageText
 from steptwin.simulation.scheduler.trace import RecordSink, TraceRecord
 from steptwin.statements import StatementHook
 
@@ -112,11 +113,15 @@ class ProgramState(enum.Enum):
     SHUT_DOWN = "shut down"
 
 
-class Wait(NamedTuple):
-    """A statement at which a program waits: for a condition, the end of a motion, or a moment."""
+class ProgramStand(NamedTuple):
+    """A program that does not go on. One that `ProgramState.RUNS` waits: for a condition, the end of a motion, or a moment."""
 
-    location: StatementLocation
-    since: Nanos
+    state: ProgramState
+    location: StatementLocation | None = None
+    """Where it waits or is held, or the statement that failed; None where that is not known, and where it has ended."""
+    since: Nanos | None = None
+    error: MessageText | None = None
+    """The error that has stopped it."""
 
 
 class Programs(Protocol):
@@ -193,8 +198,8 @@ class Programs(Protocol):
         """The statement that is executed, or comes next, then those to which it returns; empty where no program runs."""
         ...
 
-    def wait(self, now: Nanos) -> Wait | None:
-        """Where it waits, and since when; None while it does not, or where that is not known."""
+    def stand(self, now: Nanos) -> ProgramStand | None:
+        """What keeps it from going on; None while it goes on, and where there is no program."""
         ...
 
     def variables(self, now: Nanos) -> Mapping[str, float]: ...

@@ -52,8 +52,6 @@ class ProgramText:
     is_empty: bool = False
     """Whether nothing is there; the text is empty then."""
     is_running: bool = False
-    line: int | None = None
-    """Line of the present statement, from 1, while it runs or is paused; None where that is not known."""
 
 
 class Destination(NamedTuple):

@@ -13,6 +13,7 @@ from typing import Any, TypeAlias, get_args
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.messages import Message
+from steptwin.simulation.faults.answers import NEVER_SENT
 from steptwin.simulation.kinds.kind import ControllerKind
 from steptwin.simulation.kinds.lines import SCRIPTS
 from steptwin.simulation.kinds.master import ANSWER_NS
@@ -38,6 +39,7 @@ from steptwin.simulation.world.putting import Act, put, remove
 from steptwin.simulation.world.scripts import Scripts
 from steptwin.simulation.world.worldprograms import name_of_text
 from steptwin.tables import complete
+from steptwin.wire.pdu import REFUSED
 from steptwin.wire.rtu import encode_frame
 
 Action: TypeAlias = Callable[[Scripts], object]
@@ -157,7 +159,9 @@ def _write(model: Model, step: do.Write) -> Action:
             else:
                 for pdu in pdus:
                     _record(model, name, "request", pdu)
-                    model.registers(name).execute(objects.controllers[name], pdu, now)
+                    answer = model.registers(name).execute(objects.controllers[name], pdu, now)
+                    if answer and answer[0] & REFUSED and answer[1] != NEVER_SENT:
+                        scripts.refused.append((name, answer))
             scheduler.notify(name if on is None else on[0].name)
             scheduler.propagate()
 

@@ -5,14 +5,17 @@ Steps, checks and texts of programs need no more of a world. `steptwin.simulatio
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from itertools import groupby
 from operator import itemgetter
 from typing import Any
 
 from steptwin.controller import Nanos
+from steptwin.controllerstate import ControllerState, ProgramActivity, StateProgram
 from steptwin.diagnostics import SourceText
+from steptwin.jsonvalues import to_json
 from steptwin.messages import NONE, Message, text_of
 from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss
@@ -69,7 +72,8 @@ class Model:
         self.failures = BoundedLog()
         """Expectations that did not hold."""
         self.overdue = BoundedLog()
-        """Conditions that scripts of the description waited for until their time-out."""
+        """What scripts of the description waited for in vain: conditions and answers until their time-out, writes that were
+        refused."""
         self.synced_first: Sequence[Scheduler] = ()
         """Schedulers that are advanced before the others where the order is free, so that what observes them can read the
         others."""
@@ -148,6 +152,33 @@ class Model:
         """The programs of controllers that have any, by name of the controller."""
         found = {one.name: one.kind.programs(one, self.controllers[one.name], self.given) for one in self.spec.controllers}
         return {name: programs for name, programs in found.items() if programs is not None}
+
+    def state_of(self, name: str) -> ControllerState:
+        """The present state of a controller. Raises `Misuse` with the existing ones."""
+        controller = self.controller(name)
+        self.sync(name)
+        state = self.kind(name).state(controller, self.now)
+        return replace(state, program=self._located(name, state.program))
+
+    def parts_of(self, name: str, wanted: Collection[str]) -> dict[str, object]:
+        """As `state_of`, of some parts, as `steptwin.controllerstate.StateReader.parts`. Raises `Misuse`."""
+        controller = self.controller(name)
+        self.sync(name)
+        reader = self.kind(name).state
+        found = reader.parts(controller, self.now, wanted)
+        if "program" in found:
+            found["program"] = to_json(self._located(name, reader.program(controller, self.now)))
+        return found
+
+    def _located(self, name: str, program: StateProgram) -> StateProgram:
+        """With its place in the text, which a controller that stores no text does not know."""
+        programs = self.programs.get(name)
+        is_there = programs is not None and program.file is None and program.state is not ProgramActivity.STOPPED
+        stack = programs.stack(self.now) if programs is not None and is_there else ()
+        if programs is None or not stack:
+            return program
+        text, number = stack[0].location
+        return replace(program, file=programs.texts[text].name, line=programs.statements(text)[number].line)
 
     def sync_all(self) -> None:
         """Advance every scheduler to the present."""
@@ -263,7 +294,7 @@ class Model:
         self._report(self.failures, "expectation", text)
 
     def report_overdue(self, text: str) -> None:
-        """Report that a wait of a script of the description timed out."""
+        """Report that a script of the description waited in vain."""
         self._report(self.overdue, "overdue", text)
 
     def _report(self, log: BoundedLog, code: str, text: str) -> None:

@@ -13,11 +13,12 @@ from steptwin.simulation.script import steps as do
 
 
 class PendingRequests(NamedTuple):
-    """The requests ``first`` to ``last`` on a line, for whose answers a script waits."""
+    """The requests ``first`` to ``last`` on a line, for whose answers a script waits; ``written``: the values of a `Write`."""
 
     line: str
     first: int
     last: int
+    written: str = ""
 
 
 class ScriptWait(NamedTuple):

@@ -21,6 +21,7 @@ from steptwin.simulation.world.model import WORLD, Model
 from steptwin.simulation.world.motions import motion_ends, ordered
 from steptwin.simulation.world.running import PendingRequests, Script, ScriptState, ScriptWait
 from steptwin.tables import complete
+from steptwin.wire.pdu import REFUSED, ModbusException
 
 MOST_STEPS_PER_INSTANT = 10_000
 """Limit of steps of scripts at one moment; more are reported as `Runaway`."""
@@ -61,6 +62,8 @@ class Scripts:
         """Scheduled steps that can be cancelled, by name."""
         self.leaves_out: Callable[[str, do.Step], bool] | None = None
         """Whether a step of a script, by its name, is left out: nothing is done then, and its result is None."""
+        self.refused: list[tuple[str, bytes]] = []
+        """The answers with which controllers on no line refused requests of the last write."""
 
     def subscribe_to_schedulers(self, schedulers: Iterable[Scheduler], watch: Callable[[Scheduler], None]) -> None:
         """Call ``watch`` from now on with every scheduler that has changed."""
@@ -269,8 +272,16 @@ class Scripts:
         if waiting.condition is not None and not has_come:
             self._model.report_overdue(f"{script.name} waited in vain for {self._model.told(waiting.condition)}")
         for asked in waiting.asked:
-            if asked.first <= self._master(asked.line).unanswered <= asked.last:
+            master = self._master(asked.line)
+            if asked.first <= master.unanswered <= asked.last:
                 self._model.report_overdue(f"{script.name} waited in vain for an answer on {asked.line}")
+            number, frame = master.refused
+            if asked.written and asked.first <= number <= asked.last:
+                self._report_refused(script, asked.written, frame[1:])
+
+    def _report_refused(self, script: Script, written: str, answer: bytes) -> None:
+        refused = ModbusException(answer[0] & ~REFUSED, answer[1])
+        self._model.report_overdue(f"{script.name} wrote {written} in vain: {refused}")
 
     def _resume(self, script: Script, value: Any) -> None:
         script.waiting = None
@@ -355,10 +366,16 @@ class Scripts:
         model = self._model
         lines = dict.fromkeys(model.objects.line_of[name][0].name for name, *_ in step.values if name in model.objects.line_of)
         before = {name: self._master(name).asked for name in lines}
+        self.refused.clear()
         self._do(script, step)
-        asked = tuple(PendingRequests(name, before[name] + 1, self._master(name).asked) for name in lines)
-        waiting = ScriptWait(None, asked=tuple(one for one in asked if self._master(one.line).finished < one.last))
-        return (waiting if waiting.asked else None), None
+        for controller, answer in () if script.is_external else self.refused:
+            self._report_refused(script, _written(step, (controller,)), answer)
+        on = {name: {one for one, (line, _) in model.objects.line_of.items() if line.name == name} for name in lines}
+        asked = [PendingRequests(name, before[name] + 1, self._master(name).asked, _written(step, on[name])) for name in lines]
+        pending = tuple(one for one in asked if self._master(one.line).finished < one.last)
+        at_once = tuple(one for one in asked if one not in pending)
+        self._report_overdue(script, ScriptWait(None, asked=at_once), has_come=True)
+        return (ScriptWait(None, asked=pending) if pending else None), None
 
     def _do(self, script: Script, what: ExternalInput) -> None:
         if script.is_external:
@@ -384,6 +401,11 @@ class Scripts:
             if one.waiting is not None:
                 self._wait(script, one.waiting)
         self._scheduled = {script.name: script for script in self if script.name in scheduled and not script.is_external}
+
+
+def _written(step: do.Write, controllers: Collection[str]) -> str:
+    """The values that go to some of the controllers."""
+    return ", ".join(f"{name}.{register} = {value:.7g}" for name, register, value in step.values if name in controllers)
 
 
 _TAKING: Mapping[type, Callable[[Scripts, Any, Script], StepResult]] = complete(

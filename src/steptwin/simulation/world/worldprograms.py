@@ -13,11 +13,13 @@ from steptwin.explain.model import MemoryUse
 from steptwin.jsonvalues import JsonForm
 from steptwin.messages import NONE, Message
 from steptwin.simulation.kinds.kind import ControllerSpec
+from steptwin.simulation.kinds.programs import ProgramState
 from steptwin.simulation.kinds.programtexts import ProgramText, TextLanguage
 from steptwin.simulation.kinds.registry import KINDS
 from steptwin.simulation.world.model import Model
 
 P = TypeVar("P")
+_OVER = (ProgramState.STOPPED, ProgramState.SHUT_DOWN)
 _LANGUAGES = JsonForm({"enum": [language.name for kind in KINDS.values() for language in kind.languages]})
 
 
@@ -98,12 +100,27 @@ class WorldPrograms:
     def list(self) -> Sequence[ShownProgram]:
         """The places of all controllers."""
         names = self._model.controllers
-        return [_shown(ShownProgram, name, text) for name in names for text in program_texts(self._model, name)]
+        return [self._shown(ShownProgram, name, text) for name in names for text in program_texts(self._model, name)]
 
     def text(self, controller: str, place: str) -> ShownProgramText:
         """One of them. Raises `Misuse`."""
         text = text_at(self._model, controller, place)
-        return _shown(ShownProgramText, controller, text, text.source.text, findings(text.source, text.check()))
+        return self._shown(ShownProgramText, controller, text, text.source.text, findings(text.source, text.check()))
+
+    def _shown(self, kind: Callable[..., P], controller: str, text: ProgramText, *rest: object) -> P:
+        of = text.language
+        language = of.name, of.suffix, of.has_statements, of.is_typed, address_of(controller, text.place, of)
+        at = text.place, text.source.name
+        line = self._line(controller, text.place)
+        return kind(controller, *at, *language, text.is_empty, text.is_running, line, *rest)
+
+    def _line(self, controller: str, place: str) -> int | None:
+        """That of the present statement, where it is in this text."""
+        programs = self._model.programs.get(controller)
+        stack = () if programs is None or programs.state in _OVER else programs.stack(self._model.now)
+        if programs is None or not stack or stack[0].location.text != place:
+            return None
+        return programs.statements(place)[stack[0].location.number].line
 
     def memory(self, controller: str, place: str, text: str) -> Sequence[MemoryUse]:
         """Use of the memory at a place by a text; empty for one with errors. Raises `Misuse`."""
@@ -150,9 +167,3 @@ def _keys(spec: ControllerSpec, texts: Sequence[ProgramText]) -> Iterator[str]:
 def _name(controller: str, text: ProgramText) -> str:
     """Name of a text, seen from the description."""
     return address_of(controller, text.place, text.language).removeprefix("steptwin:///")
-
-
-def _shown(kind: Callable[..., P], controller: str, text: ProgramText, *rest: object) -> P:
-    of = text.language
-    language = of.name, of.suffix, of.has_statements, of.is_typed, address_of(controller, text.place, of)
-    return kind(controller, text.place, text.source.name, *language, text.is_empty, text.is_running, text.line, *rest)

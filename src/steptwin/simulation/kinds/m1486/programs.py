@@ -22,7 +22,15 @@ from steptwin.m1486.unit import MASK
 from steptwin.messages import Message
 from steptwin.simulation.kinds.m1486.memory import PLACE as TEXT
 from steptwin.simulation.kinds.m1486.statement_use import use_of
-from steptwin.simulation.kinds.programs import Frame, GivenCommand, ProgramState, Statement, StatementLocation, StatementUse, Wait
+from steptwin.simulation.kinds.programs import (
+    Frame,
+    GivenCommand,
+    ProgramStand,
+    ProgramState,
+    Statement,
+    StatementLocation,
+    StatementUse,
+)
 from steptwin.statements import StatementHook
 
 BEGIN = "program"
@@ -204,26 +212,20 @@ class ChipPrograms:
 
     def stack(self, now: Nanos) -> Sequence[Frame]:
         program = self._chip.program
-        present = self._location_in_progress() if self._is_in_progress(now) else self.location(program.pc)
+        place = program.in_progress(now)
+        present = self.location(program.pc if place is None else place)
         back = None if program.back is None else self.location(program.back)
         return [Frame(self._text.name(location.number), location) for location in (present, back) if location is not None]
 
-    def _is_in_progress(self, now: Nanos) -> bool:
-        """Whether the command before the place of the program is not over."""
-        program = self._chip.program
-        return program.waiting is not WaitReason.NOTHING or program.ready - now > program.statement_ns
-
-    def _location_in_progress(self) -> StatementLocation | None:
-        """Location in progress: what waits goes on at the command after it."""
-        pc, text = self._chip.program.pc, self._text
-        before = bisect_right(text.offsets, pc - 1) - 1
-        return self.location(text.offsets[before]) if before >= 0 and pc <= text.end else None
-
-    def wait(self, now: Nanos) -> Wait | None:
-        program = self._chip.program
-        is_held = self._chip.is_shut_down or program.is_held
-        location = self._location_in_progress() if self._is_in_progress(now) and not is_held else None
-        return None if location is None else Wait(location, program.began)
+    def stand(self, now: Nanos) -> ProgramStand | None:
+        program, state, place = self._chip.program, self.state, self._chip.program.in_progress(now)
+        if state is ProgramState.SHUT_DOWN:
+            return ProgramStand(state)
+        if state is not ProgramState.RUNS:
+            return ProgramStand(state, self.location(program.pc if place is None else place))
+        if place is not None:
+            return ProgramStand(state, self.location(place), program.began)
+        return ProgramStand(ProgramState.STOPPED) if program.is_at_end and self.texts else None
 
     def variables(self, now: Nanos) -> Mapping[str, float]:
         registers = {f"register{number}": float(self._chip.memory.register(number)) for number in GENERAL}

@@ -19,7 +19,7 @@ from steptwin.mic488.encoder import Coupling
 from steptwin.mic488.inifile import IniFile
 from steptwin.mic488.inputs import index_input
 from steptwin.mic488.position_control import PositionControl
-from steptwin.mic488.present import empty_banks, state_of, statement_of
+from steptwin.mic488.present import empty_banks, state_of
 from steptwin.mic488.program_banks import load
 from steptwin.mic488.registers import AXES, DEFAULT_FIRMWARE
 from steptwin.mic488.slave import slave
@@ -232,9 +232,6 @@ class Mic488Kind(ControllerKind[Mic488Spec, Mic488Device, Mic488View]):
     def is_idle(self, device: Mic488Device, now: Nanos) -> bool:
         running = device.program.state is ProgramState.RUNNING
         return not running and not any(axis.profile.moving(now) for axis in device.axes)
-
-    def statement(self, device: Mic488Device) -> str | None:
-        return statement_of(device)
 
     def view(self, world: RunningWorld, name: str, device: Mic488Device) -> Mic488View:
         return Mic488View(world, name, device)

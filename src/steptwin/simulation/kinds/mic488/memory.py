@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from steptwin.diagnostics import Diagnostic, Severity, SourceText, render
 from steptwin.errors import SourceErrors
 from steptwin.mic488.device import Mic488Device
-from steptwin.mic488.present import current_line
 from steptwin.mic488.program_banks import setup_of
 from steptwin.mic488.status import ProgramState
 from steptwin.simulation.kinds.mic488.build import table_for
@@ -26,11 +25,10 @@ PROGRAM, POSITIONS = "program", "positions"
 
 
 def program_texts(device: Mic488Device) -> Iterator[ProgramText]:
-    control, at = device.program, current_line(device)
+    control = device.program
     for bank in range(device.firmware.banks):
         place, program = bank_text(bank), control.banks.programs.get(bank)
         source = SourceText(place, "") if program is None else program.source
-        line = at.line if at is not None and control.runs_program(bank) else None
         yield ProgramText(
             place=place,
             language=WBC,
@@ -38,8 +36,7 @@ def program_texts(device: Mic488Device) -> Iterator[ProgramText]:
             check=lambda bank=bank, text=source.text: checked(device, bank, text).diagnostics,
             memory=lambda text, bank=bank: _program_memory(device, bank, text),
             is_empty=program is None,
-            is_running=line is not None and control.state is ProgramState.RUNNING,
-            line=line,
+            is_running=control.runs_program(bank) and control.state is ProgramState.RUNNING,
         )
 
 

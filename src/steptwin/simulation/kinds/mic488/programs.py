@@ -9,12 +9,22 @@ from functools import cached_property
 from steptwin.controlflow import ControlFlow
 from steptwin.controller import Nanos
 from steptwin.diagnostics import SourceText
+from steptwin.messages import text_of
 from steptwin.mic488.device import Mic488Device
+from steptwin.mic488.program import ProgramError
 from steptwin.mic488.program_banks import LoadedProgram
 from steptwin.mic488.program_registers import ACCESS
 from steptwin.mic488.status import ProgramState as Control
 from steptwin.simulation.kinds.mic488.statement_use import use_of
-from steptwin.simulation.kinds.programs import Frame, GivenCommand, ProgramState, Statement, StatementLocation, StatementUse, Wait
+from steptwin.simulation.kinds.programs import (
+    Frame,
+    GivenCommand,
+    ProgramStand,
+    ProgramState,
+    Statement,
+    StatementLocation,
+    StatementUse,
+)
 from steptwin.simulation.kinds.programtexts import bank_text
 from steptwin.statements import StatementHook
 from steptwin.wbc.dialect import Dialect
@@ -119,14 +129,25 @@ class WbcPrograms:
         numbers = [interpreter.place(now), *interrupted, *(step for step in calls if step == 0 or bank.comes_back(step - 1))]
         return [Frame(bank.name(number), StatementLocation(text, number)) for number in numbers]
 
-    def wait(self, now: Nanos) -> Wait | None:
-        control = self._device.program
-        since = None if control.running is None else control.interpreter.waits_since(now)
-        return (
-            None
-            if since is None
-            else Wait(StatementLocation(bank_text(control.running_bank), control.interpreter.place(now)), since)
-        )
+    def stand(self, now: Nanos) -> ProgramStand | None:
+        control, state, text = self._device.program, self.state, bank_text(self._device.program.running_bank)
+        interpreter, fault = control.interpreter, control.fault
+        if fault is not None:
+            return ProgramStand(state, self._failed(text, fault), error=text_of(fault.text))
+        if state is ProgramState.STOPPED:
+            return ProgramStand(state) if self.texts else None
+        if state is ProgramState.PAUSED:
+            return ProgramStand(state, StatementLocation(text, interpreter.place(now)), interpreter.paused_at)
+        if not interpreter.waits(now):
+            return None
+        return ProgramStand(state, StatementLocation(text, interpreter.place(now)), interpreter.waits_since(now))
+
+    def _failed(self, text: str, fault: ProgramError) -> StatementLocation | None:
+        """The statement that failed, while its text is there."""
+        found = StatementLocation(text, self._device.program.interpreter.pc)
+        statements = self.statements(text) if text in self.texts else ()
+        is_there = found.number < len(statements) and statements[found.number].start == fault.span.start
+        return found if is_there else None
 
     def variables(self, now: Nanos) -> Mapping[str, float]:
         return self._device.program.variables(now)
