@@ -10,5 +10,6 @@ import { restoreLanguage } from "./text";
 export function start(backend: Backend): void {
   restoreLanguage();
   restoreTheme();
-  mount(App, { target: document.getElementById("app") as HTMLElement, props: { backend } });
+  // The page is not blocked by all of it at once.
+  setTimeout(() => mount(App, { target: document.getElementById("app") as HTMLElement, props: { backend } }));
 }
