@@ -88,7 +88,9 @@ WBC_USES = [
     StatementUse(),
     StatementUse((axis(3),), waits=True, governs=range(23, 24), acts_by=(value("CFGINT_M3"),)),
     StatementUse(),
-    StatementUse((), waits=True, governs=range(25, 27), acts_by=(value("CFGINT_MODBUS"),)),
+    StatementUse(
+        (Resource(ResourceKind.REQUEST, "USER_REGISTER"),), waits=True, governs=range(25, 27), acts_by=(value("CFGINT_MODBUS"),)
+    ),
     StatementUse((), (value("x"),)),
     StatementUse(),
     StatementUse((), (ANY_AXIS, ANY_PIN, PROGRAM)),  # the end

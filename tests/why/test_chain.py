@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import replace
 
 import pytest
@@ -11,7 +12,7 @@ from compositions import composed, finish
 from steptwin.errors import Misuse
 from steptwin.messages import MessageText
 from steptwin.why.answer import ChainLink, ChainRule, Cover
-from steptwin.why.chain import NOT_KNOWN, Cause, Chain, Place, broken, nothing
+from steptwin.why.chain import BETWEEN, NOT_KNOWN, Cause, Chain, Place, broken, nothing
 
 
 def cause(time: int, order: int = 0, number: int = 0, *, is_root: bool = False) -> Cause:
@@ -65,13 +66,38 @@ def test_what_was_so_several_times_is_there_once_and_what_led_to_the_first_time_
     assert [one.time for one in chain(cause(9)._replace(before=lambda: before)).links] == [9, 1]
 
 
-def test_the_nearest_causes_are_taken_first() -> None:
-    far = cause(7)._replace(before=lambda: cause(6, is_root=True))
-    first = cause(9)._replace(before=lambda: far, besides=lambda: [cause(1, is_root=True)])
-    found = Chain(cause(10).link, Place(10, 1), first, is_whole=lambda moment: True, is_owed=False)
-    for _ in range(3):
+def led_by(moments: Iterable[int], *besides: Cause) -> Cause:
+    """The last of some moments, each of which led to the next one; the last one needed others besides."""
+    first, *others = (cause(moment, is_root=True) for moment in moments)
+    for one in others:
+        first = one._replace(before=lambda led=first: led)
+    return first._replace(besides=lambda: besides)
+
+
+def long_chain(first: Cause, most: int) -> Chain:
+    found = Chain(cause(1000).link, Place(1000, 1), first, is_whole=lambda moment: True, is_owed=False, most=most)
+    while not found.is_over:
         found.go_on()
-    assert [link.time for link in found.links] == [9, 7, 1]
+    return found
+
+
+def test_what_led_to_something_is_taken_before_what_had_to_be_so_besides() -> None:
+    beside = cause(1, is_root=True)
+    assert [link.time for link in long_chain(led_by((6, 7, 9), beside), 3).links] == [9, 7, 6]
+    assert [link.time for link in long_chain(led_by(range(100, 108), beside), 8).links][-1] == 1
+
+
+def test_the_beginning_of_a_long_chain_is_shown() -> None:
+    found = long_chain(led_by(range(100, 130)), 8)
+    assert [link.time for link in found.links] == [129, 128, 127, 126, 125, 102, 102, 101, 100]
+    assert str(found.links[5].text) == str(BETWEEN(count=22))
+    assert found.is_followed
+
+
+def test_a_beginning_that_is_too_far_is_not_searched() -> None:
+    found = long_chain(led_by(range(100, 900)), 8)
+    assert [link.time for link in found.links] == list(range(899, 891, -1))
+    assert not found.is_followed
 
 
 @pytest.mark.parametrize("first", [None, cause(9)])

@@ -36,7 +36,7 @@ def command(
         ),
     ] = "",
     at: Annotated[str | None, typer.Option(metavar="TIME", help="The moment, such as 2.5s. Default: now, or the end.")] = None,
-    everything: Annotated[bool, typer.Option("--all", help="All that is found, not only the first twelve causes.")] = False,
+    everything: Annotated[bool, typer.Option("--all", help="All that is found, not only the first sixteen causes.")] = False,
     try_without: Annotated[
         bool,
         typer.Option(

@@ -362,7 +362,7 @@ class World(Simulation):
     def why(self, question: str, at: Duration | None = None, *, try_without: bool = False, everything: bool = False) -> Answer:
         """Why a signal has its value, a condition its truth, or a controller's program waits; now or at a moment.
 
-        ``everything``: all that is found, not only the first twelve links. ``try_without``: the same, and what would be without
+        ``everything``: all that is found, not only the first sixteen links. ``try_without``: the same, and what would be without
         each root: an input, an action of a script, a request or a fault, each left out in a run of its own.
 
         Each call runs the past again; for several questions about one past, use `past`. Raises `Misuse` for what is no question.

@@ -194,7 +194,7 @@ class ProgramSource:
 class AskWhy:
     question: Annotated[str, Meaning("A signal, a condition, or the name of a controller: what its program waits for.")] = ""
     at: Annotated[Nanos | None, Meaning("At which moment; now without.", TIME, unit="ns", name="at_ns")] = None
-    everything: Annotated[bool, Meaning("All that is found, not only the first twelve links.", name="all")] = False
+    everything: Annotated[bool, Meaning("All that is found, not only the first sixteen links.", name="all")] = False
     try_without: Annotated[
         bool, Meaning("Repeat the run without each root: input, script act, request or fault. Implies all.")
     ] = False

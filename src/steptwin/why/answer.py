@@ -16,7 +16,7 @@ FROM_THE_BEGINNING = Message("why.from-the-beginning", "from the beginning")
 
 WITHOUT = Message("why.without", "the run again without each of its roots:")
 
-MOST_LINKS = 12
+MOST_LINKS = 16
 """Limit of the links of an answer, unless all are asked for."""
 ALL_LINKS = 1000
 """Limit where all are asked for."""
@@ -109,7 +109,7 @@ class Answer(NamedTuple):
         if self.is_cut:
             lines.append(f"{'':12}    (what was before {self.known_from / SECOND:.6f} s is not known)")
         elif not self.is_complete:
-            lines.append(f"{'':12}    (earlier causes are not shown)")
+            lines.append(f"{'':12}    (further causes are not shown)")
         lines += [WITHOUT(), *(f"{_line(trial.link)} -> {trial.text}" for trial in self.trials)] if self.trials else []
         return "\n".join(lines)
 

@@ -35,7 +35,7 @@ class Attempts:
         later = [] if ignored is None or (after >= 0 and not self._is_later(controller, number, ignored, after)) else [ignored]
         later += [] if refused is None else [refused]
         found = sorted((*later, *self._kept(controller, number, until, before)), key=lambda one: one.place)
-        return found[-1]._replace(along=tuple(found[:-1])) if found else None
+        return found[-1]._replace(along=(*found[-1].along, *found[:-1])) if found else None
 
     def _is_later(self, controller: str, number: str, ignored: Cause, after: Nanos) -> bool:
         """Whether an event is no end of a motion that began meanwhile."""
@@ -76,23 +76,30 @@ class Attempts:
             mode = 0.0 if written is None else points.level(series, written.place.time)
             if written is None or not mode:
                 continue
-            if not self._has_come(controller, use, written.place, until, before):
-                yield self._waits(controller, register, use, mode, written)
+            came = self._trigger(controller, use, written.place, until, before)
+            if came is None or not self._selects(controller, use, came):
+                yield self._waits(controller, register, use, mode, written, came)
 
-    def _has_come(self, controller: str, use: WriteUse, written: Place, until: Nanos, before: int) -> bool:
-        """Whether the trigger of a register has been written for its axis since that was written."""
-        series = self._log.points.series(f"{controller}.{use.trigger}")
-        came = self._all.controllers.written(controller, use.trigger, until, before)
+    def _trigger(self, controller: str, use: WriteUse, written: Place, until: Nanos, before: int) -> FoundCause:
+        """The write of the trigger of a register for its axis since that was written; without one the last one for others."""
+        last = came = self._all.controllers.written(controller, use.trigger, until, before)
         while came is not None and came.place > written:
-            time, order, _ = came.place
-            if series is None or int(points.level(series, time)) & use.bit:
-                return True
-            came = self._all.controllers.written(controller, use.trigger, time, order)
-        return False
+            if self._selects(controller, use, came):
+                return came
+            came = self._all.controllers.written(controller, use.trigger, came.place.time, came.place.order)
+        return last if last is not None and last.place > written else None
 
-    def _waits(self, controller: str, register: str, use: WriteUse, mode: float, written: Cause) -> Cause:
+    def _selects(self, controller: str, use: WriteUse, came: Cause) -> bool:
+        """Whether a write of a trigger was for the axis of a register."""
+        series = self._log.points.series(f"{controller}.{use.trigger}")
+        return series is None or bool(int(points.level(series, came.place.time)) & use.bit)
+
+    def _waits(self, controller: str, register: str, use: WriteUse, mode: float, written: Cause, other: FoundCause) -> Cause:
+        """``other``: a write of the trigger that was for other axes."""
         text = WAITS_FOR_TRIGGER(register=f"{controller}.{register}", trigger=use.trigger, mode=use.mode, value=mode)
         time, order, number = written.place
         by = partial(self._all.controllers.register, controller, use.mode, None, time, order)
         besides = lambda: [one for one in (by(),) if one is not None]  # noqa: E731
-        return Cause(ChainLink(time, controller, text), Place(time, order, number + 1), lambda: written, Cover.LEVEL, besides)
+        along = () if other is None else (other,)
+        place = Place(time, order, number + 1)
+        return Cause(ChainLink(time, controller, text), place, lambda: written, Cover.LEVEL, besides, along)

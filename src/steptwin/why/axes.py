@@ -22,7 +22,7 @@ from steptwin.simulation.script import steps as do
 from steptwin.why import points
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, covered, unknown
-from steptwin.why.controllers import acted
+from steptwin.why.controllers import HOMED, acted
 from steptwin.why.log import FALL, JAMS, LAST, OF_MECHANICS, Change, words_of
 
 GIVES_POWER = Message("why.gives-power", ", which gives {axis} its power")
@@ -220,6 +220,9 @@ class AxisCauses:
             is_unpowered = built.mechanism.build.coasts_unpowered or any(end > power.link.time for end in ends)
         if event is not None and not (is_unpowered and power is not None and self._is_after(power, event)):
             return self.rotor_event(axis, event)
+        if event is not None and power is not None and not is_off and self._log.record(event).subject == FALL:
+            others = (power, covered(motion, Cover.LEVEL))  # it fell on until it was caught
+            return self.rotor_event(axis, event)._replace(along=tuple(one for one in others if one is not None))
         if is_unpowered and power is not None:
             let_go = self._let_go(axis, power, until if since is None else min(until, since + BRAKES_NS))
             return let_go if is_off else self._regained(axis, let_go, power, motion)
@@ -227,8 +230,21 @@ class AxisCauses:
         if motion is None and lost is None:
             return self._all.attempts.last(controller, number, until, before)
         motion = motion and self._rests(controller, number, motion, until, before)
+        motion = motion and motion._replace(along=(*motion.along, *self._lags(axis, until, before)))
         is_last = lost is not None and (motion is None or (motion.cover is None and lost.place > motion.place))
         return lost if is_last else motion
+
+    def _lags(self, axis: str, until: Nanos, before: int) -> Iterator[Cause]:
+        """The last event of a rotor by which it lost pulses that no homing has made good since."""
+        controller, name = self._world.axes[axis].spec.drive
+        events = list(self._of_rotor(axis, until, before))
+        end = next((one for one in reversed(events) if dict(self._log.record(one).facts).get("lost")), None)
+        if end is None:
+            return
+        homed = (one for one in self._log.axis_events.get((controller, name.removeprefix("M")), ()) if one.time >= end.time)
+        began = next((one for one in reversed(events) if one.time <= end.time and _begins(self._log.record(one))), None)
+        if began is not None and not any(self._log.record(one).subject == HOMED for one in homed if one.time <= until):
+            yield self.rotor_event(axis, began)._replace(cover=Cover.LEVEL)
 
     def _has_left_it(self, event: Change, since: Nanos | None) -> bool:
         """Whether the end of an event of a rotor may have left it where it stands since a moment."""
@@ -244,7 +260,8 @@ class AxisCauses:
     def _regained(self, axis: str, found: Cause, power: Cause, motion: FoundCause) -> Cause:
         """That a motor has power again, along with the loss of it, during which its motion went on, and with that motion."""
         lost = self.power(axis, power.place.time, power.place.order)
-        return found._replace(along=(*found.along, *(one for one in (lost, motion) if one is not None)))
+        others = (lost, covered(motion, Cover.LEVEL))
+        return found._replace(along=(*found.along, *(one for one in others if one is not None)))
 
     def _is_after(self, power: Cause, event: Change) -> bool:
         """Whether a change of power comes after an event of a rotor: what falls by it is recorded before it."""
@@ -374,7 +391,7 @@ class AxisCauses:
             counts = bool(level) is (falls or not is_brake) or (change is not None and change.time == event.time)
             if counts and change is not None:
                 yield covered(self._all.change(signal, change), Cover.LEVEL) or self._all.change(signal, change)
-            elif counts and (is_brake or getattr(spec, "when", None)):
+            elif counts:
                 yield self._all.first(signal)._replace(cover=Cover.LEVEL)
 
     def _without_current(self, axis: str, event: Change) -> FoundCause:

@@ -143,7 +143,7 @@ class Causes:
         if cleared is not None:
             return cleared
         if owner in self.parts:
-            return self.elements.of_inputs(owner, change)
+            return self.elements.of_inputs(owner, change, signal)
         if owner in self._world.controllers:
             return self._of_pin(PinName(owner, terminal), change)
         if owner in self._world.axes:
@@ -161,7 +161,7 @@ class Causes:
                     and (named is None or named in str(record.value).split())
                 ):
                     link = self.fault_link(record)
-                    return Cause(link, Place(record.time, change.order, -1), self.of_fault(record, order))
+                    return Cause(link, Place(record.time, change.order, -2), self.of_fault(record, order))
         return None
 
     def _cleared(self, signal: str, change: Change) -> FoundCause:
@@ -250,8 +250,9 @@ class Causes:
             where = self._world.spec.text.where(path)
             link = ChainLink(change.time, pin.controller, DRIVES(kind=path[0], where=where, pin=str(pin)))
             name = self.elements.driving(pin)
-            before = partial(self.elements.of_followed, name, change) if self.elements.followed(name) else nothing
-            return Cause(link, Place(change.time, change.order, -1), before)
+            fault = self.fault(name, change)
+            followed = partial(self.elements.of_followed, name, change) if self.elements.followed(name) else nothing
+            return Cause(link, Place(change.time, change.order, -1), followed if fault is None else lambda: fault)
         return self.controllers.in_controller(pin.controller, change, Resource(ResourceKind.PIN, pin.pin))
 
     def _operated(self, name: str, change: Change) -> FoundCause:
@@ -262,10 +263,12 @@ class Causes:
                     if is_release(act.by):  # who pressed it was before the log
                         self.log.lack()
                     return acted(act)
-        earlier = self.log.last_change(name, change.time - 1)
-        if earlier is not None and change.time - earlier.time < SECOND:
-            return covered(self.change(name, earlier, CONTACT_BOUNCED()), Cover.BOUNCE)
-        return None
+        first = change
+        while (earlier := self.log.last_change(name, first.time - 1)) is not None and first.time - earlier.time < SECOND:
+            first = earlier
+            if any(isinstance(act.what, do.Press | do.Release) for act in self.log.acts_at(first.time, first.order)):
+                break
+        return None if first is change else covered(self.change(name, first, CONTACT_BOUNCED()), Cover.BOUNCE)
 
     def drivers(self, signal: str, at: Nanos) -> list[str]:
         """The signals that a signal follows at a moment: those that drive an input, or the inputs of an element; an input of an

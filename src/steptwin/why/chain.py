@@ -8,8 +8,16 @@ from typing import NamedTuple, TypeAlias
 
 from steptwin.controller import Nanos
 from steptwin.messages import Message, MessageText
-from steptwin.why.answer import ChainLink, ChainRule, Cover
+from steptwin.why.answer import ALL_LINKS, ChainLink, ChainRule, Cover
 
+FARTHER = 5
+"""How much farther than what led to something is what had to be so besides: it takes the place of no nearer one."""
+MOST_FOLLOWED = 40
+"""Limit of the causes that are followed on the way to the beginning of a chain beyond those that are shown."""
+LAST_SHOWN = 3
+"""Number of the causes at the beginning of a long chain that are shown, too."""
+
+BETWEEN = Message("why.between", "({count} causes between are not shown)")
 NOT_KNOWN = Message("why.not-known", "what caused this is not known from here")
 
 
@@ -61,59 +69,111 @@ def broken(cause: Cause, effect: Place) -> ChainRule | None:
 
 
 class _Waiting(NamedTuple):
-    """A cause that has not been taken yet. ``distance``: number of causes between it and what is asked for."""
+    """A cause that has not been taken yet. ``distance``: from what is asked for, in causes between; ``leads``: whether each of
+    them led to the next one, and none had to be so besides."""
 
     distance: int
     cause: Cause
+    leads: bool
 
 
 class Chain:
-    """The causes of what is so at a place: the nearest ones are taken first. ``is_whole``: whether nothing was before what is
-    known of a moment. One that breaks a rule is left out, and a link says so in its place."""
+    """The causes of what is so at a place: the nearest ones are taken first, at most ``most``; of a longer chain also those at
+    its beginning, if that is near enough. ``is_whole``: whether nothing was before what is known of a moment. One that breaks a
+    rule is left out, and a link says so in its place."""
 
     def __init__(
-        self, effect: ChainLink, place: Place, first: FoundCause, *, is_whole: Callable[[Nanos], bool], is_owed: bool
+        self,
+        effect: ChainLink,
+        place: Place,
+        first: FoundCause,
+        *,
+        is_whole: Callable[[Nanos], bool],
+        is_owed: bool,
+        most: int = ALL_LINKS,
     ) -> None:
         self._is_whole = is_whole
+        self._most = most
         self._waiting: list[_Waiting] = []
         self._taken: dict[tuple[Place, ChainLink], None] = {}
+        self._followed: list[tuple[Place, ChainLink]] = []
+        """Those that are farther than what is shown, on the way to the beginning."""
         self.is_cut = False
         """Whether something is because of what was before."""
         self.broken: ChainRule | None = None
         self._lead(effect, place, () if first is None else (first, *first.along), 0, is_owed=is_owed)
 
-    def __len__(self) -> int:
-        return len(self._taken)
-
     @property
     def links(self) -> Sequence[ChainLink]:
-        """The latest ones first. What was so several times, as in a loop, is there once."""
-        found: dict[tuple[str, MessageText], ChainLink] = {}
-        for _, link in sorted(self._taken, key=lambda one: one[0], reverse=True):
-            found.setdefault((link.subject, link.text), link)
+        """The latest ones first. What was so several times, as in a loop, is there once; each act from outside is."""
+        shown, last = list(self._taken), [one for one in self._followed if one not in self._taken]
+        if last and self._next is None:  # the beginning was found
+            shown, last = shown[: len(shown) - LAST_SHOWN], last[-LAST_SHOWN:]
+            count = len({*self._taken, *self._followed}) - len(shown) - len(last)
+            if count <= LAST_SHOWN:
+                shown += [one for one in (*self._taken, *self._followed) if one not in shown and one not in last]
+            else:
+                place, link = last[0]
+                last.insert(0, (place._replace(number=place.number + 1), ChainLink(link.time, "", BETWEEN(count=count))))
+            shown += last
+        found: dict[tuple[str, MessageText, Nanos | None], ChainLink] = {}
+        for _, link in sorted(shown, key=lambda one: one[0], reverse=True):
+            found.setdefault((link.subject, link.text, None if link.root is None else link.time), link)
         return tuple(found.values())
+
+    @property
+    def is_over(self) -> bool:
+        """Whether no more are taken."""
+        return self._next is None or len(self._followed) >= MOST_FOLLOWED
 
     @property
     def is_followed(self) -> bool:
         """Whether there are no more."""
         return not self._waiting
 
-    def go_on(self) -> None:
-        """Take the nearest one that waits, of several the latest."""
-        taken = max(self._waiting, key=lambda one: (-one.distance, one.cause.place))
-        self._waiting.remove(taken)
-        cause = taken.cause
-        if (cause.place, cause.link) not in self._taken:
-            self._taken[cause.place, cause.link] = None
-            before = cause.before()
-            found = (*(() if before is None else (before, *before.along)), *cause.besides())
-            is_owed = before is None and cause.before is not nothing
-            self._lead(cause.link, cause.place, found, taken.distance + 1, is_owed=is_owed)
+    @property
+    def _is_full(self) -> bool:
+        sentences = {(link.subject, link.text) for _, link in self._taken}
+        return len(sentences) >= self._most or len(self._taken) >= self._most + MOST_FOLLOWED
 
-    def _lead(self, effect: ChainLink, place: Place, causes: Sequence[Cause], distance: int, *, is_owed: bool) -> None:
+    @property
+    def _next(self) -> _Waiting | None:
+        """The nearest one that waits, of several the latest; beyond what is shown only what led there."""
+        waiting = (one for one in self._waiting if one.leads or not self._is_full)
+        return max(waiting, key=lambda one: (-one.distance, one.cause.place), default=None)
+
+    def go_on(self) -> None:
+        """Take the next one."""
+        taken = self._next
+        if taken is None:
+            return
+        self._waiting.remove(taken)
+        cause, key = taken.cause, (taken.cause.place, taken.cause.link)
+        if key in self._taken or key in self._followed:
+            return
+        if self._is_full:
+            self._followed.append(key)
+        else:
+            self._taken[key] = None
+        before = cause.before()
+        led = () if before is None else (before, *before.along)
+        is_owed = before is None and cause.before is not nothing
+        self._lead(cause.link, cause.place, led, taken.distance + 1, is_owed=is_owed, leads=taken.leads)
+        self._lead(cause.link, cause.place, tuple(cause.besides()), taken.distance + FARTHER, leads=False)
+
+    def _lead(
+        self,
+        effect: ChainLink,
+        place: Place,
+        causes: Sequence[Cause],
+        distance: int,
+        *,
+        is_owed: bool = False,
+        leads: bool = True,
+    ) -> None:
         """Let causes wait that lead to something. ``is_owed``: one more should have been found."""
         rules = [broken(one, place) for one in causes]
-        self._waiting += [_Waiting(distance, one) for one, rule in zip(causes, rules, strict=True) if rule is None]
+        self._waiting += [_Waiting(distance, one, leads) for one, rule in zip(causes, rules, strict=True) if rule is None]
         is_rootless = is_owed and self._is_whole(effect.time)
         self.is_cut |= is_owed and not is_rootless
         rule = next((rule for rule in rules if rule), ChainRule.ROOT if is_rootless else None)

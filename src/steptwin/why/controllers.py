@@ -68,7 +68,9 @@ class ControllerCauses:
         """Cause of a change in a controller at a moment; ``wanted``: the resource, if it is known; ``point``: that changed."""
         found = self._limit(controller, change, wanted) or self.commanded(controller, change, wanted, point)
         if found is not None:
-            return found
+            is_other = point and wanted is None and _name_of(point).search(found.link.text) is None
+            alarm = self._all.programs.alarm(controller, change.time) if is_other else None
+            return alarm if alarm is not None and alarm.place.time == change.time else found
         return self._asked_before(controller, change) or self._inside(controller, change, wanted)
 
     def _limit(self, controller: str, change: Change, wanted: Resource | None) -> FoundCause:
@@ -84,7 +86,8 @@ class ControllerCauses:
         """The pin because of which an event about an axis came: of its limit switch, or the one that enables it."""
         record = self._log.record(event)
         if record.subject == NOT_ENABLED:
-            return f"{controller}.M{dict(record.facts)['axis']}_EN"
+            enables = [f"{controller}.{axis}_EN" for axis in re.findall(r"\bM\d+\b", str(record.value))]
+            return next((pin for pin in enables if not self._log.level(pin, event.time)), None)
         if record.subject == HOMED:
             return self._home_pin(controller, event, str(dict(record.facts)["axis"]))
         values = words_of(self._log.record(event)).values
@@ -108,7 +111,7 @@ class ControllerCauses:
     def axis_event(self, controller: str, event: Change, place: Place) -> Cause:
         """An event about an axis, such as a stop by a limit switch that came or was there already, or an ignored command."""
         record, pin = self._log.record(event), self._pin_of(controller, event)
-        said, wanted = words_of(record), Resource(ResourceKind.AXIS, str(dict(record.facts)["axis"]))
+        said, wanted = words_of(record), Resource(ResourceKind.AXIS, str(dict(record.facts).get("axis", "")))
 
         def before() -> FoundCause:
             led = self.commanded(controller, event, wanted) or self._asked_before(controller, event)
@@ -119,6 +122,9 @@ class ControllerCauses:
 
         def besides() -> Iterator[Cause]:
             came = None if pin is None else covered(self._all.last((pin,), place.time, before=place.order), Cover.LEVEL)
+            if came is None and pin is not None:
+                wanted_pin = Resource(ResourceKind.PIN, pin.removeprefix(f"{controller}."))
+                came = self._all.programs.before(controller, wanted_pin, event.time)
             if came is not None:
                 yield came
 
@@ -256,7 +262,8 @@ class ControllerCauses:
             if record.kind == "frame" and self._is_for(controller, record, order):
                 lines = "".join(record.data().decode("ascii", "replace").split(" ")).upper().split("\r")
                 found += [(record, order)] * lines.count(here.location.text.upper())
-        done = executed.locations[:index].count(here.location) if self._log.reaches_begin() else len(found)
+        earlier = sum(one.number < 0 and one.text == here.location.text for one in executed.locations[:index])
+        done = earlier if self._log.reaches_begin() else len(found)
         record, order = found[min(done, len(found) - 1)] if found else (None, 0)
         return None if record is None or order > here.order else covered(self._frame(record, order), Cover.FRAME)
 
@@ -284,8 +291,9 @@ class ControllerCauses:
         for index in range(self._log.last_executed(controller, change.time), -1, -1):
             if executed[index].time < change.time:
                 break
-            if executed[index].order < change.order:
-                return index if _matches(self._all.programs.use(controller, index).writes, wanted) else None
+            use = self._all.programs.use(controller, index)
+            if executed[index].order < change.order and not (use.waits and use.governs):  # an interrupt comes between
+                return index if _matches(use.writes, wanted) else None
         return None
 
     def _from_outside(self, controller: str, change: Change, since: int, point: str) -> FoundCause:

@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.brake import BrakeSpec
+from steptwin.simulation.components.carriage import CarriageSpec
+from steptwin.simulation.components.conveyortable import FEED, RUN, ConveyorSpec
+from steptwin.simulation.components.follower import FollowerSpec
 from steptwin.simulation.components.gantry import GantrySpec
 from steptwin.simulation.components.load import LoadSpec
 from steptwin.simulation.components.logic import TerminalComponent
+from steptwin.simulation.components.shaft import ShaftSpec
+from steptwin.simulation.components.tool import ToolSpec
 from steptwin.simulation.kinds.programs import Resource, ResourceKind
 from steptwin.simulation.logic.expression import parse_condition, parse_expression
 from steptwin.simulation.scheduler.wires import PinName
-from steptwin.simulation.script import steps as do
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.axes import EVENTS_OF_ROTORS, POSITION
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing
-from steptwin.why.controllers import acted, axis_of
+from steptwin.why.controllers import axis_of
 from steptwin.why.log import LAST, Change
 from steptwin.why.movers import FALLS, GOES_ON, PUSHED, TRAVEL
 from steptwin.why.workpieces import HAS_ACTED_SINCE
@@ -27,10 +31,9 @@ from steptwin.why.workpieces import HAS_ACTED_SINCE
 FOLLOWS_AFTER = Message("why.follows-after", ", {name} follows after {delay_ms:g} ms")
 ITS_RATE_IS = Message("why.its-rate-is", "the rate of {name} is {rate:g} {unit}")
 COMES_WITH_TIME = Message("why.comes-with-time", "the time has come for {name}: {condition}")
+MOVED_BY_AXES = CarriageSpec, FollowerSpec, GantrySpec, ShaftSpec, ToolSpec
 TIME = "time"
 """States of an element that are over at a moment and are no signal."""
-OF_WORKPIECES = ("count", "crooked", "mass")
-"""Signals of the workpieces on an element."""
 
 
 class ElementCauses:
@@ -55,7 +58,8 @@ class ElementCauses:
             return self._all.last(list(self._all.sources(PinName(name, signal.upper()))), time)
         group = self._log.group(name)
         change = Change(time, 0.0, group, self._log.position(group, time), before)
-        workpiece = None if signal == POSITION or self._log.rates.has(name) else self._all.workpieces.at(name, change)
+        full, is_own = f"{name}.{signal}", signal == POSITION or self._log.rates.has(name)
+        workpiece = None if is_own else self._all.workpieces.at(name, change, full)
         if workpiece is not None:
             return workpiece
         jams = [one for one in self._all.axes.jams(name) if (one.time, one.order) < (time, before)] if signal == POSITION else []
@@ -64,13 +68,10 @@ class ElementCauses:
             return self._all.axes.rotor_event(name, jam)
         if signal == POSITION and self._all.axes.is_jammed_by(name):
             self._log.never_happened(*EVENTS_OF_ROTORS)
-        removed = next((act for act in self._log.acts_at(time, LAST) if isinstance(act.what, do.Remove)), None)
-        if removed is not None and signal in OF_WORKPIECES:
-            return acted(removed)
-        if part is None and self.followed(name):
+        if part is None and (self.followed(name) or self._is_timed(name)):
             return self.of_followed(name, change)
         channels = [one for one in self._log.first_levels if one == name or one.startswith(f"{name}.")]
-        found = None if part is None else self.of_inputs(name, change)
+        found = None if part is None else self.of_inputs(name, change, full)
         found = self._all.last(channels, time) if found is None else found
         return covered(found, Cover.ACTION) if found is not None and found.cover is None else found
 
@@ -78,29 +79,38 @@ class ElementCauses:
         """Cause of an event of an element."""
         return self._all.fault(name, change) or self.of_inputs(name, change)
 
-    def of_inputs(self, name: str, change: Change) -> FoundCause:
-        """Cause of a change of an element's output: an input at the same moment, or one before, as much earlier as it delays."""
+    def of_inputs(self, name: str, change: Change, signal: str = "") -> FoundCause:
+        """Cause of a change of an element's output, ``signal`` if that is given: an input at the same moment, or one before, as
+        much earlier as it delays."""
         part = self._all.parts[name]
         sources = [source for terminal in inputs(part) for source in self._all.sources(PinName(name, terminal))]
-        last = [found for source in sources if (found := self._all.before(source, change, change.time))]
+        last = list(self._that_act(name, signal, change, change.time))
+        if change.time - max(part.delays, default=0) <= self._log.begin:
+            self._log.lack()
         for delay in (0, *part.delays):
             exact = [found for found in last if found[0].time == change.time - delay]
             exact += [
                 found
-                for source in sources
+                for source in (sources if delay else ())
                 if (found := self._all.before(source, change, change.time - delay)) and found[0].time == change.time - delay
             ]
             if exact:
                 latest, source = max(exact, key=lambda found: found[0].order)
                 how = FOLLOWS_AFTER(name=name, delay_ms=delay / SECOND * 1000) if delay else None
                 return covered(self._all.change(source, latest, how), Cover.DELAY)
-        workpiece = self._all.workpieces.at(name, change)
+        workpiece = self._all.workpieces.at(name, change, signal)
         if workpiece is not None:
             return workpiece
         followed = self.of_followed(name, change)
         if followed is not None and all(followed.place > Place(one.time, one.order) for one, _ in last):
             return followed
         acts = Cover.ACTION if type(part).deadline is not TerminalComponent.deadline else None
+        begun = self._log.actions.begun(name, change.time)
+        if begun is not None:  # inputs that came later have not changed what it does
+            change = Change(begun, 0.0, change.group, self._log.position(change.group, begun), LAST)
+            last = list(self._that_act(name, signal, change, begun))
+        elif self._log.actions.has(name):
+            self._log.lack()
         latest, source = max(last, key=lambda found: (found[0].time, found[0].order), default=(None, ""))
         fault = self._log.last_fault(name, change.time, change.order)
         if fault is not None and (latest is None or (fault.time, fault.order) > (latest.time, latest.order)):
@@ -108,12 +118,25 @@ class ElementCauses:
             link = self._all.fault_link(record)
             return Cause(link, Place(fault.time, fault.order), self._all.of_fault(record, fault.order), acts)
         on = [source for source in sources if self._log.level(source, change.time)] if latest is None else []
-        if len(on) == 1:
-            return covered(self._all.first(on[0], HAS_ACTED_SINCE(name=name)), acts)
+        if on and self._log.reaches_begin():
+            first, *others = [self._all.first(one, HAS_ACTED_SINCE(name=name))._replace(cover=acts) for one in on]
+            return first._replace(along=tuple(others))
         how = HAS_ACTED_SINCE(name=name)
         return covered(
             self._all.last(sources, change.time, how) if latest is None else self._all.change(source, latest, how), acts
         )
+
+    def _that_act(self, name: str, signal: str, change: Change, until: Nanos) -> Iterator[tuple[Change, str]]:
+        """The last changes by a moment and before ``change`` of the inputs of an element, for a sensor of a belt those by which
+        workpieces come to it or go on: a feed that is switched off moves none, nor a stop that is switched on."""
+        is_belt = signal in self._log.first_levels and isinstance(self._all.specs.get(name), ConveyorSpec)
+        for terminal in inputs(self._all.parts[name]):
+            idle = {RUN: None, FEED: False}.get(terminal, True) if is_belt else None
+            for source in self._all.sources(PinName(name, terminal)):
+                changes = self._log.changes_before(source, until, change.order)
+                found = next((one for one in changes if bool(one.value) is not idle), None)
+                if found is not None:
+                    yield found, source
 
     def followed(self, name: str) -> tuple[str, ...]:
         """The signals that an element follows besides its inputs: those of its condition, what it measures, its axes."""
@@ -126,10 +149,17 @@ class ElementCauses:
         acts_on_axis = isinstance(spec, BrakeSpec | LoadSpec)
         axes = [getattr(spec, one, None) for one in ("axis", "other")] if not (when or of or rate or acts_on_axis) else []
         turned_by = getattr(spec, "shaft", None)
-        found = [*(parse_condition(when).names() if when else ()), *(parse_expression(of).names() if of else ())]
-        found += parse_expression(rate).names() if rate else ()
+        names = [*(parse_condition(when).names() if when else ()), *(parse_expression(of).names() if of else ())]
+        names += parse_expression(rate).names() if rate else ()
+        found = [moved for one in names for moved in self._that_move(one)]
         found += [f"{axis}.{POSITION}" for axis in axes if axis]
         return (*dict.fromkeys(one for one in found if one != TIME), *(self.followed(turned_by) if turned_by else ()))
+
+    def _that_move(self, signal: str) -> tuple[str, ...]:
+        """The positions of the axes that move a coordinate; the signal itself, if it is none."""
+        owner = signal.partition(".")[0]
+        is_moved = isinstance(self._all.specs.get(owner), MOVED_BY_AXES) and not self._log.has(signal)
+        return self.followed(owner) if is_moved else (signal,)
 
     def _condition(self, name: str) -> str:
         """Text of the condition of an element, or of what it is over; empty for none."""
@@ -177,7 +207,8 @@ class ElementCauses:
         is_integrator = self._log.rates.has(name)
         if is_integrator:
             self._log.lack()  # all its rates count
-        moving = self._log.rates.drivers(name, change.time) if is_integrator else self._log.movers.get((name, change.time))
+        moved = self._log.meetings.movers.get((name, change.time))
+        moving = self._log.rates.drivers(name, change.time) if is_integrator else moved
         names = moving if is_integrator or moving else self.followed(name)
         found: dict[str, Cause] = {}
         for signal in names or ():

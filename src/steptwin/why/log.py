@@ -18,7 +18,6 @@ from typing import NamedTuple
 from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message, MessageText, text_of
-from steptwin.simulation.components.beam import BEAM, SEEN
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.faults.active import ActiveFault, HeldLevel
 from steptwin.simulation.kinds.programs import Programs, ProgramState, StatementLocation, StatementUse
@@ -32,9 +31,10 @@ from steptwin.simulation.world.snapshot import RecordedInput
 from steptwin.simulation.world.snapshotlog import SLICE_NS, replay
 from steptwin.statements import StatementHook
 from steptwin.why import points
+from steptwin.why.actions import NotedActions
 from steptwin.why.frames import Frames
 from steptwin.why.lacking import EXECUTED, HAPPENED, NEVER, Found, Lacking
-from steptwin.why.movers import movers
+from steptwin.why.movers import NotedMeetings
 from steptwin.why.programstates import ProgramStates
 from steptwin.why.rates import NotedRates
 from steptwin.why.roots import Act
@@ -126,8 +126,6 @@ class CauseLog:
         numbers = {id(scheduler): number for number, scheduler in enumerate(world.schedulers)}
         self._group_of = {name: numbers[id(scheduler)] for name, scheduler in parts.scheduler_of.items()}
         self._timed = on_timed_lines(world)
-        self._beams = {f"{name}.{SEEN.lower()}": beam for name, beam in parts.built(BEAM).items()}
-        self._along = {spec.name: spec.towards().axis for spec in parts.described.of(BEAM)}
         self._pins = {name: frozenset(controller.pins()) for name, controller in world.controllers.items()}
         self.first_levels = levels_of(world)
         self.records: dict[int, list[TraceRecord]] = defaultdict(list)
@@ -153,8 +151,7 @@ class CauseLog:
         self.frames = Frames(world)
         self.events: dict[str, list[Change]] = defaultdict(list)
         """Events of workpieces: all, and by the workpiece and by the element."""
-        self.movers: dict[tuple[str, Nanos], tuple[str, ...]] = {}
-        """The signals that moved what a beam sees or a collision compares, by its name, at its changes."""
+        self.meetings = NotedMeetings(world)
         self.acts: list[Act] = []
         self._fault_acts: dict[str, list[Act]] = defaultdict(list)
         """Those that set or clear a fault, by its name."""
@@ -177,10 +174,10 @@ class CauseLog:
                 self._holds[signal].append(Hold(began.get(held.fault, self.begin), held))
         self._built = {group: len(records) for group, records in self.records.items()}
         self.points, self.rates = points.NotedPoints(world, lambda: self._order + 7), NotedRates(world)
+        self.actions, self.states = NotedActions(world), ProgramStates(world, self._order_of)
         world.trace.subscribers.append(self._take)
         world.act_subscribers.append(self._act)
         parts.faults.act_subscribers.append(self._fault_acted)
-        self.states = ProgramStates(world, self._order_of)
         self._note_statements()
 
     def _note_statements(self) -> None:
@@ -239,16 +236,18 @@ class CauseLog:
         match record.kind:
             case "edge":
                 signal = self.signal_of(record)
-                order = self._of_input(record) if self._is_input(record, signal) else order
-                if (beam := self._beams.get(signal)) is not None:
-                    name = beam.block.name
-                    self.movers[name, record.time] = movers(self.world, name, beam.by, record.time, self._along[name])
+                order = self._before_events(record, (record.controller,)) if self._is_input(record, signal) else order
+                self.meetings.sees(signal, record.time)
                 self.changes[signal].append(Change(record.time, record.level(), group, len(records), order))
             case "plan":
                 self.plans[record.controller, record.subject].append(Change(record.time, 0.0, group, len(records), order))
             case "coordinate":
                 self.origins[record.controller, record.subject].append(Change(record.time, 0.0, group, len(records), order))
             case "frame":
+                first = self._before_events(
+                    record, [name for name, on in self.world.objects.line_of.items() if on[0].name == record.controller]
+                )
+                order = first if first < order - 8 else order
                 self.frames.take(record, order)
                 for name in self._timed.get(record.controller, ()):
                     self.points.executes(name, record.time, keeps=True)
@@ -273,9 +272,9 @@ class CauseLog:
                 self.events[name].append(event)
         if record.subject in OF_MECHANICS or facts["what"] in JAMS:
             self.mechanics[element].append(event)
-        one, other = (getattr(record.value, "values", {}).get(part) for part in ("one", "other"))
-        if record.subject == "collision" and one and other:
-            self.movers[element, record.time] = movers(self.world, str(one), str(other).partition(",")[0], record.time)
+        if record.subject == "collision":
+            one, other = (str(getattr(record.value, "values", {}).get(part, "")) for part in ("one", "other"))
+            self.meetings.touch(element, (one, *other.split(", ")) if one and other else (), record.time)
 
     def _order_of(self, controller: str, now: Nanos, state: ProgramState) -> int:
         """The order of a change of a program: before the first statement that it lets be executed, after the one that ends it."""
@@ -298,11 +297,12 @@ class CauseLog:
             return True
         return bool(self.acts) and self.acts[-1].time == record.time and sets(self.acts[-1], pin)
 
-    def _of_input(self, record: TraceRecord) -> int:
-        """The order of an edge of an input, recorded after the statements and events that it led to."""
-        group, events = self._group_of[record.controller], self._events - 1
+    def _before_events(self, record: TraceRecord, owners: Collection[str]) -> int:
+        """The order of an edge of an input or of a frame, recorded after the statements and events that it led to."""
+        group, events = self._group_of.get(record.controller, -1), self._events - 1
         for order, earlier in self.at(group, record.time):
-            if order != 8 * events or earlier.kind != "event" or earlier.controller != record.controller:
+            is_led_to = earlier.kind == "event" and earlier.subject not in (*OF_MECHANICS, WORKPIECE)
+            if order != 8 * events or not is_led_to or earlier.controller not in owners:
                 break
             events -= 1
         return 8 * events + 1

@@ -5,18 +5,63 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from steptwin.controller import Nanos
+from steptwin.simulation.components.beam import BEAM, SEEN
+from steptwin.simulation.components.beltsensor import Sensor
+from steptwin.simulation.components.body import BODY, SIGNALS
+from steptwin.simulation.components.touch import HIT
 from steptwin.simulation.space.frames import FLOOR, Frame, path
 from steptwin.simulation.world.simulation import Simulation
 
 PUSHED, FALLS, GOES_ON = "pushed", "falls", "goes on"
 """Events of a workpiece that moves from then on."""
+PRESENT = SIGNALS["when"]
 TRAVEL = "travel"
 """The signal of a belt that moves."""
 
 
+class NotedMeetings:
+    """Notes what beams and sensors of belts see, and what touches in collisions, and what moves those."""
+
+    def __init__(self, world: Simulation) -> None:
+        self._world = world
+        contacts = (contact for circuit in world.objects.circuits.values() for contact in circuit.contacts)
+        self._sensors = {contact.channel: contact for contact in contacts if isinstance(contact, Sensor)}
+        self._beams = {f"{name}.{SEEN.lower()}": beam for name, beam in world.objects.built(BEAM).items()}
+        self._along = {spec.name: spec.towards().axis for spec in world.objects.described.of(BEAM)}
+        self._touching: dict[str, tuple[str, ...]] = {}
+        """Those that touched last, by collision."""
+        self.seen: dict[tuple[str, Nanos], tuple[str, ...]] = {}
+        """The workpiece or part that is seen, or was seen last, or those that touch, by the signal, at its changes."""
+        self.movers: dict[tuple[str, Nanos], tuple[str, ...]] = {}
+        """The signals that moved what a beam sees or a collision compares, by its name, at its changes."""
+
+    def sees(self, signal: str, now: Nanos) -> None:
+        """A signal changes, which may be that of a sensor."""
+        beam, sensor = self._beams.get(signal), self._sensors.get(signal)
+        if beam is not None:
+            name = beam.block.name
+            self.seen[signal, now] = (beam.by,)
+            self.movers[name, now] = movers(self._world, name, beam.by, now, self._along[name])
+        elif sensor is not None and (workpiece := sensor.by(now)):
+            self.seen[signal, now] = (workpiece,)
+
+    def touch(self, collision: str, parts: tuple[str, ...], now: Nanos) -> None:
+        """Parts touch in a collision; those that touched last are apart again, if none are given."""
+        parts = self._touching[collision] = parts or self._touching.get(collision, ())
+        if parts:
+            self.seen[f"{collision}.{HIT.lower()}", now] = parts
+            self.movers[collision, now] = movers(self._world, parts[0], parts[1], now)
+
+
 def movers(world: Simulation, one: str, other: str, now: Nanos, along: int | None = None) -> tuple[str, ...]:
     """Signals that change where an element, body or workpiece is, as seen from another one: ``x.position``, ``belt.travel``; with
-    the events of workpieces, ``belt.1.pushed``. Those that move at a moment, if any do, and not ``along`` an axis only."""
+    the events of workpieces, ``belt.1.pushed``. Those that move at a moment, if any do, and not ``along`` an axis only; of a body
+    that comes or goes at the moment just that, ``arm.present``."""
+    bodies = world.objects.built(BODY)
+    whens = {name: bodies[name].signals().get(PRESENT) for name in (one, other) if name in bodies}
+    flips = tuple(f"{name}.{PRESENT}" for name, when in whens.items() if when and when.value(now) != when.value(now - 1))
+    if flips:
+        return flips
     steps = [step for step in path(_frame(world, one), _frame(world, other)) if step.motion is not None]
     moving = [step.frame for step in steps if step.motion is not None and not step.motion.is_still]
     moving = [frame for frame in moving if _moves(frame, now)] or moving

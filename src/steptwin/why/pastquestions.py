@@ -20,6 +20,8 @@ from steptwin.simulation.world.snapshotlog import outside_past
 from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Effect, Trial
 from steptwin.why.causes import Causes
 from steptwin.why.lacking import Found, Lacking
+from steptwin.why.presentstates import IS_IN_A_LOOP
+from steptwin.why.programs import WAITS
 from steptwin.why.question import Asking, Why
 from steptwin.why.roots import SetFault
 from steptwin.why.search import LastChanges, Snapshots
@@ -78,21 +80,28 @@ class PastQuestions:
             self._logs = [self._note(max(snapshots.begin, at - span))]
         self._kept_to.clear()
         answer = yield from self._settled(lambda known: self._answer(known, question, at))
-        tried: dict[str, Trial] = {}
-        for name in self._suspects(answer):
-            trial = yield from self._without_fault(name, answer)
-            if trial is not None:
-                tried[name] = trial
         answer = yield from self._with_held(answer)
         lacking = yield from self._settled(lambda known: known.why.lacking(question, at))
-        answer = answer._replace(links=tuple(dict.fromkeys((*lacking, *_with(answer.links, tried.values())))))
+        answer = answer._replace(links=(*lacking, *answer.links))
+        tried: dict[str, Trial] = {}
+        held_back: list[Trial] = []
+        suspects = self._suspects(answer)
+        programs = yield from self._standing(answer if suspects else answer._replace(links=()))
+        for name in suspects:
+            first, *others = yield from self._without_fault(name, (answer, *programs))
+            if first.effect is Effect.OTHERWISE:
+                tried[name] = first
+            else:
+                held_back += [one for one in others if one.effect is Effect.OTHERWISE][:1]
+        links = _with(answer.links[len(lacking) :], (*tried.values(), *held_back))
+        answer = answer._replace(links=tuple(dict.fromkeys((*lacking, *links))))
         if not try_without:
             return answer
         trials: list[Trial] = []
         for link in answer.links:
             if link.root is not None:
                 known = tried.get(link.root.name) if isinstance(link.root, SetFault) else None
-                trials.append(known or (yield from trying_without(self._snapshots, link, answer, self._most)))
+                trials.append(known or (yield from trying_without(self._snapshots, link, (answer,), self._most))[0])
         return answer._replace(trials=tuple(trials))
 
     def _suspects(self, answer: Answer) -> Sequence[str]:
@@ -114,13 +123,20 @@ class PastQuestions:
         one = faults.find(name)
         return answer.at - since >= STANDS_NS or faults.acts[name].last >= since or bool(one is not None and one.doing)
 
-    def _without_fault(self, name: str, answer: Answer) -> Generator[None, None, Trial | None]:
-        """The run without a fault, if what was asked for is otherwise then; where the fault was long before, also for
-        `STANDS_NS` before and after: it may be later or earlier without it."""
-        link = yield from self._settled(lambda known: known.fault_link(name, answer.at))
-        around = 0 if self._is_near(name, answer) else STANDS_NS
-        trial = yield from trying_without(self._snapshots, link, answer, self._most, around=around)
-        return trial if trial.effect is Effect.OTHERWISE else None
+    def _standing(self, answer: Answer) -> Generator[None, None, Sequence[Answer]]:
+        """What the programs stand at that an answer is about besides."""
+        names = (link.subject for link in answer.links if link.text.id in (WAITS.id, IS_IN_A_LOOP.id))
+        found: dict[str, Answer] = {}
+        for name in dict.fromkeys(names):
+            found[name] = yield from self._settled(lambda known, name=name: self._answer(known, name, answer.at))
+        return [*found.values()]
+
+    def _without_fault(self, name: str, answers: Sequence[Answer]) -> Generator[None, None, Sequence[Trial]]:
+        """The run without a fault, for each of some answers. The first one, of what was asked, counts also for `STANDS_NS` before
+        and after, where the fault was long before: it may be later or earlier without it."""
+        link = yield from self._settled(lambda known: known.fault_link(name, answers[0].at))
+        around = 0 if self._is_near(name, answers[0]) else STANDS_NS
+        return (yield from trying_without(self._snapshots, link, answers, self._most, around=around))
 
     def _with_held(self, answer: Answer) -> Asking:
         """An answer with what holds the programs that could have changed what it is about since."""
@@ -156,6 +172,9 @@ class PastQuestions:
     def _have_more(self) -> Generator[None, None, bool]:
         """Have some of what lacks; whether there was something to be had."""
         moments, changes = sorted(self._lacking.moments), dict(self._lacking.changes)
+        if (moments or changes) and self._has_rest_at_once():
+            yield from self._have_longer(self._logs[0].why.log.begin)
+            return True
         for moment in moments:
             yield from self._note_about(moment)
         for moment in set(changes.values()):
@@ -170,6 +189,11 @@ class PastQuestions:
         for begin in begins:
             yield from self._have_longer(begin)
         return bool(begins)
+
+    def _has_rest_at_once(self) -> bool:
+        """Whether the next longer log has the whole past: then searches in that would cost as much, each again."""
+        log, begin = self._logs[0].why.log, self._snapshots.begin
+        return log.begin > begin and log.begin not in self._kept_to and self._logs[0].older() == begin
 
     def _note(self, moment: Nanos) -> _Known:
         """A log from the newest state at or before a moment."""

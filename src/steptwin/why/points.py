@@ -20,7 +20,8 @@ MOST_LOOKS = 100_000
 more of either, nothing is noted any more, and all is forgotten."""
 
 TimedValue: TypeAlias = tuple[Nanos, float]
-"""A moment, and the value from then on."""
+"""A moment, and the value from then on. The first one is that of a nanosecond before the beginning, at which something may be
+written at once."""
 
 
 class NotedPoints:
@@ -84,7 +85,7 @@ class _Reader:
         now = world.now
         self._kept = _Compared({path: point for path, point in found.items() if point.is_kept}, now)
         self._others = EventPoints(world, owner, {path: point for path, point in found.items() if not point.is_kept})
-        self.points = self._kept.series | {path: [(now, float(value))] for path, value in self._others.read(now).items()}
+        self.points = self._kept.series | {path: [(now - 1, float(value))] for path, value in self._others.read(now).items()}
         rows = (_memory(world, owner, f"{path}[0]") for path, point in points.items() if point is None)
         memory = next((row for row in rows if row is not None), None)
         self.cells = None if memory is None else _Cells(memory, now)
@@ -121,7 +122,9 @@ class _Compared:
     def __init__(self, found: Mapping[str, LivePoint], now: Nanos) -> None:
         self._reads = [point.read for point in found.values() if point.read is not None]
         self._values = [float(read(now)) for read in self._reads]
-        self.series: dict[str, list[TimedValue]] = {path: [(now, value)] for path, value in zip(found, self._values, strict=True)}
+        self.series: dict[str, list[TimedValue]] = {
+            path: [(now - 1, value)] for path, value in zip(found, self._values, strict=True)
+        }
 
     def look(self, now: Nanos) -> int:
         """Note what has another value at the present moment; how many changes that are."""
@@ -143,7 +146,7 @@ class _Cells:
     def __init__(self, memory: MemoryCells, now: Nanos) -> None:
         self._words = memory.words
         self._first = self._last = memory.words()[:]
-        self._begin = now
+        self._begin = now - 1
         self._series: dict[int, list[TimedValue]] = {}
 
     def look(self, now: Nanos) -> int:

@@ -25,6 +25,7 @@ ANY_PIN = Message("why.any-pin", "any pin")
 NO_AXIS_HAS_MOVED = Message("why.no-axis-has-moved", "no axis has moved until {time:g} s")
 MOVES_WITHOUT_END = Message("why.moves-without-end", "{axis} moves without end")
 MOVES_UNTIL = Message("why.moves-until", "{axis} moves until {pin} ends it")
+IS_IN_A_LOOP = Message("why.is-in-a-loop", "{controller} is in the loop of {statement}")
 HAS_NO_INPUT = Message("why.has-no-input", "{axis} homes without end: no input is configured that could end it")
 
 _Asked: TypeAlias = "str | tuple[str, Resource]"
@@ -76,7 +77,8 @@ class PresentStates:
         programs, last = self._causes.programs, self._log.last_executed(controller, self._at)
         use = programs.use(controller, last)
         is_waiting = self.waits(controller, use)
-        reads = use.reads if is_waiting else programs.decides_in_loop(controller, last)
+        loop = [] if is_waiting else programs.conditions_of_loop(controller, last, has_waits=True)
+        reads = use.reads if is_waiting else [one for number in loop for one in programs.use(controller, number).reads]
         if is_waiting and not reads:
             yield ChainLink(self._at, controller, WAITS_FOR_A_TIME())
         yield from self.of([(controller, one) for one in reads], controller)
@@ -99,7 +101,8 @@ class PresentStates:
     def _signal(self, name: str, waits: str) -> _Links:
         owner = name.partition(".")[0]
         yield ChainLink(self._at, owner, self._causes.state(name, self._at))
-        others = () if owner == waits else (yield from self._not_written(name))
+        is_held = self._log.hold(name, self._at) is not None
+        others = () if owner == waits or is_held else (yield from self._not_written(name))
         drivers = self._causes.drivers(name, self._at)
         return (*self._causes.holding.deciding(name, drivers, self._at), *others)
 
@@ -108,6 +111,9 @@ class PresentStates:
         if resource.kind is ResourceKind.PIN and resource.name:
             return [f"{controller}.{resource.name}"]
         if resource.kind is ResourceKind.ENCODER:
+            value = self._world.programs[controller].read(f"ENC{resource.name}", self._at)
+            if value is not None:
+                yield ChainLink(self._at, controller, IS(signal=f"ENC{resource.name}", value=f"{value:g}"))
             counted = self._causes.axes.counted(controller, resource.name, self._at)
             if counted is not None:
                 yield counted.link
@@ -119,7 +125,7 @@ class PresentStates:
             elif motion is not None:
                 yield motion.link
             return (yield from self.motion(controller, resource.name))
-        if resource.kind is not ResourceKind.ORIGIN:
+        if resource.kind not in (ResourceKind.ORIGIN, ResourceKind.REQUEST):
             yield ChainLink(self._at, controller, self._value(controller, resource))
         return (yield from self.interrupts(controller, resource))
 
@@ -163,37 +169,52 @@ class PresentStates:
         return IS_STILL(name=resource.name, value=value, time=written.place.time / SECOND)
 
     def _not_written(self, signal: str) -> _Links:
-        """Wait that stands between a program and an output that it can change, or what holds the program. Returns what it waits
-        for, or the supply that its controller lacks."""
+        """Reason why a program has not changed an output that it can change; the supply that its controller lacks."""
         owner, _, pin = signal.partition(".")
-        log, programs, at = self._log, self._causes.programs, self._at
+        programs, at = self._causes.programs, self._at
         if owner not in self._world.controllers or self._causes.drivers(signal, at):
             return ()
         supply = programs.supply_off(owner, at)
         if supply is not None:
             return [supply]
-        held = programs.stands(owner, at)
-        if held is not None and not programs.may_write(owner, pin):
+        if programs.stands(owner, at) is not None and not programs.may_write(owner, pin):
             return ()
+        return (yield from self._before(owner, Resource(ResourceKind.PIN, pin)))
+
+    def before(self, controller: str, wanted: Resource) -> Iterator[ChainLink]:
+        """Reason why a program has not changed something, and the states on which that depends."""
+        waiting = yield from self._before(controller, wanted)
+        yield from self.of(waiting)
+
+    def _before(self, owner: str, wanted: Resource) -> _Links:
+        """Wait or loop that stands between a program and what it can change, or what holds the program. Returns what it waits
+        for."""
+        log, programs, at = self._log, self._causes.programs, self._at
+        held = programs.stands(owner, at)
         if held is not None:
             yield held.link if held.place.order >= 0 or log.reaches_begin() else replace(held.link, time=at)
             by = held.before()
             if by is not None:
                 yield by.link
             return ()
-        index, wanted = log.last_executed(owner, at), Resource(ResourceKind.PIN, pin)
+        index = log.last_executed(owner, at)
         if owner in self._world.programs and not (index >= 0 and programs.leads_to(owner, index, wanted)):
             return (yield from self.interrupts(owner, wanted))
         if index < 0:
             return ()
         here, use = log.executed[owner][index], programs.use(owner, index)
-        against = None if use.reads else programs.decided_against(owner, Resource(ResourceKind.PIN, pin), at)
+        against = None if use.reads else programs.decided_against(owner, wanted, at)
         if against is not None:
             yield against.link
             there = self._causes.of(against.place.time) or self._causes
             reads = [(owner, one) for one in there.programs.use(owner, (against.place.number - 2) // 3).reads]
             return [*reads, *(yield from self.interrupts(owner, wanted))]
-        if not use.waits or at - here.time <= self._world.programs[owner].statement_time:
-            return ()
-        yield ChainLink(at, owner, WAITS(controller=owner, statement=statement(log, here)))
-        return [*((owner, one) for one in use.reads), *(yield from self.interrupts(owner, wanted))]
+        if use.waits and at - here.time > self._world.programs[owner].statement_time:
+            yield ChainLink(at, owner, WAITS(controller=owner, statement=statement(log, here)))
+            return [*((owner, one) for one in use.reads), *(yield from self.interrupts(owner, wanted))]
+        conditions = programs.conditions_of_loop(owner, index)
+        if conditions:
+            widest = max(conditions, key=lambda one: len(programs.use(owner, one).governs))
+            words = statement(log, programs.written_at(owner, widest))
+            yield ChainLink(at, owner, IS_IN_A_LOOP(controller=owner, statement=words))
+        return [(owner, one) for number in conditions for one in programs.use(owner, number).reads]

@@ -38,6 +38,8 @@ GOES_ON = Message("why.program-goes-on", "the program goes on")
 PROGRAM_STARTED = Message("why.program-started", "the program started")
 LONGEST_REACTION_NS: Nanos = 510 * MILLISECOND
 """Limit of the time after which a statement goes on when what it waits for has come: inputs may be filtered for 500 ms."""
+MOST_BEFORE_WAIT = 20
+"""Limit of the statements between the command of a motion and a wait for its end."""
 MOST_UNDECIDED = 5000
 """Limit of the statements among which the one that decided is looked for."""
 
@@ -212,14 +214,34 @@ class ProgramCauses:
         since = self._log.executed_before(controller, here)
         return None if since is None else Place(since, LAST)
 
-    def decides_in_loop(self, controller: str, index: int) -> Sequence[Resource]:
-        """Resources that the conditions read that were evaluated since a statement was executed before; none without a loop."""
+    def conditions_of_loop(self, controller: str, index: int, *, has_waits: bool = False) -> Sequence[int]:
+        """The numbers of the conditions that were evaluated since a statement was executed before; none without a loop, or with a
+        wait in it, unless ``has_waits``."""
         here = (self._log.executed[controller].locations[index],)
         before = self._log.last_of(controller, here, index)
         if before is None and self._log.executed_before(controller, here) is not None:
             self._log.lack()
-        uses = [] if before is None else [self.use(controller, one) for one in range(before, index)]
-        return list(dict.fromkeys(read for use in uses if use.governs or use.is_loop for read in use.reads))
+        loop = [] if before is None else list(range(before, index))
+        if not has_waits and any(self.use(controller, one).waits for one in loop):
+            return []
+        last = {self._log.executed[controller].locations[one]: one for one in loop}
+        return [one for one in last.values() if (use := self.use(controller, one)).governs or use.is_loop]
+
+    def written_at(self, controller: str, index: int) -> Executed:
+        """An executed statement; the condition of a loop where it is written: at its beginning."""
+        executed, use = self._log.executed[controller][index], self.use(controller, index)
+        return executed._replace(location=executed.location._replace(number=use.governs.start - 1)) if use.is_loop else executed
+
+    def values_at(self, controller: str, path: str) -> Iterator[Resource]:
+        """The values that statements change which are a point of their controller."""
+        programs, kind = self._world.programs[controller], self._world.kind(controller)
+        every = (StatementLocation(text, one) for text in programs.texts for one in range(len(programs.statements(text))))
+        written = dict.fromkeys(one for where in every for one in programs.use(where).writes if one.kind is ResourceKind.VALUE)
+        for one in written:
+            name = programs.point(one.name)
+            point = None if name is None else kind.point(self._world.controller(controller), name)
+            if point is not None and point.point.path.lower() == path.lower():
+                yield one
 
     def _handlers(self, controller: str, text: str) -> Sequence[range]:
         """The statements of each interrupt of a text, with the one that it begins with."""
@@ -237,8 +259,11 @@ class ProgramCauses:
         if self._log.executed[controller].locations[index].number >= 0:
             return led
         came = self._all.controllers.given(controller, index)
-        if came is None or led is None or led.place < came.place or led.link.text == PROGRAM_STARTED():
+        if came is None or led is None:
             return came or led
+        is_at_once = came.place.time >= self._log.executed[controller].times[index]
+        if is_at_once or led.place < came.place or led.link.text == PROGRAM_STARTED():
+            return came
         return led._replace(along=(came,))
 
     def _led(self, controller: str, index: int) -> FoundCause:
@@ -266,6 +291,10 @@ class ProgramCauses:
                 began = Place(executed[first].time, executed[first].order, 3 * first)
                 came = any(cause.place > began for cause in self._read(controller, first, there))
                 return self._decided(controller, first, there, ENDED) if came else self._did_not_wait(controller, earlier)
+            if use.waits and (ignored := self._ignored(controller, earlier)) is not None:
+                text = DID_NOT_WAIT(statement=statement(self._log, here), levels=[ignored.link.text])
+                place = Place(here.time, here.order, 3 * earlier + 2)
+                return Cause(ChainLink(here.time, controller, text), place, lambda: ignored, Cover.PROGRAM)
             if number in use.governs or (use.is_loop and ended.location.number >= use.governs.stop):
                 return self._decided(controller, earlier, Place(here.time, here.order, 3 * earlier + 2), DECIDED)
             after = earlier
@@ -274,6 +303,20 @@ class ProgramCauses:
             place = Place(here.time, here.order, 3 * after)
             return Cause(ChainLink(here.time, controller, text), place, nothing, Cover.PROGRAM)
         return self._began(controller, after, begun) if begun is not None else self._started(controller)
+
+    def _ignored(self, controller: str, index: int) -> FoundCause:
+        """The event by which a command was ignored whose motion a statement would have waited for."""
+        executed, here = self._log.executed[controller], self._log.executed[controller][index]
+        moves = (one for one in range(index - 1, max(-1, index - MOST_BEFORE_WAIT), -1) if _moves(self.use(controller, one)))
+        command = next(moves, None)
+        axes = ("", *(str(one) for one in range(1, len(self._world.controllers[controller].axes) + 1)))
+        events = [
+            event for one in axes if (event := self._log.last_axis_event(controller, one, here.time, here.order)) is not None
+        ]
+        event = max(events, key=lambda one: one.order, default=None)
+        if event is None or command is None or not executed[command].order < event.order < executed[command + 1].order:
+            return None
+        return covered(self._all.controllers.axis_event(controller, event, Place(event.time, event.order)), Cover.PROGRAM)
 
     def _begin_of_wait(self, controller: str, index: int, handlers: Sequence[range]) -> int:
         """The number of the statement at which a wait began, which goes on after each interrupt."""
@@ -292,22 +335,28 @@ class ProgramCauses:
         return first
 
     def _decided(self, controller: str, index: int, place: Place, how: Message) -> Cause:
-        executed, use = self._log.executed[controller][index], self.use(controller, index)
-        if use.is_loop:  # its condition is written where it begins
-            executed = executed._replace(location=executed.location._replace(number=use.governs.start - 1))
-        link = ChainLink(place.time, controller, how(statement=statement(self._log, executed)))
+        use = self.use(controller, index)
+        link = ChainLink(place.time, controller, how(statement=statement(self._log, self.written_at(controller, index))))
         if how is ENDED:
             return Cause(link, place, partial(self._of_wait, controller, index, place), Cover.PROGRAM)
+        if use.waits and use.governs and not use.reads:  # an interrupt that comes with the time
+            return Cause(link, place, nothing, Cover.PROGRAM, partial(self._enabled, controller, index, place))
         led = cache(partial(self._of_decision, controller, index, place))
 
         def besides() -> Iterator[Cause]:
             yield from (one for one in led()[1:] if one is not None)
             yield from self._unchanged(controller, index, place)
-            if use.waits and use.governs:  # an interrupt that was enabled
-                enabled = [self.resource(controller, one, index, place.time, place.order) for one in use.acts_by]
-                yield from (one for one in enabled if one is not None)
+            if use.waits and use.governs:
+                yield from self._enabled(controller, index, place)
 
         return Cause(link, place, lambda: led()[0], Cover.PROGRAM, besides)
+
+    def _enabled(self, controller: str, index: int, place: Place) -> Iterator[Cause]:
+        """Causes for which an interrupt was enabled."""
+        for one in self.use(controller, index).acts_by:
+            found = self.resource(controller, one, index, place.time, place.order)
+            if found is not None:
+                yield found
 
     def _unchanged(self, controller: str, index: int, place: Place) -> Iterator[Cause]:
         """Causes for all that a condition reads and that has had its value from the beginning."""
@@ -350,10 +399,16 @@ class ProgramCauses:
         """The changes by which what a condition reads has had its values since; of one that is new, also what led to it, if that
         came later."""
         reads = self._all_read(controller, index, place)
-        is_new = not self.use(controller, index).waits and self._executed_before(controller, index) is None
-        if reads and not is_new:
+        if self.use(controller, index).waits and self.use(controller, index).governs:
+            return reads or (None,)  # what it broke into has not led to an interrupt
+        before = None if self.use(controller, index).waits else self._executed_before(controller, index)
+        latest = place.time - LONGEST_REACTION_NS
+        is_recent = reads and (before is None or reads[0].place > before or reads[0].place.time > latest)
+        if reads and (self.use(controller, index).waits or (before is not None and is_recent)):
             return reads
         led = self._of_statement(controller, index)
+        if reads and before is not None:  # it is evaluated again, and only the time is another one
+            return reads if led is None else (*reads, led)
         return (led, *reads) if not reads or (led is not None and led.place > reads[0].place) else reads
 
     def _all_read(self, controller: str, index: int, place: Place) -> Sequence[Cause]:
@@ -366,7 +421,8 @@ class ProgramCauses:
         time depends on what led to it."""
         reads, began = self.use(controller, index).reads, self._log.executed[controller][index]
         resumed = self._resumed(controller, began.order, began._replace(time=place.time, order=place.order))
-        others = () if resumed is None else (resumed,)
+        led = None if resumed is None else covered(self._of_statement(controller, index), Cover.WAIT)
+        others = () if resumed is None else (resumed._replace(along=() if led is None else (led,)),)
         if all(resource.kind is ResourceKind.VALUE for resource in reads):
             came = [
                 cause for cause in self._read(controller, index, place) if cause.place > Place(began.time, began.order, 3 * index)
@@ -375,10 +431,11 @@ class ProgramCauses:
             return covered(last if reads or last else self._of_statement(controller, index), Cover.WAIT)
         latest = place.time - LONGEST_REACTION_NS
         passes = any(resource.kind is ResourceKind.AXIS and resource.name for resource in reads)  # a place, not the end
+        is_turned = any(resource.kind is ResourceKind.ENCODER for resource in reads)
         came = [
             cause
             for cause in self._read(controller, index, place)
-            if (passes if cause.cover is Cover.MOTION else cause.place.time >= latest)
+            if is_turned or (passes if cause.cover is Cover.MOTION else cause.place.time >= latest)
         ]
         pins = [f"{controller}.{one.name}" for one in reads if one.kind is ResourceKind.PIN and one.name]
         came += others
@@ -386,6 +443,9 @@ class ProgramCauses:
             pin = pins[0].removeprefix(f"{controller}.")
             lasts = self._world.kind(controller).filter_of(self._world.controllers[controller], pin)
             return covered(self._all.first(pins[0], FILTERED(ms=lasts / MILLISECOND) if lasts else None), Cover.LEVEL)
+        last = place.number // 3 - 1
+        if not came and last > index:  # the interrupt that it went on after
+            came = [self.statement(controller, last)]
         return covered(max(came, key=lambda cause: cause.place, default=None), Cover.WAIT)
 
     def resource(self, controller: str, resource: Resource, index: int, time: Nanos, before: int = LAST) -> FoundCause:
@@ -402,6 +462,8 @@ class ProgramCauses:
                 return self._all.axes.origin(controller, resource.name, time, before)
             case ResourceKind.ENCODER:
                 return self._all.axes.counted(controller, resource.name, time, before, index)
+            case ResourceKind.REQUEST:
+                return self._all.controllers.written(controller, resource.name, time, before)
             case ResourceKind.VALUE:
                 return self._register(controller, resource, time, before) or self.written(controller, resource, index)
         return None
@@ -423,15 +485,22 @@ class ProgramCauses:
         """The last change of an input that its filter has let in by a moment; None without a filter or such a change."""
         signal, controllers = f"{controller}.{pin}", self._world.controllers
         lasts = self._world.kind(controller).filter_of(controllers[controller], pin)
-        later: Nanos | None = None
+        later: Nanos = time
+        came: Change | None = None  # the first one since the last that was let in with another level
+        is_other = False
         for change in self._log.changes_before(signal, time, before) if lasts else ():
-            if (time if later is None else later) - change.time >= lasts:
-                return self._all.change(signal, change, FILTERED(ms=lasts / MILLISECOND))
+            if later - change.time >= lasts:
+                is_other = came is not None and change.value != came.value
+                if is_other:
+                    break
+                came = change
             later = change.time
-        begin, level = self._log.begin, self._log.first_levels.get(signal, 0.0)
-        if level and self._log.reaches_begin() and (time if later is None else later) - begin < lasts:
-            return self._all.first(signal, FILTERED(ms=lasts / MILLISECOND))
-        last = self._all.last((signal,), time, FILTERED(ms=lasts / MILLISECOND)) if lasts and later is None else None
+        begin, level, how = self._log.begin, self._log.first_levels.get(signal, 0.0), FILTERED(ms=lasts / MILLISECOND)
+        if came is not None and (is_other or not self._log.reaches_begin() or came.value != level):
+            return self._all.change(signal, came, how)
+        if came is None and level and self._log.reaches_begin() and later - begin < lasts:
+            return self._all.first(signal, how)
+        last = self._all.last((signal,), time, how) if lasts and came is None and later == time else None
         return last if last is not None and last.place.time <= time - lasts else None
 
     def _writing(self, controller: str, resource: Resource) -> Collection[StatementLocation]:
@@ -504,11 +573,15 @@ class ProgramCauses:
         held = self.held(controller, at)
         if held is None or held.place.order >= 0:
             return held
+        return self.alarm(controller, at) or held
+
+    def alarm(self, controller: str, at: Nanos) -> FoundCause:
+        """The last event of a controller by a moment, if it is an alarm: such as a start that was not possible."""
         event = self._log.last_axis_event(controller, "", at)
         sheet = self._world.kind(controller).datasheet(self._world.controller(controller))
         alarms = {one.code for one in sheet.events if one.severity is EventSeverity.ALARM}
         if event is None or self._log.record(event).subject not in alarms:
-            return held
+            return None
         place = Place(event.time, event.order)
         by = partial(self._all.controllers.commanded, controller, event, None)
         link = ChainLink(event.time, controller, words_of(self._log.record(event)))
@@ -553,6 +626,10 @@ class ProgramCauses:
             return None
         first = self._log.executed[controller][0]
         return Cause(ChainLink(first.time, controller, PROGRAM_STARTED()), Place(first.time, first.order), nothing, Cover.PROGRAM)
+
+
+def _moves(use: StatementUse) -> bool:
+    return any(one.kind is ResourceKind.AXIS for one in use.writes)
 
 
 def _is_program(resource: Resource) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TypeAlias
@@ -345,13 +345,18 @@ class Why:
         if node.value(value):
             return ()
         links: list[ChainLink] = []
+        states = PresentStates(self.causes, other, ALL_LINKS)
         for name in dict.fromkeys(name for one in deciding(node, value, wanted=True) for name in one.names()):
             full, unit = self.names.canonical(name), self.names.unit(name)
             if self.log.is_recorded(full):
-                links += PresentStates(self.causes, other, ALL_LINKS).of([full])
+                links += states.of([full])
             else:
                 text = IS_IN_UNIT(name=name, value=value(name), unit=unit) if unit else IS_NUMBER(name=name, value=value(name))
                 links.append(ChainLink(at, name.partition(".")[0], text))
+            is_kept = full.partition(".")[0] in self.log.world.controllers and full.partition(".")[2] not in self._pins(full)
+            for controller, wanted in self._changeable([full], at) if is_kept else ():
+                tried = self._tried(controller, wanted, at)
+                links += states.before(controller, wanted) if tried is None else (one.link for one in (tried, *tried.along))
         if all(map(self.names.is_signal, node.names())):
             found: list[Nanos] = []
             other.start("why", partial(_note_when, other, condition, found), is_external=True)
@@ -370,33 +375,56 @@ class Why:
         if self.names.is_script(text) or _without_not(text) in log.world.controllers:
             return ()
         found: dict[str, None] = {}
-        for controller, wanted in self._changeable(text, answer.at):
+        for controller, wanted in self._changeable(self._names_in(text), answer.at):
             held, index = programs.held(controller, answer.at), log.last_executed(controller, answer.at)
             if held is None or index < 0 or not programs.leads_to(controller, index, wanted):
                 continue
+            if self._tried(controller, wanted, answer.at) is not None:
+                continue  # it does not lack another command
             is_later = answer.since is not None and (held.place.order < 0 or held.place.time > answer.since)
             if is_later or wanted.kind is ResourceKind.AXIS:
                 found[controller] = None
         return tuple(found)
 
-    def _changeable(self, text: str, at: Nanos) -> Iterator[tuple[str, Resource]]:
-        """Resources that are asked for and that programs can change, with their controllers: driving outputs, axes, variables."""
-        variable = self.names.variable(text)
+    def _tried(self, controller: str, wanted: Resource, at: Nanos) -> Cause | None:
+        """The last command to an axis that stands which moved nothing."""
+        motion = self.causes.axes.motion(controller, wanted.name, at) if wanted.kind is ResourceKind.AXIS else None
+        if wanted.kind is not ResourceKind.AXIS or (motion is not None and motion.cover is not None):
+            return None
+        after = -1 if motion is None else motion.place.time
+        return self.causes.attempts.last(controller, wanted.name, at, after=after)
+
+    def _names_in(self, text: str) -> Sequence[str]:
+        """The signals of a question, or the variable."""
+        if self.names.variable(text) is not None:
+            return [text]
+        return [self.names.canonical(name) for name in parse_condition(self.names.named(_without_not(text))).names()]
+
+    def _changeable(self, names: Sequence[str], at: Nanos) -> Iterator[tuple[str, Resource]]:
+        """Resources on which signals depend and that programs can change, with their controllers: outputs, axes, values."""
+        world = self.log.world
+        variable = self.names.variable(names[0]) if len(names) == 1 else None
         if variable is not None:
             yield variable[0], Resource(ResourceKind.VALUE, variable[1])
             return
-        world = self.log.world
-        names = [self.names.canonical(name) for name in parse_condition(self.names.named(_without_not(text))).names()]
         for name in self._behind(names, at):
             owner, _, rest = name.partition(".")
-            axis = axis_of(rest)
-            if owner in world.axes and rest == "position":
+            if owner in world.axes and rest == POSITION:
                 drive = world.axes[owner].spec.drive
                 yield drive[0], Resource(ResourceKind.AXIS, drive[1].removeprefix("M"))
-            elif owner in world.programs and rest in world.controllers[owner].pins():
+            elif owner in world.programs and rest in self._pins(name):
                 yield owner, Resource(ResourceKind.PIN, rest)
-            elif owner in world.programs and axis is not None:
-                yield owner, axis._replace(name=axis.name or "1")
+            elif owner in world.programs:
+                axis = axis_of(rest)
+                is_moving = self.names.is_signal(name) and world.signal(name).continuous
+                if axis is not None or (is_moving and len(world.controllers[owner].axes) == 1):
+                    yield owner, Resource(ResourceKind.AXIS, "1") if axis is None else axis._replace(name=axis.name or "1")
+                yield from ((owner, one) for one in self.causes.programs.values_at(owner, rest))
+
+    def _pins(self, name: str) -> Collection[str]:
+        """The pins of the controller that has a signal."""
+        controller = self.log.world.controllers.get(name.partition(".")[0])
+        return () if controller is None else controller.pins()
 
     def _going_on(self, other: Simulation, controller: str, at: Nanos) -> Lacking:
         """When a program that waits goes on by itself."""
@@ -591,6 +619,8 @@ class Why:
         if held is not None:
             since = held.link.time if held.place.order >= 0 else None
             first = causes.programs.stands(controller, at) if since is None else _led_to(held)
+            alarm = None if since is None else causes.programs.alarm(controller, at)
+            first = _along(alarm, [first] if first is not None else []) if alarm and alarm.place > held.place else first
             supply, present = causes.programs.supply_off(controller, at), (yield from self._present(at))
             states = list(present.of([supply])) if supply is not None and since is None else []
             state = PROGRAM_IS(controller=controller, held=held.link.text)
@@ -623,9 +653,10 @@ class Why:
         pins = [f"{controller}.{resource.name}" for resource in use.reads if resource.kind is ResourceKind.PIN and resource.name]
         resting = ((yield from self._resting(pins, at)) or self._held(pins, at)) if last is None else None
         holding = [one for pin in pins for one in self.causes.holding.of((pin,), at, self.log.since(pin, at))]
-        first = covered(last, Cover.LEVEL) or resting or waiting._replace(cover=Cover.WAIT, besides=lambda: others)
+        waiting = waiting._replace(cover=Cover.WAIT, besides=lambda: others)
+        first = covered(last, Cover.LEVEL) or resting or waiting
         standing = (yield from self._standing(pins, at)) if last is None and resting is None else None
-        first = _along(first, [*(() if standing is None else (standing, *standing.along)), *holding])
+        first = _along(first, [waiting, *(() if standing is None else (standing, *standing.along)), *holding])
         answer = yield from self._answer(controller, at, WAITS(controller=controller, statement=text), since, first)
         return self._after(links, answer)
 
@@ -733,7 +764,8 @@ class Why:
             return self._ignored((name,), at)
         if self.log.rates.has(name.partition(".")[0]):
             return self.causes.elements.rate(name.partition(".")[0], at)
-        return covered(self._of_unrecorded(name, at), Cover.LEVEL)
+        ignored = self._ignored((name,), at)
+        return ignored if ignored is not None else covered(self._of_unrecorded(name, at), Cover.LEVEL)
 
     def _script(self, name: str, at: Nanos) -> Asking:
         """Cause for which a script waits: what its condition depends on."""
@@ -760,8 +792,8 @@ class Why:
             return there is not None and there.log.reaches_begin()
 
         is_owed = first is None and since is not None
-        chain = Chain(effect, Place(at, LAST), first, is_whole=is_whole, is_owed=is_owed)
-        while not chain.is_followed and len(chain) < self._most_links:
+        chain = Chain(effect, Place(at, LAST), first, is_whole=is_whole, is_owed=is_owed, most=self._most_links)
+        while not chain.is_over:
             chain.go_on()
             yield
         is_complete = chain.is_followed and not chain.is_cut

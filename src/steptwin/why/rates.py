@@ -69,11 +69,18 @@ class _OfIntegrator:
         self._signals = {name: signal for name, signal in signals.items() if isinstance(signal, SignalOf)}
         self._rate = rate.in_unit("", lambda name: self._signals[name].unit)
         self._noted = [self._read(world.now)]
+        self._seen: object = None
+        """The plans and levels that were read last: reading them again takes exact fractions."""
 
     def leave(self, moment: Nanos) -> None:
         """It need not know."""
 
     def look(self, now: Nanos) -> None:
+        levels = [signal.version() if signal.continuous else signal.value(now) for signal in self._signals.values()]
+        seen = self._integrator.plan, levels
+        if seen == self._seen:
+            return
+        self._seen = seen
         noted, last = self._read(now), self._noted[-1]
         goes_on = _at(last.rate, now - last.time) == noted.rate[:2]
         if not (goes_on and all(_at(line, now - last.time) == noted.lines[name][:2] for name, line in last.lines.items())):

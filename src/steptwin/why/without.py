@@ -31,7 +31,7 @@ NOT_FOUND_AGAIN = Message("why.not-found-again", "it is not found again in the p
 LONGEST_FRAME_NS: Nanos = 2 * SECOND
 """How long before the end of a request its bytes may have come."""
 
-Trying: TypeAlias = Generator[None, None, Trial]
+Trying: TypeAlias = Generator[None, None, Sequence[Trial]]
 
 
 class SnapshotsWithInputs(Snapshots, Protocol):
@@ -40,29 +40,39 @@ class SnapshotsWithInputs(Snapshots, Protocol):
     def inputs_from(self, number: int) -> Sequence[RecordedInput]: ...
 
 
-def trying_without(snapshots: SnapshotsWithInputs, link: ChainLink, answer: Answer, most: int, *, around: Nanos = 0) -> Trying:
-    """Whether what was asked for would be otherwise without the root of a link, in parts. ``most``: limit of what is noted;
-    ``around``: how long before and after the moment it must be otherwise."""
+def trying_without(
+    snapshots: SnapshotsWithInputs, link: ChainLink, answers: Sequence[Answer], most: int, *, around: Nanos = 0
+) -> Trying:
+    """Whether each of some answers about one moment would be otherwise without the root of a link, in parts. ``most``: limit of
+    what is noted; ``around``: how long before and after the moment the first one must be otherwise."""
     try:
-        return (yield from _trying(snapshots, link, answer, most, around))
+        return (yield from _trying(snapshots, link, answers, most, around))
     except SteptwinError as error:
-        return Trial(link, Effect.UNKNOWN, NOT_TRIED(problem=text_of(error)))
+        return [Trial(link, Effect.UNKNOWN, NOT_TRIED(problem=text_of(error)))]
 
 
-def _trying(snapshots: SnapshotsWithInputs, link: ChainLink, answer: Answer, most: int, around: Nanos) -> Trying:
+def _trying(snapshots: SnapshotsWithInputs, link: ChainLink, answers: Sequence[Answer], most: int, around: Nanos) -> Trying:
     root = link.root
     if root is None:
         raise Misuse(NOT_FOUND_AGAIN())
     state = snapshots.state_at(max(snapshots.begin, _began(snapshots, root) - 1))
-    begin = state.snapshot.now
-    if begin > root.time:
+    if state.snapshot.now > root.time:
         raise Misuse(PAST_BEFORE_IT_IS_NOT_KEPT())
     run = _RunWithout(snapshots.world, state.snapshot, root)
-    at = answer.at + around
-    inputs = run.inputs([one for one in snapshots.inputs_from(state.inputs) if one.time <= at])
-    other = yield from Why(run.make, inputs, at, most).asking(answer.question, at)
-    if not run.is_without:
-        raise Misuse(NOT_FOUND_AGAIN())
+    at = answers[0].at + around
+    other = Why(run.make, run.inputs([one for one in snapshots.inputs_from(state.inputs) if one.time <= at]), at, most)
+    found: list[Trial] = []
+    for answer in answers:
+        wide = around if answer is answers[0] else 0
+        then = yield from other.asking(answer.question, answer.at + wide)
+        if not run.is_without:
+            raise Misuse(NOT_FOUND_AGAIN())
+        found.append(_compared(link, answer, then, state.snapshot.now, wide))
+    return found
+
+
+def _compared(link: ChainLink, answer: Answer, other: Answer, begin: Nanos, around: Nanos) -> Trial:
+    """The effect of a run from ``begin`` on, in which the answer is another one."""
     if other.state != answer.state and (other.since is None or not around or other.since <= answer.at - around):
         return Trial(link, Effect.OTHERWISE, other.state)
     since = answer.since if answer.since is not None and answer.since > begin else None

@@ -19,7 +19,7 @@ from steptwin.why.movers import FALLS, GOES_ON, PUSHED
 from steptwin.why.roots import Act
 
 HAS_ACTED_SINCE = Message("why.has-acted-since", ", on which {name} has acted since")
-COMES = ("on", "crooked", "on the floor")
+COMES, HELD = ("on", "crooked", "on the floor"), "held"
 STAYS = ("stands", GOES_ON, "goes back", "collides", "jams", "free again")
 """Events after which a workpiece may still be pushed."""
 
@@ -32,13 +32,44 @@ class WorkpieceCauses:
         self._log = causes.log
         self._world = causes.log.world
 
-    def at(self, name: str, change: Change) -> FoundCause:
-        """Event of a workpiece at an element at the moment of a change, before it, or to the only one anywhere."""
-        mine = self._log.last_event(name, change.time, change.order)
-        if mine is None or mine.time != change.time:
-            found = [one for one in self._log.events_at(change.time) if one.order < change.order]
-            mine = found[0] if len(found) == 1 else None
-        return None if mine is None else self.event(mine)
+    def at(self, name: str, change: Change, signal: str = "") -> FoundCause:
+        """Cause for which a workpiece came, went or was taken at the moment of a change, before it: one that a sensor with this
+        signal sees or saw, or that touches something; else any at an element."""
+        seen = self._log.meetings.seen.get((signal, change.time))
+        names = (name,) if seen is None else seen
+
+        def is_there(workpiece: str, event: Change) -> bool:
+            return workpiece in names or (seen is None and name in self._places(workpiece, event))
+
+        moves = [one for one in self._log.events_at(change.time) if one.order < change.order and self._what(one) not in STAYS]
+        named = (one for one in moves if seen is None and name in self._named(one))
+        there = (one for one in moves if is_there(str(dict(self._log.record(one).facts)["workpiece"]), one))
+        event = next(named, None) or next(there, None)
+        if event is not None:
+            return self.event(event)
+        for act in self._log.acts_at(change.time, change.order):
+            if isinstance(act.what, do.Remove) and is_there(act.what.workpiece, change):
+                return acted(act)
+        return None
+
+    def _places(self, workpiece: str, event: Change) -> Iterator[str]:
+        """Where a workpiece was just before an event: on a belt, in a nest, at a cup, on others and what they are on."""
+        earlier = self._log.events_before(workpiece, event)
+        came = next((one for one in earlier if self._what(one) in (*COMES, HELD)), None)
+        if came is None:
+            self._log.lack()
+            yield workpiece.rpartition(".")[0]
+            return
+        for one in self._named(came) - {workpiece}:
+            yield one
+            if "." in one:
+                yield from self._places(one, came)
+
+    def _named(self, event: Change) -> set[str]:
+        """The elements and workpieces in an event."""
+        record = self._log.record(event)
+        values = getattr(record.value, "values", {}).values()
+        return {str(dict(record.facts)["element"]), *(one for one in values if isinstance(one, str))}
 
     def last(self, workpiece: str, what: str, change: Change) -> FoundCause:
         """The last event of a kind of a workpiece before a change."""
@@ -107,8 +138,12 @@ class WorkpieceCauses:
         actor = str(getattr(record.value, "values", {}).get("cup", owner))
         if actor not in self._all.parts:
             return None
-        if what in ("leaves", FALLS):
-            return self.travel(actor, event)
+        if what in ("leaves", FALLS) and hasattr(self._all.specs.get(actor), "feed_every"):
+            found, last = self.travel(actor, event), next(self._log.events_before(workpiece, event), None)
+            went = None if last is None or self._what(last) != GOES_ON else covered(self.event(last), Cover.ACTION)
+            if went is None or (found is not None and found.place > went.place):
+                return found
+            return went._replace(along=() if found is None else (found,))
         cause = self._all.elements.of_inputs(actor, event)
         # What comes onto a belt does not by what moves that.
         return None if what == "on" and cause is not None and cause.place.time < event.time else cause

@@ -127,7 +127,7 @@ export const en = {
   allCauses: "All causes",
   trials: "The run again without each root:",
   lookThere: "All panels show this moment",
-  moreCauses: "Earlier causes are not shown.",
+  moreCauses: "Further causes are not shown.",
   notKnownBefore: "What was before {time} is not known.",
   keySlash: "Find a point",
   keyFilter: "Filter controllers, where there are many",

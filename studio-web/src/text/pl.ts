@@ -131,7 +131,7 @@ export const pl: Record<keyof typeof en, string> = {
   allCauses: "Wszystkie przyczyny",
   trials: "Przebieg jeszcze raz, bez każdego źródła:",
   lookThere: "Wszystkie panele pokazują ten moment",
-  moreCauses: "Wcześniejszych przyczyn nie pokazano.",
+  moreCauses: "Dalszych przyczyn nie pokazano.",
   notKnownBefore: "Co było przed {time}, nie jest znane.",
   keySlash: "Znajdź punkt",
   keyFilter: "Filtruj sterowniki, gdy jest ich wiele",

@@ -52,9 +52,16 @@ class Sensor(Contact):
         if version == self._seen and (self._due is None or self._due > now):
             return
         self._seen = version
-        is_seen = belt.occupant(self._at, self._at, now, of_marks=self._of_marks) is not None
-        self.change(is_seen is not self.normally_closed, now)
+        self.change((self._occupant(now) != "") is not self.normally_closed, now)
         self._due = belt.next_change(self._at, now, of_marks=self._of_marks)
+
+    def _occupant(self, now: Nanos) -> str:
+        found = self._belt.occupant(self._at, self._at, now, of_marks=self._of_marks)
+        return "" if found is None else found[1].workpiece.name
+
+    def by(self, now: Nanos) -> str:
+        """The workpiece that it sees, or has just seen; empty for one that is not on the belt any more."""
+        return self._occupant(now) or self._occupant(now - 1)
 
     def deadline(self) -> Nanos | None:
         moments = (moment for moment in (self.bounce_due(), self._due) if moment is not None)

@@ -70,6 +70,10 @@ class Brake(TerminalComponent):
         if not block.scheduler.is_blank:
             mechanism.brake(spec.torque, block.scheduler.now)
 
+    @property
+    def delays(self) -> tuple[Nanos, ...]:
+        return self._spec.release_time, self._spec.apply_time
+
     def acts_on(self, mechanism: Mechanism) -> bool:
         return self._mechanism is mechanism
 

@@ -53,6 +53,8 @@ class ResourceKind(enum.Enum):
     """The counter of an encoder, by the number of its axis, which something else may turn."""
     VALUE = "value"
     """A variable or register of the program."""
+    REQUEST = "request"
+    """A request of a client, by the registers that it writes."""
     PROGRAM = "program"
     """The program itself: whether it is executed."""
 

@@ -63,8 +63,10 @@ def _awaited(step: s.ProgramStep) -> Iterable[Resource]:
     match step:
         case s.InterruptStep(event=event) if event.input:
             return (Resource(ResourceKind.PIN, f"IN{event.input}"),)
+        case s.InterruptStep(event=event) if event.axis:
+            return (Resource(ResourceKind.AXIS, str(event.axis)),)
         case s.InterruptStep(event=event):
-            return (Resource(ResourceKind.AXIS, str(event.axis)),) if event.axis else ()
+            return () if event.period else (Resource(ResourceKind.REQUEST, "USER_REGISTER"),)
         case s.EndWhileStep(condition=condition):
             return _operands((condition.left, condition.right))
     return (_ANY_AXIS,) if step.waits is s.StepWait.MOTION else ()
