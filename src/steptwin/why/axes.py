@@ -235,15 +235,16 @@ class AxisCauses:
         return lost if is_last else motion
 
     def _lags(self, axis: str, until: Nanos, before: int) -> Iterator[Cause]:
-        """The last event of a rotor by which it lost pulses that no homing has made good since."""
+        """The last event of a rotor by which it lost pulses, unless its axis was homed or got another coordinate since."""
         controller, name = self._world.axes[axis].spec.drive
         events = list(self._of_rotor(axis, until, before))
         end = next((one for one in reversed(events) if dict(self._log.record(one).facts).get("lost")), None)
         if end is None:
             return
-        homed = (one for one in self._log.axis_events.get((controller, name.removeprefix("M")), ()) if one.time >= end.time)
+        key = controller, name.removeprefix("M")
+        homed = [one for one in self._log.axis_events.get(key, ()) if self._log.record(one).subject == HOMED]
         began = next((one for one in reversed(events) if one.time <= end.time and _begins(self._log.record(one))), None)
-        if began is not None and not any(self._log.record(one).subject == HOMED for one in homed if one.time <= until):
+        if began is not None and not any(end.time <= one.time <= until for one in (*homed, *self._log.origins.get(key, ()))):
             yield self.rotor_event(axis, began)._replace(cover=Cover.LEVEL)
 
     def _has_left_it(self, event: Change, since: Nanos | None) -> bool:

@@ -139,7 +139,8 @@ class Chain:
     @property
     def _next(self) -> _Waiting | None:
         """The nearest one that waits, of several the latest; beyond what is shown only what led there."""
-        waiting = (one for one in self._waiting if one.leads or not self._is_full)
+        is_full = self._is_full
+        waiting = (one for one in self._waiting if one.leads or not is_full)
         return max(waiting, key=lambda one: (-one.distance, one.cause.place), default=None)
 
     def go_on(self) -> None:

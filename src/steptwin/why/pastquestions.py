@@ -139,14 +139,17 @@ class PastQuestions:
         return (yield from trying_without(self._snapshots, link, answers, self._most, around=around))
 
     def _with_held(self, answer: Answer) -> Asking:
-        """An answer with what holds the programs that could have changed what it is about since."""
+        """An answer with what the programs stand at, or are held by, that could have changed what it is about since."""
+        held = yield from self._settled(lambda known: known.holding(answer))
+        waiting = yield from self._settled(lambda known: known.waiting(answer))
         links = answer.links
-        for controller in (yield from self._settled(lambda known: known.holding(answer))):
-            held = yield from self._settled(lambda known, controller=controller: self._answer(known, controller, answer.at))
-            time, text = answer.at if held.since is None else held.since, held.state.message("held")
+        for controller in dict.fromkeys((*held, *waiting)):
+            stands = yield from self._settled(lambda known, controller=controller: self._answer(known, controller, answer.at))
+            time, text = answer.at if stands.since is None else stands.since, stands.state.message("held") or stands.state
+            led = stands.links if controller in held else [link for link in stands.links if link.time == answer.at]
             known = {(link.subject, link.text) for link in links}
-            if text is not None and (controller, text) not in known:
-                every = (ChainLink(time, controller, text), *held.links)
+            if (controller, text) not in known:
+                every = (ChainLink(time, controller, text), *led)
                 links = _between(links, [link for link in every if (link.subject, link.text) not in known])
         return answer._replace(links=links)
 
@@ -274,6 +277,11 @@ class _Known:
         """See `Why.holding`."""
         yield
         return self.why.holding(answer)
+
+    def waiting(self, answer: Answer) -> Generator[None, None, Sequence[str]]:
+        """See `Why.waiting`."""
+        yield
+        return self.why.waiting(answer)
 
     def running(self, moment: Nanos) -> Generator[None, None, None]:
         """Note what happened up to a moment."""

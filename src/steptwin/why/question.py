@@ -377,14 +377,44 @@ class Why:
         found: dict[str, None] = {}
         for controller, wanted in self._changeable(self._names_in(text), answer.at):
             held, index = programs.held(controller, answer.at), log.last_executed(controller, answer.at)
+            ended = None if held is not None or index < 0 else programs.ended(controller, index, answer.at)
+            held = held or ended
             if held is None or index < 0 or not programs.leads_to(controller, index, wanted):
                 continue
             if self._tried(controller, wanted, answer.at) is not None:
                 continue  # it does not lack another command
-            is_later = answer.since is not None and (held.place.order < 0 or held.place.time > answer.since)
+            since = self._since(controller, wanted, answer)
+            is_later = since is not None and (held.place.order < 0 or held.place.time > since)
             if is_later or wanted.kind is ResourceKind.AXIS:
                 found[controller] = None
         return tuple(found)
+
+    def waiting(self, answer: Answer) -> Sequence[str]:
+        """The controllers whose programs have waited for something since, before statements that would change the output that an
+        answer is about. `asking` comes first."""
+        text, log, programs = _text_of(answer.question), self.log, self.causes.programs
+        if self.names.is_script(text) or _without_not(text) in log.world.controllers or answer.since is None:
+            return ()
+        found: dict[str, None] = {}
+        names = [name for name in self._names_in(text) if self._is_output(name) or self.causes.holding.depends([name])]
+        for controller, wanted in self._changeable(names, answer.at):
+            index, since = log.last_executed(controller, answer.at), self._since(controller, wanted, answer)
+            use = programs.use(controller, index) if wanted.kind is ResourceKind.PIN and index >= 0 else None
+            begun = answer.at if index < 0 else log.executed[controller][index].time
+            is_long = since is not None and since <= begun < answer.at - log.world.programs[controller].statement_time
+            if use is not None and use.waits and use.reads and is_long and programs.leads_to(controller, index, wanted):
+                found[controller] = None
+        return tuple(found)
+
+    def _is_output(self, name: str) -> bool:
+        """Whether it is an output that a program sets."""
+        owner, _, pin = name.partition(".")
+        return owner in self.log.world.programs and pin in self._pins(name) and self.causes.programs.may_write(owner, pin)
+
+    def _since(self, controller: str, wanted: Resource, answer: Answer) -> Nanos | None:
+        """Since when an answer is so, or an output that what it is about follows later."""
+        since = self.log.since(f"{controller}.{wanted.name}", answer.at) if wanted.kind is ResourceKind.PIN else None
+        return answer.since if since is None or answer.since is None else min(since, answer.since)
 
     def _tried(self, controller: str, wanted: Resource, at: Nanos) -> Cause | None:
         """The last command to an axis that stands which moved nothing."""
