@@ -218,7 +218,7 @@ def panel() -> None:
 def main() -> None:
     panel()
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=shutil.which("chromium-headless-shell"), args=GRAPHICS)
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=GRAPHICS)
         with studio(describe_demo(free_ports=True)) as url:
             for is_solid in (False, True):
                 first_view(browser, url, is_solid=is_solid)

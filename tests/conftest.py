@@ -24,7 +24,7 @@ import time
 from collections.abc import Callable, Coroutine, Generator, Iterator, Mapping, Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 import pytest
 from facts import checked_facts
@@ -39,9 +39,6 @@ from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.mic488.config import ControllerConfig
 from steptwin.mic488.device import Mic488Device
 from steptwin.simulation.scheduler.scheduler import Scheduler
-
-if TYPE_CHECKING:
-    from playwright.sync_api import Browser
 
 T = TypeVar("T")
 
@@ -161,22 +158,6 @@ def require_peer() -> Callable[[str], str]:
         return shutil.which(program) or _missing(program)
 
     return find
-
-
-@pytest.fixture(scope="session")
-def chromium(require_peer: Callable[[str], str]) -> Iterator[tuple[Browser, asyncio.AbstractEventLoop]]:
-    """A browser, which starts when it is first needed, and the loop that has to be the running one while it is used."""
-    from playwright.sync_api import sync_playwright
-
-    program = require_peer("chromium-headless-shell")
-    with sync_playwright() as playwright:
-        # Root has no user namespace to put the sandbox into; drawing by a graphics card that is not there costs a tenth more.
-        started = playwright.chromium.launch(executable_path=program, args=["--no-sandbox", "--disable-gpu"])
-        loop = asyncio.get_running_loop()
-        asyncio._set_running_loop(None)
-        yield started, loop
-        asyncio._set_running_loop(loop)
-        started.close()
 
 
 @pytest.fixture(scope="session")

@@ -149,7 +149,7 @@ def pictures(page: Page, what: str) -> None:
 
 
 def main() -> None:
-    chromium = shutil.which("chromium-headless-shell")
+    chromium = shutil.which("chromium")
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])

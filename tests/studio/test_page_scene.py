@@ -246,7 +246,7 @@ def test_a_device_moves_the_machine_and_what_is_not_known_is_grey(
 def graphics(browser: Browser) -> Iterator[Browser]:
     """A browser that draws WebGL without a graphics processor."""
     arguments = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-    started = browser.browser_type.launch(executable_path=shutil.which("chromium-headless-shell"), args=arguments)
+    started = browser.browser_type.launch(executable_path=shutil.which("chromium"), args=arguments)
     yield started
     started.close()
 
@@ -270,7 +270,7 @@ HAS_CONTEXT = """() => {
 
 def test_three_dimensions_come_back_after_the_context_was_lost(start_studio: Callable[..., Process], graphics: Browser) -> None:
     studio = Studio(start_studio(), graphics)
-    page = studio.page(panel="Machine", viewport={"width": 800, "height": 450})  # each point of it is drawn by a processor
+    page = studio.page(panel="Machine")
     button(page, "3D").click()
     expect(button(page, "Follow")).to_be_visible()
     canvas = page.locator("canvas[data-engine]")

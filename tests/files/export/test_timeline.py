@@ -190,7 +190,7 @@ def test_channels_in_a_browser(require_peer: Callable[[str], str], tmp_path: Pat
     world.run(for_=8)
     page = tmp_path / "t.html"
     write_trace(world.trace, page, views=axis_views(world))
-    channels = re.findall(r'class="name"[^>]*>([^<]*)<', shown(require_peer("chromium-headless-shell"), page))
+    channels = re.findall(r'class="name"[^>]*>([^<]*)<', shown(require_peer("chromium"), page))
     assert channels[:3] == ["table", "M1 position, x true", "M1 since power-on"]
     assert channels[3:6] == ["M1 velocity", "M1 pulses", "no motion: M2, M3, M4"]
     assert not [name for name in channels if name.startswith("M2 ")]
@@ -214,7 +214,7 @@ def test_the_page_computes_the_motion_in_a_browser(require_peer: Callable[[str],
     """
     page = tmp_path / "t.html"
     page.write_text(page_of(trace).replace("</script>\n</body>", script % moments + "</script></body>"), "utf-8")
-    (shown_output,) = re.findall(r"<output>(.*?)</output>", shown(require_peer("chromium-headless-shell"), page))
+    (shown_output,) = re.findall(r"<output>(.*?)</output>", shown(require_peer("chromium"), page))
     found = json.loads(shown_output)
     for now, (position, velocity, count) in zip(moments, found["looks"], strict=True):
         assert position == pytest.approx(profile.position(now), abs=1e-6)

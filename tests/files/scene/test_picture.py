@@ -40,7 +40,7 @@ def test_the_timeline_draws_what_a_picture_of_its_moment_does(require_peer: Call
     page.write_text(text.replace("readAddress();\n", 'location.hash = "#at=7.25";\nreadAddress();\n', 1), "utf-8")
     there = World.load(WORLDS / "palletizer/palletizer.toml")
     there.run(for_=7.25)
-    found, expected = solids(shown(require_peer("chromium-headless-shell"), page)), solids(picture(there, View.ISO))
+    found, expected = solids(shown(require_peer("chromium"), page)), solids(picture(there, View.ISO))
     assert [(name, shapes) for name, *_, shapes in found] == [(name, shapes) for name, *_, shapes in expected]
     places = [[one for _, x, y, _ in drawn for one in (x, y)] for drawn in (found, expected)]
     assert places[0] == pytest.approx(places[1], abs=0.011)  # rounded to two digits, and differently
