@@ -59,7 +59,6 @@ for _number in (signal.SIGINT, signal.SIGHUP):
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 STEPTWIN = COMMAND
-TESTS = Path(__file__).parent
 
 PEER_FIXTURES = {"require_peer", "require_library"}
 IN_WALL_TIME = (
@@ -77,17 +76,11 @@ IN_WALL_TIME = (
 """Tests with processes of their own, on a machine that may have other work."""
 
 
-def is_part_of_a_whole_run(config: pytest.Config) -> bool:
-    return "PYTEST_XDIST_WORKER" in os.environ and config.args_source is pytest.Config.ArgsSource.TESTPATHS
-
-
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     try:
         soak_limit = time_limit()
     except ValueError as error:
         raise pytest.UsageError(str(error)) from error
-    if is_part_of_a_whole_run(config):
-        items.sort(key=lambda item: item.nodeid.partition("::")[0])
     for item in items:
         has_peer = bool(PEER_FIXTURES.intersection(getattr(item, "fixturenames", ())))
         if has_peer:
@@ -107,26 +100,10 @@ def pytest_xdist_auto_num_workers() -> Generator[None, int, int]:
     return found if "PYTEST_XDIST_AUTO_NUM_WORKERS" in os.environ else found + 1
 
 
-def pytest_collection(session: pytest.Session) -> None:
-    """Without looks for garbage, a quarter of the time: what describes the tests is there to stay.
-
-    In a fresh clone most of the time goes into compiling the test files. Each process of a whole run begins elsewhere and finds
-    there what another one has compiled; `pytest_collection_modifyitems` puts all into one order.
-    """
-    gc.disable()
-    if is_part_of_a_whole_run(session.config):
-        number, count = os.environ["PYTEST_XDIST_WORKER"].removeprefix("gw"), os.environ["PYTEST_XDIST_WORKER_COUNT"]
-        files = sorted(TESTS.rglob("test_*.py"))
-        first = len(files) * int(number) // int(count)
-        places = (TESTS / file.relative_to(TESTS).parts[0] for file in files[first:] + files[:first])
-        session.config.args = [str(place) for place in dict.fromkeys(places)]
-
-
 def pytest_collection_finish() -> None:
-    """Later looks for garbage would look at it, too, for half a second each."""
+    """What describes all tests is there to stay: each look for garbage would look at it, too, for half a second."""
     gc.collect()
     gc.freeze()
-    gc.enable()
 
 
 def _missing(peer: str) -> NoReturn:
