@@ -54,7 +54,6 @@ NOT_RUN = {
 """Blocks that are not run here, with the reason that stands before them in the source."""
 
 
-@pytest.mark.timeout(300)  # about forty commands, each an interpreter of its own
 @pytest.mark.parametrize("page", WITH_CODE)
 def test_the_blocks_of_a_page_run(page: str, tmp_path: Path) -> None:
     wanted = [block for block in blocks(page) if block.is_done]

@@ -13,7 +13,6 @@ from shell import Shell
 QUICK = ",timeout=0.1"
 
 
-@pytest.mark.timeout(300)
 def test_a_mic488_over_pty_and_tcp(serve: Callable[..., Any], tmp_path: Path) -> None:
     twin = serve()
     report = tmp_path / "report.json"

@@ -185,7 +185,6 @@ def test_a_part_that_the_server_gives_wrongly_is_named(address: str, browser: Br
     context.close()
 
 
-@pytest.mark.timeout(300)
 def test_a_page_that_could_not_be_stored_says_why_and_can_be_used(
     address: str,
     browser: Browser,  # noqa: F811
@@ -202,7 +201,6 @@ def test_a_page_that_could_not_be_stored_says_why_and_can_be_used(
     context.close()
 
 
-@pytest.mark.timeout(300)
 def test_the_demo_moves_in_a_page_without_a_service(demo: Demo) -> None:
     page = demo.page
     # The machine at its beginning is there before Python, and nothing can be done with it yet.
@@ -308,7 +306,6 @@ def until(page: Page, condition: Callable[[], bool], what: str) -> None:
     raise AssertionError(f"not seen: {what}")
 
 
-@pytest.mark.timeout(300)
 def test_a_device_at_a_serial_port_of_the_browser_moves_to_a_target_and_nothing_without_end(
     demo: Demo, serve: Callable[..., Any]
 ) -> None:
@@ -359,7 +356,6 @@ def test_a_device_at_a_serial_port_of_the_browser_moves_to_a_target_and_nothing_
     expect(page.get_by_role("banner").get_by_text("REAL")).to_have_count(0)
 
 
-@pytest.mark.timeout(300)
 def test_a_link_to_the_machine_opens_another_twin_in_another_tab(demo: Demo, monkeypatch: pytest.MonkeyPatch) -> None:
     expect(time_of(demo.page)).to_contain_text("live", timeout=LOADING_MS)
     button(demo.page, "Share").click()
