@@ -6,7 +6,7 @@ older ones where the causes are older. It stays for further questions, which onl
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Protocol, TypeVar
@@ -16,7 +16,7 @@ from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
-from steptwin.simulation.world.snapshotlog import outside_past
+from steptwin.simulation.world.snapshotlog import SLICE_NS, outside_past
 from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Effect, Trial
 from steptwin.why.causes import Causes
 from steptwin.why.lacking import Found, Lacking
@@ -24,7 +24,7 @@ from steptwin.why.presentstates import IS_IN_A_LOOP
 from steptwin.why.programs import WAITS
 from steptwin.why.question import Asking, Why
 from steptwin.why.roots import SetFault
-from steptwin.why.search import LastChanges, Snapshots
+from steptwin.why.search import Asked, LastChanges, Snapshots
 from steptwin.why.without import trying_without
 
 FIRST_SPAN_NS: Nanos = 5 * SECOND
@@ -32,6 +32,8 @@ FIRST_SPAN_NS: Nanos = 5 * SECOND
 FIRST_STATEMENTS = 5500
 """Most statements of a program at first: some more than the last ones, among which the one that decided is looked for."""
 FURTHER = 8
+SEARCHED_SHARE = 16
+"""Part of what is before the log, one of so many, that is searched before all of it is noted instead."""
 STANDS_NS: Nanos = SECOND
 """Time after which a state may be because of any fault that has acted before, whatever it would be a moment earlier or later."""
 MOST_SUSPECTS = 4
@@ -62,6 +64,8 @@ class PastQuestions:
         self._lacking = Lacking()
         self._kept_to: set[Nanos] = set()
         """Beginnings of logs that cannot be longer."""
+        self._searched = 0
+        """Slices of the past that were run again for the question besides the log."""
         self._most_links = MOST_LINKS
         self._changes = LastChanges(snapshots, second_world)
 
@@ -79,6 +83,7 @@ class PastQuestions:
             self._lacking.forget()
             self._logs = [self._note(max(snapshots.begin, at - span))]
         self._kept_to.clear()
+        self._searched = 0
         answer = yield from self._settled(lambda known: self._answer(known, question, at))
         answer = yield from self._with_held(answer)
         lacking = yield from self._settled(lambda known: known.why.lacking(question, at))
@@ -175,15 +180,19 @@ class PastQuestions:
     def _have_more(self) -> Generator[None, None, bool]:
         """Have some of what lacks; whether there was something to be had."""
         moments, changes = sorted(self._lacking.moments), dict(self._lacking.changes)
-        if (moments or changes) and self._has_rest_at_once():
-            yield from self._have_longer(self._logs[0].why.log.begin)
-            return True
         for moment in moments:
+            self._searched += (moment - self._snapshots.state_at(max(0, moment - 1)).snapshot.now) // SLICE_NS
+            if self._is_longer_cheaper():
+                yield from self._have_longer(self._logs[0].why.log.begin)
+                return True
             yield from self._note_about(moment)
         for moment in set(changes.values()):
             texts = [text for text, before in changes.items() if before == moment]
             asked = [one for text in texts if (one := self._logs[0].why.asked(text)) is not None]
-            found = yield from self._changes.before(asked, moment)
+            found = yield from self._searching(asked, moment)
+            if found is None:
+                yield from self._have_longer(self._logs[0].why.log.begin)
+                return True
             for text in texts:
                 self._lacking.learn(text, moment, found.get(text, Found(None, moment)))
         if moments or changes:
@@ -193,10 +202,25 @@ class PastQuestions:
             yield from self._have_longer(begin)
         return bool(begins)
 
-    def _has_rest_at_once(self) -> bool:
-        """Whether the next longer log has the whole past: then searches in that would cost as much, each again."""
+    def _searching(self, asked: Sequence[Asked], moment: Nanos) -> Generator[None, None, Mapping[str, Found] | None]:
+        """The last changes before a moment; None as soon as a longer log is cheaper."""
+        searching = self._changes.before(asked, moment)
+        while not self._is_longer_cheaper():
+            try:
+                next(searching)
+            except StopIteration as end:
+                return end.value
+            self._searched += 1
+            yield
+        searching.close()
+        return None
+
+    def _is_longer_cheaper(self) -> bool:
+        """Whether the next longer log has the whole past, and a good part of that was searched already, which is for one question
+        only."""
         log, begin = self._logs[0].why.log, self._snapshots.begin
-        return log.begin > begin and log.begin not in self._kept_to and self._logs[0].older() == begin
+        is_enough = self._searched > (log.begin - begin) // (SEARCHED_SHARE * SLICE_NS)
+        return is_enough and log.begin > begin and log.begin not in self._kept_to and self._logs[0].older() == begin
 
     def _note(self, moment: Nanos) -> _Known:
         """A log from the newest state at or before a moment."""
