@@ -44,6 +44,9 @@ NO_STATEMENT_SETS = Message("why.no-statement-sets", ", which no statement of it
 NOTHING_HAS_SET = Message("why.nothing-has-set", ", which nothing has set")
 NOBODY_PRESSED = Message("why.nobody-pressed", ", which nobody has pressed")
 CONTACT_OF = Message("why.contact-of", ", a contact of {pin}")
+OF = Message("why.of", " of {pin}")
+NORMALLY_CLOSED = Message("why.normally-closed", ", a normally closed contact{how}")
+INVERTED = Message("why.inverted", ", an inverted input{how}")
 CONTACT_BOUNCED = Message("why.contact-bounced", ", and the contact bounced")
 DRIVES = Message("why.drives", "[[{kind}]] in {where} drives {pin}")
 
@@ -61,6 +64,8 @@ class Causes:
         self.parts: dict[str, TerminalComponent] = {
             name: part for kind, parts in built.items() if ELEMENTS[kind].terminals is not None for name, part in parts.items()
         }
+        circuits = world.objects.circuits.values()
+        self.contacts = {one.channel: one for circuit in circuits for one in circuit.contacts if one.channel}
         self.axes, self.attempts, self.programs = AxisCauses(self), Attempts(self), ProgramCauses(self)
         self.controllers, self.elements = ControllerCauses(self), ElementCauses(self)
         self.workpieces = WorkpieceCauses(self)
@@ -80,8 +85,17 @@ class Causes:
         owner, place = signal.partition(".")[0], Place(change.time, change.order)
         if self.log.is_first(signal, change):
             return self.first(signal, how, place)
-        text = BECAME(signal=signal, value=change.value, how=how or "")
+        text = BECAME(signal=signal, value=change.value, how=self._as_it_is(signal, how))
         return Cause(ChainLink(change.time, owner, text), place, partial(self._of_change, signal, change))
+
+    def _as_it_is(self, signal: str, how: MessageText | str | None) -> MessageText | str:
+        """Words behind a level, after those for a contact or input that has the other level than usual."""
+        owner, _, pin = signal.partition(".")
+        if signal in self.contacts:
+            return NORMALLY_CLOSED(how=how or "") if self.contacts[signal].normally_closed else how or ""
+        is_pin = owner in self._world.controllers
+        is_inverted = is_pin and self._world.kind(owner).is_inverted(self._world.controller(owner), pin)
+        return INVERTED(how=how or "") if is_inverted else how or ""
 
     def state(self, signal: str, at: Nanos) -> MessageText:
         """The level of a signal at a moment, since when, and what drives it."""
@@ -92,7 +106,20 @@ class Causes:
         driven = DRIVEN_BY(names=reduce(lambda one, other: AND(one=one, other=other), drivers)) if drivers else ""
         if since is None and not drivers:
             driven = self.undriven(signal) or ""
-        return IS_SINCE(signal=signal, value=self.log.level(signal, at), since=when, how=driven)
+        how = self._as_it_is(signal, driven)
+        return IS_SINCE(signal=signal, value=self.log.level(signal, at), since=when, how=how)
+
+    def unchanged(self, signal: str, place: Place) -> Cause:
+        """A signal is at a place as it has been from the beginning, along with the contacts that keep it so."""
+        time, order, number = place
+        link = ChainLink(time, signal.partition(".")[0], self.state(signal, time))
+        return Cause(link, place, *self._kept(signal, Place(time, order, number - 1)))
+
+    def _kept(self, signal: str, place: Place) -> tuple[Callable[[], FoundCause], None, Callable[[], Sequence[Cause]]]:
+        """Search for the contacts from the beginning that keep a signal as it has been from the beginning."""
+        names = [name for name in self.holding.leaves(signal, place.time) if name in self.contacts and name != signal]
+        names = [name for name in names if self.log.since(name, place.time) is None]
+        return nothing, None, lambda: [self.unchanged(name, place) for name in names]
 
     def undriven(self, signal: str) -> MessageText | None:
         """Reason why a signal that has not changed cannot change by itself; None where it can."""
@@ -119,8 +146,9 @@ class Causes:
         if earlier is not None:
             return earlier
         value, place = self.log.level(signal, self.log.begin), place or Place(known.known_from)
-        text = IS_SINCE(signal=signal, value=value, since=since_before(known.known_from), how=how or "")
-        return Cause(ChainLink(place.time, signal.partition(".")[0], text), place, nothing if known == NEVER else unknown)
+        text = IS_SINCE(signal=signal, value=value, since=since_before(known.known_from), how=self._as_it_is(signal, how))
+        link, by = ChainLink(place.time, signal.partition(".")[0], text), place._replace(number=place.number - 1)
+        return Cause(link, place, *self._kept(signal, by)) if known == NEVER else Cause(link, place, unknown)
 
     def last(self, signals: Sequence[str], until: Nanos, how: MessageText | None = None, before: int = LAST) -> FoundCause:
         """The last change among signals by a moment, before an order."""
@@ -241,7 +269,8 @@ class Causes:
         at_once = [found for found in channels if found[0].time == change.time]
         if at_once:
             latest, channel = max(at_once, key=lambda found: found[0].order)
-            return self.change(channel, latest, CONTACT_OF(pin=str(pin)))
+            of = OF if self.contacts[channel].normally_closed else CONTACT_OF
+            return self.change(channel, latest, of(pin=str(pin)))
         act = next((act for act in self.log.acts_at(change.time, change.order) if sets(act, pin)), None)
         if act is not None:
             return acted(act)

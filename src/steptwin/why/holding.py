@@ -35,23 +35,32 @@ class HoldingCauses:
     def of(self, signals: Iterable[str], at: Nanos, since: Nanos | None) -> Iterator[Cause]:
         """The last changes after ``since`` of what keeps signals as they are at a moment; None: since the beginning."""
         floor = -1 if since is None else since
-        waiting, seen = list(signals), set[str]()
-        unchanged = waiting[0] if since is not None and len(waiting) == 1 else None
-        while waiting:
-            name = waiting.pop()
-            if name in seen:
-                continue
-            seen.add(name)
-            behind = self._keeping(name, at, floor)
+        names = list(signals)
+        unchanged = names[0] if since is not None and len(names) == 1 else None
+        for name, behind in self._all_keeping(names, at, floor):
             if name != unchanged and floor < self._log.begin and (behind is None or self.depends((name,))):
                 self._log.lack()  # it may have changed before the log, but after that
-            waiting += behind or ()
             is_leaf = behind is None and self._log.has(name) and name.partition(".")[0] not in self._world.axes
             changed = self._log.since(name, at) if is_leaf else None
             if changed is not None and changed > floor:
                 cause = covered(self._all.last((name,), at), Cover.LEVEL)
                 if cause is not None:
                     yield cause
+
+    def leaves(self, signal: str, at: Nanos) -> Iterator[str]:
+        """The signals at the other ends of wires, gates, relays and timers that keep one as it is from the beginning."""
+        return (name for name, behind in self._all_keeping([signal], at, -1) if behind is None)
+
+    def _all_keeping(self, signals: Sequence[str], at: Nanos, floor: Nanos) -> Iterator[tuple[str, list[str] | None]]:
+        """Signals and all that keep them as they are at a moment, each with what keeps it (`_keeping`)."""
+        waiting, seen = list(signals), set[str]()
+        while waiting:
+            name = waiting.pop()
+            if name not in seen:
+                seen.add(name)
+                behind = self._keeping(name, at, floor)
+                waiting += behind or ()
+                yield name, behind
 
     def _keeping(self, signal: str, at: Nanos, floor: Nanos) -> list[str] | None:
         """The signals that keep another one as it is at a moment; empty where a fault or a delay does; None for one that is not

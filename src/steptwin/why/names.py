@@ -49,6 +49,12 @@ class QuestionNames:
         is_moving = self.is_signal(name) and self._log.world.signal(name).continuous
         return is_moving and "pos" in rest and not rest.startswith("enc")
 
+    def pin(self, name: str) -> str:
+        """The input whose level, as its filter lets it in, a register shows; other names as they are."""
+        owner, point = name.partition(".")[0], self.point(name)
+        terminals = () if point is None else self._log.world.kind(owner).terminals.digital_inputs
+        return f"{owner}.{point.point.path}" if point is not None and point.point.path in terminals else name
+
     def point(self, name: str) -> LivePoint | None:
         """The point of a controller with this name; None for what is none."""
         owner, _, rest = name.partition(".")
@@ -126,7 +132,9 @@ class QuestionNames:
                 if self._log.is_recorded(f"{owner}.{rest.upper()}")
                 else world.kind(owner).point(world.controller(owner), rest)
             )
-            return f"{owner}.{rest.upper() if point is None else point.point.path}"
+            path = rest.upper() if point is None else point.point.path
+            is_register = path in world.controllers[owner].pins() and rest.upper() != path  # not the level at the terminal
+            return f"{owner}.{rest.lower() if is_register else path}"
         return f"{owner}.{rest.lower()}"
 
     def is_script(self, name: str) -> bool:

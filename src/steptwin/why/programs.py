@@ -34,6 +34,7 @@ HELD = {
 }
 WHERE = Message("why.where", " at {statement}")
 FILTERED = Message("why.filtered", ", which the filter of the input lets in after {ms:g} ms")
+TOO_SHORT = Message("why.too-short", ", for {lasts:g} ms: the filter of the input lets in what lasts {ms:g} ms")
 GOES_ON = Message("why.program-goes-on", "the program goes on")
 PROGRAM_STARTED = Message("why.program-started", "the program started")
 LONGEST_REACTION_NS: Nanos = 510 * MILLISECOND
@@ -366,9 +367,12 @@ class ProgramCauses:
             if one.name and self.resource(controller, one, index, time, order) is None:
                 is_pin = one.kind is ResourceKind.PIN and self._log.since(name, time) is None
                 is_value = one.kind is ResourceKind.VALUE and self._is_variable(controller, one.name)
-                text = self._all.state(name, time) if is_pin else NEVER_SET(name=one.name) if is_value else None
-                if text is not None:
-                    yield Cause(ChainLink(time, controller, text), Place(time, order, number - 1), nothing)
+                if is_pin:
+                    yield self._all.unchanged(name, Place(time, order, number - 1))
+                elif is_value:
+                    yield Cause(ChainLink(time, controller, NEVER_SET(name=one.name)), Place(time, order, number - 1), nothing)
+                elif one.kind is ResourceKind.PIN and (short := self.unseen(controller, one.name, time)) is not None:
+                    yield short
 
     def _is_variable(self, controller: str, name: str) -> bool:
         return name in self._world.programs[controller].variables(self._world.now)
@@ -381,12 +385,17 @@ class ProgramCauses:
         levels, words = [self._all.state(pin, here.time) for pin in pins], statement(self._log, here)
         text = DID_NOT_WAIT(statement=words, levels=levels) if levels else DECIDED(statement=words)
 
-        def before() -> FoundCause:
-            there = [covered(cause, Cover.LEVEL) for cause in self._read(controller, index, place)]
+        def found() -> Sequence[Cause]:
+            there = [cause._replace(cover=Cover.LEVEL) for cause in self._read(controller, index, place)]
             led = self._of_statement(controller, index)
-            return max((one for one in (led, *there) if one is not None), key=lambda one: one.place, default=None)
+            return sorted((*there, *(() if led is None else (led,))), key=lambda one: one.place, reverse=True)
 
-        return Cause(ChainLink(here.time, controller, text), place, before, Cover.PROGRAM)
+        def besides() -> Iterator[Cause]:
+            yield from found()[1:]
+            for one in self._unchanged(controller, index, place):
+                yield from one.besides()
+
+        return Cause(ChainLink(here.time, controller, text), place, lambda: next(iter(found()), None), Cover.PROGRAM, besides)
 
     def _read(self, controller: str, index: int, place: Place) -> Iterator[Cause]:
         """The last changes of what a statement reads."""
@@ -440,9 +449,7 @@ class ProgramCauses:
         pins = [f"{controller}.{one.name}" for one in reads if one.kind is ResourceKind.PIN and one.name]
         came += others
         if not came and len(pins) == 1 and self._log.since(pins[0], place.time) is None:  # a filter lets it in later
-            pin = pins[0].removeprefix(f"{controller}.")
-            lasts = self._world.kind(controller).filter_of(self._world.controllers[controller], pin)
-            return covered(self._all.first(pins[0], FILTERED(ms=lasts / MILLISECOND) if lasts else None), Cover.LEVEL)
+            return covered(self.first(controller, next(one for one in reads if one.kind is ResourceKind.PIN)), Cover.LEVEL)
         last = place.number // 3 - 1
         if not came and last > index:  # the interrupt that it went on after
             came = [self.statement(controller, last)]
@@ -454,8 +461,10 @@ class ProgramCauses:
             case ResourceKind.PIN:
                 every = [name for name in self._log.first_levels if name.startswith(f"{controller}.")]
                 read = [f"{controller}.{resource.name}"] if resource.name else every
-                last = self._all.last(read, time, before=before)
-                return self._all.lasting(read, time, self._seen(controller, resource.name, time, before) or last, before)
+                lasts = self._filter(controller, resource.name)
+                seen = self._seen(controller, resource.name, time, before, lasts) if lasts else None
+                last = seen if lasts else self._all.last(read, time, before=before)
+                return self._all.lasting(read, time, last, before)
             case ResourceKind.AXIS:
                 return self._all.axes.motion(controller, resource.name, time, before=before)
             case ResourceKind.ORIGIN:
@@ -481,27 +490,59 @@ class ProgramCauses:
             return there.programs.resource(controller, resource, number, since)
         return None
 
-    def _seen(self, controller: str, pin: str, time: Nanos, before: int) -> FoundCause:
-        """The last change of an input that its filter has let in by a moment; None without a filter or such a change."""
-        signal, controllers = f"{controller}.{pin}", self._world.controllers
-        lasts = self._world.kind(controller).filter_of(controllers[controller], pin)
+    def _seen(self, controller: str, pin: str, time: Nanos, before: int, lasts: Nanos) -> FoundCause:
+        """The last change of an input by a moment that its filter has let in, which takes a time; None without such a change."""
+        signal, how = f"{controller}.{pin}", FILTERED(ms=lasts / MILLISECOND)
         later: Nanos = time
         came: Change | None = None  # the first one since the last that was let in with another level
         is_other = False
-        for change in self._log.changes_before(signal, time, before) if lasts else ():
+        for change in self._log.changes_before(signal, time, before):
             if later - change.time >= lasts:
                 is_other = came is not None and change.value != came.value
                 if is_other:
                     break
                 came = change
             later = change.time
-        begin, level, how = self._log.begin, self._log.first_levels.get(signal, 0.0), FILTERED(ms=lasts / MILLISECOND)
+        begin, level = self._log.begin, self._log.first_levels.get(signal, 0.0)
         if came is not None and (is_other or not self._log.reaches_begin() or came.value != level):
             return self._all.change(signal, came, how)
         if came is None and level and self._log.reaches_begin() and later - begin < lasts:
             return self._all.first(signal, how)
-        last = self._all.last((signal,), time, how) if lasts and came is None and later == time else None
-        return last if last is not None and last.place.time <= time - lasts else None
+        since = None if came is not None else self._log.before(signal).since
+        there = None if since is None else self._all.of(since)
+        if there is None or there is self._all:
+            return None
+        return there.programs._seen(controller, pin, later, LAST, lasts)
+
+    def unseen(self, controller: str, pin: str, time: Nanos, after: Nanos = -1) -> FoundCause:
+        """The last change of an input by a moment, after another one, that its filter has not let in, as it was too short."""
+        signal, lasts, later = f"{controller}.{pin}", self._filter(controller, pin), time
+        level: float | None = None  # that its filter let in last
+        short: list[tuple[Change, Nanos]] = []
+        for change in self._log.changes_before(signal, time) if lasts else ():
+            length, later = later - change.time, change.time
+            if length < lasts:
+                short += [(change, length)] if change.time > after else ()
+            elif level is None:
+                level = change.value
+            if length >= lasts and (short or change.time <= after):
+                break
+        if level is None and short and self._log.reaches_begin():
+            level = self._log.first_levels.get(signal, 0.0) if later - self._log.begin >= lasts else 0.0
+        found = next((one for one in short if level is not None and one[0].value != level), None)
+        if found is None:
+            return None
+        how = TOO_SHORT(lasts=found[1] / MILLISECOND, ms=lasts / MILLISECOND)
+        return covered(self._all.change(signal, found[0], how), Cover.LEVEL)
+
+    def first(self, controller: str, pin: Resource) -> Cause:
+        """The level of an input before the log, which its filter lets in."""
+        lasts = self._filter(controller, pin.name)
+        return self._all.first(f"{controller}.{pin.name}", FILTERED(ms=lasts / MILLISECOND) if lasts else None)
+
+    def _filter(self, controller: str, pin: str) -> Nanos:
+        """How long a level must last at an input before a program sees it."""
+        return self._world.kind(controller).filter_of(self._world.controllers[controller], pin)
 
     def _writing(self, controller: str, resource: Resource) -> Collection[StatementLocation]:
         """The statements that change something."""

@@ -279,11 +279,15 @@ class Why:
             value, since = yield from self._from_run(asked, canonical, at, is_bare=is_bare)
         since = self.log.before(asked).since if since is None else since
         state = IS_NUMBER(name=asked, value=value) if is_bare else IS_TRUE(name=asked) if value else IS_FALSE(name=asked)
+        changed = None if since is None else self._changed((*canonical.values(),), since)
+        shown = [pin for full in canonical.values() if (pin := self.names.pin(full)) != full]
+        canonical = {name: self.names.pin(full) for name, full in canonical.items()}
         signals = tuple(canonical.values())
-        first = self.causes.lasting(signals, at, None if since is None else self._changed(signals, since))
+        first = self.causes.lasting(signals, at, changed)
         first = self._with_refused(signals, at, since, first)
         if first is not None or since is not None:
-            first = _along(first, list(self.causes.holding.of(self._deciding(asked, canonical, at), at, since)))
+            holding = self.causes.holding.of(self._deciding(asked, canonical, at), at, since)
+            first = _along(first, [*holding, *self._unseen(shown, at, -1 if since is None else since)])
             return (yield from self._answer(text, at, state, since, first))
         waited = (*signals, *self._awaited(signals, at))
         resting = (yield from self._resting(waited, at)) or self._held(signals, at)
@@ -294,12 +298,20 @@ class Why:
             decides = self._deciding(asked, canonical, at)
             holding = self.causes.holding.of((*decides, *self._awaited(decides, at)), at, None)
             resting = _along(resting, list(holding))
+        resting = _along(resting, list(self._unseen((*shown, *waited[len(signals) :]), at, -1)))
         answer = yield from self._answer(text, at, state, None, resting)
         present, named = (yield from self._present(at)), [name for name in signals if self.log.has(name)]
         states = [link for name in named for link in present.of([name])]
         says_more = resting is not None or len(states) > len(signals)
         says_more |= any(self.causes.drivers(name, at) or self.causes.undriven(name) is not None for name in signals)
         return self._after(states if says_more else [], answer)
+
+    def _unseen(self, pins: Iterable[str], at: Nanos, after: Nanos) -> Iterator[Cause]:
+        """The last changes of inputs after a moment that were too short for their filters."""
+        for owner, _, pin in (one.partition(".") for one in pins):
+            found = self.causes.programs.unseen(owner, pin, at, after)
+            if found is not None:
+                yield found
 
     def _with_refused(self, signals: Iterable[str], at: Nanos, since: Nanos | None, first: FoundCause) -> FoundCause:
         """A cause along with the requests that would have written one of these registers since, and were refused."""
@@ -587,17 +599,21 @@ class Why:
         world, causes = self.log.world, self.causes.of(time)
         if causes is None:
             return None
+        if owner in world.axes and rest in SLIPS:
+            return causes.axes.slipped(owner, time, SLIPS[rest])
+        if owner in world.axes and rest != "power":
+            return causes.axes.moved(owner, time, since=since)
         if owner in world.axes:
-            if rest in SLIPS:
-                return causes.axes.slipped(owner, time, SLIPS[rest])
-            if rest != "power":
-                return causes.axes.moved(owner, time, since=since)
             drive, switched = world.axes[owner].spec.drive, causes.axes.power(owner, time)
-            if switched is not None and switched.link.time == time:
-                return switched
-            return causes.controllers.at_moment(drive[0], time, Resource(ResourceKind.AXIS, drive[1].removeprefix("M")))
+            wanted = Resource(ResourceKind.AXIS, drive[1].removeprefix("M"))
+            is_switched = switched is not None and switched.link.time == time
+            return switched if is_switched else causes.controllers.at_moment(drive[0], time, wanted)
         if owner not in world.controllers:
             return causes.elements.of_element(owner, rest, time)
+        shown = self.names.pin(signal)
+        if shown != signal:
+            pin = Resource(ResourceKind.PIN, shown.partition(".")[2])
+            return covered(causes.programs.resource(owner, pin, 0, time) or causes.programs.first(owner, pin), Cover.LEVEL)
         wanted = axis_of(rest)
         if wanted is None and self.names.is_signal(signal) and world.signal(signal).continuous:
             wanted = Resource(ResourceKind.AXIS, "")
@@ -686,7 +702,8 @@ class Why:
         waiting = waiting._replace(cover=Cover.WAIT, besides=lambda: others)
         first = covered(last, Cover.LEVEL) or resting or waiting
         standing = (yield from self._standing(pins, at)) if last is None and resting is None else None
-        first = _along(first, [waiting, *(() if standing is None else (standing, *standing.along)), *holding])
+        lasting = (*(() if standing is None else (standing, *standing.along)), *holding, *self._unseen(pins, at, here.time))
+        first = _along(first, [waiting, *lasting])
         answer = yield from self._answer(controller, at, WAITS(controller=controller, statement=text), since, first)
         return self._after(links, answer)
 

@@ -135,8 +135,9 @@ class _RunWithout:
         match root:
             case Sent(time):
                 left_out = [one for one in reversed(inputs) if _is_of(one, root) and one.time <= time][:1]
-            case Act(time, "", what):
+            case Act(time, "", what, fault=fault):
                 left_out = [one for one in inputs if (one.time, one.what) == (time, what)][:1]
+                left_out += [one for one in inputs if one.what == do.ClearFault(fault)]
             case SetFault(_, name, by):
                 given = (by.time, by.what) if by is not None and not by.script else None
                 left_out = [one for one in inputs if (one.time, one.what) == given or one.what == do.ClearFault(name)]

@@ -377,6 +377,10 @@ class ControllerKind(OptionalMethods, ABC, Generic[S, M, V]):
         """How long a level must last at an input, ns, before programs of the controller see it."""
         return 0
 
+    def is_inverted(self, controller: M, pin: str, /) -> bool:
+        """Whether programs and registers have the other level of an input than its terminal."""
+        return False
+
     def would_end_seek(self, controller: M, pin: str, /) -> bool:
         """Whether a seek of an input (`steptwin.simulation.script.control.Seek`) would end without any motion now."""
         return False

@@ -179,6 +179,10 @@ class Mic488Kind(ControllerKind[Mic488Spec, Mic488Device, Mic488View]):
         number = pin.removeprefix("IN")
         return device.inputs.filter_ns(int(number) - 1) if number.isdecimal() and pin != number else 0
 
+    def is_inverted(self, device: Mic488Device, pin: str) -> bool:
+        number = pin.removeprefix("IN")
+        return number.isdecimal() and pin != number and device.config.inputs[int(number) - 1].level == 1
+
     def scale(self, given: GivenScale, device: Mic488Device, axis: int) -> DriveScale:
         its = device.axes[axis - 1]
         return DriveScale(
