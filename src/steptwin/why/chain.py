@@ -10,8 +10,8 @@ from steptwin.controller import Nanos
 from steptwin.messages import Message, MessageText
 from steptwin.why.answer import ALL_LINKS, ChainLink, ChainRule, Cover
 
-FARTHER = 5
-"""How much farther than what led to something is what had to be so besides: it takes the place of no nearer one."""
+BESIDES = 5
+"""Distance of what had to be so besides, in causes that led to something: it takes the place of no nearer one."""
 MOST_FOLLOWED = 40
 """Limit of the causes that are followed on the way to the beginning of a chain beyond those that are shown."""
 LAST_SHOWN = 3
@@ -160,7 +160,7 @@ class Chain:
         led = () if before is None else (before, *before.along)
         is_owed = before is None and cause.before is not nothing
         self._lead(cause.link, cause.place, led, taken.distance + 1, is_owed=is_owed, leads=taken.leads)
-        self._lead(cause.link, cause.place, tuple(cause.besides()), taken.distance + FARTHER, leads=False)
+        self._lead(cause.link, cause.place, tuple(cause.besides()), taken.distance + BESIDES, leads=False)
 
     def _lead(
         self,
