@@ -54,6 +54,8 @@ class ChainLink:
     text: MessageText
     root: Root | None = field(default=None, compare=False)
     """The input, act, request or fault that the run can be repeated without, if it is one."""
+    is_stand: bool = field(default=False, compare=False)
+    """Whether it says at which wait or loop the program of its subject stands."""
 
     def to_json(self) -> dict[str, Any]:
         return with_messages({"time_ns": str(self.time), "subject": self.subject, "text": self.text})
@@ -100,6 +102,8 @@ class Answer(NamedTuple):
     """The runs without each of the roots, if that was asked for."""
     broken: ChainRule | None = None
     """The rule that what was found next would have broken: the chain was ended there, and its last link says so."""
+    has_all_states: bool = True
+    """Whether it has the present states of all on which what was asked about depends."""
 
     def text(self) -> str:
         """The answer in lines."""
@@ -108,8 +112,9 @@ class Answer(NamedTuple):
         lines += map(_line, self.links)
         if self.is_cut:
             lines.append(f"{'':12}    (what was before {self.known_from / SECOND:.6f} s is not known)")
-        elif not self.is_complete:
-            lines.append(f"{'':12}    (further causes are not shown)")
+        left_out = ["present states"] * (not self.has_all_states) + ["causes"] * (not self.is_complete and not self.is_cut)
+        if left_out:
+            lines.append(f"{'':12}    (further {' and '.join(left_out)} are not shown: --all shows more)")
         lines += [WITHOUT(), *(f"{_line(trial.link)} -> {trial.text}" for trial in self.trials)] if self.trials else []
         return "\n".join(lines)
 
@@ -121,7 +126,7 @@ class Answer(NamedTuple):
             "state": self.state,
             "since_ns": None if self.since is None else str(self.since),
             "links": [link.to_json() for link in self.links],
-            "complete": self.is_complete,
+            "complete": self.is_complete and self.has_all_states,
             "known_from_ns": str(self.known_from),
             "cut": self.is_cut,
             "trials": [trial.to_json() for trial in self.trials],

@@ -85,11 +85,13 @@ class ControllerCauses:
     def _pin_of(self, controller: str, event: Change) -> str | None:
         """The pin because of which an event about an axis came: of its limit switch, or the one that enables it."""
         record = self._log.record(event)
+        axis = dict(record.facts).get("axis")
         if record.subject == NOT_ENABLED:
-            enables = [f"{controller}.{axis}_EN" for axis in re.findall(r"\bM\d+\b", str(record.value))]
+            every = range(1, len(self._world.controllers[controller].axes) + 1)  # a motion of several is one of the first axes
+            enables = [f"{controller}.M{one}_EN" for one in (every if axis is None else (axis,))]
             return next((pin for pin in enables if not self._log.level(pin, event.time)), None)
         if record.subject == HOMED:
-            return self._home_pin(controller, event, str(dict(record.facts)["axis"]))
+            return self._home_pin(controller, event, str(axis))
         values = words_of(self._log.record(event)).values
         axes: Any = getattr(getattr(self._world.controllers[controller], "config", None), "axes", ())
         if not axes or "limit" not in values:

@@ -20,8 +20,6 @@ from steptwin.simulation.world.snapshotlog import SLICE_NS, outside_past
 from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Effect, Trial
 from steptwin.why.causes import Causes
 from steptwin.why.lacking import Found, Lacking
-from steptwin.why.presentstates import IS_IN_A_LOOP
-from steptwin.why.programs import WAITS
 from steptwin.why.question import Asking, Why
 from steptwin.why.roots import SetFault
 from steptwin.why.search import Asked, LastChanges, Snapshots
@@ -130,7 +128,7 @@ class PastQuestions:
 
     def _standing(self, answer: Answer) -> Generator[None, None, Sequence[Answer]]:
         """What the programs stand at that an answer is about besides."""
-        names = (link.subject for link in answer.links if link.text.id in (WAITS.id, IS_IN_A_LOOP.id))
+        names = (link.subject for link in answer.links if link.is_stand)
         found: dict[str, Answer] = {}
         for name in dict.fromkeys(names):
             found[name] = yield from self._settled(lambda known, name=name: self._answer(known, name, answer.at))
@@ -139,22 +137,21 @@ class PastQuestions:
     def _without_fault(self, name: str, answers: Sequence[Answer]) -> Generator[None, None, Sequence[Trial]]:
         """The run without a fault, for each of some answers. The first one, of what was asked, counts also for `STANDS_NS` before
         and after, where the fault was long before: it may be later or earlier without it."""
-        link = yield from self._settled(lambda known: known.fault_link(name, answers[0].at))
+        link = yield from self._settled(lambda known: known.find(lambda why: why.fault_link(name, answers[0].at)))
         around = 0 if self._is_near(name, answers[0]) else STANDS_NS
         return (yield from trying_without(self._snapshots, link, answers, self._most, around=around))
 
     def _with_held(self, answer: Answer) -> Asking:
         """An answer with what the programs stand at, or are held by, that could have changed what it is about since."""
-        held = yield from self._settled(lambda known: known.holding(answer))
-        waiting = yield from self._settled(lambda known: known.waiting(answer))
+        standing = yield from self._settled(lambda known: known.find(lambda why: why.standing(answer)))
         links = answer.links
-        for controller in dict.fromkeys((*held, *waiting)):
+        for controller, is_held in standing.items():
             stands = yield from self._settled(lambda known, controller=controller: self._answer(known, controller, answer.at))
             time, text = answer.at if stands.since is None else stands.since, stands.state.message("held") or stands.state
-            led = stands.links if controller in held else [link for link in stands.links if link.time == answer.at]
+            led = stands.links if is_held else [link for link in stands.links if link.time == answer.at]
             known = {(link.subject, link.text) for link in links}
             if (controller, text) not in known:
-                every = (ChainLink(time, controller, text), *led)
+                every = (ChainLink(time, controller, text, is_stand=not is_held), *led)
                 links = _between(links, [link for link in every if (link.subject, link.text) not in known])
         return answer._replace(links=links)
 
@@ -292,20 +289,10 @@ class _Known:
         self._go_on(at)
         return (yield from self.why.asking(question, at, most_links))
 
-    def fault_link(self, name: str, until: Nanos) -> Generator[None, None, ChainLink]:
-        """See `Why.fault_link`."""
+    def find(self, what: Callable[[Why], _T]) -> Generator[None, None, _T]:
+        """Result of something that is found in one part."""
         yield
-        return self.why.fault_link(name, until)
-
-    def holding(self, answer: Answer) -> Generator[None, None, Sequence[str]]:
-        """See `Why.holding`."""
-        yield
-        return self.why.holding(answer)
-
-    def waiting(self, answer: Answer) -> Generator[None, None, Sequence[str]]:
-        """See `Why.waiting`."""
-        yield
-        return self.why.waiting(answer)
+        return what(self.why)
 
     def running(self, moment: Nanos) -> Generator[None, None, None]:
         """Note what happened up to a moment."""

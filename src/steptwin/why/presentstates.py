@@ -42,6 +42,8 @@ class PresentStates:
         self._world = world
         self._at: Nanos = world.now
         self._most = most
+        self.has_all = True
+        """Whether none have been left out because of ``most``."""
 
     def of(self, asked: Sequence[_Asked], waits: str = "") -> Iterator[ChainLink]:
         """The states of these and, one after the other, of what they depend on. ``waits``: the controller that waits for them, of
@@ -52,6 +54,7 @@ class PresentStates:
             if one not in seen:
                 seen.add(one)
                 waiting += yield from (self._signal(one, waits) if isinstance(one, str) else self._resource(*one))
+        self.has_all &= seen.issuperset(waiting)
 
     def disabled(self, controller: str, wanted: Resource) -> Iterator[ChainLink]:
         """The switches that are off of the interrupts that change something, and who set them."""
@@ -210,11 +213,11 @@ class PresentStates:
             reads = [(owner, one) for one in there.programs.use(owner, (against.place.number - 2) // 3).reads]
             return [*reads, *(yield from self.interrupts(owner, wanted))]
         if use.waits and at - here.time > self._world.programs[owner].statement_time:
-            yield ChainLink(at, owner, WAITS(controller=owner, statement=statement(log, here)))
+            yield ChainLink(at, owner, WAITS(controller=owner, statement=statement(log, here)), is_stand=True)
             return [*((owner, one) for one in use.reads), *(yield from self.interrupts(owner, wanted))]
         conditions = programs.conditions_of_loop(owner, index)
         if conditions:
             widest = max(conditions, key=lambda one: len(programs.use(owner, one).governs))
             words = statement(log, programs.written_at(owner, widest))
-            yield ChainLink(at, owner, IS_IN_A_LOOP(controller=owner, statement=words))
+            yield ChainLink(at, owner, IS_IN_A_LOOP(controller=owner, statement=words), is_stand=True)
         return [(owner, one) for number in conditions for one in programs.use(owner, number).reads]

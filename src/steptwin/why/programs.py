@@ -139,7 +139,8 @@ class ProgramCauses:
         found, here = self.statement(controller, index), self._log.executed[controller][index]
         text = WAITS(controller=controller, statement=statement(self._log, here))
         besides = partial(self._unchanged, controller, index, found.place)
-        return found._replace(link=ChainLink(here.time, controller, text), cover=Cover.WAIT, besides=besides)
+        link = ChainLink(here.time, controller, text, is_stand=True)
+        return found._replace(link=link, cover=Cover.WAIT, besides=besides)
 
     def is_of_interrupt(self, controller: str, index: int) -> bool:
         """Whether an executed statement stands in an interrupt."""

@@ -304,7 +304,7 @@ class Why:
         states = [link for name in named for link in present.of([name])]
         says_more = resting is not None or len(states) > len(signals)
         says_more |= any(self.causes.drivers(name, at) or self.causes.undriven(name) is not None for name in signals)
-        return self._after(states if says_more else [], answer)
+        return self._after(present, states if says_more else [], answer)
 
     def _unseen(self, pins: Iterable[str], at: Nanos, after: Nanos) -> Iterator[Cause]:
         """The last changes of inputs after a moment that were too short for their filters."""
@@ -380,43 +380,29 @@ class Why:
             links.append(ChainLink(at, "", ahead))
         return tuple(dict.fromkeys(links))
 
-    def holding(self, answer: Answer) -> Sequence[str]:
-        """The controllers whose programs are held, and could else have changed what an answer is about since. `asking` comes
-        first."""
-        text, log, programs = _text_of(answer.question), self.log, self.causes.programs
+    def standing(self, answer: Answer) -> Mapping[str, bool]:
+        """The controllers whose programs would else have changed what an answer is about since: True for those that are held,
+        False for those that wait for something before statements that would change its output. `asking` comes first."""
+        text, at, log, programs = _text_of(answer.question), answer.at, self.log, self.causes.programs
+        found: dict[str, bool] = {}
         if self.names.is_script(text) or _without_not(text) in log.world.controllers:
-            return ()
-        found: dict[str, None] = {}
-        for controller, wanted in self._changeable(self._names_in(text), answer.at):
-            held, index = programs.held(controller, answer.at), log.last_executed(controller, answer.at)
-            ended = None if held is not None or index < 0 else programs.ended(controller, index, answer.at)
-            held = held or ended
-            if held is None or index < 0 or not programs.leads_to(controller, index, wanted):
+            return found
+        names = self._names_in(text)
+        waiting = {*self._changeable([one for one in names if self._is_output(one) or self.causes.holding.depends([one])], at)}
+        for controller, wanted in self._changeable(names, at):
+            index, since = log.last_executed(controller, at), self._since(controller, wanted, answer)
+            if index < 0 or not programs.leads_to(controller, index, wanted):
                 continue
-            if self._tried(controller, wanted, answer.at) is not None:
-                continue  # it does not lack another command
-            since = self._since(controller, wanted, answer)
-            is_later = since is not None and (held.place.order < 0 or held.place.time > since)
-            if is_later or wanted.kind is ResourceKind.AXIS:
-                found[controller] = None
-        return tuple(found)
-
-    def waiting(self, answer: Answer) -> Sequence[str]:
-        """The controllers whose programs have waited for something since, before statements that would change the output that an
-        answer is about. `asking` comes first."""
-        text, log, programs = _text_of(answer.question), self.log, self.causes.programs
-        if self.names.is_script(text) or _without_not(text) in log.world.controllers or answer.since is None:
-            return ()
-        found: dict[str, None] = {}
-        names = [name for name in self._names_in(text) if self._is_output(name) or self.causes.holding.depends([name])]
-        for controller, wanted in self._changeable(names, answer.at):
-            index, since = log.last_executed(controller, answer.at), self._since(controller, wanted, answer)
-            use = programs.use(controller, index) if wanted.kind is ResourceKind.PIN and index >= 0 else None
-            begun = answer.at if index < 0 else log.executed[controller][index].time
-            is_long = since is not None and since <= begun < answer.at - log.world.programs[controller].statement_time
-            if use is not None and use.waits and use.reads and is_long and programs.leads_to(controller, index, wanted):
-                found[controller] = None
-        return tuple(found)
+            held = programs.held(controller, at) or programs.ended(controller, index, at)
+            if held is not None:
+                is_later = since is not None and (held.place.order < 0 or held.place.time > since)
+                if (is_later or wanted.kind is ResourceKind.AXIS) and self._tried(controller, wanted, at) is None:
+                    found[controller] = True
+            elif wanted.kind is ResourceKind.PIN and (controller, wanted) in waiting and since is not None:
+                use, begun = programs.use(controller, index), log.executed[controller][index].time
+                if use.waits and use.reads and since <= begun < at - log.world.programs[controller].statement_time:
+                    found.setdefault(controller, False)
+        return found
 
     def _is_output(self, name: str) -> bool:
         """Whether it is an output that a program sets."""
@@ -507,7 +493,9 @@ class Why:
         there = None if written is None else self.causes.of(written.place.time)  # it may be numbered in the log of another moment
         came = there is not None and written is not None and there.programs.is_of_interrupt(controller, written.place.number // 3)
         states = [] if came else list(present.disabled(controller, wanted))
-        return self._after(states, (yield from self._answer(text, at, state, None if last is None else last.place.time, last)))
+        return self._after(
+            present, states, (yield from self._answer(text, at, state, None if last is None else last.place.time, last))
+        )
 
     def _from_log(self, text: str, canonical: dict[str, str], at: Nanos, *, is_bare: bool) -> tuple[float, Nanos | None]:
         """The value at a moment, and when it became so."""
@@ -670,7 +658,7 @@ class Why:
             supply, present = causes.programs.supply_off(controller, at), (yield from self._present(at))
             states = list(present.of([supply])) if supply is not None and since is None else []
             state = PROGRAM_IS(controller=controller, held=held.link.text)
-            return self._after(states, (yield from self._answer(controller, at, state, since, first)))
+            return self._after(present, states, (yield from self._answer(controller, at, state, since, first)))
         if index < 0 and log.reaches_begin():
             raise Misuse(NOTHING_EXECUTED_YET(controller=controller, at=at / SECOND))
         if index < 0:
@@ -689,7 +677,7 @@ class Why:
         if not present.waits(controller, use) or at - here.time <= log.world.programs[controller].statement_time:
             state = DOES_NOT_WAIT(controller=controller, statement=text)
             first = covered(causes.programs.statement(controller, index), Cover.PROGRAM)
-            return self._after(links, (yield from self._answer(controller, at, state, since, first)))
+            return self._after(present, links, (yield from self._answer(controller, at, state, since, first)))
         found = {one: cause for one in use.reads if (cause := causes.programs.resource(controller, one, index, at))}
         waiting = causes.programs.statement(controller, index)
         known = {one: cause for one, cause in found.items() if cause.place < waiting.place}
@@ -705,7 +693,7 @@ class Why:
         lasting = (*(() if standing is None else (standing, *standing.along)), *holding, *self._unseen(pins, at, here.time))
         first = _along(first, [waiting, *lasting])
         answer = yield from self._answer(controller, at, WAITS(controller=controller, statement=text), since, first)
-        return self._after(links, answer)
+        return self._after(present, links, answer)
 
     def _is_held(self, controller: str, resource: Resource, at: Nanos) -> bool:
         """Whether a fault holds a pin, or what drives it: the run without the fault proves it."""
@@ -713,12 +701,11 @@ class Why:
         holds = [self.log.hold(name, at) for name in self._behind(pin, at) if self.names.is_signal(name)]
         return any(hold is not None for hold in holds)
 
-    def _after(self, states: Sequence[ChainLink], answer: Answer) -> Answer:
+    def _after(self, present: PresentStates, states: Sequence[ChainLink], answer: Answer) -> Answer:
         """An answer after present states, which take no place of its causes."""
         known = {(link.subject, link.text) for link in states}
         later = [link for link in answer.links if (link.subject, link.text) not in known]
-        is_all = self._most_links != MOST_LINKS or len(states) < MOST_SNAPSHOTS
-        return answer._replace(links=tuple(dict.fromkeys((*states, *later))), is_complete=answer.is_complete and is_all)
+        return answer._replace(links=tuple(dict.fromkeys((*states, *later))), has_all_states=present.has_all)
 
     def _behind(self, signals: Iterable[str], at: Nanos) -> set[str]:
         """Signals, and those that drive one of them."""
