@@ -12,6 +12,7 @@ from steptwin.simulation.faults import read
 from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.snapshotlog import SnapshotLog
 from steptwin.why import pastquestions, search
+from steptwin.why.notedpast import NotedPast
 from steptwin.why.pastquestions import PastQuestions
 from steptwin.why.question import Why, finish
 
@@ -85,7 +86,7 @@ def test_answers_are_those_of_what_is_noted_from_the_beginning() -> None:
     world = World.from_toml(WORLD, {"m.prg": PROGRAM.encode()})
     end = 5 * SECOND
     past = past_of(world, end - 200 * MILLISECOND)
-    whole = Why(lambda: World(world.blueprint), world.inputs, world.now)
+    whole = Why(NotedPast(lambda: World(world.blueprint), world.inputs, world.now))
     moments = [world.now, 1_250 * MILLISECOND]
     for question in QUESTIONS:
         for at in moments:
@@ -104,7 +105,7 @@ def test_flags_of_a_chip_are_set_without_an_event() -> None:
     for moment in range(50, 1000, 50):
         world.run_to(moment * MILLISECOND)
         snapshots.take()
-    whole = Why(lambda: World(world.blueprint), world.inputs, world.now).ask("chip.U14")
+    whole = Why(NotedPast(lambda: World(world.blueprint), world.inputs, world.now)).ask("chip.U14")
     found = finish(PastQuestions(snapshots).asking("chip.U14"))
     assert (found.state, found.since, found.links) == (whole.state, whole.since, whole.links)
     assert found.since is not None
@@ -180,7 +181,7 @@ def test_what_became_what_it_was_before_the_next_state_has_changed(monkeypatch: 
     for moment in range(300, 6000, 300):
         world.run_to(moment * MILLISECOND)
         snapshots.take()
-    past, whole = PastQuestions(snapshots), Why(lambda: World(world.blueprint), world.inputs, world.now)
+    past, whole = PastQuestions(snapshots), Why(NotedPast(lambda: World(world.blueprint), world.inputs, world.now))
     changed = ("m.USER_REGISTER[4]", "m.USER_REGISTER[5]", "m.M2_VMAX", "m.M3.status", "m.M3.enabled", "m.M4_POSLIM_L")
     for question in changed:
         found, expected = finish(past.asking(question)), whole.ask(question)
@@ -226,7 +227,7 @@ def test_a_fault_that_holds_a_level_is_shown_however_old(since: int) -> None:
             world.run_to(since * MILLISECOND)
             world.apply_input(do.SetFault(read("stuck machine=cell pin=IN1 value=1")))
             world.apply_input(do.SetFault(read("stuck machine=cell pin=IN2 value=0 name=cut")))
-    past, whole = PastQuestions(snapshots), Why(lambda: World(world.blueprint), world.inputs, world.now)
+    past, whole = PastQuestions(snapshots), Why(NotedPast(lambda: World(world.blueprint), world.inputs, world.now))
     for question in HELD:
         found, expected = finish(past.asking(question)), whole.ask(question)
         assert (found.state, found.since) == (expected.state, expected.since), question

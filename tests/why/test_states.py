@@ -13,6 +13,7 @@ from steptwin.simulation.script import steps as do
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput
 from steptwin.why import log, points, replayed, states
+from steptwin.why.notedpast import NotedPast
 from steptwin.why.question import Why
 
 COUNTS = "n = 0\n$I5 = 0\nMAIN:\n    n = n + 1\n    $I4 = n\n    DELAY 0.3\n    IF n = 7\n        $I5 = 1\n    ENDIF\nJUMP MAIN\n"
@@ -22,7 +23,7 @@ QUESTIONS = ("m.USER_REGISTER[4] > 3", "m.USER_REGISTER[4]", "m.USER_REGISTER[5]
 
 def whole_past(world: World) -> Why:
     """What is noted of the whole past at once."""
-    return Why(lambda: World(world.blueprint), world.inputs, world.now)
+    return Why(NotedPast(lambda: World(world.blueprint), world.inputs, world.now))
 
 
 def counting() -> Why:
@@ -52,7 +53,7 @@ def test_what_came_from_outside_at_the_moment_of_a_state_is_a_change(begin: int)
     world.run_to(10 * SECOND)  # many times the distance of states after the first one
     world.apply_input(do.Write((("m", "M1_POS_ACT", 77.0),)))
     world.run(for_=1.0)
-    past = Why(lambda: World(world.blueprint, at=state), world.inputs, world.now)
+    past = Why(NotedPast(lambda: World(world.blueprint, at=state), world.inputs, world.now))
     answer = past.ask("m.M1.position")
     assert (answer.since, answer.links[0].text) == (10 * SECOND, "from outside: writes m.M1_POS_ACT = 77")
 

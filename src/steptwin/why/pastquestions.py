@@ -20,9 +20,11 @@ from steptwin.simulation.world.snapshotlog import SLICE_NS, outside_past
 from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Effect, Trial
 from steptwin.why.causes import Causes
 from steptwin.why.lacking import Found, Lacking
+from steptwin.why.notedpast import NotedPast
 from steptwin.why.question import Asking, Why
 from steptwin.why.roots import SetFault
 from steptwin.why.search import Asked, LastChanges, Snapshots
+from steptwin.why.whynot import what_lacks
 from steptwin.why.without import trying_without
 
 FIRST_SPAN_NS: Nanos = 5 * SECOND
@@ -84,7 +86,7 @@ class PastQuestions:
         self._searched = 0
         answer = yield from self._settled(lambda known: self._answer(known, question, at))
         answer = yield from self._with_held(answer)
-        lacking = yield from self._settled(lambda known: known.why.lacking(question, at))
+        lacking = yield from self._settled(lambda known: what_lacks(known.past, question, at))
         answer = answer._replace(links=(*lacking, *answer.links))
         tried: dict[str, Trial] = {}
         held_back: list[Trial] = []
@@ -109,20 +111,20 @@ class PastQuestions:
 
     def _suspects(self, answer: Answer) -> Sequence[str]:
         """The faults that may be why something is so, as far as the chain does not have them, the last ones first."""
-        faults, at = self._logs[0].why.log.world.objects.faults, answer.at
+        faults, at = self._logs[0].past.log.world.objects.faults, answer.at
         there = {link.root.name for link in answer.links if isinstance(link.root, SetFault)}
         acted = [
             (acts.last, name)
             for name, acts in faults.acts.items()
             if name not in there
             and acts.first <= at
-            and (self._is_near(name, answer) or self._logs[0].why.asked(answer.question) is not None)
+            and (self._is_near(name, answer) or self._logs[0].why.values.asked(answer.question) is not None)
         ]
         return [name for _, name in sorted(acted, reverse=True)][:MOST_SUSPECTS]
 
     def _is_near(self, name: str, answer: Answer) -> bool:
         """Whether something has been so for `STANDS_NS`, or a fault does something at the moment, or has since it is so."""
-        faults, since = self._logs[0].why.log.world.objects.faults, answer.known_from if answer.since is None else answer.since
+        faults, since = self._logs[0].past.log.world.objects.faults, answer.known_from if answer.since is None else answer.since
         one = faults.find(name)
         return answer.at - since >= STANDS_NS or faults.acts[name].last >= since or bool(one is not None and one.doing)
 
@@ -160,9 +162,9 @@ class PastQuestions:
         answer = yield from known.asking(question, at, self._most_links)
         begins = self._lacking.begins
         is_cut, known_from = bool(begins), max(begins, default=self._snapshots.begin)
-        asked = None if answer.since is not None else known.why.asked(question)
+        asked = None if answer.since is not None else known.why.values.asked(question)
         if asked is not None:
-            known_from = known.why.log.before(asked.text).known_from
+            known_from = known.past.log.before(asked.text).known_from
             is_cut = known_from > 0
         return answer._replace(is_cut=is_cut, known_from=known_from, is_complete=answer.is_complete and not begins)
 
@@ -180,15 +182,15 @@ class PastQuestions:
         for moment in moments:
             self._searched += (moment - self._snapshots.state_at(max(0, moment - 1)).snapshot.now) // SLICE_NS
             if self._is_longer_cheaper():
-                yield from self._have_longer(self._logs[0].why.log.begin)
+                yield from self._have_longer(self._logs[0].past.log.begin)
                 return True
             yield from self._note_about(moment)
         for moment in set(changes.values()):
             texts = [text for text, before in changes.items() if before == moment]
-            asked = [one for text in texts if (one := self._logs[0].why.asked(text)) is not None]
+            asked = [one for text in texts if (one := self._logs[0].why.values.asked(text)) is not None]
             found = yield from self._searching(asked, moment)
             if found is None:
-                yield from self._have_longer(self._logs[0].why.log.begin)
+                yield from self._have_longer(self._logs[0].past.log.begin)
                 return True
             for text in texts:
                 self._lacking.learn(text, moment, found.get(text, Found(None, moment)))
@@ -215,7 +217,7 @@ class PastQuestions:
     def _is_longer_cheaper(self) -> bool:
         """Whether the next longer log has the whole past, and a good part of that was searched already, which is for one question
         only."""
-        log, begin = self._logs[0].why.log, self._snapshots.begin
+        log, begin = self._logs[0].past.log, self._snapshots.begin
         is_enough = self._searched > (log.begin - begin) // (SEARCHED_SHARE * SLICE_NS)
         return is_enough and log.begin > begin and log.begin not in self._kept_to and self._logs[0].older() == begin
 
@@ -226,8 +228,8 @@ class PastQuestions:
     def _causes_of(self, moment: Nanos) -> Causes | None:
         """Causes of what was at a moment, if that is noted."""
         for part in self._logs:
-            if part.why.log.covers(moment):
-                return part.why.causes
+            if part.past.log.covers(moment):
+                return part.past.causes
         if self._snapshots.begin and moment <= self._snapshots.begin:
             self._lacking.lack(self._snapshots.begin)
         else:
@@ -237,7 +239,7 @@ class PastQuestions:
     def _note_about(self, moment: Nanos) -> Generator[None, None, None]:
         """Note a part of the past up to a moment."""
         state = self._snapshots.state_at(max(0, moment - 1))
-        part = next((one for one in self._logs[1:] if one.why.log.begin == state.snapshot.now), None)
+        part = next((one for one in self._logs[1:] if one.past.log.begin == state.snapshot.now), None)
         if part is None:
             part = self._note(state.snapshot.now)
             self._logs.append(part)
@@ -245,14 +247,14 @@ class PastQuestions:
 
     def _have_longer(self, begin: Nanos) -> Generator[None, None, None]:
         """Have a log from before its beginning on."""
-        part = next((one for one in self._logs if one.why.log.begin == begin), None)
+        part = next((one for one in self._logs if one.past.log.begin == begin), None)
         older = None if part is None else part.older()
         if part is None or older is None:
             self._kept_to.add(begin)
             return
         try:
             longer = self._note(older)
-            yield from longer.running(part.why.end)
+            yield from longer.running(part.past.end)
         except Misuse:
             self._kept_to.add(begin)
             return
@@ -276,14 +278,15 @@ class _Known:
         self._branch = snapshots.branch
         self._most = most
         make = partial(second_world, snapshots.world, state.snapshot)
-        self.why = Why(make, (), state.snapshot.now, most, lacking, others)
+        self.past = NotedPast(make, (), state.snapshot.now, most, lacking, others)
+        self.why = Why(self.past)
 
     def fits(self, at: Nanos, not_before: Nanos) -> bool:
         """Whether a question about a moment can be answered from it. ``not_before``: up to when it must have come."""
-        snapshots, log = self._snapshots, self.why.log
+        snapshots, log = self._snapshots, self.past.log
         is_same = snapshots.branch == self._branch and snapshots.keeps_inputs_from(self._taken)
-        has_room = log.noted < self._most // 2 or at <= self.why.end
-        return is_same and log.begin <= at and not_before <= self.why.end and has_room
+        has_room = log.noted < self._most // 2 or at <= self.past.end
+        return is_same and log.begin <= at and not_before <= self.past.end and has_room
 
     def asking(self, question: str, at: Nanos, most_links: int) -> Asking:
         self._go_on(at)
@@ -297,16 +300,16 @@ class _Known:
     def running(self, moment: Nanos) -> Generator[None, None, None]:
         """Note what happened up to a moment."""
         self._go_on(moment)
-        return self.why.running()
+        return self.past.running()
 
     def _go_on(self, moment: Nanos) -> None:
         inputs = self._snapshots.inputs_from(self._taken)
         self._taken += len(inputs)
-        self.why.go_on(inputs, max(moment, self.why.end))
+        self.past.go_on(inputs, max(moment, self.past.end))
 
     def older(self) -> Nanos | None:
         """Where a longer search would begin; None if nothing older is kept, or too much has happened since."""
-        snapshots, log, end = self._snapshots, self.why.log, self.why.end
+        snapshots, log, end = self._snapshots, self.past.log, self.past.end
         span = FURTHER * max(end - log.begin, 1)
         if log.noted:
             span = min(span, self._most * (end - log.begin) // (2 * log.noted))

@@ -35,6 +35,8 @@ REPLACED_STATEMENT = Message("why.replaced-statement", "a statement of a program
 LINE = Message("why.line", "line {line} `{code}`")
 GIVEN = Message("why.given", "`{code}`")
 END_OF_PROGRAM = Message("why.end-of-program", "the end of the program")
+IS_NUMBER = Message("why.is-number", "{name} is {value:g}")
+IS_IN_UNIT = Message("why.is-in-unit", "{name} is {value:.6g} {unit}")
 
 
 def _halted(given: Halt) -> MessageText:
@@ -68,6 +70,11 @@ def describe_input(what: ExternalInput) -> MessageText:
     """An action in words."""
     words = _WORDS.get(type(what))
     return MessageText(type(what).__name__) if words is None else words(what)
+
+
+def value_with_unit(name: str, value: float, unit: str) -> MessageText:
+    """A value in words; ``unit`` may be empty."""
+    return IS_IN_UNIT(name=name, value=value, unit=unit) if unit else IS_NUMBER(name=name, value=value)
 
 
 def statement(log: CauseLog, executed: Executed) -> MessageText:

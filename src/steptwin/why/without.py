@@ -17,6 +17,7 @@ from steptwin.simulation.world.inputs import Bytes
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
 from steptwin.why.answer import Answer, ChainLink, Effect, Trial
+from steptwin.why.notedpast import NotedPast
 from steptwin.why.question import Why
 from steptwin.why.roots import Act, Root, Sent, SetFault
 from steptwin.why.search import Snapshots
@@ -60,7 +61,8 @@ def _trying(snapshots: SnapshotsWithInputs, link: ChainLink, answers: Sequence[A
         raise Misuse(PAST_BEFORE_IT_IS_NOT_KEPT())
     run = _RunWithout(snapshots.world, state.snapshot, root)
     at = answers[0].at + around
-    other = Why(run.make, run.inputs([one for one in snapshots.inputs_from(state.inputs) if one.time <= at]), at, most)
+    inputs = run.inputs([one for one in snapshots.inputs_from(state.inputs) if one.time <= at])
+    other = Why(NotedPast(run.make, inputs, at, most))
     found: list[Trial] = []
     for answer in answers:
         wide = around if answer is answers[0] else 0
