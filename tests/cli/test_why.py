@@ -15,7 +15,7 @@ VALVE = """\
 valve.out == 0 is true, since 3.206000 s (at 3.3455 s)
     3.206000 s  valve      valve.out became 0
     3.206000 s  safety     safety.no became 0
-    3.198000 s  curtain    curtain became 0, safety follows after 8 ms
+    3.198000 s  curtain    curtain became 0, a normally closed contact, safety follows after 8 ms
     3.198000 s  check      script check: presses curtain
 """
 """As docs/why.md shows it."""
@@ -48,7 +48,7 @@ def test_the_run_again_without_a_root(session: str) -> None:
 def test_more_causes_than_are_shown(session: str) -> None:
     asked = "why", session, "cell", "--at", "3s"
     first, everything = (invoke(*asked, *more).splitlines() for more in ((), ("--all",)))
-    assert first[-1].strip() == "(further present states are not shown: --all shows more)"
+    assert first[-1].strip() == "(further present states and causes are not shown: --all shows more)"
     assert set(first[:-1]) < set(everything)
 
 
