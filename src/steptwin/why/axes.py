@@ -239,12 +239,16 @@ class AxisCauses:
         controller, name = self._world.axes[axis].spec.drive
         events = list(self._of_rotor(axis, until, before))
         end = next((one for one in reversed(events) if dict(self._log.record(one).facts).get("lost")), None)
-        if end is None:
-            return
         key = controller, name.removeprefix("M")
         homed = [one for one in self._log.axis_events.get(key, ()) if self._log.record(one).subject == HOMED]
+        zeroed = max((one.time for one in (*homed, *self._log.origins.get(key, ())) if one.time <= until), default=0)
+        lost = self._lost_by_fault(axis, until, before, LOSES_PULSES, since=zeroed)
+        if lost is not None:
+            yield lost
+        if end is None:
+            return
         began = next((one for one in reversed(events) if one.time <= end.time and _begins(self._log.record(one))), None)
-        if began is not None and not any(end.time <= one.time <= until for one in (*homed, *self._log.origins.get(key, ()))):
+        if began is not None and (end.time > zeroed or not zeroed):
             yield self.rotor_event(axis, began)._replace(cover=Cover.LEVEL)
 
     def _has_left_it(self, event: Change, since: Nanos | None) -> bool:

@@ -28,7 +28,7 @@ from steptwin.why.lacking import NEVER
 from steptwin.why.log import LAST, CauseLog, Change, sets
 from steptwin.why.programs import ProgramCauses
 from steptwin.why.roots import SetFault
-from steptwin.why.workpieces import WorkpieceCauses
+from steptwin.why.workpieces import IS_WIRED_TO, WorkpieceCauses
 
 BECAME = Message("why.became", "{signal} became {value:g}{how}")
 IS_SINCE = Message("why.is-since", "{signal} is {value:g} {since}{how}")
@@ -38,7 +38,6 @@ DRIVEN_BY = Message("why.driven-by", ", driven by {names}")
 AND = Message("why.and", "{one} and {other}")
 IS = Message("why.is", "{signal} is {value}")
 FAULT = Message("why.fault", "fault {name}: {what}")
-IS_WIRED_TO = Message("why.is-wired-to", ", which is wired to {pin}")
 NOTHING_IS_WIRED = Message("why.nothing-is-wired", ", to which nothing is wired")
 NO_STATEMENT_SETS = Message("why.no-statement-sets", ", which no statement of its program sets")
 NOTHING_HAS_SET = Message("why.nothing-has-set", ", which nothing has set")
@@ -115,11 +114,20 @@ class Causes:
         link = ChainLink(time, signal.partition(".")[0], self.state(signal, time))
         return Cause(link, place, *self._kept(signal, Place(time, order, number - 1)))
 
-    def _kept(self, signal: str, place: Place) -> tuple[Callable[[], FoundCause], None, Callable[[], Sequence[Cause]]]:
+    def _kept(self, signal: str, place: Place) -> tuple[Callable[[], FoundCause], None, Callable[[], Iterator[Cause]]]:
         """Search for the contacts from the beginning that keep a signal as it has been from the beginning."""
         names = [name for name in self.holding.leaves(signal, place.time) if name in self.contacts and name != signal]
         names = [name for name in names if self.log.since(name, place.time) is None]
-        return nothing, None, lambda: [self.unchanged(name, place) for name in names]
+
+        def besides() -> Iterator[Cause]:
+            for name in names:
+                yield self.unchanged(name, place)
+            owner = signal.partition(".")[0]
+            found = self.axes.moved(owner, place.time, place.order) if owner in self._world.axes else None
+            if found is not None:
+                yield from (one._replace(cover=one.cover or Cover.LEVEL) for one in (found, *found.along))
+
+        return nothing, None, besides
 
     def undriven(self, signal: str) -> MessageText | None:
         """Reason why a signal that has not changed cannot change by itself; None where it can."""

@@ -6,13 +6,17 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, TypeVar
 
 from steptwin.controller import Nanos
+from steptwin.messages import Message
 from steptwin.simulation.components.gate import Gate
 from steptwin.simulation.components.latch import RESET, SET, Latch
 from steptwin.simulation.components.relay import COIL, NC, Relay
 from steptwin.simulation.components.timer import IN, PULSE, Timer
 from steptwin.simulation.scheduler.wires import PinName
-from steptwin.why.answer import Cover
-from steptwin.why.chain import Cause, covered
+from steptwin.why.answer import ChainLink, Cover
+from steptwin.why.chain import Cause, Place, covered
+from steptwin.why.log import LAST
+
+ALTHOUGH = Message("why.although", "{signal} is {value:g} although {other}")
 
 T = TypeVar("T")
 _DECISIVE: Mapping[str, float] = {"and": 0.0, "nand": 0.0, "or": 1.0, "nor": 1.0}
@@ -46,6 +50,23 @@ class HoldingCauses:
                 cause = covered(self._all.last((name,), at), Cover.LEVEL)
                 if cause is not None:
                     yield cause
+            if is_leaf:
+                yield from self._all.workpieces.keeping(name, at, floor)
+            yield from self._although(name, at)
+
+    def _although(self, signal: str, at: Nanos) -> Iterator[Cause]:
+        """The coil of a relay whose contact a fault keeps as it is."""
+        owner, _, terminal = signal.partition(".")
+        relay, coil = self._all.parts.get(owner), PinName(owner, COIL)
+        if not isinstance(relay, Relay) or terminal.upper() == COIL:
+            return
+        closed = bool(self._log.level(signal, at)) is (terminal.upper() != NC)
+        sources = list(self._all.sources(coil))
+        others = [one for one in sources if bool(self._log.level(one, at)) is not closed]
+        last = self._all.last(sources, at)
+        if others and last is not None and self.level(coil, at) != closed and last.place.time + max(relay.delays) < at:
+            text = ALTHOUGH(signal=signal, value=self._log.level(signal, at), other=self._all.state(others[0], at))
+            yield Cause(ChainLink(at, owner, text), Place(at, LAST, -1), lambda: covered(last, Cover.LEVEL))
 
     def leaves(self, signal: str, at: Nanos) -> Iterator[str]:
         """The signals at the other ends of wires, gates, relays and timers that keep one as it is from the beginning."""
@@ -83,7 +104,7 @@ class HoldingCauses:
     def _of_gate(self, owner: str, gate: Gate, at: Nanos, floor: Nanos) -> list[str]:
         """The sources of the inputs of a gate without whose levels its output would be another."""
         inputs = [PinName(owner, name) for name in gate.block.levels if name not in gate.block.outputs]
-        levels = {one: self._level(one, at) for one in inputs}
+        levels = {one: self.level(one, at) for one in inputs}
         if gate.kind in _DECISIVE and _DECISIVE[gate.kind] in levels.values():
             inputs = [one for one in inputs if levels[one] == _DECISIVE[gate.kind]]
             inputs = self._enough([(one, list(self._all.sources(one))) for one in inputs], at, floor)
@@ -95,7 +116,7 @@ class HoldingCauses:
         part = self._all.parts.get(owner)
         if not isinstance(part, Gate | Latch) or self._log.hold(signal, at) is not None:
             return drivers
-        levels = {name: self._level(PinName(owner, name), at) for name in part.block.levels if name not in part.block.outputs}
+        levels = {name: self.level(PinName(owner, name), at) for name in part.block.levels if name not in part.block.outputs}
         if isinstance(part, Latch):
             # One that is on decides; else the other one, which would change it.
             changes = RESET if self._log.level(signal, at) else SET
@@ -110,7 +131,7 @@ class HoldingCauses:
 
     def _following(self, target: PinName, level: bool, at: Nanos, floor: Nanos) -> list[str]:
         """The sources of an input that an output follows after a delay; none while that lasts."""
-        return self._sources(target, at, floor) if self._level(target, at) == float(level) else []
+        return self._sources(target, at, floor) if self.level(target, at) == float(level) else []
 
     def _sources(self, target: PinName, at: Nanos, floor: Nanos) -> list[str]:
         """The sources of an input that keep it as it is: of several contacts, those that are enough for its level."""
@@ -126,7 +147,7 @@ class HoldingCauses:
         lasting = [one for one, signals in found if all((self._log.since(name, at) or -1) <= floor for name in signals)]
         return lasting or [one for one, _ in found]
 
-    def _level(self, target: PinName, at: Nanos) -> float:
+    def level(self, target: PinName, at: Nanos) -> float:
         """The level of an input of an element at a moment."""
         levels = [self._log.level(source, at) for source in self._all.sources(target)]
         circuit = self._world.objects.circuits.get(target)

@@ -34,7 +34,7 @@ from steptwin.why import points
 from steptwin.why.actions import NotedActions
 from steptwin.why.frames import Frames
 from steptwin.why.lacking import EXECUTED, HAPPENED, NEVER, Found, Lacking
-from steptwin.why.movers import NotedMeetings
+from steptwin.why.movers import STANDS, NotedMeetings
 from steptwin.why.programstates import ProgramStates
 from steptwin.why.rates import NotedRates
 from steptwin.why.roots import Act
@@ -270,6 +270,8 @@ class CauseLog:
         if record.subject == WORKPIECE:
             for name in (WORKPIECE, element, str(facts["workpiece"])):
                 self.events[name].append(event)
+            if facts["what"] == STANDS:
+                self.meetings.stands(element, str(facts["workpiece"]), record.time)
         if record.subject in OF_MECHANICS or facts["what"] in JAMS:
             self.mechanics[element].append(event)
         if record.subject == "collision":

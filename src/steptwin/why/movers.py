@@ -8,12 +8,18 @@ from steptwin.controller import Nanos
 from steptwin.simulation.components.beam import BEAM, SEEN
 from steptwin.simulation.components.beltsensor import Sensor
 from steptwin.simulation.components.body import BODY, SIGNALS
+from steptwin.simulation.components.conveyor import CONVEYOR
+from steptwin.simulation.components.conveyortable import stop_terminal
 from steptwin.simulation.components.touch import HIT
 from steptwin.simulation.space.frames import FLOOR, Frame, path
 from steptwin.simulation.world.simulation import Simulation
 
 PUSHED, FALLS, GOES_ON = "pushed", "falls", "goes on"
 """Events of a workpiece that moves from then on."""
+STANDS = "stands"
+"""Event of a workpiece that does not move from then on, though its belt may."""
+TOUCH_NM = 4
+"""Most by which places on two belts are rounded."""
 PRESENT = SIGNALS["when"]
 TRAVEL = "travel"
 """The signal of a belt that moves."""
@@ -26,14 +32,37 @@ class NotedMeetings:
         self._world = world
         contacts = (contact for circuit in world.objects.circuits.values() for contact in circuit.contacts)
         self._sensors = {contact.channel: contact for contact in contacts if isinstance(contact, Sensor)}
+        self._by = {name: sensor.by(world.now) for name, sensor in self._sensors.items()}
+        """The workpiece that a sensor saw last, which somebody may have taken."""
         self._beams = {f"{name}.{SEEN.lower()}": beam for name, beam in world.objects.built(BEAM).items()}
         self._along = {spec.name: spec.towards().axis for spec in world.objects.described.of(BEAM)}
+        self._conveyors = world.objects.built(CONVEYOR)
+        self.there = {name: {one.workpiece.name for one in it.belt.workpieces} for name, it in self._conveyors.items()}
+        """The workpieces that were on each belt at first."""
         self._touching: dict[str, tuple[str, ...]] = {}
         """Those that touched last, by collision."""
         self.seen: dict[tuple[str, Nanos], tuple[str, ...]] = {}
         """The workpiece or part that is seen, or was seen last, or those that touch, by the signal, at its changes."""
         self.movers: dict[tuple[str, Nanos], tuple[str, ...]] = {}
         """The signals that moved what a beam sees or a collision compares, by its name, at its changes."""
+
+        self.holders: dict[tuple[str, Nanos], str] = {}
+        """The workpiece before one that comes to stand on a belt, or the terminal of the stop that holds it, by its name and
+        the moment."""
+
+    def stands(self, conveyor: str, workpiece: str, now: Nanos) -> None:
+        """A workpiece comes to stand on a belt."""
+        belt = self._conveyors[conveyor].belt
+        placed = next((one for one in belt.workpieces if one.workpiece.name == workpiece), None)
+        if placed is None or placed.held is None:
+            return
+        ahead = belt.occupant(placed.held + 1, placed.held + 1 + belt.from_nm(TOUCH_NM), now, beside=placed)
+        if ahead is not None:
+            self.holders[workpiece, now] = ahead[1].workpiece.name
+            return
+        for number, stop in enumerate(self._conveyors[conveyor].spec.stops, start=1):
+            if belt.to_grid(stop.at) == placed.held:
+                self.holders[workpiece, now] = f"{conveyor}.{stop_terminal(number).lower()}"
 
     def sees(self, signal: str, now: Nanos) -> None:
         """A signal changes, which may be that of a sensor."""
@@ -42,7 +71,8 @@ class NotedMeetings:
             name = beam.block.name
             self.seen[signal, now] = (beam.by,)
             self.movers[name, now] = movers(self._world, name, beam.by, now, self._along[name])
-        elif sensor is not None and (workpiece := sensor.by(now)):
+        elif sensor is not None and (workpiece := sensor.by(now) or self._by.get(signal)):
+            self._by[signal] = workpiece
             self.seen[signal, now] = (workpiece,)
 
     def touch(self, collision: str, parts: tuple[str, ...], now: Nanos) -> None:

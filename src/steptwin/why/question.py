@@ -8,6 +8,7 @@ from typing import TypeAlias
 from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message, MessageText
+from steptwin.simulation.components.beltsensor import Sensor
 from steptwin.simulation.kinds.programs import Resource, ResourceKind
 from steptwin.simulation.logic.expression import deciding, parse_condition
 from steptwin.simulation.logic.signal import SignalOf
@@ -144,7 +145,9 @@ class Why:
         resting = (yield from self.resting.moved(waited, at)) or self.resting.held(signals, at)
         resting = resting or (yield from self.resting.standing(signals, at))
         behind = self.past.behind(waited, at)
-        is_kept = any(self.log.rates.has(name.partition(".")[0]) for name in behind) or self.causes.holding.depends(behind)
+        is_kept = any(self.log.rates.has(name.partition(".")[0]) for name in behind)
+        is_kept = is_kept or any(isinstance(self.causes.contacts.get(name), Sensor) for name in behind)
+        is_kept = is_kept or self.causes.holding.depends(behind)
         if is_kept and self.log.reaches_begin():  # otherwise it is not known what was before
             decides = self._deciding(asked, canonical, at)
             holding = self.causes.holding.of((*decides, *self.resting.awaited(decides, at)), at, None)

@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Collection, Iterator
 from functools import partial
+from itertools import islice, takewhile
 from typing import Any
 
+from steptwin.controller import Nanos
 from steptwin.messages import Message
-from steptwin.simulation.components.conveyortable import RUN
+from steptwin.simulation.components.beltsensor import Sensor
+from steptwin.simulation.components.conveyortable import FEED, RUN, ConveyorSpec
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing
 from steptwin.why.controllers import acted
-from steptwin.why.log import Change, words_of
-from steptwin.why.movers import FALLS, GOES_ON, PUSHED
+from steptwin.why.log import LAST, Change, words_of
+from steptwin.why.movers import FALLS, GOES_ON, PUSHED, STANDS
 from steptwin.why.roots import Act
 
 HAS_ACTED_SINCE = Message("why.has-acted-since", ", on which {name} has acted since")
+IS_WIRED_TO = Message("why.is-wired-to", ", which is wired to {pin}")
+MOST_EVENTS = 1000
+"""Limit of the events at a belt that are searched for workpieces on it."""
 COMES, HELD = ("on", "crooked", "on the floor"), "held"
-STAYS = ("stands", GOES_ON, "goes back", "collides", "jams", "free again")
+STAYS = (STANDS, GOES_ON, "goes back", "collides", "jams", "free again")
 """Events after which a workpiece may still be pushed."""
 
 
@@ -124,6 +131,8 @@ class WorkpieceCauses:
         same = self._same(event, workpiece)
         if same is not None:
             return self.event(same)
+        if what == STANDS:
+            return self._holder(workpiece, event)
         if what == FALLS:  # what it lay on is gone
             below = next((one for one in self._log.events_at(event.time) if one.order < event.order), None)
             if below is not None:
@@ -147,6 +156,113 @@ class WorkpieceCauses:
         cause = self._all.elements.of_inputs(actor, event)
         # What comes onto a belt does not by what moves that.
         return None if what == "on" and cause is not None and cause.place.time < event.time else cause
+
+    def _holder(self, workpiece: str, event: Change) -> FoundCause:
+        """The workpiece before one that comes to stand, where that stands or moves more slowly, or the stop that holds it."""
+        by = self._log.meetings.holders.get((workpiece, event.time), "")
+        if by in self._log.events:
+            last = next(self._log.events_before(by, event), None)
+            return self.rests(by, event) or (None if last is None else covered(self.event(last), Cover.LEVEL))
+        owner, _, terminal = by.partition(".")
+        stop = PinName(owner, terminal.upper())
+        sources = list(self._all.sources(stop)) if by else []
+        found = self._all.last(sources, event.time, IS_WIRED_TO(pin=str(stop)), event.order) if sources else None
+        return covered(found or (self._all.first(sources[0]) if sources else None), Cover.ACTION)
+
+    def rests(self, workpiece: str, change: Change) -> FoundCause:
+        """The reason why a workpiece on a belt does not move before a change: what holds it, or its belt stands; None if that is
+        not known, or it moves."""
+        last = next(self._log.events_before(workpiece, change), None)
+        if last is None:
+            self._log.lack()
+            return None
+        if self._what(last) == STANDS:
+            return covered(self.event(last), Cover.LEVEL)
+        return self._stopped(str(dict(self._log.record(last).facts)["element"]), change)
+
+    def _stopped(self, belt: str, change: Change) -> FoundCause:
+        """The last change by which a belt stands before another one, or that it has never run; None for one that runs."""
+        spec = self._all.specs.get(belt)
+        if not isinstance(spec, ConveyorSpec):
+            return None
+        if spec.axis is not None:
+            controller, axis = self._world.axes[spec.axis].spec.drive
+            is_moving = self._all.axes.is_moving(controller, axis.removeprefix("M"), change.time)
+            return None if is_moving else covered(self._all.axes.moved(spec.axis, change.time, change.order), Cover.LEVEL)
+        run = PinName(belt, RUN)
+        is_on = self._all.holding.level(run, change.time)
+        sources = list(self._all.sources(run))
+        if is_on or not sources:
+            return None
+        stopped = self._switched(belt, change, runs=False)
+        return covered(stopped or self._all.unchanged(sources[0], Place(change.time, change.order, -1)), Cover.LEVEL)
+
+    def keeping(self, signal: str, at: Nanos, since: Nanos) -> Iterator[Cause]:
+        """The reason why a beam or the sensor of a belt goes on seeing a workpiece at a moment, or none, as it has since another
+        one: that stands, or none comes."""
+        last, change = self._log.last_change(signal, at), Change(at, 0.0, -1, 0, LAST)
+        contact, seen = self._all.contacts.get(signal), self._log.meetings.seen
+        is_seen = last is not None and bool(last.value) is not (contact is not None and contact.normally_closed)
+        if last is not None and is_seen:
+            found = [self.rests(one, change) for one in seen.get((signal, last.time), ()) if one in self._log.events]
+        elif isinstance(contact, Sensor):
+            found = self._lacking(
+                signal.partition(".")[0],
+                contact.at_mm,
+                {one for key in seen if key[0] == signal for one in seen[key]},
+                change,
+                since,
+            )
+        else:
+            found = []
+        yield from (one for one in found if one is not None)
+
+    def _lacking(self, belt: str, place: float, seen: Collection[str], change: Change, since: Nanos) -> Iterator[FoundCause]:
+        """Reasons why no workpiece comes to a place of a belt, mm, before a change, as none has since a moment, but those that
+        have been ``seen``."""
+        stopped = self._stopped(belt, change)
+        if stopped is not None:
+            yield stopped
+            return
+        names = dict.fromkeys(self._workpiece(one) for one in islice(self._log.events_before(belt, change), MOST_EVENTS))
+        lasts = [last for one in names if one not in seen and (last := next(self._log.events_before(one, change), None))]
+        here = [one for one in lasts if belt in self._named(one) and self._what(one) not in ("leaves", FALLS, HELD)]
+        here = [one for one in here if not self._removed(one, change)]
+        held = [one for one in here if self._what(one) == STANDS and self._place(one) < place]
+        if held:
+            yield self.rests(self._workpiece(max(held, key=self._place)), change)
+        if here:
+            return
+        if self._log.meetings.there[belt] - names.keys():  # what became of them is not known
+            self._log.lack()
+            return
+        gone = [one for one in lasts if one.time > since and self._what(one) != "leaves"]
+        gone = [one for one in gone if belt in self._places(self._workpiece(one), one)]
+        acts = [act for one in lasts if (act := self._removed(one, change)) is not None and act.time > since]
+        if acts:
+            yield covered(acted(max(acts, key=lambda act: (act.time, act.order))), Cover.LEVEL)
+        elif gone:
+            yield covered(self.event(max(gone, key=lambda one: (one.time, one.order))), Cover.LEVEL)
+        else:
+            feed = list(self._all.sources(PinName(belt, FEED)))
+            yield covered(self._all.last(feed, change.time) if feed else None, Cover.LEVEL)
+            for name, spec in self._all.specs.items():
+                if getattr(spec, "next", None) == belt:
+                    yield from self._lacking(name, math.inf, seen, change, since)
+
+    def _workpiece(self, event: Change) -> str:
+        return str(dict(self._log.record(event).facts)["workpiece"])
+
+    def _place(self, event: Change) -> float:
+        """Where a workpiece stands from an event on, in mm of its belt."""
+        return float(self._log.record(event).value.values["place"])
+
+    def _removed(self, event: Change, change: Change) -> Act | None:
+        """The action after an event of a workpiece and before a change that took it away."""
+        name = self._workpiece(event)
+        acts = self._log.acts_before(change.time, change.order)
+        acts = takewhile(lambda act: (act.time, act.order) > (event.time, event.order), acts)
+        return next((act for act in acts if isinstance(act.what, do.Remove) and act.what.workpiece == name), None)
 
     def _what(self, event: Change) -> str:
         return str(dict(self._log.record(event).facts)["what"])

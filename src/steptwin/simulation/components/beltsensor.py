@@ -27,7 +27,7 @@ class SensorSpec(ContactSpec):
 class Sensor(Contact):
     """On while a workpiece, or a mark on one, covers its place."""
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_at", "_belt", "_of_marks", "_seen")
+    FIXED: ClassVar[tuple[str, ...]] = ("_at", "_belt", "_of_marks", "_seen", "at_mm")
     __slots__ = (*FIXED,)
 
     def __init__(self, circuit: Circuit, belt: Belt, spec: SensorSpec, chance: Chance, channel: str) -> None:
@@ -40,6 +40,7 @@ class Sensor(Contact):
             channel=channel,
         )
         self._belt = belt
+        self.at_mm = spec.at
         self._at = belt.to_grid(spec.at)
         self._of_marks = spec.sees == MARK
         self._seen: object = None
