@@ -141,6 +141,27 @@ def test_one_that_slides_along_a_wall_does_not_touch_it(looks: list[Nanos]) -> N
     assert len(looks) < 12
 
 
+@pytest.mark.parametrize(("shape", "most"), [(CUBE, 14), (Cylinder(10 * MM, 10 * MM), 40)], ids=["cube", "can"])
+@pytest.mark.parametrize(("beside", "changes"), [(19 * MM, True), (20 * MM, False), (21 * MM, False)])
+def test_what_a_belt_that_goes_on_for_ever_brings_costs_as_much_as_its_contact_takes(
+    looks: list[Nanos], shape: Box | Cylinder, most: int, beside: int, changes: bool
+) -> None:
+    """Faces that only touch cost one look, an edge that comes near a few, and no search a year of halves."""
+    piece = Body("piece", axis(at_speed(0.1e9)), shape)
+    pair = Pair(piece, Body("post", FLOOR, CUBE, (10_000 * MM, beside, 0)))
+    came = pair.next_change(0)
+    assert came.changes is changes
+    assert len(looks) < (most if changes else 4)
+    if came.at is not None:
+        assert [pair.overlap(came.at - 1), pair.overlap(came.at)] == [False, True]
+        went = pair.next_change(came.at)
+        assert went.at is not None
+        assert [pair.overlap(went.at - 1), pair.overlap(went.at)] == [True, False]
+    del looks[:]
+    assert Pair(piece, Body("above", FLOOR, CUBE, (10_000 * MM, 0, 20 * MM))).next_change(0) == NEVER
+    assert len(looks) < 4
+
+
 def test_one_that_circles_a_column_at_a_constant_gap_does_not_touch_it(looks: list[Nanos]) -> None:
     """For ever, a hundredth of a mm away: seen from the table the column stands."""
     shoe = Body("shoe", table(3.0), CUBE, (60 * MM, 0, 0))

@@ -1,8 +1,9 @@
 """When two bodies begin or cease to overlap while everything moves as planned, to the nanosecond.
 
 An interval of time is left out where nothing can change in it: bodies that are apart along one direction at both of its ends are
-apart in all of it, but for what the motion bends away from a straight line, which the plans bound. Other intervals are halved,
-down to a nanosecond. Bodies that slide along each other do not bend towards each other, however near they are, and cost one look.
+apart in all of it, but for what the motion bends away from a straight line, which the plans bound. Other intervals are divided,
+down to a nanosecond: where motions in straight lines meet or part, and otherwise in halves. Bodies that slide along each other do
+not bend towards each other, however near they are, and cost one look.
 """
 
 from __future__ import annotations
@@ -33,6 +34,14 @@ MOST_LOOKS = 4000
 
 TURNS_AHEAD_NS = 10 * SECOND
 """Time for which what turns is searched at once: each turn costs looks, and homing, a turn without an end, is stopped soon."""
+BESIDE_NM = 2.0
+"""So far before and behind a place that is calculated one looks: positions are whole."""
+BESIDE_NS = 4
+"""The same for a moment."""
+MOST_CALCULATED = 4
+"""So often in a row the moment to look at next is calculated: just before and behind where boxes about two bodies begin to
+overlap, and where they cease to. Then it is the middle."""
+UPRIGHT: Unit = (0.0, 0.0, 1.0)
 
 
 class Look(NamedTuple):
@@ -102,6 +111,19 @@ class _Spot(NamedTuple):
     direction: Unit
 
 
+class _Side(NamedTuple):
+    """A direction that does not turn, across a side of either body, and how far their centres are from each other along it where
+    they touch."""
+
+    way: Unit
+    reach: float
+
+    def shift(self, spot: _Spot) -> float:
+        """How far the second body is from the first one."""
+        (u, v, w), (one, other) = self.way, spot.placed
+        return (other.place[0] - one.place[0]) * u + (other.place[1] - one.place[1]) * v + (other.place[2] - one.place[2]) * w
+
+
 class _Slide(NamedTuple):
     """A joint that moves the second body along ``way``, seen from the first."""
 
@@ -120,7 +142,7 @@ class _Bounds(NamedTuple):
 class _Stretch:
     """A time in which each joint between the bodies of a pair goes through one piece: from ``begin`` to ``end``, with both."""
 
-    __slots__ = ("_begin", "_common", "_end", "_pieces", "_positions", "_slides", "_turns", "_ways", "looks", "pair")
+    __slots__ = ("_begin", "_common", "_end", "_pieces", "_positions", "_sides", "_slides", "_turns", "_ways", "looks", "pair")
 
     def __init__(self, pair: Pair, pieces: Sequence[Piece], begin: Nanos, end: Nanos) -> None:
         self.pair = pair
@@ -142,6 +164,7 @@ class _Stretch:
         self._ways = min(self._common, *views, key=self._bend_of) if turning else self._common
         """From the frame between them from which they are seen: that from which their ways are straightest."""
         self._slides = [*self._find_slides()]
+        self._sides: tuple[_Side, ...] = ()
 
     # ------------------------------------------------------------------ search
 
@@ -156,12 +179,15 @@ class _Stretch:
     def _first(self, most: int, *, overlap: bool) -> Look:
         stays = self._stays_apart if overlap else self._stays_over
         begin, end = self.look(self._begin), self.look(self._end)
+        self._sides = self._find_sides(begin)
+        is_straight = not self._turns and all(piece.bend(self._begin, self._end) == (0.0, 0.0) for piece in self._pieces.values())
+        calculated = MOST_CALCULATED if is_straight else 0
         last = min(self._end, self._begin + TURNS_AHEAD_NS)
         if self._turns and last < self._end and not stays(begin, end):
             end = self.look(last)
-        ahead, last = [(begin, end)], end.now
+        ahead, last = [(begin, end, calculated)], end.now
         while ahead:
-            begin, end = ahead.pop()
+            begin, end, left = ahead.pop()
             if (begin.apart < OVERLAP_NM) is overlap:
                 return Look(begin.now, changes=True)
             if begin.now == end.now or stays(begin, end):
@@ -172,15 +198,49 @@ class _Stretch:
                 continue
             if self.looks >= most:
                 return Look(begin.now)
-            middle = self.look((begin.now + end.now) // 2)
-            ahead += (middle, end), (begin, middle)
+            at = self._near_change(begin, end, overlap=overlap) if left else None
+            middle = self.look((begin.now + end.now) // 2 if at is None else at)
+            ahead += (middle, end, calculated if at is None else left - 1), (begin, middle, calculated if at is None else 0)
         return NEVER if last == self._end else Look(last)
+
+    def _find_sides(self, spot: _Spot) -> tuple[_Side, ...]:
+        one, other = spot.placed
+        upright = _Side(UPRIGHT, one.outline.half_w + other.outline.half_w)
+        if self._turns:
+            return (upright,)
+        sides = dict.fromkeys((*one.sides, *other.sides))
+        return (upright, *(_Side(way, one.half_along(*way[:2]) + other.half_along(*way[:2])) for way in sides))
+
+    def _near_change(self, begin: _Spot, end: _Spot, *, overlap: bool) -> Nanos | None:
+        """A moment just before they begin to overlap, or to be apart; just behind, if that is hardly after ``begin``. Straight
+        lines tell it: they overlap where they do along all directions. None where these tell nothing."""
+        comes: list[tuple[float, float]] = []
+        goes: list[tuple[float, float]] = []
+        for side in self._sides:
+            first, last = side.shift(begin), side.shift(end)
+            for apart, then in ((first - side.reach, last - side.reach), (-first - side.reach, -last - side.reach)):
+                if (apart < OVERLAP_NM) is not (then < OVERLAP_NM):
+                    found = (OVERLAP_NM - apart) / (then - apart), BESIDE_NM / abs(then - apart)
+                    (goes if apart < OVERLAP_NM else comes).append(found)
+        found = max(comes) if overlap and comes else min(goes, default=None)
+        if found is None:
+            return None
+        share, beside = (one * (end.now - begin.now) for one in found)
+        at, near = begin.now + int(share), BESIDE_NS + int(beside)
+        if at - begin.now > 2 * near:
+            return at - near
+        return at + near if end.now - at > 2 * near else None
 
     def _stays_apart(self, begin: _Spot, end: _Spot) -> bool:
         """Whether they are apart along one direction all the time."""
         for way in {begin.direction, end.direction}:
             apart = min(gap_along(way, *begin.placed), gap_along(way, *end.placed))
             if apart > OVERLAP_NM + NOISE_NM and apart - self._sag(way, begin.now, end.now) > OVERLAP_NM + NOISE_NM:
+                return True
+        for side in self._sides:
+            first, last = side.shift(begin), side.shift(end)
+            apart = max(min(first, last), -max(first, last)) - side.reach
+            if apart > OVERLAP_NM + NOISE_NM and apart - self._sag(side.way, begin.now, end.now) > OVERLAP_NM + NOISE_NM:
                 return True
         return False
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left, insort
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from math import frexp, inf, isfinite, ldexp
 from typing import NamedTuple, TypeAlias
 
@@ -14,6 +14,7 @@ from steptwin.simulation.space.frames import AXES, Frame, Joint
 from steptwin.simulation.space.pieces import Range, span
 
 ROUNDING_NM = 1.0
+"""More than the rounding errors of what moves; places that do not move are whole."""
 
 Bounds: TypeAlias = tuple[float, float, float]
 """nm by x, y and z of the floor; infinite for a motion that does not end."""
@@ -47,7 +48,7 @@ def swept(body: Body, ranges: Callable[[Frame, Joint], Range], seen_from: Frame 
             low[axis] += shift
             high[axis] += shift
     (a, b, c), (d, e, f) = low, high
-    return Sweep((a - ROUNDING_NM, b - ROUNDING_NM, c - ROUNDING_NM), (d + ROUNDING_NM, e + ROUNDING_NM, f + ROUNDING_NM))
+    return Sweep((a, b, c), (d, e, f))
 
 
 def versions_of(body: Body) -> tuple[Callable[[], object], ...]:
@@ -83,8 +84,8 @@ def _carry(joint: Joint, low: list[float], high: list[float], ends: Range) -> No
     axis, sign = joint.along
     least, most = (sign * end for end in ends[::sign])
     if not joint.turns:
-        low[axis] += least
-        high[axis] += most
+        low[axis] += least - ROUNDING_NM
+        high[axis] += most + ROUNDING_NM
         return
     u, v = (axis + 1) % 3, (axis + 2) % 3
     if not all(map(isfinite, (low[u], low[v], high[u], high[v]))):  # without corners or a length
@@ -97,8 +98,8 @@ def _carry(joint: Joint, low: list[float], high: list[float], ends: Range) -> No
     else:
         far = max(length(x, y) for x, y in corners)
         corners = [(-far, -far), (far, far)]
-    low[u], high[u] = min(x for x, _ in corners), max(x for x, _ in corners)
-    low[v], high[v] = min(y for _, y in corners), max(y for _, y in corners)
+    low[u], high[u] = min(x for x, _ in corners) - ROUNDING_NM, max(x for x, _ in corners) + ROUNDING_NM
+    low[v], high[v] = min(y for _, y in corners) - ROUNDING_NM, max(y for _, y in corners) + ROUNDING_NM
 
 
 class Sweeps:
@@ -137,16 +138,15 @@ class Sweeps:
 
     def near(self, its: Sweep) -> list[str]:
         """Those whose sweep has a part in common with this one, in no order."""
-        fewest = min((self._along(its, axis) for axis in range(len(AXES))), key=lambda found: sum(len(one) for one in found))
-        return [name for ordered in fewest for name in ordered if meet(its, self._by_name[name])]
+        _, axis = min((sum(last - first for _, first, last in self._along(its, axis)), axis) for axis in range(len(AXES)))
+        there = (name for ordered, first, last in self._along(its, axis) for _, name in ordered[first:last])
+        return [name for name in there if meet(its, self._by_name[name])]
 
-    def _along(self, its: Sweep, axis: int) -> list[list[str]]:
-        """Those that may meet it as far as one axis tells."""
+    def _along(self, its: Sweep, axis: int) -> Iterator[tuple[list[tuple[float, str]], int, int]]:
+        """Those that may meet it as far as one axis tells: in each list from the first to the last, which is not one of them."""
         low, high = its.low[axis], its.high[axis]
-        return [
-            [name for _, name in ordered[bisect_left(ordered, (low - width, "")) : bisect_left(ordered, (high, ""))]]
-            for width, ordered in self._lows[axis].items()
-        ]
+        for width, ordered in self._lows[axis].items():
+            yield ordered, bisect_left(ordered, (low - width, "")), bisect_left(ordered, (high, ""))
 
 
 def _width(its: Sweep, axis: int) -> float:
