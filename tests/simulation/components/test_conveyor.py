@@ -405,9 +405,9 @@ def test_a_workpiece_waits_until_the_next_belt_has_room() -> None:
     # Room for half of it: 20 mm at 50 mm/s. Then it touches again: 33.3 mm at 125 mm/s, while the other one makes 13.3 mm.
     # At last the rear of that is where its front is when the next belt takes it over.
     assert [one for one in happened(world) if one[0] > 5000] == [
-        (pytest.approx(5400, abs=1e-4), "belt.1 goes on on belt"),
+        (pytest.approx(5400, abs=1e-4), "belt.1 goes on along belt"),
         (pytest.approx(5666.667, abs=1e-3), "belt.1 stands at 403.333 mm of belt"),
-        (pytest.approx(6000, abs=1e-4), "belt.1 goes on on belt"),
+        (pytest.approx(6000, abs=1e-4), "belt.1 goes on along belt"),
     ]
 
 

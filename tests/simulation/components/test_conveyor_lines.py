@@ -125,7 +125,7 @@ def test_a_stop_of_the_next_belt_holds_the_front() -> None:
     world.run(until=5.0)
     assert happened(world)[1:4] == [
         (2050, "first.1 stands at 205 mm of first"),
-        (4000, "first.1 goes on on first"),
+        (4000, "first.1 goes on along first"),
         (4150, "first.1 leaves first"),
     ]
 
@@ -231,7 +231,7 @@ def test_where_two_ways_join_one_goes_after_the_other() -> None:
         (1700, "left.1 stands at 100 mm of left"),
         (1800, "right.1 leaves right"),
         (1800, "right.1 is on out"),
-        (pytest.approx(1900, abs=1e-4), "left.1 goes on on left"),
+        (pytest.approx(1900, abs=1e-4), "left.1 goes on along left"),
         (pytest.approx(2000, abs=1e-4), "left.1 leaves left"),
         (pytest.approx(2000, abs=1e-4), "left.1 is on out"),
     ]
@@ -343,7 +343,7 @@ def test_what_a_belt_pushes_back_against_another_one_collides_with_it() -> None:
     assert [text for _, text in happened(world)][-3:] == [
         "first.2 stands at 98 mm of first",
         "first.1 collides with first.2 on first",
-        "first.2 goes on on first",
+        "first.2 goes on along first",
     ]
     assert [world.read(f"{name}.count") for name in ("first", "second")] == [1, 0]
 

@@ -156,6 +156,37 @@ def test_what_is_on_it_moves_by_its_value() -> None:
     assert here.read("tank.value") == pytest.approx(32.0, abs=1e-6), "330 mm are 33 l, less the 10 mm of the float"
 
 
+def test_a_beam_that_sees_what_is_on_it_may_be_in_its_rate() -> None:
+    """It rises 140 mm at 50 mm/s; from then on the beam, which is 20 mm longer while it sees something, keeps it there."""
+    world = World.from_toml("""
+[[mic488]]
+name = "c"
+[[integrator]]
+name = "level"
+unit = "ml"
+rate = "100 - 150 * eye.seen"
+mm_per_unit = 0.5
+along = "+z"
+[[body]]
+name = "surface"
+on = "level"
+diameter = 60
+height = 10
+[[beam]]
+name = "eye"
+at = [0, 0, 200]
+along = "-z"
+length = 50
+hysteresis = 20
+sees = ["surface"]
+to = "c.IN1"
+""")
+    world.run(for_=10)
+    edges = [(record.time / SECOND, record.level()) for record in world.trace.of("edge") if record.subject == "IN1"]
+    assert [level for _, level in edges[:4]] == [0.0, 1.0, 0.0, 1.0]
+    assert [time for time, _ in edges[1:4]] == pytest.approx([2.8, 3.6, 4.0], abs=1e-7)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

@@ -126,7 +126,7 @@ def test_a_workpiece_that_comes_stands_before_a_blade_until_that_is_gone() -> No
     world.mic488["c"].write("OUT2", 0)
     world.run(until=7.0)
     times, texts = zip(*told(world), strict=True)
-    assert texts == ("main.1 stands at 270 mm of main", "main.1 goes on on main")
+    assert texts == ("main.1 stands at 270 mm of main", "main.1 goes on along main")
     assert list(times) == seconds(4.7, 6.0 + 105.0 / 400.0)
     assert world.read("blade.pushed") == 0
 

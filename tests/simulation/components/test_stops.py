@@ -65,16 +65,16 @@ def test_a_stop_holds_a_queue_that_goes_on_together() -> None:
     # The next belt moves it from 420 mm on.
     assert happened(world, "belt.1")[1:5] == [
         (2900, "stands at 300 mm of belt"),
-        (5000, "goes on on belt"),
+        (5000, "goes on along belt"),
         (5960, "leaves belt"),
         (5960, "is on out"),
     ]
-    assert happened(world, "belt.2")[1:3] == [(3080, "stands at 260 mm of belt"), (5000, "goes on on belt")]
+    assert happened(world, "belt.2")[1:3] == [(3080, "stands at 260 mm of belt"), (5000, "goes on along belt")]
     # The next conveyor is half as fast: the second one touches the first at once, at 380 mm, and waits for 20 mm of room. Then it
     # makes 40 mm while the first one makes 20.
     assert happened(world, "belt.2")[3:6] == [
         (pytest.approx(5960, abs=1e-5), "stands at 380 mm of belt"),
-        (pytest.approx(6280, abs=1e-4), "goes on on belt"),
+        (pytest.approx(6280, abs=1e-4), "goes on along belt"),
         (pytest.approx(6600, abs=1e-4), "leaves belt"),
     ]
 

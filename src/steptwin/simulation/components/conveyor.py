@@ -50,7 +50,7 @@ PICOMETRES = 10**9
 
 IS_ON = Message("simulation.is-on-a-belt", "{workpiece} is on {belt}")
 GOES_BACK = Message("simulation.goes-back-on-a-belt", "{workpiece} goes back on {belt}")
-GOES_ON = Message("simulation.goes-on-on-a-belt", "{workpiece} goes on on {belt}")
+GOES_ON = Message("simulation.goes-on-on-a-belt", "{workpiece} goes on along {belt}")
 LEAVES = Message("simulation.leaves-a-belt", "{workpiece} leaves {belt}")
 FALLS_OFF = Message("simulation.falls-off-a-belt", "{workpiece} falls off the beginning of {belt}")
 COLLIDES = Message("simulation.workpieces-collide", "{workpiece} collides with {other} on {belt}")

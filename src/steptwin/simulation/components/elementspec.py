@@ -58,6 +58,14 @@ class ElementSpecs(dict[str, tuple[TableSpec, ...]]):
             found += (other for other, its in mounts.items() if its.on == one and other not in found)
         return found
 
+    def carriers(self, name: str) -> list[str]:
+        """All that carry it, directly or through others."""
+        mounts, found = self.mounts, list[str]()
+        while name in mounts and (on := mounts[name].on) is not None and on not in found:
+            found.append(on)
+            name = on
+        return found
+
     @property
     def mounts(self) -> dict[str, MountSpec]:
         """Those that may have a place in space, by name."""

@@ -12,6 +12,7 @@ from steptwin.messages import Message
 from steptwin.motioncontroller import MotionController
 from steptwin.nearmiss import NearMiss, alike
 from steptwin.simulation.components.builtobjects import BuiltObjects
+from steptwin.simulation.components.logic import level_signal
 from steptwin.simulation.faults.controller import FaultyController
 from steptwin.simulation.kinds.kind import AnyKind
 from steptwin.simulation.kinds.lines import Line
@@ -95,6 +96,9 @@ def find_signal(plan: BuiltObjects, name: str) -> SignalOf | Idle:
     controller = plan.controllers.get(owner)
     if controller is None:
         later = plan.unbuilt(owner)
+        block = plan.scheduler_of[owner].terminal_blocks.get(owner) if owner in plan.terminals else None
+        if block is not None and rest.upper() in block.levels:
+            return level_signal(block, rest.upper())
         if later is not None:
             raise Unknown(owner, SIGNAL_IS_LATER(name=name, table=later, owner=owner))
         known = [*plan.controllers, *plan.element_names, "time", "idle"]

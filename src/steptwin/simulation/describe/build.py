@@ -142,16 +142,16 @@ class _Builder:
     # ------------------------------------------------------------------ elements
 
     def _make_elements(self) -> None:
-        """In the order of `ELEMENTS`, but behind those whose signals they are over (`_waits`)."""
+        """In the order of `ELEMENTS`, but behind those whose signals they are over, and what those carry (`_waits`)."""
         later: list[tuple[AnyElement, TableSpec]] = []
         for element in ELEMENTS.values():
             specs = self.spec.elements[element.name]
-            waiting = [spec for spec in specs if self._waits(element, spec)]
+            waiting = [spec for spec in specs if self._waits(element, spec, later)]
             later += [(element, spec) for spec in waiting]
             self._build_elements(element, [spec for spec in specs if all(spec is not one for one in waiting)])
         while later:
-            # Where all wait for each other, the first one says so.
-            turn = next((turn for turn, one in enumerate(later) if not self._waits(*one)), 0)
+            # Where all wait for each other, the first one may do with the terminals of the others, or says so.
+            turn = next((turn for turn, one in enumerate(later) if not self._waits(*one, later)), 0)
             element, spec = later.pop(turn)
             self._build_elements(element, [spec])
         if not self.spec.text.findings:
@@ -171,11 +171,17 @@ class _Builder:
             if spec.may_drop(self.spec.elements) and not text.findings:
                 resting_of(self.context, self.context.scheduler(spec.name))
 
-    def _waits(self, element: AnyElement, spec: TableSpec) -> bool:
-        """Whether it is over a signal of an element that is not built yet."""
-        references = element.refers(spec, self.spec.elements)
+    def _waits(self, element: AnyElement, spec: TableSpec, later: Iterable[tuple[AnyElement, TableSpec]]) -> bool:
+        """Whether it is over a signal of an element that is not built yet, or has to do with what one of ``later`` carries."""
+        references = [*element.refers(spec, self.spec.elements)]
         over = (reference.other for reference in references if reference.path[-1] in OVER)
-        return any(self.objects.unbuilt(owner) is not None for owner in over)
+        if any(self.objects.unbuilt(owner) is not None for owner in over):
+            return True
+        mounts = self.spec.elements.mounts
+        moving = {named.name for other, one in later if one is not spec for named in other.named((one,))}
+        moving = {name for name in moving if name in mounts and mounts[name].moves_others}
+        carried = (name for reference in references for name in (reference.one, reference.other)) if moving else ()
+        return any(carrier in moving for name in carried for carrier in self.spec.elements.carriers(name))
 
     def _build_elements(self, element: AnyElement, specs: Iterable[TableSpec]) -> None:
         built = [(spec, self._element(element, spec)) for spec in specs]

@@ -229,6 +229,7 @@ class Scheduler:
     def add_terminal_block(self, block: TerminalBlock) -> None:
         """Add the terminals of an element, whose part has their state."""
         self.terminal_blocks[block.name] = block
+        self._sources[block.name] = Source(self, block.name)
 
     def add_part(
         self,
@@ -249,7 +250,7 @@ class Scheduler:
         self._join()
         number = self._parts.add(part, depends_on, name, drives, reads)
         if name is not None:
-            self._sources[name] = Source(self, name)
+            self._sources.setdefault(name, Source(self, name))
         if not self.is_blank:
             self._parts.queue.add(number)
         self.is_dirty = True

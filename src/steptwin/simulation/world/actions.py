@@ -10,6 +10,7 @@ from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from typing import Any, TypeAlias, get_args
 
+from steptwin.controller import Fact
 from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.messages import Message
@@ -55,8 +56,8 @@ def prepare(model: Model, what: ExternalInput) -> Action:
     return found(model, what)
 
 
-def _record(model: Model, controller: str, what: str, value: object) -> None:
-    model.trace.add(TraceRecord(model.now, controller, "input", what, value))
+def _record(model: Model, controller: str, what: str, value: object, *facts: Fact) -> None:
+    model.trace.add(TraceRecord(model.now, controller, "input", what, value, facts))
 
 
 @contextmanager
@@ -138,7 +139,7 @@ def _remove(model: Model, step: do.Remove) -> Action:
 
 def _of_workpiece(model: Model, act: Act, name: str, what: str) -> Action:
     def action(scripts: Scripts) -> None:
-        _record(model, act.scheduler.first, name, what)
+        _record(model, act.scheduler.first, name, what, ("element", name.partition(".")[0]))
         act.do(model.now)
         act.scheduler.propagate()
 

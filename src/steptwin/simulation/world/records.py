@@ -100,6 +100,8 @@ def owner_of(controller: str, facts: Iterable[Fact]) -> str:
 
 def describe(record: TraceRecord) -> str:
     """Describe a record in one line."""
-    what = f"{record.subject}: " if record.kind != "event" or record.subject in _NAMED else ""
+    owner = owner_of(record.controller, record.facts)
+    is_named = (record.kind != "event" or record.subject in _NAMED) and record.subject != owner
+    what = f"{record.subject}: " if is_named else ""
     value = record.value.hex(" ") if isinstance(record.value, bytes) else record.value
-    return f"{record.time / SECOND:12.6f} s  {owner_of(record.controller, record.facts):<10} {what}{value}".rstrip()
+    return f"{record.time / SECOND:12.6f} s  {owner:<10} {what}{value}".rstrip()
