@@ -30,6 +30,7 @@ def value(name: str) -> Resource:
 ANY_AXIS, ANY_PIN = axis(""), pin("")
 PROGRAM = Resource(ResourceKind.PROGRAM, "")
 SIGNALS = pin("BOOST"), pin("DIRECTION"), pin("B1")
+SPEEDS = tuple(map(value, ("start_stop", "acceleration", "velocity", "profile")))
 OPERANDS = ANY_PIN, value("variable"), value("register5")
 """Of + - * /: functions 46 and 58 make lines or a register of the number."""
 
@@ -110,9 +111,9 @@ def test_statements_of_wbc() -> None:
         ("T2", StatementUse(writes=(pin("B2"),))),
         ("C1", StatementUse(writes=(pin("B1"),))),
         ("T", StatementUse((value("variable"),), (ANY_PIN, *SIGNALS), keeps=True)),
-        ("T40", StatementUse(writes=SIGNALS)),
-        ("T41", StatementUse()),
-        ("C42", StatementUse(writes=(PROGRAM,))),  # LIMIT that is low holds it
+        ("T40", StatementUse(writes=(*SIGNALS, value("function40")))),
+        ("T41", StatementUse(writes=(value("function41"),))),
+        ("C42", StatementUse(writes=(value("function42"), PROGRAM))),  # LIMIT that is low holds it
         ("T80", StatementUse(writes=(value("flag80"),), keeps=True)),
         ("!12", StatementUse((value("variable"), value("register10")), (pin("B1"), pin("B2")))),
         ("?12", StatementUse((pin("B1"), pin("B2")), (value("variable"),))),
@@ -131,10 +132,12 @@ def test_statements_of_wbc() -> None:
         ("U1", StatementUse(waits=True)),
         ("I3H1", StatementUse((pin("B3"),), governs=range(1 << 16))),
         ("W100", StatementUse(waits=True)),
-        ("R", StatementUse((axis(1),), (axis(1), *SIGNALS, PROGRAM), waits=True, acts_by=(value("distance"),))),
-        (")4", StatementUse((axis(1), pin("B4")), (axis(1), *SIGNALS, PROGRAM), waits=True)),
-        ("(4", StatementUse((axis(1), pin("B4")), (axis(1), *SIGNALS, PROGRAM), waits=True)),
-        ("V300", StatementUse()),
+        ("R", StatementUse((axis(1),), (axis(1), *SIGNALS, PROGRAM), waits=True, acts_by=(value("distance"),), made_by=SPEEDS)),
+        (")4", StatementUse((axis(1), pin("B4")), (axis(1), *SIGNALS, PROGRAM), waits=True, made_by=SPEEDS[:1])),
+        ("(4", StatementUse((axis(1), pin("B4")), (axis(1), *SIGNALS, PROGRAM), waits=True, made_by=SPEEDS[:1])),
+        ("V300", StatementUse(writes=(value("velocity"),))),
+        ("F640", StatementUse(writes=(value("distance"),))),
+        ("D", StatementUse(writes=(value("distance"),), acts_by=(value("distance"),))),
         ("@7", StatementUse()),
     ],
 )

@@ -181,6 +181,9 @@ class AxisCauses:
                 found = covered(then.controllers.at_moment(controller, since, wanted, point), Cover.LEVEL)
                 if found is not None:
                     yield found
+        plan = max(self._log.plans_in_force(controller, axis, until), key=self._end, default=None) if names == SETTINGS else None
+        if plan is not None:
+            yield from self._all.controllers.made_by(controller, plan)
 
     def soft_limit(self, controller: str, axis: str, end: Nanos, until: Nanos) -> str:
         """The register of the soft limit at which a motion has ended; empty for another one."""

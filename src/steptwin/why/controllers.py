@@ -20,8 +20,8 @@ from steptwin.simulation.script.control import Halt
 from steptwin.simulation.world.inputs import Download, See, SetVariable
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing
-from steptwin.why.log import LAST, MOST_LOOKED_BACK, Change, Executed, words_of
-from steptwin.why.programstates import StateChange
+from steptwin.why.log import BEGINS, LAST, MOST_LOOKED_BACK, Change, Executed, words_of
+from steptwin.why.programstates import OVER, StateChange
 from steptwin.why.roots import Act, Sent
 from steptwin.why.sentences import SETS_A_FAULT, describe_input
 
@@ -36,6 +36,9 @@ HOMED = "homed"
 POSITION_ERROR = "position-error"
 """Event of an axis that did not reach its position."""
 REFUSED = Message("why.refused", "{request}: refused, {reason}")
+NOT_STARTED_SINCE = Message("why.not-started-since", "{event}, and nothing has started the program since")
+NOT_SWITCHED_ON_SINCE = Message("why.not-switched-on-since", "{event}, and nothing has switched {name} on since")
+NOT_COMMANDED_SINCE = Message("why.not-commanded-since", "{event}, and nothing has commanded {axis} to move since")
 REQUEST = Message("why.request", "request: {meaning}")
 
 
@@ -127,8 +130,10 @@ class ControllerCauses:
             if came is None and pin is not None:
                 wanted_pin = Resource(ResourceKind.PIN, pin.removeprefix(f"{controller}."))
                 came = self._all.programs.before(controller, wanted_pin, event.time)
-            if came is not None:
-                yield came
+            if came is not None and pin is not None:
+                on = Resource(ResourceKind.PIN, pin.removeprefix(f"{controller}."))
+                again = self.begun_in_vain(controller, on, came.place.time, event.time)
+                yield from (came,) if again is None else (came, again)
 
         text = said if pin is None else STOPPED_WHERE(event=said, level=self._all.state(pin, event.time))
         return Cause(ChainLink(event.time, controller, text), place, before, besides=besides)
@@ -156,6 +161,14 @@ class ControllerCauses:
         return [
             one for name, use in registers.uses(axis).items() if _name_of(name).search(found.link.text) for one in use.acts_by
         ]
+
+    def made_by(self, controller: str, plan: Change) -> Iterator[Cause]:
+        """The statements that gave a plan of an axis the values by which it is made."""
+        index = self._statement_at(controller, plan, Resource(ResourceKind.AXIS, ""))
+        for one in () if index is None else self._all.programs.use(controller, index).made_by:
+            found = self._all.programs.resource(controller, one, index, plan.time, plan.order)
+            if found is not None:
+                yield found
 
     def register(self, controller: str, name: str, wanted: Resource | None, until: Nanos, before: int = LAST) -> FoundCause:
         """The last change of a register of a controller by a moment, before an order, as far as its values are noted."""
@@ -234,6 +247,34 @@ class ControllerCauses:
         lost = None if supply is None else self._lost(f"{supply}.good", event)
         besides = tuple if lost is None else lambda: [lost]
         return Cause(link, Place(event.time, event.order), before, Cover.PROGRAM, besides)
+
+    def begun_in_vain(self, controller: str, wanted: Resource | None, since: Nanos | None, at: Nanos) -> FoundCause:
+        """What began a controller anew between two moments, if nothing has started its program since, by which ``wanted`` would
+        change, or has switched that on or moved it."""
+        event = self._log.last_begin(controller, at, LAST)
+        if event is None or event.position < 0 or since is None or event.time <= since:
+            return None
+        text, begun = self._not_done(controller, wanted, event, at), self.begun(controller, event)
+        return (
+            None if text is None or begun is None else covered(begun._replace(link=replace(begun.link, text=text)), Cover.LEVEL)
+        )
+
+    def _not_done(self, controller: str, wanted: Resource | None, begun: Change, at: Nanos) -> MessageText | None:
+        """The thing that nothing has done between two moments, in words."""
+        log, programs, event = self._log, self._all.programs, words_of(self._log.record(begun))
+        if wanted is None or (controller in self._world.programs and programs.is_written(controller, wanted)):
+            state, alarm = log.states.last(controller, at, LAST), programs.alarm(controller, at)
+            was_tried = alarm is not None and alarm.place.time >= begun.time
+            is_over = state is not None and state.state in OVER and state.time <= begun.time
+            return NOT_STARTED_SINCE(event=event) if is_over and not was_tried else None
+        pin = f"{controller}.{wanted.name if wanted.kind is ResourceKind.PIN else f'M{wanted.name}_EN'}"
+        if log.has(pin) and not log.level(pin, at):
+            return NOT_SWITCHED_ON_SINCE(event=event, name=pin) if (log.since(pin, at) or 0) <= begun.time else None
+        if wanted.kind is not ResourceKind.AXIS:
+            return None
+        moved = any(plan.time > begun.time for plan in log.plans_in_force(controller, wanted.name, at))
+        was_tried = moved or self._all.attempts.last(controller, wanted.name, at, after=begun.time) is not None
+        return None if was_tried else NOT_COMMANDED_SINCE(event=event, axis=f"{controller}.M{wanted.name}")
 
     def _lost(self, good: str, event: Change) -> FoundCause:
         """The last loss of a supply, by its signal, before it fed a controller again."""
@@ -316,7 +357,7 @@ class ControllerCauses:
     def _inside(self, controller: str, change: Change, wanted: Resource | None) -> FoundCause:
         """Cause of an act of the controller itself: an input, or the end of what an earlier statement began."""
         inputs: list[tuple[int, str]] = []
-        event: tuple[int, TraceRecord] | None = None
+        events: list[tuple[int, TraceRecord]] = []
         supply = self._world.objects.supplied.get(controller)
         for order, record in self._log.at(change.group, change.time):
             if order >= change.order or not (record.controller == controller or ("element", supply) in record.facts):
@@ -324,7 +365,11 @@ class ControllerCauses:
             if record.kind == "edge" and self._is_input(PinName(controller, record.subject)):
                 inputs.append((order, f"{controller}.{record.subject}"))
             elif record.kind == "event" and record.subject != "workpiece":
-                event = order, record
+                events.append((order, record))
+        # What it tells about itself leads no farther than its supply.
+        event = min(
+            events, key=lambda one: (one[1].subject not in BEGINS, "element" not in dict(one[1].facts), one[0]), default=None
+        )
         limit = change.order if event is None else event[0]
         last = max((one for one in inputs if one[0] < limit), default=None)
         facts = {} if event is None else dict(event[1].facts)

@@ -44,8 +44,8 @@ class QuestionNames:
     def is_coordinate(self, name: str) -> bool:
         """Whether a signal is the position of an axis as its controller counts it, which is not always that of its motor."""
         owner, _, rest = name.lower().partition(".")
-        if owner not in self._log.world.controllers or self._log.world.kind(owner).registers is None:
-            return False  # what it counts is never set
+        if owner not in self._log.world.controllers:
+            return False
         is_moving = self.is_signal(name) and self._log.world.signal(name).continuous
         return is_moving and "pos" in rest and not rest.startswith("enc")
 

@@ -56,10 +56,9 @@ class PresentStates:
                 waiting += yield from (self._signal(one, waits) if isinstance(one, str) else self._resource(*one))
         self.has_all &= seen.issuperset(waiting)
 
-    def disabled(self, controller: str, wanted: Resource) -> Iterator[ChainLink]:
-        """The switches that are off of the interrupts that change something, and who set them."""
-        for use, writing in self._causes.programs.interrupts(controller, wanted):
-            yield from self._disabled(controller, use, writing)
+    def interrupted(self, controller: str, wanted: Resource) -> Iterator[ChainLink]:
+        """The switches of the interrupts that change something, who set them, and the states of the events that they wait for."""
+        yield from self.of((yield from self._interrupts(controller, wanted)))
 
     def _disabled(self, controller: str, use: StatementUse, writing: StatementLocation) -> Iterator[ChainLink]:
         """The switches of an interrupt that are off, who set them, and the statement that is not executed therefore."""
@@ -71,9 +70,8 @@ class PresentStates:
             yield from self._switch(controller, switch)
 
     def waits(self, controller: str, use: StatementUse) -> bool:
-        """Whether a program waits at a statement that it has executed last, which may be over if it is a wait for a time."""
-        kind = self._world.kind(controller)
-        return use.waits and (bool(use.reads) or not kind.is_idle(self._world.controller(controller), self._at))
+        """Whether a program waits at a statement that it has executed last, which may be over."""
+        return use.waits and not self._world.kind(controller).is_idle(self._world.controller(controller), self._at)
 
     def awaited(self, controller: str) -> Iterator[ChainLink]:
         """Those for which the program of a controller waits, or which the loop reads in which it is."""
@@ -130,9 +128,9 @@ class PresentStates:
             return (yield from self.motion(controller, resource.name))
         if resource.kind not in (ResourceKind.ORIGIN, ResourceKind.REQUEST):
             yield ChainLink(self._at, controller, self._value(controller, resource))
-        return (yield from self.interrupts(controller, resource))
+        return (yield from self._interrupts(controller, resource))
 
-    def interrupts(self, controller: str, wanted: Resource) -> _Links:
+    def _interrupts(self, controller: str, wanted: Resource) -> _Links:
         """The switches of the interrupts that change something, and who set them. Returns the events of those that are on."""
         events: list[_Asked] = []
         for use, writing in self._causes.programs.interrupts(controller, wanted):
@@ -193,29 +191,32 @@ class PresentStates:
         """Wait or loop that stands between a program and what it can change, or what holds the program. Returns what it waits
         for."""
         log, programs, at = self._log, self._causes.programs, self._at
-        held = programs.stands(owner, at)
+        held, index = programs.stands(owner, at), log.last_executed(owner, at)
+        comes = index >= 0 and programs.leads_to(owner, index, wanted)
         if held is not None:
             yield held.link if held.place.order >= 0 or log.reaches_begin() else replace(held.link, time=at)
             by = held.before()
             if by is not None:
                 yield by.link
-            return ()
-        index = log.last_executed(owner, at)
-        if owner in self._world.programs and not (index >= 0 and programs.leads_to(owner, index, wanted)):
-            return (yield from self.interrupts(owner, wanted))
+            if comes or index < 0:
+                return ()
+        elif owner in self._world.programs and not comes:
+            return (yield from self._interrupts(owner, wanted))
         if index < 0:
             return ()
         here, use = log.executed[owner][index], programs.use(owner, index)
-        against = None if use.reads else programs.decided_against(owner, wanted, at)
+        against = None if use.reads and comes else programs.decided_against(owner, wanted, at)
         if against is not None:
             yield against.link
             there = self._causes.of(against.place.time) or self._causes
             reads = [(owner, one) for one in there.programs.use(owner, (against.place.number - 2) // 3).reads]
-            return [*reads, *(yield from self.interrupts(owner, wanted))]
-        if use.waits and at - here.time > self._world.programs[owner].statement_time:
+            return [*reads, *(yield from self._interrupts(owner, wanted))]
+        if held is not None:
+            return ()
+        conditions = () if use.waits and use.reads else programs.conditions_of_loop(owner, index)
+        if not conditions and self.waits(owner, use) and at - here.time > self._world.programs[owner].statement_time:
             yield ChainLink(at, owner, WAITS(controller=owner, statement=statement(log, here)), is_stand=True)
-            return [*((owner, one) for one in use.reads), *(yield from self.interrupts(owner, wanted))]
-        conditions = programs.conditions_of_loop(owner, index)
+            return [*((owner, one) for one in use.reads), *(yield from self._interrupts(owner, wanted))]
         if conditions:
             widest = max(conditions, key=lambda one: len(programs.use(owner, one).governs))
             words = statement(log, programs.written_at(owner, widest))

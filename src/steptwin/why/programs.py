@@ -132,7 +132,7 @@ class ProgramCauses:
         before it; None if that is not known."""
         if controller not in self._world.programs or not self.is_written(controller, wanted):
             return None
-        held = self.stands(controller, at) or self.decided_against(controller, wanted, at)
+        held = self.prevented(controller, wanted, at)
         index = self._log.last_executed(controller, at)
         if held is not None or index < 0 or not self.use(controller, index).waits or not self.leads_to(controller, index, wanted):
             return held
@@ -141,6 +141,15 @@ class ProgramCauses:
         besides = partial(self._unchanged, controller, index, found.place)
         link = ChainLink(here.time, controller, text, is_stand=True)
         return found._replace(link=link, cover=Cover.WAIT, besides=besides)
+
+    def prevented(self, controller: str, wanted: Resource, at: Nanos) -> FoundCause:
+        """What holds a program at a moment, or the condition that has decided against a statement that changes something; both
+        where the program could not come to one any more when it was held."""
+        held, index = self.stands(controller, at), self._log.last_executed(controller, at)
+        if held is not None and (index < 0 or self.leads_to(controller, index, wanted)):
+            return held
+        against = self.decided_against(controller, wanted, at)
+        return held if against is None else against._replace(along=() if held is None else (held,))
 
     def is_of_interrupt(self, controller: str, index: int) -> bool:
         """Whether an executed statement stands in an interrupt."""
@@ -172,15 +181,10 @@ class ProgramCauses:
         """Values that an executed statement makes others of, or acts by."""
         use, here = self.use(controller, index), self._log.executed[controller][index]
         for one in (*(use.reads if use.writes and not use.waits else ()), *use.acts_by):
-            is_written = one in use.writes or one.kind is ResourceKind.ORIGIN  # that of its motion
+            is_written = (one in use.reads and one in use.writes) or one.kind is ResourceKind.ORIGIN  # that of its motion
             value = None if is_written else self.resource(controller, one, index, here.time, here.order)
-            if value is not None and not (one in use.acts_by and self._is_just_before(controller, index, value)):
+            if value is not None:
                 yield value._replace(cover=Cover.LEVEL)
-
-    def _is_just_before(self, controller: str, index: int, value: Cause) -> bool:
-        """Whether a value by which a statement of a text acts has come since it was decided that this is executed."""
-        led = self._of_statement(controller, index)
-        return self._log.executed[controller].locations[index].number >= 0 and led is not None and value.place > led.place
 
     def _of_executed(self, controller: str, index: int) -> FoundCause:
         """Value that a statement reads, if it has changed since the last execution, so that another one was written, or of the
@@ -218,13 +222,13 @@ class ProgramCauses:
 
     def conditions_of_loop(self, controller: str, index: int, *, has_waits: bool = False) -> Sequence[int]:
         """The numbers of the conditions that were evaluated since a statement was executed before; none without a loop, or with a
-        wait in it, unless ``has_waits``."""
+        wait for more than a time in it, unless ``has_waits``."""
         here = (self._log.executed[controller].locations[index],)
         before = self._log.last_of(controller, here, index)
         if before is None and self._log.executed_before(controller, here) is not None:
             self._log.lack()
         loop = [] if before is None else list(range(before, index))
-        if not has_waits and any(self.use(controller, one).waits for one in loop):
+        if not has_waits and any((use := self.use(controller, one)).waits and use.reads for one in loop):
             return []
         last = {self._log.executed[controller].locations[one]: one for one in loop}
         return [one for one in last.values() if (use := self.use(controller, one)).governs or use.is_loop]
@@ -597,18 +601,15 @@ class ProgramCauses:
         return last if came is None else covered(came._replace(along=() if last is None else (last,)), Cover.WAIT)
 
     def _holding(self, controller: str, change: StateChange) -> Iterator[Cause]:
-        """The level of the input that holds a program in its state."""
-        pin = self._world.programs[controller].holding.get(change.state)
-        if pin is None:
-            return
-        signal, place = f"{controller}.{pin}", Place(change.time, change.order)
-        came = self._all.last((signal,), change.time, before=change.order)
-        if came is not None:
-            yield covered(came, Cover.LEVEL) or came
-        elif self._log.reaches_begin():
-            yield Cause(
-                ChainLink(change.time, controller, self._all.state(signal, change.time)), place._replace(number=-1), nothing
-            )
+        """The levels and values that hold a program in its state."""
+        time, index = change.time, self._log.last_executed(controller, change.time) + 1
+        for one in self._world.programs[controller].holding.get(change.state, ()):
+            came = self.resource(controller, one, index, time, change.order)
+            if came is not None and came.place < Place(time, change.order):
+                yield came._replace(cover=Cover.LEVEL)
+            elif one.kind is ResourceKind.PIN and self._log.reaches_begin():
+                text = self._all.state(f"{controller}.{one.name}", time)
+                yield Cause(ChainLink(time, controller, text), Place(time, change.order, -1), nothing)
 
     def stands(self, controller: str, at: Nanos) -> FoundCause:
         """As `held`; of a program that was never started the attempt to start it, if there was one."""

@@ -59,10 +59,7 @@ PROGRAM_IS = Message("why.program-is", "{controller}: {held}")
 FORM_OF_A_QUESTION = Message(
     "why.form-of-a-question", "a question is a signal, a condition, or a controller: table.OUT3, 'table.OUT3 == 0', table"
 )
-NOTHING_EXECUTED_YET = Message(
-    "why.nothing-executed-yet", "{controller} has executed no statement until {at:g} s: ask about one of its signals"
-)
-NOTHING_EXECUTED_SINCE = Message("why.nothing-executed-since", "{controller} has executed no statement since {begin:g} s")
+NOTHING_EXECUTED = Message("why.nothing-executed", "{controller} has executed no statement")
 
 
 class Why:
@@ -139,10 +136,11 @@ class Why:
         first = self._with_refused(signals, at, since, first)
         if first is not None or since is not None:
             holding = self.causes.holding.of(self._deciding(asked, canonical, at), at, since)
-            first = along(first, [*holding, *self._unseen(shown, at, -1 if since is None else since)])
+            others = (*self._unseen(shown, at, -1 if since is None else since), *self._again(signals, since, at))
+            first = along(first, [*holding, *others])
             return (yield from self._answer(text, at, state, since, first))
-        waited = (*signals, *self.resting.awaited(signals, at))
-        resting = (yield from self.resting.moved(waited, at)) or self.resting.held(signals, at)
+        waited = (*signals, *self.resting.awaited_pins(signals, at))
+        resting = (yield from self.resting.moved(waited, at)) or self.resting.held(waited, at)
         resting = resting or (yield from self.resting.standing(signals, at))
         behind = self.past.behind(waited, at)
         is_kept = any(self.log.rates.has(name.partition(".")[0]) for name in behind)
@@ -150,9 +148,13 @@ class Why:
         is_kept = is_kept or self.causes.holding.depends(behind)
         if is_kept and self.log.reaches_begin():  # otherwise it is not known what was before
             decides = self._deciding(asked, canonical, at)
-            holding = self.causes.holding.of((*decides, *self.resting.awaited(decides, at)), at, None)
+            holding = self.causes.holding.of((*decides, *self.resting.awaited_pins(decides, at)), at, None)
             resting = along(resting, list(holding))
-        resting = along(resting, list(self._unseen((*shown, *waited[len(signals) :]), at, -1)))
+        awaited = self.resting.awaited(signals, at) if resting is None else ()
+        came = [self.causes.programs.resource(*one, self.log.last_executed(one[0], at) + 1, at) for one in awaited]
+        resting = along(
+            resting, [*(covered(one, Cover.LEVEL) for one in came), *self._unseen((*shown, *waited[len(signals) :]), at, -1)]
+        )
         answer = yield from self._answer(text, at, state, None, resting)
         present, named = (yield from self._present(at)), [name for name in signals if self.log.has(name)]
         states = [link for name in named for link in present.of([name])]
@@ -160,12 +162,25 @@ class Why:
         says_more |= any(self.causes.drivers(name, at) or self.causes.undriven(name) is not None for name in signals)
         return self._after(present, states if says_more else [], answer)
 
-    def _unseen(self, pins: Iterable[str], at: Nanos, after: Nanos) -> Iterator[Cause]:
-        """The last changes of inputs after a moment that were too short for their filters."""
-        for owner, _, pin in (one.partition(".") for one in pins):
-            found = self.causes.programs.unseen(owner, pin, at, after)
+    def _again(self, signals: Sequence[str], since: Nanos | None, at: Nanos) -> Iterator[Cause]:
+        """What began controllers anew that could have changed signals since, and has led to nothing."""
+        for controller, wanted in self.past.changeable(signals, at):
+            found = self.causes.controllers.begun_in_vain(controller, wanted, since, at)
             if found is not None:
                 yield found
+
+    def _unseen(self, pins: Iterable[str], at: Nanos, after: Nanos) -> Iterator[Cause]:
+        """The last changes of inputs after a moment that were too short for their filters."""
+        for owner, pin in map(self._pin, pins):
+            found = self.causes.programs.unseen(owner, pin.name, at, after)
+            if found is not None:
+                yield found
+
+    @staticmethod
+    def _pin(signal: str) -> tuple[str, Resource]:
+        """The controller of a pin, and the pin as one of its resources."""
+        owner, _, pin = signal.partition(".")
+        return owner, Resource(ResourceKind.PIN, pin)
 
     def _with_refused(self, signals: Iterable[str], at: Nanos, since: Nanos | None, first: FoundCause) -> FoundCause:
         """A cause along with the requests that would have written one of these registers since, and were refused."""
@@ -239,7 +254,7 @@ class Why:
         present, wanted = (yield from self._present(at)), Resource(ResourceKind.VALUE, name)
         there = None if written is None else self.causes.of(written.place.time)  # it may be numbered in the log of another moment
         came = there is not None and written is not None and there.programs.is_of_interrupt(controller, written.place.number // 3)
-        states = [] if came else list(present.disabled(controller, wanted))
+        states = [] if came else list(present.interrupted(controller, wanted))
         return self._after(
             present, states, (yield from self._answer(text, at, state, None if last is None else last.place.time, last))
         )
@@ -266,6 +281,7 @@ class Why:
                 is_turned = (axis_of(full.partition(".")[2]) or (None,))[0] is ResourceKind.ENCODER
                 changed = self.resting.ignored((full,), at) if since is None else self.past.changed((full,), since)
                 changed = self.past.unrecorded(full, at) if changed is None and is_turned else changed
+            changed = along(changed, list(self._again((full,), since, at)))
             return (yield from self._answer(signal, at, state, since, changed))
         since: Nanos | None = at
         if isinstance(standing, SignalOf) and is_constant(standing, at):
@@ -283,17 +299,18 @@ class Why:
             first = causes.programs.stands(controller, at) if since is None else _led_to(held)
             alarm = None if since is None else causes.programs.alarm(controller, at)
             first = along(alarm, [first] if first is not None else []) if alarm and alarm.place > held.place else first
+            first = along(first, [causes.controllers.begun_in_vain(controller, None, since, at)])
             supply, present = causes.programs.supply_off(controller, at), (yield from self._present(at))
             states = list(present.of([supply])) if supply is not None and since is None else []
             state = PROGRAM_IS(controller=controller, held=held.link.text)
             return self._after(present, states, (yield from self._answer(controller, at, state, since, first)))
-        if index < 0 and log.reaches_begin():
-            raise Misuse(NOTHING_EXECUTED_YET(controller=controller, at=at / SECOND))
         if index < 0:
-            state = NOTHING_EXECUTED_SINCE(controller=controller, begin=log.begin / SECOND)
-            return (yield from self._answer(controller, at, state, None, None))
-        executed = log.executed[controller]
-        here = executed[index]
+            log.lack()
+            return (yield from self._answer(controller, at, NOTHING_EXECUTED(controller=controller), None, None))
+        here, begun = log.executed[controller][index], log.last_begin(controller, at, LAST)
+        if begun is not None and begun.order > here.order:
+            led, state = causes.controllers.begun(controller, begun), NOTHING_EXECUTED(controller=controller)
+            return (yield from self._answer(controller, at, state, begun.time, led))
         use = causes.programs.use(controller, index)
         text, since = statement(log, here), None if log.is_in_progress(here) else here.time
         ended = causes.programs.ended(controller, index, at)
@@ -302,9 +319,13 @@ class Why:
             return (yield from self._answer(controller, at, state, ended.link.time, _led_to(ended)))
         present = yield from self._present(at)
         links = list(present.awaited(controller))
-        if not present.waits(controller, use) or at - here.time <= log.world.programs[controller].statement_time:
+        if not use.waits or at - here.time <= log.world.programs[controller].statement_time:
             state = DOES_NOT_WAIT(controller=controller, statement=text)
             first = covered(causes.programs.statement(controller, index), Cover.PROGRAM)
+            loop = causes.programs.conditions_of_loop(controller, index, has_waits=True)
+            read = ((one, number) for number in loop for one in causes.programs.use(controller, number).reads)
+            led = [causes.programs.resource(controller, one, number, at) for one, number in read]
+            first = along(first, [covered(one, Cover.LEVEL) for one in led])
             return self._after(present, links, (yield from self._answer(controller, at, state, since, first)))
         found = {one: cause for one in use.reads if (cause := causes.programs.resource(controller, one, index, at))}
         waiting = causes.programs.statement(controller, index)
@@ -320,8 +341,8 @@ class Why:
         standing = (yield from self.resting.standing(pins, at)) if last is None and resting is None else None
         lasting = (*(() if standing is None else (standing, *standing.along)), *holding, *self._unseen(pins, at, here.time))
         first = along(first, [waiting, *lasting])
-        answer = yield from self._answer(controller, at, WAITS(controller=controller, statement=text), since, first)
-        return self._after(present, links, answer)
+        state = (WAITS if present.waits(controller, use) else DOES_NOT_WAIT)(controller=controller, statement=text)
+        return self._after(present, links, (yield from self._answer(controller, at, state, since, first)))
 
     def _is_held(self, controller: str, resource: Resource, at: Nanos) -> bool:
         """Whether a fault holds a pin, or what drives it: the run without the fault proves it."""

@@ -78,8 +78,7 @@ class RestingCauses:
         for name in self._past.behind(signals, at):
             owner, _, pin = name.partition(".")
             if owner in self._world.programs and not self._past.causes.drivers(name, at) and programs.may_write(owner, pin):
-                held = programs.stands(owner, at)
-                found.append(held or programs.decided_against(owner, Resource(ResourceKind.PIN, pin), at))
+                found.append(programs.prevented(owner, Resource(ResourceKind.PIN, pin), at))
         return max((one for one in found if one is not None), key=lambda one: one.place, default=None)
 
     def ignored(self, signals: Iterable[str], at: Nanos) -> Cause | None:
@@ -96,15 +95,21 @@ class RestingCauses:
                 return self._past.causes.attempts.unmoved(drive[0], number, at)
         return None
 
-    def awaited(self, signals: Iterable[str], at: Nanos) -> Iterator[str]:
-        """The pins for which programs wait before they change signals, or those that drive them."""
+    def awaited(self, signals: Iterable[str], at: Nanos) -> Iterator[tuple[str, Resource]]:
+        """All for which programs wait before they change signals, or those that drive them, with their controllers."""
         programs = self._past.causes.programs
         for name in self._past.behind(signals, at):
             owner, _, pin = name.partition(".")
             index = self._log.last_executed(owner, at) if owner in self._world.programs else -1
             if index >= 0 and programs.leads_to(owner, index, Resource(ResourceKind.PIN, pin)):
-                reads = programs.use(owner, index).reads if programs.use(owner, index).waits else ()
-                yield from (f"{owner}.{one.name}" for one in reads if one.kind is ResourceKind.PIN and one.name)
+                use = programs.use(owner, index)
+                yield from ((owner, one) for one in use.reads if use.waits)
+
+    def awaited_pins(self, signals: Iterable[str], at: Nanos) -> Iterator[str]:
+        """The pins among `awaited`."""
+        yield from (
+            f"{owner}.{one.name}" for owner, one in self.awaited(signals, at) if one.kind is ResourceKind.PIN and one.name
+        )
 
     def _axes_of(self, signals: Iterable[str], at: Nanos) -> set[str]:
         """The axes whose position or switch is among signals, or drives one of them."""
@@ -115,10 +120,9 @@ def _given(cause: Cause) -> Cause:
     return cause
 
 
-def along(first: Cause | None, others: Sequence[Cause]) -> Cause | None:
+def along(first: FoundCause, others: Sequence[FoundCause]) -> Cause | None:
     """A cause along with others, of which each is there once."""
     every = [one for one in (first, *others) if one is not None]
     if not every:
         return None
-    others = [one for one in every[1:] if one.link != every[0].link]
-    return every[0]._replace(along=(*every[0].along, *others))
+    return every[0]._replace(along=(*every[0].along, *(one for one in every[1:] if one.link != every[0].link)))

@@ -81,6 +81,8 @@ class StatementUse(NamedTuple):
     """Where the program goes on, if that depends on nothing."""
     acts_by: tuple[Resource, ...] = ()
     """Values by which it acts, besides those that it reads, such as the distance of a move."""
+    made_by: tuple[Resource, ...] = ()
+    """Values by which the motion that it begins is made, such as a velocity."""
     keeps: bool = False
     """Whether it may change a point of the controller without an event of that (`steptwin.points.LivePoint.is_kept`)."""
 
@@ -178,8 +180,8 @@ class Programs(Protocol):
     def state(self) -> ProgramState: ...
 
     @property
-    def holding(self) -> Mapping[ProgramState, str]:
-        """The inputs whose level holds a program in a state."""
+    def holding(self) -> Mapping[ProgramState, Sequence[Resource]]:
+        """The inputs whose level, and values by which, a program is held in a state."""
         ...
 
     def given(self, number: int) -> GivenCommand | None:

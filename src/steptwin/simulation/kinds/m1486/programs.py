@@ -12,6 +12,7 @@ from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.commands import When, when
 from steptwin.m1486.encoding import decode, encode
+from steptwin.m1486.functions import EDGE, LIMITOFF, RECOVER
 from steptwin.m1486.points import live_point
 from steptwin.m1486.program import WaitReason
 from steptwin.m1486.registers import GENERAL
@@ -21,12 +22,14 @@ from steptwin.m1486.syntax import ChipCommand, parse
 from steptwin.m1486.unit import MASK
 from steptwin.messages import Message
 from steptwin.simulation.kinds.m1486.memory import PLACE as TEXT
-from steptwin.simulation.kinds.m1486.statement_use import use_of
+from steptwin.simulation.kinds.m1486.statement_use import function_switch, use_of
 from steptwin.simulation.kinds.programs import (
     Frame,
     GivenCommand,
     ProgramStand,
     ProgramState,
+    Resource,
+    ResourceKind,
     Statement,
     StatementLocation,
     StatementUse,
@@ -172,8 +175,11 @@ class ChipPrograms:
         return next(there, None)
 
     @property
-    def holding(self) -> Mapping[ProgramState, str]:
-        return {ProgramState.LIMITED: "LIMIT"}
+    def holding(self) -> Mapping[ProgramState, Sequence[Resource]]:
+        return {
+            ProgramState.KILLED: (function_switch(RECOVER),),
+            ProgramState.LIMITED: (Resource(ResourceKind.PIN, "LIMIT"), *map(function_switch, (LIMITOFF, EDGE, RECOVER))),
+        }
 
     def given(self, number: int) -> GivenCommand | None:
         stored = decode(self._chip.memory.fetch(number))

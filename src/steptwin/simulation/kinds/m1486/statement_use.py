@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
-from steptwin.m1486.commanduse import NOTHING, ChipState, Control, Wait
-from steptwin.m1486.functions import CARRY, USER_FLAGS
+from steptwin.m1486.commanduse import NOTHING, ChipState, Control, Motion, Setting, Wait
+from steptwin.m1486.functions import CARRY, FUNCTIONS, USER_FLAGS
 from steptwin.m1486.lines import RUNSIGN_LINE
 from steptwin.m1486.pins import OUTPUT_PINS, WAVEFORM
 from steptwin.m1486.registers import GENERAL, REMAINDER_REGISTER
@@ -16,6 +16,11 @@ from steptwin.tables import complete
 
 _AXIS = Resource(ResourceKind.AXIS, "1")
 _DISTANCE = Resource(ResourceKind.VALUE, "distance")
+_SPEEDS = {
+    Motion.MOVE: (Setting.START_STOP, Setting.ACCELERATION, Setting.VELOCITY, Setting.PROFILE),
+    Motion.SEEK: (Setting.START_STOP,),
+}
+"""Settings that decide how fast a motion is."""
 _EVERYTHING = range(1 << 16)
 """A jump that depends on something decides about what comes after it, wherever that is."""
 _KEPT = ChipState.FLAGS | ChipState.CARRY
@@ -24,15 +29,16 @@ _KEPT = ChipState.FLAGS | ChipState.CARRY
 def use_of(command: ChipCommand) -> StatementUse:
     """A move holds the program until its end."""
     use = command.use
-    # What is sent does not decide how long that waits.
-    reads = NOTHING if use.waits is Wait.SENDING else use.reads
+    # What is sent does not decide how long that waits; which functions are read is not known.
+    reads = NOTHING if use.waits is Wait.SENDING else use.reads & ~ChipState.FUNCTIONS
     writes = _resources(use.writes, command)
     return StatementUse(
         _resources(reads, command),
         (*writes, _DISTANCE) if ChipState.DISTANCE in use.writes else writes,
         waits=use.waits is not Wait.NOTHING,
         governs=_EVERYTHING if is_computed(command) or use.control is Control.BRANCH else range(0),
-        acts_by=(_DISTANCE,) if ChipState.DISTANCE in use.reads and ChipState.MOTION in use.writes else (),
+        acts_by=(_DISTANCE,) if ChipState.DISTANCE in use.reads else (),
+        made_by=tuple(_value(one.value) for one in _SPEEDS.get(use.motion, ())),
         keeps=bool(use.writes & _KEPT),
     )
 
@@ -58,6 +64,17 @@ def _of_number(what: str, numbers: range) -> Callable[[ChipCommand], Iterable[Re
     return lambda command: (_value(f"{what}{command.number}"),) if command.number in numbers else ()
 
 
+def _function(command: ChipCommand) -> Iterable[Resource]:
+    """The function that a command switches."""
+    number = command.number
+    return (function_switch(number),) if number is not None and number in FUNCTIONS and command.use.level is not None else ()
+
+
+def function_switch(number: int) -> Resource:
+    """Whether a function is on."""
+    return _value(f"function{number}")
+
+
 def _lines(command: ChipCommand) -> Iterable[Resource]:
     return [_pin(f"B{line}") for line in command.lines] or (_pin(""),)
 
@@ -77,8 +94,9 @@ _RESOURCES: Mapping[ChipState, Callable[[ChipCommand], Iterable[Resource]]] = co
         ChipState.FLAGS: _of_number("flag", USER_FLAGS),
         ChipState.CARRY: _always(_value(f"flag{CARRY}")),
         ChipState.DISTANCE: _always(),  # what a move acts by
+        ChipState.FUNCTIONS: _function,
+        ChipState.SETTINGS: lambda command: (_value(command.use.sets.value),) if command.use.sets else (),
         # Neither pins nor axes, nor what a program calculates with.
-        **dict.fromkeys((ChipState.FUNCTIONS, ChipState.SETTINGS), _always()),
         ChipState.HELD: _always(Resource(ResourceKind.PROGRAM, "")),
         **dict.fromkeys((ChipState.LOOPS, ChipState.CALL, ChipState.SENDING), _always()),
         **dict.fromkeys((ChipState.LISTENING, ChipState.MEMORY), _always()),

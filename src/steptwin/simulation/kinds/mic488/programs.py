@@ -21,6 +21,7 @@ from steptwin.simulation.kinds.programs import (
     GivenCommand,
     ProgramStand,
     ProgramState,
+    Resource,
     Statement,
     StatementLocation,
     StatementUse,
@@ -102,7 +103,7 @@ class WbcPrograms:
         return _STATES[self._device.program.state]
 
     @property
-    def holding(self) -> Mapping[ProgramState, str]:
+    def holding(self) -> Mapping[ProgramState, Sequence[Resource]]:
         return {}
 
     def given(self, number: int) -> GivenCommand | None:
