@@ -150,11 +150,11 @@ class Why:
             decides = self._deciding(asked, canonical, at)
             holding = self.causes.holding.of((*decides, *self.resting.awaited_pins(decides, at)), at, None)
             resting = along(resting, list(holding))
+        again = list(self._again(signals, None, at))
         awaited = self.resting.awaited(signals, at) if resting is None else ()
         came = [self.causes.programs.resource(*one, self.log.last_executed(one[0], at) + 1, at) for one in awaited]
-        resting = along(
-            resting, [*(covered(one, Cover.LEVEL) for one in came), *self._unseen((*shown, *waited[len(signals) :]), at, -1)]
-        )
+        unseen = list(self._unseen((*shown, *waited[len(signals) :]), at, -1))
+        resting = along(resting, [*(covered(one, Cover.LEVEL) for one in came), *again, *unseen])
         answer = yield from self._answer(text, at, state, None, resting)
         present, named = (yield from self._present(at)), [name for name in signals if self.log.has(name)]
         states = [link for name in named for link in present.of([name])]
