@@ -262,15 +262,18 @@ class ProgramCauses:
         """The wait or condition that let a statement be executed; of a command that came over the line by itself that, or the
         wait behind which it stood."""
         led = self._led(controller, index)
-        if self._log.executed[controller].locations[index].number >= 0:
-            return led
-        came = self._all.controllers.given(controller, index)
+        came = self._came(controller, index)
         if came is None or led is None:
             return came or led
         is_at_once = came.place.time >= self._log.executed[controller].times[index]
-        if is_at_once or led.place < came.place or led.link.text == PROGRAM_STARTED():
+        if is_at_once or led.place <= came.place or led.link.text == PROGRAM_STARTED():
             return came
         return led._replace(along=(came,))
+
+    def _came(self, controller: str, index: int) -> FoundCause:
+        """The frame with an executed statement that came over a line by itself."""
+        is_given = self._log.executed[controller].locations[index].number < 0
+        return self._all.controllers.given(controller, index) if is_given else None
 
     def _led(self, controller: str, index: int) -> FoundCause:
         executed = self._log.executed[controller]
@@ -288,6 +291,9 @@ class ProgramCauses:
             if use.jumps is not None and ended.location.number == use.jumps <= number:
                 number = here.location.number
             if use.waits and ended.time - here.time > at_once:
+                came = self._came(controller, after)
+                if came is not None and came.place.time >= ended.time:
+                    return came  # the wait was over before that
                 return self._decided(controller, earlier, Place(ended.time, ended.order, 3 * after), ENDED)
             resumed = self._resumed(controller, here.order, ended)
             if resumed is not None:
@@ -612,8 +618,10 @@ class ProgramCauses:
                 yield Cause(ChainLink(time, controller, text), Place(time, change.order, -1), nothing)
 
     def stands(self, controller: str, at: Nanos) -> FoundCause:
-        """As `held`; of a program that was never started the attempt to start it, if there was one."""
-        held = self.held(controller, at)
+        """As `held`, or `ended`; of a program that was never started the attempt to start it, if there was one."""
+        held, index = self.held(controller, at), self._log.last_executed(controller, at)
+        if held is None and index >= 0:
+            return self.ended(controller, index, at)
         if held is None or held.place.order >= 0:
             return held
         return self.alarm(controller, at) or held
