@@ -61,10 +61,10 @@ def licences() -> str:
 def main(target: str) -> None:
     programs = {path.name: str(path) for path in DEMO.glob("*.prg")}
     world = {"name": "demo", "path": str(DEMO / "demo.toml"), "files": programs}
-    archives = {"steptwin.zip": own(), "editor.zip": libraries()}
+    archives = {"steptwin": own(), "editor": libraries()}
     text = json.dumps({"archives": archives, "world": world, "licences": licences()})
     Path(target).write_text(text, "utf-8")
-    own_files = [*archives["steptwin.zip"].values(), world["path"], *programs.values()]
+    own_files = [*archives["steptwin"].values(), world["path"], *programs.values()]
     names = [Path(path).relative_to(ROOT).as_posix() for path in own_files]
     # A rule without a recipe for each of them: a file that has been removed makes the site anew too, and no error.
     rules = [f"{SITE}: {' '.join(names)}", *(f"{name}:" for name in names)]

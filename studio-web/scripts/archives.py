@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import encodings.aliases
+import gzip
 import importlib.util
 import io
 import marshal
@@ -24,13 +25,19 @@ UNUSED = frozenset(
 
 
 def pack(sources: Mapping[str, str | bytes]) -> bytes:
-    """An archive of compiled modules, which is always the same. They have no docstrings, and of places lines only."""
+    """An archive of compiled modules, which is always the same. They have no docstrings, and of places lines only.
+
+    It is packed as a whole: a fifth smaller than one in which each module is packed, and Python need not unpack any of them."""
+    return gzip.compress(archive_of(sources, zipfile.ZIP_STORED), 9, mtime=0)
+
+
+def archive_of(sources: Mapping[str, str | bytes], compression: int = zipfile.ZIP_DEFLATED) -> bytes:
     made = io.BytesIO()
     with zipfile.ZipFile(made, "w", compresslevel=9) as archive:
         for name, source in sorted(sources.items()):
             code = marshal.dumps(compile(source, name, "exec", dont_inherit=True, optimize=2))
             unchecked = importlib.util.MAGIC_NUMBER + (1).to_bytes(4, "little") + bytes(8)
-            archive.writestr(zipfile.ZipInfo(name + "c"), unchecked + code, zipfile.ZIP_DEFLATED)
+            archive.writestr(zipfile.ZipInfo(name + "c"), unchecked + code, compression)
     return made.getvalue()
 
 

@@ -2,6 +2,7 @@
 // compiles the modules, and the whole state at the beginning, which the page shows before Python is there.
 import { createHash } from "node:crypto";
 import { copyFileSync, mkdirSync, readFileSync, readdirSync, writeFileSync } from "node:fs";
+import { gunzipSync } from "node:zlib";
 import { loadPyodide } from "pyodide";
 
 const [modules, folder] = process.argv.slice(2);
@@ -19,22 +20,19 @@ writeFileSync(`${folder}/python/pyodide-lock.json`, JSON.stringify({ ...lock, pa
 // Without the columns of each instruction the archives are a quarter smaller; tracebacks still have the lines.
 const python = await loadPyodide({ args: ["-X", "no_debug_ranges"] });
 python.FS.writeFile("/home/pyodide/archives.py", readFileSync(new URL("archives.py", import.meta.url)));
-const { pack, library } = python.pyimport("archives");
+const { pack, archive_of, library } = python.pyimport("archives");
 const own = {};
-
-function write(name, archive) {
-  const bytes = archive.toJs();
-  writeFileSync(`${folder}/python/${name}`, bytes);
-  python.FS.writeFile(`/home/pyodide/${name}`, bytes);
-}
 
 for (const [archive, files] of Object.entries(archives)) {
   const sources = Object.fromEntries(Object.entries(files).map(([name, path]) => [name, readFileSync(path, "utf-8")]));
   Object.assign(own, sources);
-  write(archive, pack(python.toPy(sources)));
-  python.runPython(`import sys; sys.path.append("/home/pyodide/${archive}")`);
+  const packed = pack(python.toPy(sources)).toJs();
+  writeFileSync(`${folder}/python/${archive}.modules`, packed);
+  python.FS.writeFile(`/${archive}.zip`, gunzipSync(packed));
+  python.runPython(`import sys; sys.path.append("/${archive}.zip")`);
 }
-write("python_stdlib.zip", pack(library(python.toPy(own))));
+// Pyodide reads this one itself.
+writeFileSync(`${folder}/python/python_stdlib.zip`, archive_of(library(python.toPy(own))).toJs());
 
 // The same way as in the page (src/site/python.worker.ts), with one request.
 const messages = [];

@@ -175,7 +175,8 @@ def test_a_part_that_the_server_gives_wrongly_is_named(address: str, browser: Br
     context = browser.new_context(locale="en-US")
     page = context.new_page()
     for file, answer, words in (
-        ("steptwin.zip", {"status": 404}, "404"),
+        ("steptwin.modules", {"status": 404}, "404"),
+        ("steptwin.modules", {"body": "wrong"}, "it did not come as it was built"),
         ("pyodide.mjs", {"content_type": "text/plain"}, "the server sends it as text/plain; it has to be text/javascript"),
     ):
         context.route(f"**/{file}", lambda route, _, answer=answer: route.fulfill(**answer))

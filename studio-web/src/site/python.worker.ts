@@ -90,18 +90,18 @@ async function start(task: Task, root: string): Promise<void> {
   during("python");
   const folder = `${root}python/`;
   const { loadPyodide } = (await import(/* @vite-ignore */ `${folder}pyodide.mjs`)) as typeof import("pyodide");
-  const archives = "twin" in task ? ["steptwin.zip"] : ["steptwin.zip", "editor.zip"];
+  const archives = "twin" in task ? ["steptwin"] : ["steptwin", "editor"];
   const [pyodide, ...files] = await Promise.all([
     loadPyodide({ indexURL: folder }) as Promise<PyodideInterface>,
-    ...archives.map((name) => bytesOf(folder + name)),
+    ...archives.map((name) => unpacked(`${folder}${name}.modules`)),
   ]);
   python = pyodide;
   during("modules");
   // Nearly all that modules make stays: to look for what does not took a tenth of the time.
   pyodide.runPython("import gc, sys; gc.disable()");
   archives.forEach((name, i) => {
-    pyodide.FS.writeFile(`/${name}`, files[i] as Uint8Array);
-    pyodide.runPython(`sys.path.append("/${name}")`);
+    pyodide.FS.writeFile(`/${name}.zip`, files[i] as Uint8Array);
+    pyodide.runPython(`sys.path.append("/${name}.zip")`);
   });
   const room = pyodide.pyimport("twin" in task ? "steptwin.inpage.host" : "steptwin.inpage.editor");
   during("world");
@@ -118,10 +118,15 @@ async function start(task: Task, root: string): Promise<void> {
   waiting = [];
 }
 
-async function bytesOf(address: string): Promise<Uint8Array> {
-  const response = await fetch(address);
-  if (!response.ok) throw new Error(`${address}: ${response.status} ${response.statusText}`);
-  return new Uint8Array(await response.arrayBuffer());
+async function unpacked(address: string): Promise<Uint8Array> {
+  const { ok, status, statusText, body } = await fetch(address);
+  if (!ok || body === null) throw new Error(`${address}: ${status} ${statusText}`);
+  const stream = body.pipeThrough(new DecompressionStream("gzip"));
+  try {
+    return new Uint8Array(await new Response(stream).arrayBuffer());
+  } catch {
+    throw new Error(`${address}: it did not come as it was built`);
+  }
 }
 
 /** What a server has to say of the files that the browser runs itself. */
