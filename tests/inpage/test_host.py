@@ -5,19 +5,30 @@ from __future__ import annotations
 import asyncio
 import json
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from textwrap import dedent
 from typing import Any
 
+import pytest
 from studio_rig import WORLD, check_message
 from virtual_loop import VirtualLoop, run_virtually
 
 from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.inpage.editor import PageEditor
 from steptwin.inpage.host import PageTwin, open_twin
+from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.studio.viewers import MOST_UNSENT
 from steptwin.subject.commands import VERSION
 
+TICKING = """
+[[script]]
+name = "ticks"
+repeat = 10000
+steps = [{ wait = "0.1 s" }, { note = "tick" }]
+[[mic488]]
+name = "table"
+"""
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
@@ -129,7 +140,10 @@ def test_a_page_that_takes_nothing_is_sent_no_more_than_may_be_unread() -> None:
     run_virtually(visit())
 
 
-def test_a_world_that_cannot_keep_up_is_delayed_and_a_stop_is_answered_between_two_slices() -> None:
+@pytest.mark.parametrize("speed", [1000, "max"])
+def test_a_world_that_cannot_keep_up_rests_between_slices_in_which_a_stop_is_answered(
+    monkeypatch: pytest.MonkeyPatch, speed: object
+) -> None:
     """To compute a second takes 20 ms here."""
 
     async def visit() -> None:
@@ -149,14 +163,50 @@ def test_a_world_that_cannot_keep_up_is_delayed_and_a_stop_is_answered_between_t
         page = Page()
         twin = make(page, slow)
         await page.enter()
-        await page.ask("resume", speed=1000)
+        await page.ask("resume", speed=speed)
+        slices: list[tuple[Nanos, Nanos]] = []
+        whole = RealTimeDriver.advance
+
+        def advance(driver: RealTimeDriver, to: Nanos) -> Nanos:
+            began = loop.now_ns
+            reached = whole(driver, to)
+            slices.append((began, loop.now_ns))
+            return reached
+
+        monkeypatch.setattr(RealTimeDriver, "advance", advance)
         begin, real = twin.hub.around.moment().time, loop.now_ns
         await asyncio.sleep(2)
         passed = twin.hub.around.moment().time - begin
         assert 20 < passed / (loop.now_ns - real) < 50
+        long = [one for one in slices if one[0] < one[1]]
+        assert len(long) > 50
+        for (_, ended), (began, _) in pairwise(long):
+            assert began - ended >= 4 * MILLISECOND
         asked = loop.now_ns
         await page.ask("stop_all")
-        assert loop.now_ns - asked < 100 * MILLISECOND
+        assert loop.now_ns - asked < 50 * MILLISECOND
+
+    run_virtually(visit())
+
+
+def test_a_long_step_has_parts_as_short_as_slices() -> None:
+    async def visit() -> None:
+        loop = asyncio.get_running_loop()
+        assert isinstance(loop, VirtualLoop)
+
+        def slow() -> Nanos:
+            loop.now_ns += MILLISECOND
+            return loop.now_ns
+
+        page = Page()
+        twin = PageTwin(page, "hall", TICKING, {}, slow)
+        page.twin = twin
+        await page.enter()
+        for _ in range(3):
+            before = loop.now_ns
+            part = await page.ask("step", to_ns=str(100 * SECOND))
+            assert part["to_ns"] == str(100 * SECOND)
+            assert loop.now_ns - before < 50 * MILLISECOND
 
     run_virtually(visit())
 

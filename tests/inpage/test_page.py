@@ -298,6 +298,21 @@ def test_a_breakpoint_stops_the_world_and_a_browser_without_room_is_named(demo: 
     expect(time_of(page)).to_contain_text("live")
 
 
+def test_a_long_step_goes_to_its_end(demo: Demo) -> None:
+    page = demo.page
+    expect(time_of(page)).to_contain_text("live", timeout=LOADING_MS)
+    button(page, "Pause time").click()
+    expect(time_of(page)).to_contain_text("paused")
+    show(page, "Time")
+    now = page.get_by_label("World time")
+    stood = float(now.inner_text())
+    page.get_by_label("Duration of a step").fill("30")
+    button(page, "Step by a duration").click()
+    expect(now).to_have_text(f"{stood + 30:.6f}")
+    page.locator("body").press("p")
+    expect(time_of(page)).to_contain_text("live")
+
+
 def until(page: Page, condition: Callable[[], bool], what: str) -> None:
     """Wait while bytes of the page pass."""
     for _ in range(1000):

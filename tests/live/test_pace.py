@@ -50,7 +50,7 @@ CLOCKLESS = """
 @pytest.fixture(autouse=True)
 def steps_have_one_part(monkeypatch: pytest.MonkeyPatch) -> None:
     """However slow this machine is now."""
-    monkeypatch.setattr(pacing, "PART_S", 3600.0)
+    monkeypatch.setattr(pacing, "PART_NS", 3600 * SECOND)
 
 
 class Rig:
@@ -218,7 +218,7 @@ def test_steps_end_at_a_time_a_condition_or_what_happens_next(run: Run) -> None:
 
 
 def test_a_long_step_is_taken_in_parts(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pacing, "PART_S", 0.0)
+    monkeypatch.setattr(pacing, "PART_NS", 0)
 
     async def scene() -> None:
         rig = Rig(feeder(), 0.0)

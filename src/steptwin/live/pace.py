@@ -9,7 +9,6 @@ import asyncio
 from collections.abc import Callable
 from math import inf
 from pathlib import Path
-from time import perf_counter
 from typing import TYPE_CHECKING
 
 from steptwin.controller import SECOND, Nanos
@@ -19,7 +18,7 @@ from steptwin.files import recording as recordings
 from steptwin.files.export import axis_views, check_target, write_trace
 from steptwin.files.loader import check_recording_target, is_recording
 from steptwin.files.textfiles import check_folder
-from steptwin.live.realtimedriver import RealTimeDriver
+from steptwin.live.realtimedriver import REST_S, RealTimeDriver
 from steptwin.messages import Message, text_of
 from steptwin.numerals import read_number
 from steptwin.simulation.logic.condition import SignalCondition
@@ -37,8 +36,8 @@ if TYPE_CHECKING:
 
 SLICE_NS: Nanos = 10 * SECOND
 """Virtual time per slice without a clock, ns, so that clients are served between slices."""
-PART_S = 0.1
-"""Longest real time of a part of a step, s; each request executes one part."""
+PART_NS: Nanos = SECOND // 10
+"""Longest real time of a part of a step, ns; each request executes one part. Where an advance is bounded, a part is, too."""
 PERMITTED_SPEEDS = Message("live.permitted-speeds", "permitted are {least:g} to {most:g}, and 'max'")
 PERMITTED_SPEEDS_AND_NONE = Message(
     "live.permitted-speeds-and-none", "permitted are 0 (paused), {least:g} to {most:g}, and 'max'"
@@ -173,7 +172,8 @@ class Pace:
         self._realtime.advance(end)
         self._realtime.clock.stop(world.now)
         if not self.is_paused and world.stopped is None:
-            self._turn = asyncio.get_running_loop().call_soon(self._run_freely)
+            rest_s = 0.0 if self._realtime.longest_ns is None else REST_S
+            self._turn = asyncio.get_running_loop().call_later(rest_s, self._run_freely)
 
     def close(self) -> None:
         if self._turn is not None:
@@ -200,7 +200,8 @@ class Pace:
         """
         live = self._live
         world = live.world
-        until = perf_counter() + PART_S
+        wall_ns = self._realtime.clock.wall_ns
+        until = wall_ns() + min(PART_NS, self._realtime.longest_ns or PART_NS)
         moves = self._is_held = False
         if live.run_control is not None:
             live.run_control.resumed()
@@ -210,7 +211,7 @@ class Pace:
                     return True
                 if live.now >= end or world.stopped is not None:
                     return False
-                if moves and (perf_counter() > until or len(subscription) >= MOST_SHOWN // 2):
+                if moves and (wall_ns() >= until or len(subscription) >= MOST_SHOWN // 2):
                     return None
                 deadlines = [end, live.deadline(), None if condition is None else condition.due(live.now)]
                 live.advance(max(live.now, min(due for due in deadlines if due is not None)))

@@ -19,6 +19,9 @@ LONGEST_DELAY_NS: Nanos = 500 * MILLISECOND
 
 
 LEAST_PART_NS, MOST_PART_NS = MILLISECOND, SECOND // 4
+REST_S = 0.004
+"""Real time between two advances that are bounded. Where something is always due at once a browser gives a worker no messages of
+its page, for seconds; 4 ms is its shortest timer."""
 
 
 class Advanceable(Protocol):
@@ -39,13 +42,15 @@ class RealTimeDriver:
     While the process does not run, virtual time stands still, so that there is no backlog; ``on_lag`` is called with the delay.
 
     ``longest_ns``: real time that an advance takes at most where nothing else can run meanwhile; virtual time that does not fit
-    into it is delayed. None: each advance ends at the present.
+    into it is delayed. Until the next one, which the timer begins, inputs come at the moment that was reached: a request would
+    wait for an advance for each thing that is read for it. None: each advance ends at the present.
     """
 
     __slots__ = (
         "_armed_for",
         "_batch",
         "_batches",
+        "_is_behind",
         "_loop",
         "_part",
         "_timer",
@@ -59,6 +64,8 @@ class RealTimeDriver:
     def __init__(self, scheduler: Advanceable, clock: Clock, longest_ns: Nanos | None = None) -> None:
         self.scheduler = scheduler
         self.longest_ns = longest_ns
+        self._is_behind = False
+        """Whether the last advance did not reach the present, and the timer will begin the next one."""
         self._part: Nanos = LEAST_PART_NS
         """Virtual time between two readings of the wall clock, in an advance that is bounded."""
         self.clock = clock
@@ -80,7 +87,7 @@ class RealTimeDriver:
     def enter(self) -> Nanos:
         """Advance the controllers to the present. Apply inputs at the moment returned, then call `leave`."""
         batch = self._batches.current
-        if batch and batch == self._batch:
+        if (batch and batch == self._batch) or self._is_behind:
             return self.scheduler.now
         self._batch = batch
         self.moments += 1
@@ -91,6 +98,8 @@ class RealTimeDriver:
         reached = self.advance(now)
         if reached < now and not self.clock.is_stopped:
             self.clock.lag(now - reached)
+            self._is_behind = True
+            self._arm_after(REST_S, reached)
         return reached
 
     def advance(self, to: Nanos) -> Nanos:
@@ -128,17 +137,23 @@ class RealTimeDriver:
     def _arm(self, due: Nanos | None) -> None:
         if due is None or self.clock.is_stopped or (self._armed_for is not None and self._armed_for <= due):
             return
+        self._arm_after(min(self.clock.wait_s(due), LONGEST_WAIT_S), due)
+
+    def _arm_after(self, wait_s: float, due: Nanos) -> None:
         if self._timer is not None:
             self._timer.cancel()
         self._armed_for = due
-        self._timer = self._loop.call_later(min(self.clock.wait_s(due), LONGEST_WAIT_S), self._wake)
+        self._timer = self._loop.call_later(wait_s, self._wake)
 
     def _wake(self) -> None:
+        self._is_behind = False
         self.enter()
-        self._timer = self._armed_for = None
-        self._arm(self.scheduler.deadline())
+        if not self._is_behind:
+            self._timer = self._armed_for = None
+            self._arm(self.scheduler.deadline())
 
     def close(self) -> None:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = self._armed_for = None
+        self._is_behind = False

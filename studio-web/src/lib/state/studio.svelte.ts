@@ -21,6 +21,7 @@ import { modelOf, type AxisModel, type ControllerModel, type Model } from "./mod
 import { levelsOf, Pins } from "./pins.svelte";
 import { Question } from "./question.svelte";
 import { severityOf, type Severity } from "./severity";
+import { wholeStep, type Stepped } from "./step";
 import { Watches, type Watch } from "./watch.svelte";
 
 export type EventKind = SubjectEvent["kind"];
@@ -72,6 +73,8 @@ export interface Notice extends Said {
 }
 
 const NOTICE_MS = 8000;
+/** A step of several parts does not go on after these. */
+const ENDS_STEPS: ReadonlySet<RequestName> = new Set(["stop", "stop_all", "pause", "resume", "restore", "go_back"]);
 
 /** What the page knows of the studio, and what it asks of it. */
 export class Studio {
@@ -122,6 +125,8 @@ export class Studio {
   private readonly subscriptions = new Set<Subscription>();
   private readonly connection: Connection;
   private noticeTimer = 0;
+  /** Counts what was wanted of time. */
+  private turns = 0;
 
   constructor(
     readonly backend: Backend,
@@ -206,7 +211,18 @@ export class Studio {
   }
 
   ask<N extends RequestName>(name: N, fields: Fields<N>, within_ms?: number): Promise<Requests[N]["answer"]> {
+    if (ENDS_STEPS.has(name)) this.turns++;
     return this.connection.request(name, fields, within_ms);
+  }
+
+  /** A step of the world, all of it unless somebody here stops the machine or turns time meanwhile. */
+  step(fields: Fields<"step">): Promise<Stepped> {
+    const turns = ++this.turns;
+    return wholeStep(
+      (part) => this.ask("step", part) as Promise<Stepped>,
+      fields,
+      () => this.turns === turns,
+    );
   }
 
   /** A request of the user: an error is shown. Gives whether it was done. */
