@@ -171,16 +171,10 @@ class Why:
 
     def _unseen(self, pins: Iterable[str], at: Nanos, after: Nanos) -> Iterator[Cause]:
         """The last changes of inputs after a moment that were too short for their filters."""
-        for owner, pin in map(self._pin, pins):
-            found = self.causes.programs.unseen(owner, pin.name, at, after)
+        for owner, _, pin in (one.partition(".") for one in pins):
+            found = self.causes.programs.unseen(owner, pin, at, after)
             if found is not None:
                 yield found
-
-    @staticmethod
-    def _pin(signal: str) -> tuple[str, Resource]:
-        """The controller of a pin, and the pin as one of its resources."""
-        owner, _, pin = signal.partition(".")
-        return owner, Resource(ResourceKind.PIN, pin)
 
     def _with_refused(self, signals: Iterable[str], at: Nanos, since: Nanos | None, first: FoundCause) -> FoundCause:
         """A cause along with the requests that would have written one of these registers since, and were refused."""
@@ -209,34 +203,34 @@ class Why:
 
     def standing(self, answer: Answer) -> Mapping[str, bool]:
         """The controllers whose programs would else have changed what an answer is about since: True for those that are held,
-        False for those that wait for something before statements that would change its output. `asking` comes first."""
+        False for those that wait for something before statements that would change its output or variable. `asking` comes
+        first."""
         text, at, log, programs = text_of_question(answer.question), answer.at, self.log, self.causes.programs
         found: dict[str, bool] = {}
         if self.names.is_script(text) or without_not(text) in log.world.controllers:
             return found
         names = self.past.names_in(text)
-        waiting = {
-            *self.past.changeable([one for one in names if self._is_output(one) or self.causes.holding.depends([one])], at)
-        }
+        waiting = {*self.past.changeable([one for one in names if self._is_set(one) or self.causes.holding.depends([one])], at)}
         for controller, wanted in self.past.changeable(names, at):
             index, since = log.last_executed(controller, at), self._since(controller, wanted, answer)
             if index < 0 or not programs.leads_to(controller, index, wanted):
                 continue
             held = programs.held(controller, at) or programs.ended(controller, index, at)
             if held is not None:
-                is_later = since is not None and (held.place.order < 0 or held.place.time > since)
+                is_later = since is None or held.place.order < 0 or held.place.time > since
                 if (is_later or wanted.kind is ResourceKind.AXIS) and self.past.tried(controller, wanted, at) is None:
                     found[controller] = True
-            elif wanted.kind is ResourceKind.PIN and (controller, wanted) in waiting and since is not None:
+            elif (controller, wanted) in waiting and wanted.kind is (ResourceKind.VALUE if since is None else ResourceKind.PIN):
                 use, begun = programs.use(controller, index), log.executed[controller][index].time
-                if use.waits and use.reads and since <= begun < at - log.world.programs[controller].statement_time:
+                if use.waits and use.reads and (since or 0) <= begun < at - log.world.programs[controller].statement_time:
                     found.setdefault(controller, False)
         return found
 
-    def _is_output(self, name: str) -> bool:
-        """Whether it is an output that a program sets."""
+    def _is_set(self, name: str) -> bool:
+        """Whether it is an output that a program sets, or a variable."""
         owner, _, pin = name.partition(".")
-        return owner in self.world.programs and pin in self.past.pins(name) and self.causes.programs.may_write(owner, pin)
+        is_output = owner in self.world.programs and pin in self.past.pins(name) and self.causes.programs.may_write(owner, pin)
+        return is_output or self.names.variable(name) is not None
 
     def _since(self, controller: str, wanted: Resource, answer: Answer) -> Nanos | None:
         """Since when an answer is so, or an output that what it is about follows later."""
