@@ -526,7 +526,8 @@ class ProgramCauses:
         return there.programs._seen(controller, pin, later, LAST, lasts)
 
     def unseen(self, controller: str, pin: str, time: Nanos, after: Nanos = -1) -> FoundCause:
-        """The last change of an input by a moment, after another one, that its filter has not let in, as it was too short."""
+        """The last change of an input by a moment, after another one, that its filter has not let in; of one that bounced the
+        longest level."""
         signal, lasts, later = f"{controller}.{pin}", self._filter(controller, pin), time
         level: float | None = None  # that its filter let in last
         short: list[tuple[Change, Nanos]] = []
@@ -540,7 +541,8 @@ class ProgramCauses:
                 break
         if level is None and short and self._log.reaches_begin():
             level = self._log.first_levels.get(signal, 0.0) if later - self._log.begin >= lasts else 0.0
-        found = next((one for one in short if level is not None and one[0].value != level), None)
+        others = [one for one in short if level is not None and one[0].value != level]
+        found = max(others, key=lambda one: one[1], default=None)
         if found is None:
             return None
         how = TOO_SHORT(lasts=found[1] / MILLISECOND, ms=lasts / MILLISECOND)

@@ -24,6 +24,7 @@ from steptwin.why.roots import Act
 
 HAS_ACTED_SINCE = Message("why.has-acted-since", ", on which {name} has acted since")
 IS_WIRED_TO = Message("why.is-wired-to", ", which is wired to {pin}")
+NOT_FED_SINCE = Message("why.not-fed-since", ", and {name} was not fed since")
 MOST_EVENTS = 1000
 """Limit of the events at a belt that are searched for workpieces on it."""
 COMES, HELD = ("on", "crooked", "on the floor"), "held"
@@ -203,18 +204,14 @@ class WorkpieceCauses:
         last, change = self._log.last_change(signal, at), Change(at, 0.0, -1, 0, LAST)
         contact, seen = self._all.contacts.get(signal), self._log.meetings.seen
         is_seen = last is not None and bool(last.value) is not (contact is not None and contact.normally_closed)
+        belt, found = signal.partition(".")[0], iter(())
         if last is not None and is_seen:
-            found = [self.rests(one, change) for one in seen.get((signal, last.time), ()) if one in self._log.events]
+            found = (self.rests(one, change) for one in seen.get((signal, last.time), ()) if one in self._log.events)
+        elif isinstance(contact, Sensor) and contact.of_marks:
+            found = iter([self._stopped(belt, change)])
         elif isinstance(contact, Sensor):
-            found = self._lacking(
-                signal.partition(".")[0],
-                contact.at_mm,
-                {one for key in seen if key[0] == signal for one in seen[key]},
-                change,
-                since,
-            )
-        else:
-            found = []
+            passed = {one for key in seen if key[0] == signal for one in seen[key]}
+            found = self._lacking(belt, contact.at_mm, passed, change, since)
         yield from (one for one in found if one is not None)
 
     def _lacking(self, belt: str, place: float, seen: Collection[str], change: Change, since: Nanos) -> Iterator[FoundCause]:
@@ -224,7 +221,8 @@ class WorkpieceCauses:
         if stopped is not None:
             yield stopped
             return
-        names = dict.fromkeys(self._workpiece(one) for one in islice(self._log.events_before(belt, change), MOST_EVENTS))
+        events = list(islice(self._log.events_before(belt, change), MOST_EVENTS))
+        names = dict.fromkeys(self._workpiece(one) for one in events)
         lasts = [last for one in names if one not in seen and (last := next(self._log.events_before(one, change), None))]
         here = [one for one in lasts if belt in self._named(one) and self._what(one) not in ("leaves", FALLS, HELD)]
         here = [one for one in here if not self._removed(one, change)]
@@ -233,7 +231,8 @@ class WorkpieceCauses:
             yield self.rests(self._workpiece(max(held, key=self._place)), change)
         if here:
             return
-        if self._log.meetings.there[belt] - names.keys():  # what became of them is not known
+        came = {self._workpiece(one) for one in events if self._what(one) in COMES}
+        if self._log.meetings.there[belt] - came:  # where they have been is not known
             self._log.lack()
             return
         gone = [one for one in lasts if one.time > since and self._what(one) != "leaves"]
@@ -245,7 +244,7 @@ class WorkpieceCauses:
             yield covered(self.event(max(gone, key=lambda one: (one.time, one.order))), Cover.LEVEL)
         else:
             feed = list(self._all.sources(PinName(belt, FEED)))
-            yield covered(self._all.last(feed, change.time) if feed else None, Cover.LEVEL)
+            yield covered(self._all.last(feed, change.time, NOT_FED_SINCE(name=belt)) if feed else None, Cover.LEVEL)
             for name, spec in self._all.specs.items():
                 if getattr(spec, "next", None) == belt:
                     yield from self._lacking(name, math.inf, seen, change, since)

@@ -27,7 +27,7 @@ class SensorSpec(ContactSpec):
 class Sensor(Contact):
     """On while a workpiece, or a mark on one, covers its place."""
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_at", "_belt", "_of_marks", "_seen", "at_mm")
+    FIXED: ClassVar[tuple[str, ...]] = ("_at", "_belt", "_seen", "at_mm", "of_marks")
     __slots__ = (*FIXED,)
 
     def __init__(self, circuit: Circuit, belt: Belt, spec: SensorSpec, chance: Chance, channel: str) -> None:
@@ -42,7 +42,7 @@ class Sensor(Contact):
         self._belt = belt
         self.at_mm = spec.at
         self._at = belt.to_grid(spec.at)
-        self._of_marks = spec.sees == MARK
+        self.of_marks = spec.sees == MARK
         self._seen: object = None
         self.rest_at(self.normally_closed)
 
@@ -54,10 +54,10 @@ class Sensor(Contact):
             return
         self._seen = version
         self.change((self._occupant(now) != "") is not self.normally_closed, now)
-        self._due = belt.next_change(self._at, now, of_marks=self._of_marks)
+        self._due = belt.next_change(self._at, now, of_marks=self.of_marks)
 
     def _occupant(self, now: Nanos) -> str:
-        found = self._belt.occupant(self._at, self._at, now, of_marks=self._of_marks)
+        found = self._belt.occupant(self._at, self._at, now, of_marks=self.of_marks)
         return "" if found is None else found[1].workpiece.name
 
     def by(self, now: Nanos) -> str:
