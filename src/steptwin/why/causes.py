@@ -112,22 +112,18 @@ class Causes:
         """A signal is at a place as it has been from the beginning, along with the contacts that keep it so."""
         time, order, number = place
         link = ChainLink(time, signal.partition(".")[0], self.state(signal, time))
-        return Cause(link, place, *self._kept(signal, Place(time, order, number - 1)))
+        return Cause(link, place, nothing, besides=partial(self._kept, signal, Place(time, order, number - 1)))
 
-    def _kept(self, signal: str, place: Place) -> tuple[Callable[[], FoundCause], None, Callable[[], Iterator[Cause]]]:
-        """Search for the contacts from the beginning that keep a signal as it has been from the beginning."""
-        names = [name for name in self.holding.leaves(signal, place.time) if name in self.contacts and name != signal]
-        names = [name for name in names if self.log.since(name, place.time) is None]
-
-        def besides() -> Iterator[Cause]:
-            for name in names:
+    def _kept(self, signal: str, place: Place) -> Iterator[Cause]:
+        """The contacts from the beginning that keep a signal as it has been from the beginning; of a switch of an axis what has
+        left that where it is."""
+        for name in self.holding.leaves(signal, place.time):
+            if name in self.contacts and name != signal and self.log.since(name, place.time) is None:
                 yield self.unchanged(name, place)
-            owner = signal.partition(".")[0]
-            found = self.axes.moved(owner, place.time, place.order) if owner in self._world.axes else None
-            if found is not None:
-                yield from (one._replace(cover=one.cover or Cover.LEVEL) for one in (found, *found.along))
-
-        return nothing, None, besides
+        owner = signal.partition(".")[0]
+        found = self.axes.moved(owner, place.time, place.order) if owner in self._world.axes else None
+        if found is not None:
+            yield from (one._replace(cover=one.cover or Cover.LEVEL) for one in (found, *found.along))
 
     def undriven(self, signal: str) -> MessageText | None:
         """Reason why a signal that has not changed cannot change by itself; None where it can."""
@@ -156,7 +152,11 @@ class Causes:
         value, place = self.log.level(signal, self.log.begin), place or Place(known.known_from)
         text = IS_SINCE(signal=signal, value=value, since=since_before(known.known_from), how=self._as_it_is(signal, how))
         link, by = ChainLink(place.time, signal.partition(".")[0], text), place._replace(number=place.number - 1)
-        return Cause(link, place, *self._kept(signal, by)) if known == NEVER else Cause(link, place, unknown)
+        return (
+            Cause(link, place, nothing, besides=partial(self._kept, signal, by))
+            if known == NEVER
+            else Cause(link, place, unknown)
+        )
 
     def last(self, signals: Sequence[str], until: Nanos, how: MessageText | None = None, before: int = LAST) -> FoundCause:
         """The last change among signals by a moment, before an order."""
@@ -223,7 +223,7 @@ class Causes:
 
     def of_fault(self, record: TraceRecord, order: int) -> Callable[[], FoundCause]:
         """Search for the action that set or cleared a fault, unless it belongs to the description."""
-        act = self.log.fault_act(record.subject, record.time, order)
+        act = self.log.fault_act(record.subject, record.time, order) or self.fault_root(record.subject, record.time).by
         return nothing if act is None else lambda: covered(acted(act), Cover.FAULT)
 
     def lasting(self, signals: Sequence[str], at: Nanos, first: FoundCause, before: int = LAST) -> FoundCause:

@@ -539,6 +539,13 @@ class ProgramCauses:
                 level = change.value
             if length >= lasts and (short or change.time <= after):
                 break
+        else:
+            if lasts and later == time and self._log.begin > max(after, 0):
+                since = self._log.before(signal).since
+                there = None if since is None or since <= after else self._all.of(since)
+                return None if there is None or there is self._all else there.programs.unseen(controller, pin, time, after)
+            if later - self._log.begin < lasts:
+                self._log.lack()  # what was short may have begun before
         if level is None and short and self._log.reaches_begin():
             level = self._log.first_levels.get(signal, 0.0) if later - self._log.begin >= lasts else 0.0
         others = [one for one in short if level is not None and one[0].value != level]

@@ -201,12 +201,13 @@ class WorkpieceCauses:
     def keeping(self, signal: str, at: Nanos, since: Nanos) -> Iterator[Cause]:
         """The reason why a beam or the sensor of a belt goes on seeing a workpiece at a moment, or none, as it has since another
         one: that stands, or none comes."""
-        last, change = self._log.last_change(signal, at), Change(at, 0.0, -1, 0, LAST)
+        changed, change = self._log.since(signal, at), Change(at, 0.0, -1, 0, LAST)
         contact, seen = self._all.contacts.get(signal), self._log.meetings.seen
-        is_seen = last is not None and bool(last.value) is not (contact is not None and contact.normally_closed)
         belt, found = signal.partition(".")[0], iter(())
-        if last is not None and is_seen:
-            found = (self.rests(one, change) for one in seen.get((signal, last.time), ()) if one in self._log.events)
+        if bool(self._log.level(signal, at)) is not (contact is not None and contact.normally_closed):
+            there = None if changed is None else self._all.of(changed)
+            names = () if there is None else there.log.meetings.seen.get((signal, changed), ())
+            found = (self.rests(one, change) for one in names if "." in one)  # a workpiece
         elif isinstance(contact, Sensor) and contact.of_marks:
             found = iter([self._stopped(belt, change)])
         elif isinstance(contact, Sensor):
@@ -226,14 +227,14 @@ class WorkpieceCauses:
         lasts = [last for one in names if one not in seen and (last := next(self._log.events_before(one, change), None))]
         here = [one for one in lasts if belt in self._named(one) and self._what(one) not in ("leaves", FALLS, HELD)]
         here = [one for one in here if not self._removed(one, change)]
+        came = {self._workpiece(one) for one in events if self._what(one) in COMES}
+        if self._log.meetings.there[belt] - came:  # where they have been is not known
+            self._log.lack()
+            return
         held = [one for one in here if self._what(one) == STANDS and self._place(one) < place]
         if held:
             yield self.rests(self._workpiece(max(held, key=self._place)), change)
         if here:
-            return
-        came = {self._workpiece(one) for one in events if self._what(one) in COMES}
-        if self._log.meetings.there[belt] - came:  # where they have been is not known
-            self._log.lack()
             return
         gone = [one for one in lasts if one.time > since and self._what(one) != "leaves"]
         gone = [one for one in gone if belt in self._places(self._workpiece(one), one)]
