@@ -37,7 +37,7 @@ export function pictureOf(
   width: number,
   title: string | null = null,
 ): string {
-  const frame = pageOf(view, stage.extent);
+  const frame = pageOf(view, stage.extents);
   const pixel = Math.max(frame[2], frame[3]) / width;
   const colour = (property: string) => palette.get(property) ?? "#000000";
   const [paper, line] = [colour("--paper"), mixed(colour("--ink"), 0.55, colour("--paper"))];

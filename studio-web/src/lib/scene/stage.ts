@@ -52,8 +52,8 @@ export class Stage {
   /** Ends of the least upright box about each solid: x, y, z. */
   lows = new Float64Array();
   highs = new Float64Array();
-  /** Of all, wherever they may be. */
-  readonly extent: Extent;
+  /** Of each solid, wherever it may be. */
+  readonly extents: readonly Extent[];
   /** Frames of what works on workpieces, or of the outermost axes. */
   readonly tips: readonly number[];
   /** Lines, by the numbers of their solids. */
@@ -91,7 +91,7 @@ export class Stage {
       ),
     );
     this.take(pieces);
-    this.extent = this.widest(rangesOf(scene, model));
+    this.extents = this.widest(rangesOf(scene, model));
     this.poses.values.fill(NaN);
     this.update();
   }
@@ -221,22 +221,33 @@ export class Stage {
     }
   }
 
-  private widest(ranges: ReadonlyMap<string, readonly [number, number]>): Extent {
-    const STEPS = 4;
-    const low = [Infinity, Infinity, Infinity];
-    const high = [-Infinity, -Infinity, -Infinity];
+  /** The least box about all of them. */
+  get extent(): Extent {
+    const ends = (choose: typeof Math.min, of: keyof Extent) =>
+      [0, 1, 2].map((k) => choose(...this.extents.map((one) => one[of][k] as number))) as unknown as Vector;
+    return { low: ends(Math.min, "low"), high: ends(Math.max, "high") };
+  }
+
+  private widest(ranges: ReadonlyMap<string, readonly [number, number]>): Extent[] {
+    // Of what turns each eighth of a turn is seen.
+    const STEPS = 8;
+    const lows = new Float64Array(this.lows.length).fill(Infinity);
+    const highs = new Float64Array(this.highs.length).fill(-Infinity);
     for (let step = 0; step <= STEPS; step++) {
       this.poses.signals.forEach((signal, k) => {
         const [from, to] = ranges.get(signal) ?? [0, 1];
         this.poses.values[k] = from + ((to - from) * step) / STEPS;
       });
       this.update();
-      for (let k = 0; k < this.lows.length; k++) {
+      for (let k = 0; k < lows.length; k++) {
         if (!this.isThere[Math.floor(k / 3)]) continue;
-        low[k % 3] = Math.min(low[k % 3] as number, this.lows[k] as number);
-        high[k % 3] = Math.max(high[k % 3] as number, this.highs[k] as number);
+        lows[k] = Math.min(lows[k] as number, this.lows[k] as number);
+        highs[k] = Math.max(highs[k] as number, this.highs[k] as number);
       }
     }
-    return { low: low as unknown as Vector, high: high as unknown as Vector };
+    const part = (all: Float64Array, n: number) => Array.from(all.subarray(3 * n, 3 * n + 3)) as unknown as Vector;
+    return this.solids
+      .map((_, n) => ({ low: part(lows, n), high: part(highs, n) }))
+      .filter(({ low, high }) => low[0] <= high[0]);
   }
 }

@@ -62,7 +62,20 @@ test("what turns is drawn turned, and stands where its carrier has it", () => {
   const [solid] = stage.solids;
   if (solid === undefined) throw new Error("no solid");
   expect(facesOf(solid, places, 0, VIEWS.top)).toEqual({ front: "", side: "", top: "M-5.00 -10.00L-5.00 10.00L5.00 10.00L5.00 -10.00Z" }); // prettier-ignore
-  expect(frameOf(VIEWS.top, stage.extent)[2]).toBeGreaterThan(200);
+  expect(frameOf(VIEWS.top, stage.extents)[2]).toBeGreaterThan(200);
+});
+
+test("a picture has room for what is in it, and not for the corners of a box about all", () => {
+  const { extents, extent } = stageOf([
+    ["bed", [0, 0, 0], [1000, 400, 20]],
+    ["post", [400, -150, 20], [30, 30, 300]],
+  ]);
+  for (const view of ["front", "side", "top"] as const)
+    expect(frameOf(VIEWS[view], extents)).toEqual(frameOf(VIEWS[view], [extent]));
+  const [, , wide, tall] = frameOf(VIEWS.oblique, extents);
+  const [, , widest, tallest] = frameOf(VIEWS.oblique, [extent]);
+  expect(wide).toBeCloseTo(widest);
+  expect(tall).toBeLessThan(0.8 * tallest);
 });
 
 test("the end of a cylinder that is seen fills its outline, whichever way it lies", () => {

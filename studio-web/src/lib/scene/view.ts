@@ -1,4 +1,4 @@
-import { dot, type Vector } from "./builder";
+import { dot, plus, times, type Vector } from "./builder";
 import { PLACE } from "./poses";
 import type { Extent, Stage } from "./stage";
 
@@ -24,21 +24,27 @@ export const VIEWS = {
 } as const satisfies Record<string, View>;
 export type ViewName = keyof typeof VIEWS;
 
-/** Left, upper edge, width and height of a picture of it, y downwards. */
-export function frameOf({ right, up }: View, { low, high }: Extent): [number, number, number, number] {
-  const middle: Vector = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2];
-  const half: Vector = [(high[0] - low[0]) / 2, (high[1] - low[1]) / 2, (high[2] - low[2]) / 2];
-  const reach = (direction: Vector) => dot(direction.map(Math.abs) as unknown as Vector, half);
-  const [wide, tall] = [reach(right), reach(up)];
-  return [dot(right, middle) - wide, -dot(up, middle) - tall, 2 * wide, 2 * tall];
+/** Left, upper edge, width and height of a picture of them, y downwards. */
+export function frameOf({ right, up }: View, extents: readonly Extent[]): [number, number, number, number] {
+  const span = (direction: Vector): [number, number] => {
+    const ends = extents.flatMap(({ low, high }) => {
+      const middle = dot(direction, times(plus(low, high), 0.5));
+      const half = dot(direction.map(Math.abs) as unknown as Vector, times(plus(high, times(low, -1)), 0.5));
+      return [middle - half, middle + half];
+    });
+    return [Math.min(...ends), Math.max(...ends)];
+  };
+  const [left, right_end] = span(right);
+  const [bottom, top] = span(up);
+  return [left, -top, right_end - left, top - bottom];
 }
 
 /** As a share of the longer side. */
 const ROOM = 0.06;
 
 /** As `frameOf`, with room around what is in it. */
-export function pageOf(view: View, extent: Extent): [number, number, number, number] {
-  const [left, top, wide, tall] = frameOf(view, extent);
+export function pageOf(view: View, extents: readonly Extent[]): [number, number, number, number] {
+  const [left, top, wide, tall] = frameOf(view, extents);
   const room = ROOM * Math.max(wide, tall);
   return [left - room, top - room, wide + 2 * room, tall + 2 * room];
 }

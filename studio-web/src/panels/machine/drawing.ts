@@ -73,7 +73,7 @@ export class Drawing {
     private readonly view: View,
   ) {
     svg.replaceChildren();
-    this.frame = pageOf(view, stage.extent);
+    this.frame = pageOf(view, stage.extents);
     svg.setAttribute("viewBox", this.frame.join(" "));
     this.all = create("g", svg);
     this.all.transform.baseVal.appendItem(this.scaled(1 / UM_PER_MM));

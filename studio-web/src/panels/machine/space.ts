@@ -109,9 +109,9 @@ export class Space {
   look(view: ViewName): void {
     this.view = view;
     const { right, up, near } = VIEWS[view];
-    const [, , wide, tall] = frameOf({ right, up, near }, this.stage.extent);
+    const [, , wide, tall] = frameOf({ right, up, near }, [this.stage.extent]);
     const half = Math.tan((ANGLE * Math.PI) / 360);
-    const [, , , deep] = frameOf({ right, up: near, near: up }, this.stage.extent);
+    const [, , , deep] = frameOf({ right, up: near, near: up }, [this.stage.extent]);
     const far = (0.5 * Math.max(tall, wide / this.camera.aspect)) / half + deep / 2;
     this.controls.target.copy(this.middle);
     // Who looks straight down would have no direction that is up.
