@@ -20,8 +20,8 @@ LONGEST_DELAY_NS: Nanos = 500 * MILLISECOND
 
 LEAST_PART_NS, MOST_PART_NS = MILLISECOND, SECOND // 4
 REST_S = 0.004
-"""Real time between two advances that are bounded. Where something is always due at once a browser gives a worker no messages of
-its page, for seconds; 4 ms is its shortest timer."""
+"""Real time after an advance that is bounded and took long. Where something is always due at once a browser gives a worker no
+messages of its page, for seconds; 4 ms is its shortest timer."""
 
 
 class Advanceable(Protocol):
@@ -42,17 +42,17 @@ class RealTimeDriver:
     While the process does not run, virtual time stands still, so that there is no backlog; ``on_lag`` is called with the delay.
 
     ``longest_ns``: real time that an advance takes at most where nothing else can run meanwhile; virtual time that does not fit
-    into it is delayed. Until the next one, which the timer begins, inputs come at the moment that was reached: a request would
-    wait for an advance for each thing that is read for it. None: each advance ends at the present.
+    into it is delayed. After an advance that took long inputs come at the moment that was reached, until the timer begins the
+    next one: a request would wait for an advance for each thing that is read for it. None: each advance ends at the present.
     """
 
     __slots__ = (
         "_armed_for",
         "_batch",
         "_batches",
-        "_is_behind",
         "_loop",
         "_part",
+        "_rests",
         "_timer",
         "clock",
         "longest_ns",
@@ -64,8 +64,8 @@ class RealTimeDriver:
     def __init__(self, scheduler: Advanceable, clock: Clock, longest_ns: Nanos | None = None) -> None:
         self.scheduler = scheduler
         self.longest_ns = longest_ns
-        self._is_behind = False
-        """Whether the last advance did not reach the present, and the timer will begin the next one."""
+        self._rests = False
+        """Whether the last advance took long, and the timer will begin the next one."""
         self._part: Nanos = LEAST_PART_NS
         """Virtual time between two readings of the wall clock, in an advance that is bounded."""
         self.clock = clock
@@ -87,7 +87,7 @@ class RealTimeDriver:
     def enter(self) -> Nanos:
         """Advance the controllers to the present. Apply inputs at the moment returned, then call `leave`."""
         batch = self._batches.current
-        if (batch and batch == self._batch) or self._is_behind:
+        if (batch and batch == self._batch) or self._rests:
             return self.scheduler.now
         self._batch = batch
         self.moments += 1
@@ -95,11 +95,13 @@ class RealTimeDriver:
         due = self._armed_for
         if due is not None and now - due > LONGEST_DELAY_NS * self.clock.speed:
             now = self._held_up(due, now)
+        began = 0 if self.longest_ns is None else self.clock.wall_ns()
         reached = self.advance(now)
-        if reached < now and not self.clock.is_stopped:
+        if self.longest_ns is not None and not self.clock.is_stopped:
             self.clock.lag(now - reached)
-            self._is_behind = True
-            self._arm_after(REST_S, reached)
+            self._rests = reached < now or self.clock.wall_ns() - began > self.longest_ns // 4
+            if self._rests:
+                self._arm_after(REST_S, reached)
         return reached
 
     def advance(self, to: Nanos) -> Nanos:
@@ -146,9 +148,9 @@ class RealTimeDriver:
         self._timer = self._loop.call_later(wait_s, self._wake)
 
     def _wake(self) -> None:
-        self._is_behind = False
+        self._rests = False
         self.enter()
-        if not self._is_behind:
+        if not self._rests:
             self._timer = self._armed_for = None
             self._arm(self.scheduler.deadline())
 
@@ -156,4 +158,4 @@ class RealTimeDriver:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = self._armed_for = None
-        self._is_behind = False
+        self._rests = False
