@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 import functools
 import gzip
-import json
 import os
 import shutil
 import statistics
@@ -78,6 +77,7 @@ window.Talk = class {
     const from = performance.now();
     return new Promise((done) => {
       this.asked.set(id, { from, done });
+      setTimeout(() => done([20000, { error: { code: "timeout", message: "no answer in 20 s" } }]), 20000);
       this.worker.postMessage({ send: JSON.stringify({ do: name, ...fields, id }), on: this.on });
     });
   }
@@ -253,15 +253,19 @@ def speed(page: Page) -> None:
 
 
 def stops(page: Page) -> None:
-    """How long a stop takes to be answered, at each speed and while each long request is answered."""
-
-    def report(what: str, found: list[float]) -> None:
-        print(f"stop, {what}: median {statistics.median(found):.0f} ms, most {max(found):.0f} ms (goal 100)")
-
+    """How long a stop takes to be answered at each speed."""
     for wanted in SPEEDS:
         ask(page, "resume", speed=wanted)
         page.wait_for_timeout(1000)
         report(f"speed {wanted}", page.evaluate("(count) => stops(count, null)", STOPS))
+
+
+def report(what: str, found: list[float]) -> None:
+    print(f"stop, {what}: median {statistics.median(found):.0f} ms, most {max(found):.0f} ms (goal 100)")
+
+
+def requests(page: Page) -> None:
+    """How long it takes while each long request is answered."""
     ask(page, "resume", speed=20)
     page.wait_for_timeout(5000)
     now = virtual_s(page)
@@ -272,7 +276,7 @@ def stops(page: Page) -> None:
     text = page.evaluate("fetch('world/demo.prg').then((one) => one.text())")
     long = {
         "why": {"question": "table.M1.position"},
-        "past_events": {"from_ns": ns(max(now - 60, 0)), "to_ns": ns(now)},
+        "past_events": {"from_ns": ns(max(now - 59, 0)), "to_ns": ns(now)},
         "show_moment": {"to_ns": ns(now / 2)},
         "describe": {},
         "resync": {},
@@ -289,7 +293,7 @@ def stops(page: Page) -> None:
             ask(page, name)
         ask(page, "resume", speed=20)
         found = page.evaluate("([count, before]) => stops(count, before)", [STOPS // 3, {"name": name, "fields": fields}])
-        report(f"during {name} (alone {took:.0f} ms{f', refused: {refused}' if refused else ''})", found)
+        report(f"during {name} (alone {took:.0f} ms{f', {refused}' if refused else ''})", found)
         ask(page, "show_moment")
     ask(page, "resume", speed=1)
 
@@ -312,67 +316,34 @@ def diagnostics(page: Page) -> None:
     )
 
 
-class Memory:
-    """Bytes of WebAssembly and of JavaScript, of the page and its first worker with Python."""
-
-    def __init__(self, page: Page) -> None:
-        self._page = page
-        self._session = page.context.new_cdp_session(page)
-        self._answers: dict[int, Any] = {}
-        self._worker = ""
-        self._next = 1
-        self._session.on("Target.attachedToTarget", self._attached)
-        self._session.on("Target.receivedMessageFromTarget", self._received)
-        self._session.send("Target.setAutoAttach", {"autoAttach": True, "waitForDebuggerOnStart": False, "flatten": False})
-        while not self._worker:
-            page.wait_for_timeout(50)
-
-    def _attached(self, event: dict[str, Any]) -> None:
-        if "python.worker" in event["targetInfo"]["url"] and not self._worker:
-            self._worker = event["sessionId"]
-
-    def _received(self, event: dict[str, Any]) -> None:
-        message = json.loads(event["message"])
-        if "id" in message:
-            self._answers[message["id"]] = message.get("result", message)
-
-    def _of_worker(self, method: str, **params: object) -> Any:
-        number, self._next = self._next, self._next + 1
-        message = json.dumps({"id": number, "method": method, "params": params})
-        self._session.send("Target.sendMessageToTarget", {"sessionId": self._worker, "message": message})
-        while number not in self._answers:
-            self._page.wait_for_timeout(20)
-        return self._answers.pop(number)
-
-    def read(self) -> tuple[int, int, int]:
-        """WebAssembly, JavaScript of the worker, JavaScript of the page."""
-        prototype = self._of_worker("Runtime.evaluate", expression="WebAssembly.Memory.prototype")["result"]["objectId"]
-        found = self._of_worker("Runtime.queryObjects", prototypeObjectId=prototype)["objects"]["objectId"]
-        code = "function () { return this.reduce((sum, one) => sum + one.buffer.byteLength, 0); }"
-        wasm = self._of_worker("Runtime.callFunctionOn", functionDeclaration=code, objectId=found, returnByValue=True)
-        for objects in (prototype, found):
-            self._of_worker("Runtime.releaseObject", objectId=objects)
-        self._of_worker("HeapProfiler.collectGarbage")
-        of_worker = self._of_worker("Runtime.getHeapUsage")["usedSize"]
-        self._session.send("HeapProfiler.collectGarbage")
-        of_page = self._session.send("Runtime.getHeapUsage")["usedSize"]
-        return wasm["result"]["value"], int(of_worker), int(of_page)
+COUNT = """() => {
+  const grow = WebAssembly.Memory.prototype.grow;
+  self.grown = 0;
+  WebAssembly.Memory.prototype.grow = function (pages) {
+    self.grown += pages;
+    return grow.call(this, pages);
+  };
+}"""
+"""Pages by which WebAssembly grows, of 64 KiB."""
 
 
 def memory(page: Page, minutes: float) -> None:
-    reader = Memory(page)
+    (worker,) = [one for one in page.workers if "python" in one.url]
+    worker.evaluate(COUNT)
+    session = page.context.new_cdp_session(page)
     ask(page, "resume", speed=20)
     began, begin = time.monotonic(), virtual_s(page)
-    found: list[tuple[float, tuple[int, int, int]]] = []
+    found: list[tuple[int, int]] = []
     while (passed := time.monotonic() - began) < minutes * 60:
-        found.append((passed, reader.read()))
+        if passed >= minutes * 60 * FROM:
+            session.send("HeapProfiler.collectGarbage")
+            found.append((worker.evaluate("self.grown"), session.send("Runtime.getHeapUsage")["usedSize"]))
         page.wait_for_timeout(min(SAMPLE_S, minutes * 60 / 6) * 1000)
     rate = (virtual_s(page) - begin) / (time.monotonic() - began)
-    counted = [one for passed, one in found if passed >= minutes * 60 * FROM]
-    print(f"memory in {minutes:g} minutes at {rate:.1f} × real time, from minute {minutes * FROM:.1f} on (goal + 2 %); {load()}")
-    for place, name in enumerate(("WebAssembly", "JavaScript of the worker", "JavaScript of the page")):
-        first, most = counted[0][place], max(one[place] for one in counted)
-        print(f"  {name}: {first / MB:.2f} MB, most {most / MB:.2f} MB, {100 * (most - first) / first:+.2f} %")
+    (pages, heap), most = found[0], max(size for _, size in found)
+    print(f"memory in {minutes:g} minutes at {rate:.1f} × real time, from minute {minutes * FROM:.1f} on; {load()}")
+    print(f"  WebAssembly: {found[-1][0] - pages} pages more, {pages} before")
+    print(f"  JavaScript of the page: {heap / MB:.2f} MB, most {most / MB:.2f} MB, {100 * (most - heap) / heap:+.2f} % (goal 2)")
 
 
 def main(minutes: float = 0.5) -> None:
@@ -383,8 +354,9 @@ def main(minutes: float = 0.5) -> None:
         with tempfile.TemporaryDirectory() as profile, browser(playwright, profile) as context:
             page = open_twin(context, address)
             speed(page)
-            stops(page)
+            requests(page)  # before the past is long
             diagnostics(page)
+            stops(page)
         with tempfile.TemporaryDirectory() as profile, browser(playwright, profile) as context:
             memory(open_twin(context, address), minutes)
 
