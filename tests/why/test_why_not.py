@@ -69,7 +69,7 @@ def lacks(condition: str, at: float) -> Sequence[str]:
             1.0,
             ["c.OUT3 is 0 from the beginning", BEFORE, "c.OUT4 is 0 from the beginning", ALONE.format("2.502000")],
         ),
-        ("go", 1.0, ["go is 0 from the beginning, which nobody has pressed"]),
+        ("go", 1.0, ["go is 0 from the beginning, not pressed until then"]),
     ],
 )
 def test_what_is_lacking(condition: str, at: float, links: list[str]) -> None:

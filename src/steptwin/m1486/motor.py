@@ -93,6 +93,11 @@ class MotorControl(Stateful):
             self._started("moves", text, now, ("direction", 1 if drive.distance_u > 0 else -1), ("distance", drive.distance_u))
         return True
 
+    @property
+    def sought(self) -> int | None:
+        """The line whose level ends the present motion; None if that is no seek."""
+        return self._seek_line if self.drive.motion is MotionMode.SEEK else None
+
     def seek(self, line: int, direction: int, now: Nanos) -> bool:
         """A seek; it ends at once if the line already has its end level. False as for `move`."""
         chip = self._chip

@@ -35,13 +35,15 @@ IS_SINCE = Message("why.is-since", "{signal} is {value:g} {since}{how}")
 IS_HELD = Message("why.is-held", "{signal} is {held} since {time:.6f} s")
 SINCE = Message("why.since", "since {time:.6f} s")
 DRIVEN_BY = Message("why.driven-by", ", driven by {names}")
+OVER_INVERTED_WIRE = Message("why.over-inverted-wire", "{driven} over an inverted wire")
+IS_WIRED_INVERTED = Message("why.is-wired-inverted", ", which is wired to {pin} and inverted there")
 AND = Message("why.and", "{one} and {other}")
 IS = Message("why.is", "{signal} is {value}")
 FAULT = Message("why.fault", "fault {name}: {what}")
 NOTHING_IS_WIRED = Message("why.nothing-is-wired", ", to which nothing is wired")
 NO_STATEMENT_SETS = Message("why.no-statement-sets", ", which no statement of its program sets")
 NOTHING_HAS_SET = Message("why.nothing-has-set", ", which nothing has set")
-NOBODY_PRESSED = Message("why.nobody-pressed", ", which nobody has pressed")
+NOBODY_PRESSED = Message("why.nobody-pressed", ", not pressed until then")
 CONTACT_OF = Message("why.contact-of", ", a contact of {pin}")
 OF = Message("why.of", " of {pin}")
 NORMALLY_CLOSED = Message("why.normally-closed", ", a normally closed contact{how}")
@@ -102,11 +104,21 @@ class Causes:
         if hold is not None and hold.held is not None:
             return IS_HELD(signal=signal, held=hold.held.description(), time=hold.time / SECOND)
         when = since_before(self.log.before(signal).known_from) if since is None else SINCE(time=since / SECOND)
-        driven = DRIVEN_BY(names=reduce(lambda one, other: AND(one=one, other=other), drivers)) if drivers else ""
-        if since is None and not drivers:
+        driven: MessageText | str = ""
+        if drivers:
+            driven = DRIVEN_BY(names=reduce(lambda one, other: AND(one=one, other=other), drivers))
+            driven = OVER_INVERTED_WIRE(driven=driven) if self._is_inverted_wire(signal) else driven
+        elif since is None:
             driven = self.undriven(signal) or ""
         how = self._as_it_is(signal, driven)
         return IS_SINCE(signal=signal, value=self.log.level(signal, at), since=when, how=how)
+
+    def _is_inverted_wire(self, signal: str) -> bool:
+        """Whether an inverted wire drives an input of a controller or element."""
+        owner, _, terminal = signal.partition(".")
+        scheduler = self._world.objects.scheduler_of.get(owner)
+        wire = None if scheduler is None else scheduler.wire_to(PinName(owner, terminal.upper()))
+        return wire is not None and wire.inverted
 
     def unchanged(self, signal: str, place: Place) -> Cause:
         """A signal is at a place as it has been from the beginning, along with the contacts that keep it so."""
@@ -272,7 +284,8 @@ class Causes:
         if wire is not None:
             found = self.before(self.name(wire.source), change, change.time - wire.delay)
             if found is not None and found[0].time == change.time - wire.delay:
-                return covered(self.change(found[1], found[0], IS_WIRED_TO(pin=str(pin))), Cover.DELAY)
+                wired = IS_WIRED_INVERTED if wire.inverted else IS_WIRED_TO
+                return covered(self.change(found[1], found[0], wired(pin=str(pin))), Cover.DELAY)
         channels = [found for channel in self.sources(pin) if (found := self.before(channel, change, change.time))]
         at_once = [found for found in channels if found[0].time == change.time]
         if at_once:

@@ -23,7 +23,7 @@ IS_STILL = Message("why.is-still", "{name} is {value:g} since {time:.6f} s")
 OF_INTERRUPT = Message("why.of-interrupt", "{statement} is executed by an interrupt that is off")
 ANY_PIN = Message("why.any-pin", "any pin")
 NO_AXIS_HAS_MOVED = Message("why.no-axis-has-moved", "no axis has moved until {time:g} s")
-MOVES_WITHOUT_END = Message("why.moves-without-end", "{axis} moves without end")
+MOVES_WITHOUT_TARGET = Message("why.moves-without-target", "{axis} moves without a target")
 MOVES_UNTIL = Message("why.moves-until", "{axis} moves until {pin} ends it")
 IS_IN_A_LOOP = Message("why.is-in-a-loop", "{controller} is in the loop of {statement}")
 HAS_NO_INPUT = Message("why.has-no-input", "{axis} homes without end: no input is configured that could end it")
@@ -96,7 +96,7 @@ class PresentStates:
             if pin:
                 pins.append(f"{controller}.{pin}")
             text = MOVES_UNTIL(axis=axis, pin=pins[-1]) if pin else HAS_NO_INPUT(axis=axis) if pin == "" else None
-            yield ChainLink(self._at, controller, text or MOVES_WITHOUT_END(axis=axis))
+            yield ChainLink(self._at, controller, text or MOVES_WITHOUT_TARGET(axis=axis))
         return pins
 
     def _signal(self, name: str, waits: str) -> _Links:

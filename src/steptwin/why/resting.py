@@ -96,12 +96,14 @@ class RestingCauses:
         return None
 
     def awaited(self, signals: Iterable[str], at: Nanos) -> Iterator[tuple[str, Resource]]:
-        """All for which programs wait before they change signals, or those that drive them, with their controllers."""
+        """All for which programs wait before they change signals, or those that drive them, with their controllers. One that is
+        paused or has no supply waits for nothing else."""
         programs = self._past.causes.programs
         for name in self._past.behind(signals, at):
             owner, _, pin = name.partition(".")
             index = self._log.last_executed(owner, at) if owner in self._world.programs else -1
-            if index >= 0 and programs.leads_to(owner, index, Resource(ResourceKind.PIN, pin)):
+            is_held = index >= 0 and programs.held(owner, at) is not None
+            if index >= 0 and not is_held and programs.leads_to(owner, index, Resource(ResourceKind.PIN, pin)):
                 use = programs.use(owner, index)
                 yield from ((owner, one) for one in use.reads if use.waits)
 

@@ -120,6 +120,10 @@ class M1486Kind(ControllerKind[M1486Spec, M1486Chip, M1486View]):
     def refuse_taken(self, chip: M1486Chip, pin: str) -> None:
         refuse_taken(pin, chip.interface)
 
+    def ends_motion(self, chip: M1486Chip, axis: int) -> str | None:
+        line = chip.motor.sought
+        return None if line is None else f"B{line}"
+
     def would_end_seek(self, chip: M1486Chip, pin: str) -> bool:
         line = line_number(pin)
         return seek_ends(line, chip.io.levels[line])
