@@ -11,7 +11,8 @@ from steptwin.motion.profile import Profile, cruise
 from steptwin.simulation.space.bodies import Body, Box
 from steptwin.simulation.space.contacts import NEVER, Pair
 from steptwin.simulation.space.frames import FLOOR, Direction, Frame, Joint, in_plane, placement, whole
-from steptwin.simulation.space.sweeps import Sweep, Sweeps, sweep
+from steptwin.simulation.space.pieces import Motion
+from steptwin.simulation.space.sweeps import Sweep, Sweeps, SweptBody, sweep
 
 
 def moving(seconds: float, *, turns: bool = False) -> Frame:
@@ -29,6 +30,25 @@ def test_a_sweep_is_the_way_of_a_body_until_its_plan_ends() -> None:
 def test_what_goes_on_for_ever_comes_anywhere_and_what_turns_stays_within_its_radius() -> None:
     assert sweep(Body("body", moving(inf), Box((10, 20, 30))), 0).low[0] == -inf
     assert sweep(Body("body", moving(inf, turns=True), Box((10, 30, 40))), 0) == Sweep((90.0, -51.0, -51.0), (110.0, 51.0, 51.0))
+
+
+@pytest.mark.parametrize("seconds", [2.0, inf])
+def test_a_sweep_may_be_that_of_a_time(seconds: float) -> None:
+    body, second = Body("body", moving(seconds), Box((10, 20, 30)), (5, 0, 0)), 10**9
+    assert sweep(body, 0, until=second) == Sweep((-906.0, -20.0, -30.0), (116.0, 20.0, 30.0))
+    assert sweep(body, 0, since=second, until=2 * second).high == (-884.0, 20.0, 30.0)
+    assert sweep(body, 0, since=second).low[0] == (-inf if seconds == inf else -1906.0)
+    assert sweep(body, 0, since=3 * second).high[0] == (inf if seconds == inf else -1884.0)
+
+
+def test_where_it_comes_soon_is_that_of_its_present_plan() -> None:
+    plans = [Profile(0, 0, (cruise(0.0, inf, 0.0, 1000.0),), 0.0), Profile(0, 0, (cruise(0.0, inf, 0.0, -3000.0),), 0.0)]
+    motion = Motion(lambda: len(plans), lambda now: motion_of(plans[0]).pieces(now))
+    body, second = SweptBody(Body("body", Frame("x", FLOOR, (0, 0, 0), Joint(motion, Direction(0, 1))), Box((10, 10, 10)))), 10**9
+    assert (body.soon(0, second).low[0], body.soon(0, second).high[0]) == (-11.0, 1011.0)
+    assert body.soon(0, 2 * second).high[0] == 2011.0
+    del plans[0]
+    assert (body.soon(0, 2 * second).low[0], body.soon(0, 2 * second).high[0]) == (-6011.0, 11.0)
 
 
 @pytest.mark.parametrize("turns", [0.0, 0.25, 0.1])

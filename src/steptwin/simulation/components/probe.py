@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
+from typing import TypeAlias
 
 from steptwin.controller import Nanos
 from steptwin.simulation.components.bodycontact import BodyContact
@@ -10,7 +11,7 @@ from steptwin.simulation.components.touch import Meeting
 from steptwin.simulation.components.workpieces import Workpieces
 from steptwin.simulation.space.bodies import Body
 from steptwin.simulation.space.frames import Frame
-from steptwin.simulation.space.sweeps import SweptBody
+from steptwin.simulation.space.sweeps import SweptBody, sweep
 
 
 def whole(body: Body) -> Body | None:
@@ -23,11 +24,15 @@ def unless_on(frames: Collection[Frame], body: Body) -> Body | None:
     return None if any(map(body.is_on, frames)) else body
 
 
+_Contacts: TypeAlias = dict[str, tuple[Body, BodyContact | None]]
+"""With workpieces by name: the body it is with, None where there is nothing to meet."""
+
+
 class Probe:
     """A `steptwin.simulation.components.touch.Meeting` of one body with parts of the machine, or with workpieces.
 
     What it has found holds while no workpiece comes or goes and no plan changes, up to the moment that it has found. A workpiece
-    that does not come near before its plan changes is not searched for.
+    that does not come near before its plan changes is not searched for; nor one that comes later than what was found.
     """
 
     __slots__ = (
@@ -58,8 +63,7 @@ class Probe:
         self.forget()
 
     def forget(self) -> None:
-        self._contacts: dict[str, tuple[Body, BodyContact | None]] = {}
-        """With workpieces: the body it is with, None where there is nothing to meet."""
+        self._contacts: _Contacts = {}
         self._state: object = None
         self._met: tuple[str, ...] = ()
         self._due: Nanos | None = None
@@ -76,9 +80,21 @@ class Probe:
             return
         self._state = state
         bodies, known, self._contacts = workpieces.bodies(), self._contacts, {}
-        met: list[str] = []
         self._due = None
-        for name in workpieces.near(self._swept.sweep(now)):
+        soon, until = workpieces.near_soon(self._swept.sweep(now), now)
+        self._met = tuple(self._look(soon, known, workpieces, now))
+        if until is None:
+            return
+        if self._due is None or self._due > until:
+            later = workpieces.near(sweep(self.body, now, since=until))
+            self._look(set(later).difference(soon), known, workpieces, now)
+        kept = {name: one for name, one in known.items() if bodies.get(name) is one[0]}
+        self._contacts = {**kept, **self._contacts}
+
+    def _look(self, names: Iterable[str], known: _Contacts, workpieces: Workpieces, now: Nanos) -> list[str]:
+        """Those of some workpieces that it meets; find when that changes."""
+        bodies, met = workpieces.bodies(), list[str]()
+        for name in names:
             body = bodies[name]
             its, contact = known.get(name, (None, None))
             if its is not body:
@@ -92,7 +108,7 @@ class Probe:
             due = contact.change(now)
             if due is not None and (self._due is None or due < self._due):
                 self._due = due
-        self._met = tuple(met)
+        return met
 
     def met(self, now: Nanos) -> tuple[str, ...]:
         """The names of what it overlaps: parts of the machine, then workpieces, each in their order."""

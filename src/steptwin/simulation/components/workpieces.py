@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from math import inf
 from typing import Any, NamedTuple, Protocol, TypeVar
 
-from steptwin.controller import Nanos
+from steptwin.controller import SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.simulation.components.mount import UPRIGHT, to_nm
 from steptwin.simulation.mechanics.workpiece import Workpiece
@@ -22,6 +22,10 @@ WORKPIECES = "workpieces"
 """Name by which sensors have all of them; the name of the part that has those which rest."""
 REACH_NM = 2_000_000
 """Height from which a workpiece is put down. From higher up it falls. As far may it be pressed into what it is put on."""
+SOON_NS = 4 * SECOND
+"""Least time for which contacts with what moves without an end are looked for first: with most of that there is none by then."""
+FEW_ENDLESS = 10
+"""As many that move without an end are looked at at once: that costs less than to keep where they come soon."""
 
 
 H = TypeVar("H")
@@ -137,13 +141,17 @@ class Workpieces:
 
     __slots__ = (
         "_bodies",
+        "_endless",
         "_holder_of",
+        "_is_soon_known",
         "_motions",
         "_order",
         "_plans",
+        "_soon",
         "_supports",
         "_sweeps",
         "_swept",
+        "_until",
         "_version",
         "falling",
         "holders",
@@ -159,6 +167,12 @@ class Workpieces:
         self._holder_of: Mapping[str, Holder] = {}
         self._swept: dict[str, SweptBody] = {}
         self._sweeps = Sweeps()
+        self._endless = 0
+        """Count of those that move without an end."""
+        self._soon = Sweeps()
+        self._until: Nanos = 0
+        """The moment up to which `_soon` says where they come, if `_is_soon_known`."""
+        self._is_soon_known = False
         self._supports: dict[Body, SweptBody] = {}
         """Supports with where they may come."""
         self._order: Mapping[str, int] = {}
@@ -186,6 +200,7 @@ class Workpieces:
             for name in [name for name, one in self._swept.items() if self._bodies.get(name) is not one.body]:
                 del self._swept[name]
                 self._sweeps.discard(name)
+                self._soon.discard(name)
             self._order = {name: place for place, name in enumerate(self._bodies)}
             self._motions = tuple(dict.fromkeys(one for name in self._bodies for one in self.swept(name).versions))
             self._plans = None
@@ -206,20 +221,35 @@ class Workpieces:
         if plans != self._plans:
             self._plans = plans
             self.moves += 1
+            self._endless, self._is_soon_known = 0, False
             for name in bodies:
-                self._sweeps.put(name, self.swept(name).sweep(now))
+                its = self.swept(name).sweep(now)
+                self._endless += its.is_endless
+                self._sweeps.put(name, its)
         return self.moves
 
     def near(self, its: Sweep) -> list[str]:
         """Those that may come there before the plan of one changes, in their order, as `follow` has found them."""
         return sorted(self._sweeps.near(its), key=self._order.__getitem__)
 
+    def near_soon(self, its: Sweep, now: Nanos) -> tuple[list[str], Nanos | None]:
+        """Those that may come there up to a moment, in their order, and that moment; None where no other ones come later."""
+        if self._endless <= FEW_ENDLESS:
+            return self.near(its), None
+        if not now + SOON_NS <= self._until <= now + 2 * SOON_NS:
+            self._until, self._is_soon_known = now + 2 * SOON_NS, False
+        if not self._is_soon_known:
+            self._is_soon_known = True
+            for name in self._bodies:
+                self._soon.put(name, self.swept(name).soon(now, self._until))
+        return sorted(self._soon.near(its), key=self._order.__getitem__), self._until
+
     def forget(self) -> None:
         """Find them and where they may come anew: a snapshot was restored, and holders make other bodies."""
         self._version = None
         self._swept.clear()
         self._supports.clear()
-        self._sweeps = Sweeps()
+        self._sweeps, self._soon = Sweeps(), Sweeps()
 
     def holder_of(self, name: str) -> Holder | None:
         """Holder of the workpiece called ``name``, if that is there."""

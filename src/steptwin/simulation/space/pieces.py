@@ -347,20 +347,28 @@ def together(parts: Sequence[Iterable[Piece]]) -> Iterator[tuple[Nanos, Nanos | 
         present = [next(stream) if piece.end == end else piece for stream, piece in zip(streams, present, strict=True)]
 
 
-def span(pieces: Iterable[Piece], most: int = 256) -> Range:
-    """Bounds of all positions of a motion; infinite where it does not end, or has more than so many pieces."""
+def span(pieces: Iterable[Piece], most: int = 256, *, since: Nanos | None = None, until: Nanos | None = None) -> Range:
+    """Bounds of all positions of a motion, or of those between two moments, with both; infinite where it does not end, or has
+    more than so many pieces."""
     low, high = inf, -inf
     for n, piece in enumerate(pieces):
+        if until is not None and piece.begin > until:
+            break
         if n >= most:
             return -inf, inf
-        if piece.end is None:
-            if piece.speed(piece.begin, piece.begin + FARTHEST_NS) > 0.0:
+        begin, end = piece.begin if since is None else max(piece.begin, since), piece.end
+        if until is not None and (end is None or end > until):
+            end = until + 1
+        if end is None:
+            if piece.speed(begin, begin + FARTHEST_NS) > 0.0:
                 return -inf, inf
-            ends, more = [piece.at(piece.begin)], 0.0
+            ends, more = [piece.at(begin)], 0.0
+        elif begin < end:
+            last = end - 1
+            ends = [piece.at(begin), piece.at(last)]
+            more = sag(*piece.bend(begin, last), last - begin)
         else:
-            last = piece.end - 1
-            ends = [piece.at(piece.begin), piece.at(last)]
-            more = sag(*piece.bend(piece.begin, last), last - piece.begin)
+            continue
         low, high = min(low, min(ends) - more), max(high, max(ends) + more)
     return low, high
 

@@ -26,10 +26,15 @@ class Sweep(NamedTuple):
     low: Bounds
     high: Bounds
 
+    @property
+    def is_endless(self) -> bool:
+        """Whether it has no end in one direction."""
+        return -inf in self.low or inf in self.high
 
-def sweep(body: Body, now: Nanos) -> Sweep:
-    """Space that a body may occupy from a moment on, as everything below it moves now."""
-    return swept(body, lambda frame, joint: span(joint.motion.pieces(now)))
+
+def sweep(body: Body, now: Nanos, *, since: Nanos | None = None, until: Nanos | None = None) -> Sweep:
+    """Space that a body may occupy from a moment on, as everything below it moves now; or from ``since`` on, up to ``until``."""
+    return swept(body, lambda frame, joint: span(joint.motion.pieces(now), since=since, until=until))
 
 
 def swept(body: Body, ranges: Callable[[Frame, Joint], Range], seen_from: Frame | None = None) -> Sweep:
@@ -60,7 +65,7 @@ def versions_of(body: Body) -> tuple[Callable[[], object], ...]:
 class SweptBody:
     """A body with its sweep, which is computed once for each plan of its motion."""
 
-    __slots__ = ("_state", "_sweep", "body", "versions")
+    __slots__ = ("_soon", "_state", "_sweep", "body", "versions")
 
     def __init__(self, body: Body) -> None:
         self.body = body
@@ -71,13 +76,23 @@ class SweptBody:
         """Compute it anew: a snapshot was restored, whose moment may be before that of the sweep."""
         self._state: list[object] | None = None
         self._sweep: Sweep | None = None
+        self._soon: tuple[Nanos, Sweep] | None = None
 
     def sweep(self, now: Nanos) -> Sweep:
         """Where it may come before its plan changes."""
         state = [version() for version in self.versions]
         if self._sweep is None or state != self._state:
-            self._state, self._sweep = state, sweep(self.body, now)
+            self._state, self._sweep, self._soon = state, sweep(self.body, now), None
         return self._sweep
+
+    def soon(self, now: Nanos, until: Nanos) -> Sweep:
+        """Where it may come before its plan changes; where that has no end, up to a moment."""
+        whole = self.sweep(now)
+        if not whole.is_endless:
+            return whole
+        if self._soon is None or self._soon[0] != until:
+            self._soon = until, sweep(self.body, now, until=until)
+        return self._soon[1]
 
 
 def _carry(joint: Joint, low: list[float], high: list[float], ends: Range) -> None:
