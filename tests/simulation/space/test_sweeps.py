@@ -88,6 +88,16 @@ def test_what_cannot_meet_is_not_near() -> None:
     assert apart > 2
 
 
+def test_those_without_an_end_are_counted() -> None:
+    sweeps = Sweeps()
+    assert sweeps.endless == 0
+    for name, seconds in (("one", inf), ("other", inf), ("third", 2.0)):
+        sweeps.put(name, sweep(Body(name, moving(seconds), Box((10, 20, 30))), 0))
+    assert sweeps.endless == 2
+    sweeps.discard("one")
+    assert sweeps.endless == 1
+
+
 def test_near_ones_are_those_of_a_comparison_with_all() -> None:
     chance = Random(1)
     sweeps, those = Sweeps(), {}

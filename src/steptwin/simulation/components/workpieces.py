@@ -168,7 +168,7 @@ class Workpieces:
         self._swept: dict[str, SweptBody] = {}
         self._sweeps = Sweeps()
         self._endless = 0
-        """Count of those that move without an end."""
+        """Count of those that move without an end along an axis."""
         self._soon = Sweeps()
         self._until: Nanos = 0
         """The moment up to which `_soon` says where they come, if `_is_soon_known`."""
@@ -221,11 +221,9 @@ class Workpieces:
         if plans != self._plans:
             self._plans = plans
             self.moves += 1
-            self._endless, self._is_soon_known = 0, False
             for name in bodies:
-                its = self.swept(name).sweep(now)
-                self._endless += its.is_endless
-                self._sweeps.put(name, its)
+                self._sweeps.put(name, self.swept(name).sweep(now))
+            self._endless, self._is_soon_known = self._sweeps.endless, False
         return self.moves
 
     def near(self, its: Sweep) -> list[str]:

@@ -151,6 +151,11 @@ class Sweeps:
             if not ordered:
                 del by_width[width]
 
+    @property
+    def endless(self) -> int:
+        """Count of those without an end along an axis, of that which has most."""
+        return max(len(by_width.get(inf, ())) for by_width in self._lows)
+
     def near(self, its: Sweep) -> list[str]:
         """Those whose sweep has a part in common with this one, in no order."""
         _, axis = min((sum(last - first for _, first, last in self._along(its, axis)), axis) for axis in range(len(AXES)))
