@@ -401,6 +401,8 @@ class AxisCauses:
                 yield covered(self._all.change(signal, change), Cover.LEVEL) or self._all.change(signal, change)
             elif counts:
                 yield self._all.first(signal)._replace(cover=Cover.LEVEL)
+                keeping = self._all.holding.of([signal], event.time - 1, None) if event.time else ()
+                yield from (one._replace(cover=one.cover or Cover.LEVEL) for one in keeping)
 
     def _without_current(self, axis: str, event: Change) -> FoundCause:
         """The last that took the current of a motor by an event: its power, or its controller."""

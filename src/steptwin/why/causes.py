@@ -23,7 +23,7 @@ from steptwin.why.axes import AxisCauses
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing, unknown
 from steptwin.why.controllers import ControllerCauses, acted
 from steptwin.why.elements import ElementCauses, inputs
-from steptwin.why.holding import HoldingCauses
+from steptwin.why.holding import FAULT, HoldingCauses
 from steptwin.why.lacking import NEVER
 from steptwin.why.log import LAST, CauseLog, Change, sets
 from steptwin.why.programs import ProgramCauses
@@ -39,7 +39,6 @@ OVER_INVERTED_WIRE = Message("why.over-inverted-wire", "{driven} over an inverte
 IS_WIRED_INVERTED = Message("why.is-wired-inverted", ", which is wired to {pin} and inverted there")
 AND = Message("why.and", "{one} and {other}")
 IS = Message("why.is", "{signal} is {value}")
-FAULT = Message("why.fault", "fault {name}: {what}")
 NOTHING_IS_WIRED = Message("why.nothing-is-wired", ", to which nothing is wired")
 NO_STATEMENT_SETS = Message("why.no-statement-sets", ", which no statement of its program sets")
 NOTHING_HAS_SET = Message("why.nothing-has-set", ", which nothing has set")

@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any, TypeVar
 
 from steptwin.controller import Nanos
 from steptwin.messages import Message
+from steptwin.simulation.components.brake import RELEASE, Brake
 from steptwin.simulation.components.gate import Gate
 from steptwin.simulation.components.latch import RESET, SET, Latch
 from steptwin.simulation.components.relay import COIL, NC, Relay
 from steptwin.simulation.components.timer import IN, PULSE, Timer
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.why.answer import ChainLink, Cover
-from steptwin.why.chain import Cause, Place, covered
+from steptwin.why.chain import Cause, Place, covered, nothing
+from steptwin.why.controllers import acted
+from steptwin.why.lacking import HAPPENED
 from steptwin.why.log import LAST
 
 ALTHOUGH = Message("why.although", "{signal} is {value:g} although {other}")
+FAULT = Message("why.fault", "fault {name}: {what}")
+FAULT_ACTS = Message("why.fault-acts", "fault {name}, there from the beginning, acts: {what}")
 
 T = TypeVar("T")
+_FOLLOWED = {Relay: COIL, Brake: RELEASE}
+"""The input that the outputs of an element follow after a delay."""
 _DECISIVE: Mapping[str, float] = {"and": 0.0, "nand": 0.0, "or": 1.0, "nor": 1.0}
 """Level of one input of a gate that decides alone, by kind."""
 
@@ -34,7 +42,7 @@ class HoldingCauses:
     def depends(self, signals: Iterable[str]) -> bool:
         """Whether one of these signals is made of others alone."""
         parts = (self._all.parts.get(name.partition(".")[0]) for name in signals)
-        return any(isinstance(part, Gate | Relay | Timer) for part in parts)
+        return any(isinstance(part, Gate | Relay | Brake | Timer) for part in parts)
 
     def of(self, signals: Iterable[str], at: Nanos, since: Nanos | None) -> Iterator[Cause]:
         """The last changes after ``since`` of what keeps signals as they are at a moment; None: since the beginning."""
@@ -55,18 +63,44 @@ class HoldingCauses:
             yield from self._although(name, at)
 
     def _although(self, signal: str, at: Nanos) -> Iterator[Cause]:
-        """The coil of a relay whose contact a fault keeps as it is."""
+        """The coil of a relay whose contact a fault keeps as it is, or what releases a brake, with the fault."""
         owner, _, terminal = signal.partition(".")
-        relay, coil = self._all.parts.get(owner), PinName(owner, COIL)
-        if not isinstance(relay, Relay) or terminal.upper() == COIL:
+        part = self._all.parts.get(owner)
+        if part is None or terminal.upper() not in part.block.outputs or type(part) not in _FOLLOWED:
             return
+        coil = PinName(owner, _FOLLOWED[type(part)])
         closed = bool(self._log.level(signal, at)) is (terminal.upper() != NC)
         sources = list(self._all.sources(coil))
         others = [one for one in sources if bool(self._log.level(one, at)) is not closed]
         last = self._all.last(sources, at)
-        if others and last is not None and self.level(coil, at) != closed and last.place.time + max(relay.delays) < at:
+        if others and last is not None and self.level(coil, at) != closed and last.place.time + max(part.delays) < at:
             text = ALTHOUGH(signal=signal, value=self._log.level(signal, at), other=self._all.state(others[0], at))
-            yield Cause(ChainLink(at, owner, text), Place(at, LAST, -1), lambda: covered(last, Cover.LEVEL))
+            besides = partial(self._faults, owner, at)
+            yield Cause(ChainLink(at, owner, text), Place(at, LAST, -1), lambda: covered(last, Cover.LEVEL), besides=besides)
+
+    def _faults(self, owner: str, at: Nanos) -> Iterator[Cause]:
+        """The fault of an element that has acted by a moment and holds no terminal, if there is one only."""
+        faults = self._world.objects.faults
+        there = (one for one in faults.of_element(owner) if one.begin <= at and (one.end is None or at < one.end))
+        acting = [one.name for one in there if not one.fault.kind.effect.holds and one.name in faults.acts]
+        if len(acting) == 1 and faults.acts[acting[0]].first <= at:
+            link = self.fault_link(acting[0], at)
+            act = self._all.fault_root(acting[0], at).by
+            place = Place(link.time) if act is None else Place(link.time, act.order, 1)
+            yield Cause(link, place, nothing if act is None else lambda: covered(acted(act), Cover.FAULT), Cover.FAULT)
+
+    def fault_link(self, name: str, until: Nanos) -> ChainLink:
+        """A fault that has acted by a moment, as a cause: when it began, or acted first, where no record says that it began."""
+        record, active = self._log.fault_record(name, until), self._world.objects.faults.find(name)
+        last = None if record is not None else self._log.before(f"{HAPPENED}fault {name}").since
+        if last is not None and (there := self._all.of(last)) is not None:
+            record = there.log.fault_record(name, last)
+        root = self._all.fault_root(name, until)
+        if record is not None:
+            return ChainLink(record.time, record.controller, FAULT(name=name, what=record.value), root)
+        subject = "" if active is None else str(active.fault.get("element") or "")
+        text = FAULT if active is None or active.begin else FAULT_ACTS
+        return ChainLink(root.time, subject, text(name=name, what="" if active is None else str(active.fault)), root)
 
     def leaves(self, signal: str, at: Nanos) -> Iterator[str]:
         """The signals at the other ends of wires, gates, relays and timers that keep one as it is from the beginning."""
@@ -95,6 +129,8 @@ class HoldingCauses:
         match self._all.parts.get(owner):
             case Gate() as gate:
                 return self._of_gate(owner, gate, at, floor)
+            case Brake():
+                return self._following(PinName(owner, RELEASE), level, at, floor)
             case Relay():
                 return self._following(PinName(owner, COIL), level is (terminal.upper() != NC), at, floor)
             case Timer(kind=kind) if kind != PULSE:

@@ -14,10 +14,9 @@ from steptwin.simulation.logic.expression import deciding, parse_condition
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.world.snapshotlog import outside_past
 from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Cover
-from steptwin.why.causes import FAULT, Causes
+from steptwin.why.causes import Causes
 from steptwin.why.chain import Cause, Chain, FoundCause, Place, covered
 from steptwin.why.controllers import axis_of
-from steptwin.why.lacking import HAPPENED
 from steptwin.why.log import LAST
 from steptwin.why.notedpast import NotedPast, text_of_question, without_not
 from steptwin.why.presentstates import PresentStates
@@ -78,14 +77,7 @@ class Why:
 
     def fault_link(self, name: str, until: Nanos) -> ChainLink:
         """A fault that has acted by a moment, as a cause."""
-        record, active = self.log.fault_record(name, until), self.world.objects.faults.find(name)
-        last = None if record is not None else self.log.before(f"{HAPPENED}fault {name}").since
-        if last is not None and (there := self.causes.of(last)) is not None:
-            record = there.log.fault_record(name, last)
-        what = record.value if record is not None else "" if active is None else str(active.fault)
-        subject = "" if record is None else record.controller
-        root = self.causes.fault_root(name, until)
-        return ChainLink(root.time if record is None else record.time, subject, FAULT(name=name, what=what), root)
+        return self.causes.holding.fault_link(name, until)
 
     def ask(self, question: str, at: Nanos | None = None) -> Answer:
         """The answer for a moment (ns), the end by default. Raises `Misuse` for what is no question here."""
