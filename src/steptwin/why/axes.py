@@ -28,6 +28,7 @@ from steptwin.why.log import FALL, JAMS, LAST, OF_MECHANICS, Change, words_of
 GIVES_POWER = Message("why.gives-power", ", which gives {axis} its power")
 BEGAN_TO_MOVE = Message("why.began-to-move", "{axis} began to move")
 STOPPED = Message("why.stopped", "{axis} stopped")
+PULSES_STOPPED = Message("why.pulses-stopped", "the pulses of {axis} stopped")
 BEGAN_TO_BRAKE = Message("why.began-to-brake", "{axis} began to brake")
 MOTION_CHANGED = Message("why.motion-changed", "the motion of {axis} changed, which began at {time:.6f} s")
 MOTION_ENDED = Message("why.motion-ended", "the motion of {axis} ended, which began at {time:.6f} s")
@@ -71,16 +72,17 @@ class AxisCauses:
             began = ChainLink(profile.start, controller, BEGAN_TO_MOVE(axis=shown))
             return Cause(began, Place(profile.start), unknown, Cover.MOTION) if profile.segments else None
         place = Place(plan.time, plan.order)
+        stopped = PULSES_STOPPED if self._falls(controller, record.subject, plan, profile) else STOPPED
         cover, names = None, SETTINGS
         limit = self.soft_limit(controller, record.subject, plan.time if profile.end is None else profile.end, until)
         if limit:
             text, names = STOPPED_AT_SOFT_LIMIT(axis=shown, limit=limit), (limit.partition("_")[2],)
             place = max(place, Place(plan.time if profile.end is None else profile.end))
         elif not profile.segments:
-            text, names = STOPPED(axis=shown), ()
+            text, names = stopped(axis=shown), ()
         elif profile.end is not None and profile.end <= until:
             began, place = self._began(controller, plan), max(place, Place(profile.end))
-            text = STOPPED(axis=shown) if _brakes(profile) else MOTION_ENDED(axis=shown, time=began / SECOND)
+            text = stopped(axis=shown) if _brakes(profile) else MOTION_ENDED(axis=shown, time=began / SECOND)
             names = ()
         elif _brakes(profile):
             text, cover = BEGAN_TO_BRAKE(axis=shown), Cover.MOTION
@@ -101,6 +103,14 @@ class AxisCauses:
             yield from self._going_on(controller, plan, mechanics)
 
         return Cause(ChainLink(place.time, controller, text), place, planned, cover, besides)
+
+    def _falls(self, controller: str, number: str, plan: Change, profile: Profile) -> bool:
+        """Whether the load of an axis moves by itself when a motion of its pulses ends."""
+        axis = self.driven(controller, number)
+        end = plan.time if profile.end is None else max(plan.time, profile.end)
+        falls = [one for one in self._log.mechanics.get(axis or "", ()) if self._log.record(one).subject == FALL]
+        last = max((one for one in falls if one.time <= end), key=lambda one: (one.time, one.order), default=None)
+        return last is not None and _begins(self._log.record(last))
 
     def _going_on(self, controller: str, plan: Change, mechanics: str) -> Iterator[Cause]:
         """The motion that a plan takes no farther."""
@@ -214,6 +224,7 @@ class AxisCauses:
         event = max(lasting, key=lambda one: (one.time, one.order), default=None)
         if event is None:
             self._log.never_happened(*EVENTS_OF_ROTORS)
+        rests = until if since is None else min(until, since + BRAKES_NS)
         is_off = power is not None and not self._log.level(self._power_of(axis), until)
         is_unpowered = power is not None and (is_off or motion is None or motion.link.time < power.link.time)
         if power is not None and is_unpowered:
@@ -222,12 +233,13 @@ class AxisCauses:
             ends = [there.axes._end(one)[0] for one in plans]
             is_unpowered = built.mechanism.build.coasts_unpowered or any(end > power.link.time for end in ends)
         if event is not None and not (is_unpowered and power is not None and self._is_after(power, event)):
-            return self.rotor_event(axis, event)
+            found = self.rotor_event(axis, event)
+            return self._caught_by(axis, found, rests) if self._log.record(event).subject == FALL else found
         if event is not None and power is not None and not is_off and self._log.record(event).subject == FALL:
             others = (power, covered(motion, Cover.LEVEL))  # it fell on until it was caught
             return self.rotor_event(axis, event)._replace(along=tuple(one for one in others if one is not None))
         if is_unpowered and power is not None:
-            let_go = self._let_go(axis, power, until if since is None else min(until, since + BRAKES_NS))
+            let_go = self._let_go(axis, power, rests)
             return let_go if is_off else self._regained(axis, let_go, power, motion)
         lost = self._lost_by_fault(axis, until, before, LOSES_PULSES)
         if motion is None and lost is None:
@@ -288,10 +300,20 @@ class AxisCauses:
 
     def _let_go(self, axis: str, power: Cause, until: Nanos) -> Cause:
         """The last that let an axis without power move, or held it: its power or a brake, along with the others."""
-        brakes = [name for name, spec in self._all.specs.items() if isinstance(spec, BrakeSpec) and spec.axis == axis]
-        found = [covered(self._all.last((f"{name}.{RELEASED.lower()}",), until), Cover.MOTION) for name in brakes]
-        first, *others = sorted((power, *(one for one in found if one is not None)), key=lambda one: one.place, reverse=True)
+        first, *others = sorted((power, *self._brakes(axis, until)), key=lambda one: one.place, reverse=True)
         return first._replace(along=tuple(others))
+
+    def _caught_by(self, axis: str, fall: Cause, until: Nanos) -> Cause:
+        """A fall, along with what its brakes did after it."""
+        after = [one for one in self._brakes(axis, until) if one.place > fall.place]
+        first, *others = sorted((fall, *after), key=lambda one: one.place, reverse=True)
+        return first._replace(along=(*first.along, *others))
+
+    def _brakes(self, axis: str, until: Nanos) -> Iterator[Cause]:
+        """The last changes of the brakes of an axis."""
+        brakes = [name for name, spec in self._all.specs.items() if isinstance(spec, BrakeSpec) and spec.axis == axis]
+        found = (covered(self._all.last((f"{name}.{RELEASED.lower()}",), until), Cover.MOTION) for name in brakes)
+        yield from (one for one in found if one is not None)
 
     def _power_of(self, axis: str) -> str:
         """The output that gives the motor of an axis power; empty for one that always has some."""

@@ -369,7 +369,9 @@ class ControllerCauses:
                 events.append((order, record))
         # What it tells about itself leads no farther than its supply.
         first = [*BEGINS, POSITION_ERROR]  # the error comes before what the motor does without a motion
-        event = min(events, key=lambda one: (one[1].subject not in first, "element" not in dict(one[1].facts), one[0]), default=None)
+        event = min(
+            events, key=lambda one: (one[1].subject not in first, "element" not in dict(one[1].facts), one[0]), default=None
+        )
         limit = change.order if event is None else event[0]
         last = max((one for one in inputs if one[0] < limit), default=None)
         facts = {} if event is None else dict(event[1].facts)
