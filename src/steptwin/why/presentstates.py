@@ -9,6 +9,10 @@ from typing import TypeAlias
 from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message, MessageText
 from steptwin.motion.divisions import profile_of
+from steptwin.simulation.components.brake import Brake
+from steptwin.simulation.components.cylinder import EXTENDED, RETRACTED, Cylinder
+from steptwin.simulation.components.relay import Relay
+from steptwin.simulation.components.timer import PULSE, Timer
 from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementLocation, StatementUse
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.why.answer import ChainLink
@@ -26,6 +30,7 @@ NO_AXIS_HAS_MOVED = Message("why.no-axis-has-moved", "no axis has moved until {t
 MOVES_WITHOUT_TARGET = Message("why.moves-without-target", "{axis} moves without a target")
 MOVES_UNTIL = Message("why.moves-until", "{axis} moves until {pin} ends it")
 IS_IN_A_LOOP = Message("why.is-in-a-loop", "{controller} is in the loop of {statement}")
+DELAY_LASTS = Message("why.delay-lasts", "the delay of {name} lasts until {time:.6f} s")
 HAS_NO_INPUT = Message("why.has-no-input", "{axis} homes without end: no input is configured that could end it")
 
 _Asked: TypeAlias = "str | tuple[str, Resource]"
@@ -103,9 +108,33 @@ class PresentStates:
         owner = name.partition(".")[0]
         yield ChainLink(self._at, owner, self._causes.state(name, self._at))
         is_held = self._log.hold(name, self._at) is not None
+        if not is_held:
+            yield from self._ended(name) if owner in self._world.controllers else self._under_way(name)
         others = () if owner == waits or is_held else (yield from self._not_written(name))
         drivers = self._causes.drivers(name, self._at)
         return (*self._causes.holding.deciding(name, drivers, self._at), *others)
+
+    def _ended(self, name: str) -> Iterator[ChainLink]:
+        """The statement of which the level of an output is the end, such as that of a pulse."""
+        changed = None if self._causes.drivers(name, self._at) else self._log.since(name, self._at)
+        last = None if changed is None else self._causes.last((name,), self._at)
+        by = None if last is None else last.before()
+        if last is not None and by is not None and by.place.time < last.place.time and by.link.subject == last.link.subject:
+            yield by.link
+
+    def _under_way(self, name: str) -> Iterator[ChainLink]:
+        """The delay of an element that lasts, or what a cylinder stands at before the end to which its valve sends it."""
+        owner, _, terminal = name.partition(".")
+        part = next((parts[owner] for parts in self._world.objects.elements.values() if owner in parts), None)
+        match part:
+            case Relay() | Brake() | Timer():
+                due = None if isinstance(part, Timer) and part.kind == PULSE else part.deadline()
+                if due is not None and due > self._at and terminal.upper() in part.block.outputs:
+                    yield ChainLink(self._at, owner, DELAY_LASTS(name=owner, time=due / SECOND))
+            case Cylinder() if part.blockers and terminal.upper() == (EXTENDED if part.wanted > 0 else RETRACTED):
+                jams = [one for one in self._causes.axes.jams(owner) if one.time <= self._at]
+                axes = self._causes.axes
+                yield from (axes.rotor_event(owner, one).link for one in jams if axes.holds_rotor(one, jams))
 
     def _resource(self, controller: str, resource: Resource) -> _Links:
         """Links and signals of the thing that a statement waits for."""
