@@ -29,6 +29,7 @@ GIVES_POWER = Message("why.gives-power", ", which gives {axis} its power")
 BEGAN_TO_MOVE = Message("why.began-to-move", "{axis} began to move")
 STOPPED = Message("why.stopped", "{axis} stopped")
 PULSES_STOPPED = Message("why.pulses-stopped", "the pulses of {axis} stopped")
+AS = Message("why.as", "{what}, as {condition}")
 BEGAN_TO_BRAKE = Message("why.began-to-brake", "{axis} began to brake")
 MOTION_CHANGED = Message("why.motion-changed", "the motion of {axis} changed, which began at {time:.6f} s")
 MOTION_ENDED = Message("why.motion-ended", "the motion of {axis} ended, which began at {time:.6f} s")
@@ -381,7 +382,8 @@ class AxisCauses:
         """An event of a rotor, whose cause is what led to it."""
         record = self._log.record(event)
         owner = str(dict(record.facts)["element"])
-        text = words_of(record)
+        condition = getattr(self._all.specs.get(owner), "when", None) if _begins(record) else None
+        text = AS(what=words_of(record), condition=condition) if condition else words_of(record)
         if owner == axis:
             before = partial(self._of_rotor_event, axis, event, begins=_begins(record))
         else:
