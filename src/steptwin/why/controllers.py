@@ -381,7 +381,8 @@ class ControllerCauses:
             if last is None and event is not None:
                 found = self.commanded(controller, change._replace(order=event[0]), None)
                 ended = self._ended(controller, change.time, of)
-                return found or (self._earlier(controller, change.time, of) if ended is None else ended.before())
+                found = found or (self._earlier(controller, change.time, of) if ended is None else ended.before())
+                return found or self._in_execution(controller, change.time, order, of)
             if last is None:
                 return self._earlier(controller, change.time, of)
             edge = next(one for one in self._log.changes[last[1]] if one.order == last[0])
@@ -400,6 +401,16 @@ class ControllerCauses:
             before = partial(self._all.elements.at_element, element, change._replace(order=order))
         text = words_of(record)
         return Cause(ChainLink(change.time, controller, text), Place(change.time, order), before)
+
+    def _in_execution(self, controller: str, time: Nanos, before: int, wanted: Resource | None) -> FoundCause:
+        """The statement at which a program was ended by itself, at a moment before an order."""
+        index, executed = self._log.last_executed(controller, time), self._log.executed[controller]
+        state = self._log.states.last(controller, time, LAST)
+        is_ended = state is not None and state.time == time and state.order >= before and state.state in OVER
+        is_other = wanted is not None and wanted.kind is not ResourceKind.PROGRAM
+        if is_other or not is_ended or index < 0 or executed[index].time < time or executed[index].order > before:
+            return None
+        return self._all.programs.statement(controller, index)
 
     def _not_followed(self, controller: str, error: Change, wanted: Resource) -> FoundCause:
         """Cause that kept an axis from its position since its motion began, or the command of that."""
