@@ -17,14 +17,13 @@ from steptwin.simulation.kinds.programs import Resource, ResourceKind, Statement
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.why.answer import ChainLink
 from steptwin.why.causes import IS, Causes
-from steptwin.why.programs import WAITS
+from steptwin.why.programs import OF_INTERRUPT, WAITS
 from steptwin.why.sentences import statement, statement_at
 
 WAITS_FOR_A_TIME = Message("why.waits-for-a-time", "it waits for a time only")
 DEPENDS_ON = Message("why.depends-on", "it depends on {name}")
 IS_NOT_SET = Message("why.is-not-set", "{name} is {value:g}: nothing has set it")
 IS_STILL = Message("why.is-still", "{name} is {value:g} since {time:.6f} s")
-OF_INTERRUPT = Message("why.of-interrupt", "{statement} is executed by an interrupt that is off")
 ANY_PIN = Message("why.any-pin", "any pin")
 NO_AXIS_HAS_MOVED = Message("why.no-axis-has-moved", "no axis has moved until {time:g} s")
 MOVES_WITHOUT_TARGET = Message("why.moves-without-target", "{axis} moves without a target")

@@ -14,7 +14,7 @@ from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing, unknown
 from steptwin.why.log import LAST, Change, Executed, words_of
 from steptwin.why.programstates import OVER, StateChange
-from steptwin.why.sentences import statement
+from steptwin.why.sentences import statement, statement_at
 
 WAS_EXECUTED = Message("why.was-executed", "{statement} was executed")
 WAS_IN_EXECUTION = Message("why.was-in-execution", "{statement} was in execution before")
@@ -23,6 +23,7 @@ ENDED = Message("why.ended", "{statement} ended")
 DID_NOT_WAIT = Message("why.did-not-wait", "{statement} did not wait: {levels}")
 DECIDED = Message("why.decided", "{statement} decided")
 FARTHER = Message("why.farther", "the last {most} statements did not decide it: those before were not searched")
+OF_INTERRUPT = Message("why.of-interrupt", "{statement} is executed by an interrupt that is off")
 NEVER_SET = Message("why.never-set", "nothing has set {name}")
 NOT_STARTED = Message("why.not-started", "nothing has started the program")
 HELD = {
@@ -168,6 +169,53 @@ class ProgramCauses:
                 if writing is not None:
                     yield programs.use(places[0]), writing
 
+    def switched(self, controller: str, wanted: Resource, at: Nanos) -> Iterator[tuple[str, Cause]]:
+        """The switches, written since, of the interrupt that changed something last and would have changed it again by a moment;
+        each with the statement that is not executed while it is off, which leads to who wrote it."""
+        writing = self._writing(controller, wanted)
+        handlers = [(text, one) for text in self._world.programs[controller].texts for one in self._handlers(controller, text)]
+        is_changed = any(where.text == text and where.number in one for where in writing for text, one in handlers)
+        if not is_changed or self.stands(controller, at) is not None:
+            return
+        last = self._last_of(controller, writing, self._log.last_executed(controller, at) + 1)
+        if last is None or not self._log.is_of_present_text(self._log.executed[controller][last]):
+            return
+        text, number = self._log.executed[controller].locations[last]
+        handler = next((one for where, one in handlers if where == text and number in one), range(0))
+        uses = [self._world.programs[controller].use(StatementLocation(text, one)) for one in handler]
+        changing, made = [one for one in uses if wanted in one.writes], {one for use in uses for one in use.writes}
+        if not handler or (len(changing) < 2 and made.isdisjoint(changing[0].reads)):
+            return  # it would change nothing
+        label, since = StatementLocation(text, handler.start), self._log.executed[controller].times[last]
+        words = OF_INTERRUPT(statement=statement_at(self._world.programs[controller], StatementLocation(text, number)))
+        for switch in uses[0].acts_by:
+            written = self.resource(controller, switch, self._log.last_executed(controller, at) + 1, at)
+            moment = -1 if written is None else written.place.time
+            if written is not None and moment > since and self._comes_again(controller, label, last, moment, at):
+                place = written.place._replace(number=written.place.number + 1)
+                by = partial(_given, covered(written, Cover.LEVEL))
+                yield switch.name, Cause(ChainLink(moment, controller, words), place, by, Cover.LEVEL)
+
+    def _comes_again(self, controller: str, label: StatementLocation, index: int, since: Nanos, until: Nanos) -> bool:
+        """Whether the event of an interrupt that had come before a statement comes again between two moments."""
+        times, reads = self._log.executed[controller].times, self._world.programs[controller].use(label).reads
+        came = self._last_of(controller, (label,), index)
+        if came is None:
+            return False
+        if not reads:  # it comes with the time
+            before = self._last_of(controller, (label,), came)
+            return before is not None and until - times[came] > times[came] - times[before]
+        pins = [f"{controller}.{one.name}" for one in reads if one.kind is ResourceKind.PIN]
+        changes = ((self._log.level(pin, times[came]), one) for pin in pins for one in self._log.changes_before(pin, until))
+        return any(one.time > since and one.value == level for level, one in changes)
+
+    def _last_of(self, controller: str, locations: Collection[StatementLocation], before: int) -> int | None:
+        """As that of the log, which is to have it."""
+        found = self._log.last_of(controller, locations, before)
+        if found is None and self._log.executed_before(controller, locations) is not None:
+            self._log.lack()
+        return found
+
     def statement(self, controller: str, index: int) -> Cause:
         """A statement was executed."""
         executed = self._log.executed[controller][index]
@@ -224,9 +272,7 @@ class ProgramCauses:
         """The numbers of the conditions that were evaluated since a statement was executed before; none without a loop, or with a
         wait for more than a time in it, unless ``has_waits``."""
         here = (self._log.executed[controller].locations[index],)
-        before = self._log.last_of(controller, here, index)
-        if before is None and self._log.executed_before(controller, here) is not None:
-            self._log.lack()
+        before = self._last_of(controller, here, index)
         loop = [] if before is None else list(range(before, index))
         if not has_waits and any((use := self.use(controller, one)).waits and use.reads for one in loop):
             return []
@@ -686,6 +732,10 @@ class ProgramCauses:
             return None
         first = self._log.executed[controller][0]
         return Cause(ChainLink(first.time, controller, PROGRAM_STARTED()), Place(first.time, first.order), nothing, Cover.PROGRAM)
+
+
+def _given(cause: FoundCause) -> FoundCause:
+    return cause
 
 
 def _moves(use: StatementUse) -> bool:

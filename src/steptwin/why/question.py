@@ -129,7 +129,8 @@ class Why:
         if first is not None or since is not None:
             holding = self.causes.holding.of(self._deciding(asked, canonical, at), at, since)
             others = (*self._unseen(shown, at, -1 if since is None else since), *self._again(signals, since, at))
-            first = along(first, [*holding, *others])
+            off = yield from self._switched_off(self.past.changeable(signals, at), at)
+            first = along(first, [*holding, *others, *off])
             return (yield from self._answer(text, at, state, since, first))
         waited = (*signals, *self.resting.awaited_pins(signals, at))
         resting = (yield from self.resting.moved(waited, at)) or self.resting.held(waited, at)
@@ -143,10 +144,11 @@ class Why:
             holding = self.causes.holding.of((*decides, *self.resting.awaited_pins(decides, at)), at, None)
             resting = along(resting, list(holding))
         again = list(self._again(signals, None, at))
-        awaited = self.resting.awaited(signals, at) if resting is None else ()
+        awaited = list(self.resting.awaited(signals, at)) if resting is None else []
         came = [self.causes.programs.resource(*one, self.log.last_executed(one[0], at) + 1, at) for one in awaited]
         unseen = list(self._unseen((*shown, *waited[len(signals) :]), at, -1))
-        resting = along(resting, [*(covered(one, Cover.LEVEL) for one in came), *again, *unseen])
+        off = yield from self._switched_off(awaited, at)
+        resting = along(resting, [*(covered(one, Cover.LEVEL) for one in came), *off, *again, *unseen])
         answer = yield from self._answer(text, at, state, None, resting)
         present, named = (yield from self._present(at)), [name for name in signals if self.log.has(name)]
         states = [link for name in named for link in present.of([name])]
@@ -160,6 +162,14 @@ class Why:
             found = self.causes.controllers.begun_in_vain(controller, wanted, since, at)
             if found is not None:
                 yield found
+
+    def _switched_off(self, changeable: Iterable[tuple[str, Resource]], at: Nanos) -> Generator[None, None, Sequence[Cause]]:
+        """The switches that are off of the interrupts that would have changed something again."""
+        every = [(owner, *found) for owner, one in changeable for found in self.causes.programs.switched(owner, one, at)]
+        if not every:
+            return ()
+        other = yield from self.past.world_at(at)
+        return [cause for owner, switch, cause in every if not other.programs[owner].read(switch, at)]
 
     def _unseen(self, pins: Iterable[str], at: Nanos, after: Nanos) -> Iterator[Cause]:
         """The last changes of inputs after a moment that were too short for their filters."""
@@ -241,9 +251,8 @@ class Why:
         there = None if written is None else self.causes.of(written.place.time)  # it may be numbered in the log of another moment
         came = there is not None and written is not None and there.programs.is_of_interrupt(controller, written.place.number // 3)
         states = [] if came else list(present.interrupted(controller, wanted))
-        return self._after(
-            present, states, (yield from self._answer(text, at, state, None if last is None else last.place.time, last))
-        )
+        since, off = None if last is None else last.place.time, (yield from self._switched_off([(controller, wanted)], at))
+        return self._after(present, states, (yield from self._answer(text, at, state, since, along(last, off))))
 
     def _moving(self, signal: str, at: Nanos) -> Asking:
         """Cause of a quantity that changes all the time: the motion, or since when it stands."""
@@ -309,9 +318,10 @@ class Why:
             state = DOES_NOT_WAIT(controller=controller, statement=text)
             first = covered(causes.programs.statement(controller, index), Cover.PROGRAM)
             loop = causes.programs.conditions_of_loop(controller, index, has_waits=True)
-            read = ((one, number) for number in loop for one in causes.programs.use(controller, number).reads)
+            read = [(one, number) for number in loop for one in causes.programs.use(controller, number).reads]
+            off = yield from self._switched_off([(controller, one) for one, _ in read], at)
             led = [causes.programs.resource(controller, one, number, at) for one, number in read]
-            first = along(first, [covered(one, Cover.LEVEL) for one in led])
+            first = along(first, [*(covered(one, Cover.LEVEL) for one in led), *off])
             return self._after(present, links, (yield from self._answer(controller, at, state, since, first)))
         found = {one: cause for one in use.reads if (cause := causes.programs.resource(controller, one, index, at))}
         waiting = causes.programs.statement(controller, index)

@@ -96,8 +96,8 @@ class RestingCauses:
         return None
 
     def awaited(self, signals: Iterable[str], at: Nanos) -> Iterator[tuple[str, Resource]]:
-        """All for which programs wait before they change signals, or those that drive them, with their controllers. One that is
-        paused or has no supply waits for nothing else."""
+        """All for which programs wait before they change signals, or those that drive them, with their controllers, and what
+        interrupts change for which they loop. One that is paused or has no supply waits for nothing else."""
         programs = self._past.causes.programs
         for name in self._past.behind(signals, at):
             owner, _, pin = name.partition(".")
@@ -106,6 +106,9 @@ class RestingCauses:
             if index >= 0 and not is_held and programs.leads_to(owner, index, Resource(ResourceKind.PIN, pin)):
                 use = programs.use(owner, index)
                 yield from ((owner, one) for one in use.reads if use.waits)
+                loop = () if use.waits and use.reads else programs.conditions_of_loop(owner, index)
+                counted = (one for number in loop for one in programs.use(owner, number).reads)
+                yield from ((owner, one) for one in counted if any(programs.interrupts(owner, one)))
 
     def awaited_pins(self, signals: Iterable[str], at: Nanos) -> Iterator[str]:
         """The pins among `awaited`."""
