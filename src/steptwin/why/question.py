@@ -213,6 +213,7 @@ class Why:
             return found
         names = self.past.names_in(text)
         waiting = {*self.past.changeable([one for one in names if self._is_set(one) or self.causes.holding.depends([one])], at)}
+        waiting |= set(self._kept(names, at))
         for controller, wanted in self.past.changeable(names, at):
             index, since = log.last_executed(controller, at), self._since(controller, wanted, answer)
             if index < 0 or not programs.leads_to(controller, index, wanted):
@@ -227,6 +228,18 @@ class Why:
                 if use.waits and use.reads and (since or 0) <= begun < at - log.world.programs[controller].statement_time:
                     found.setdefault(controller, False)
         return found
+
+    def _kept(self, names: Sequence[str], at: Nanos) -> Iterator[tuple[str, Resource]]:
+        """The outputs whose last changes keep workpieces where signals are as they are because of them."""
+        causes = self.causes
+        held = [
+            one for name in names if name in self.log.changes for one in causes.holding.of((name,), at, self.log.since(name, at))
+        ]
+        led = {one.place for cause in held for one in (cause, cause.before()) if one is not None}
+        for controller, wanted in self.past.changeable(names, at) if led else ():
+            last = causes.last((f"{controller}.{wanted.name}",), at) if wanted.kind is ResourceKind.PIN else None
+            if last is not None and last.place in led:
+                yield controller, wanted
 
     def _is_set(self, name: str) -> bool:
         """Whether it is an output that a program sets, or a variable."""
