@@ -13,14 +13,14 @@ from __future__ import annotations
 
 from array import array
 from collections import deque
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from steptwin.controller import MICROSECOND, MILLISECOND, SECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.state import Stateful
 from steptwin.statements import HookedStatements, StatementHook, StatementHooks, hook_before, without
-from steptwin.wbc.code import Cells, Code, Execution, StepCode
+from steptwin.wbc.code import Cells, Code, Execution, InterruptEntry, StepCode
 from steptwin.wbc.controller import ProgramController
 from steptwin.wbc.resting import NEVER, RestingLoop, Visit
 
@@ -217,6 +217,10 @@ class Interpreter(Stateful):
     def _pending_events(self) -> Iterator[int]:
         pending = self.pending
         return (event for event in range(pending.bit_length()) if pending >> event & 1)
+
+    def deferred(self, entries: Mapping[int, InterruptEntry]) -> Sequence[int]:
+        """The steps of the interrupts that have come and wait for the end of a statement or of another interrupt."""
+        return [entries[e].step for e in self._pending_events() if self.handling or entries[e].hard]
 
     def _enter(self, code: Code, event: int, now: Nanos) -> None:
         self.pending &= ~(1 << event)

@@ -24,6 +24,7 @@ WAITS_FOR_A_TIME = Message("why.waits-for-a-time", "it waits for a time only")
 DEPENDS_ON = Message("why.depends-on", "it depends on {name}")
 IS_NOT_SET = Message("why.is-not-set", "{name} is {value:g}: nothing has set it")
 IS_STILL = Message("why.is-still", "{name} is {value:g} since {time:.6f} s")
+IS_DEFERRED = Message("why.is-deferred", "{statement} has come, and waits for the end of what is in execution")
 ANY_PIN = Message("why.any-pin", "any pin")
 NO_AXIS_HAS_MOVED = Message("why.no-axis-has-moved", "no axis has moved until {time:g} s")
 MOVES_WITHOUT_TARGET = Message("why.moves-without-target", "{axis} moves without a target")
@@ -87,6 +88,10 @@ class PresentStates:
         if is_waiting and not reads:
             yield ChainLink(self._at, controller, WAITS_FOR_A_TIME())
         yield from self.of([(controller, one) for one in reads], controller)
+        for where in self._world.programs[controller].deferred():
+            label = self._world.programs[controller].use(where)
+            yield ChainLink(self._at, controller, IS_DEFERRED(statement=statement_at(self._world.programs[controller], where)))
+            yield from self.of([(controller, one) for one in label.reads], controller)
 
     def motion(self, controller: str, number: str) -> _Links:
         """Motions of an axis, of all if ``number`` is empty, that need something to end. Returns the inputs that can do that."""

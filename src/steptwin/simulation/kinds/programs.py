@@ -192,6 +192,10 @@ class Programs(Protocol):
         """How many calls and interrupts have not returned yet."""
         ...
 
+    def deferred(self) -> Sequence[StatementLocation]:
+        """The labels of interrupts that have come while a program runs, and wait for the end of what is in execution."""
+        ...
+
     def comes_back(self, location: StatementLocation) -> bool:
         """Whether what the statement calls returns to the one after it; True for what calls nothing."""
         ...

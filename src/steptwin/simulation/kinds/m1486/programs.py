@@ -204,6 +204,9 @@ class ChipPrograms:
     def depth(self) -> int:
         return 0 if self._chip.program.back is None else 1
 
+    def deferred(self) -> Sequence[StatementLocation]:
+        return ()
+
     def has_name(self, name: str) -> bool:
         return self.read(name, 0) is not None
 

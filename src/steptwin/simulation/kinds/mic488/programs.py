@@ -112,6 +112,13 @@ class WbcPrograms:
     def depth(self) -> int:
         return len(self._device.program.interpreter.stack)
 
+    def deferred(self) -> Sequence[StatementLocation]:
+        control = self._device.program
+        if control.running is None or self.state is not ProgramState.RUNS:
+            return ()
+        found = (self.location(step) for step in control.interpreter.deferred(control.running.code.entries))
+        return [one for one in found if one is not None]
+
     def comes_back(self, location: StatementLocation) -> bool:
         return self._bank(location.text).comes_back(location.number)
 
