@@ -7,6 +7,7 @@ What acts when received (K, X, C75) is recognised on the way in (M-27). Blanks, 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import ClassVar, Protocol
 
@@ -301,6 +302,12 @@ class Receiver(Stateful):
                 self._take(command, now)
             else:
                 self._chip.wrong_data_received(command, now)
+
+    def commands_waiting(self) -> Sequence[ChipCommand]:
+        """Commands of the whole lines in the buffer."""
+        lines = bytes(self._buffer).decode("latin-1").split("\r")[: self._lines]
+        commands = (_read(line, self._chip.variant) for line in lines)
+        return [command for command in commands if isinstance(command, ChipCommand)]
 
     def _is_stopped_by_motor(self) -> bool:
         """Whether compression pauses because the motor runs; inside ``[ ]`` it continues."""

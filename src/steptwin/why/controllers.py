@@ -294,22 +294,27 @@ class ControllerCauses:
         return None
 
     def given(self, controller: str, index: int) -> FoundCause:
-        """The frame with a command that came over the line by itself: of several with the same one the first that has not been
-        executed before."""
+        """The frame with a command that came over the line by itself."""
+        here = self._log.executed[controller][index]
+        return self.sent(controller, here.location.text, index, here.time, here.order)
+
+    def sent(self, controller: str, code: str, index: int, time: Nanos, before: int = LAST) -> FoundCause:
+        """The frame with a command, by a moment and before an order: of several with the same one the first that has not been
+        executed before the statement with a number."""
         on, executed = self._world.objects.line_of.get(controller), self._log.executed[controller]
         if on is None:
             return None
-        here, group = executed[index], self._log.group(controller)
+        group = self._log.group(controller)
         found: list[tuple[TraceRecord, int]] = []
-        for position in range(self._log.position(group, here.time)):
+        for position in range(self._log.position(group, time)):
             record, order = self._log.records[group][position], self._log.order(group, position)
             if record.kind == "frame" and self._is_for(controller, record, order):
                 lines = "".join(record.data().decode("ascii", "replace").split(" ")).upper().split("\r")
-                found += [(record, order)] * lines.count(here.location.text.upper())
-        earlier = sum(one.number < 0 and one.text == here.location.text for one in executed.locations[:index])
+                found += [(record, order)] * lines.count(code.upper())
+        earlier = sum(one.number < 0 and one.text == code for one in executed.locations[:index])
         done = earlier if self._log.reaches_begin() else len(found)
         record, order = found[min(done, len(found) - 1)] if found else (None, 0)
-        return None if record is None or order > here.order else covered(self._frame(record, order), Cover.FRAME)
+        return None if record is None or order > before else covered(self._frame(record, order), Cover.FRAME)
 
     def came(self, controller: str, here: Executed, event: Change) -> FoundCause:
         """The first frame between a statement and an event that has a line with whose command the reason of the event begins."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import TypeAlias
 
 from steptwin.controller import SECOND, Nanos
@@ -49,6 +50,7 @@ def _led_to(effect: Cause) -> Cause | None:
     return found[0]._replace(along=(*found[0].along, *found[1:])) if found else None
 
 
+IS_QUEUED = Message("why.is-queued", "`{command}` waits for the end of what is in execution")
 IS_TRUE = Message("why.is-true", "{name} is true")
 IS_FALSE = Message("why.is-false", "{name} is false")
 DOES_NOT_WAIT = Message("why.does-not-wait", "{controller} does not wait: {statement}")
@@ -130,7 +132,8 @@ class Why:
             holding = self.causes.holding.of(self._deciding(asked, canonical, at), at, since)
             others = (*self._unseen(shown, at, -1 if since is None else since), *self._again(signals, since, at))
             off = yield from self._switched_off(self.past.changeable(signals, at), at)
-            first = along(first, [*holding, *others, *off])
+            queued = yield from self._queued(signals, at)
+            first = along(first, [*holding, *others, *off, *queued])
             return (yield from self._answer(text, at, state, since, first))
         waited = (*signals, *self.resting.awaited_pins(signals, at))
         resting = (yield from self.resting.moved(waited, at)) or self.resting.held(waited, at)
@@ -148,7 +151,8 @@ class Why:
         came = [self.causes.programs.resource(*one, self.log.last_executed(one[0], at) + 1, at) for one in awaited]
         unseen = list(self._unseen((*shown, *waited[len(signals) :]), at, -1))
         off = yield from self._switched_off(awaited, at)
-        resting = along(resting, [*(covered(one, Cover.LEVEL) for one in came), *off, *again, *unseen])
+        queued = yield from self._queued(signals, at)
+        resting = along(resting, [*(covered(one, Cover.LEVEL) for one in came), *off, *queued, *again, *unseen])
         answer = yield from self._answer(text, at, state, None, resting)
         present, named = (yield from self._present(at)), [name for name in signals if self.log.has(name)]
         states = [link for name in named for link in present.of([name])]
@@ -170,6 +174,26 @@ class Why:
             return ()
         other = yield from self.past.world_at(at)
         return [cause for owner, switch, cause in every if not other.programs[owner].read(switch, at)]
+
+    def _queued(self, signals: Sequence[str], at: Nanos) -> Generator[None, None, Sequence[Cause]]:
+        """Commands that would have changed outputs otherwise than they were changed last, and wait behind others."""
+        found: list[Cause] = []
+        programs = self.causes.programs
+        for controller, wanted in self.past.changeable(signals, at):
+            index = self.log.last_executed(controller, at)
+            is_pin = wanted.kind is ResourceKind.PIN and controller in self.world.objects.line_of
+            if not is_pin or index < 0 or not programs.use(controller, index).waits:
+                continue
+            last = programs.written(controller, wanted, index + 1)
+            other = yield from self.past.world_at(at)
+            waiting = [one for one in other.programs[controller].queued() if wanted in one.use.writes]
+            if waiting and (last is None or waiting[-1].code not in str(last.link.text).upper()):
+                sent = self.causes.controllers.sent(controller, waiting[-1].code, index + 1, at)
+                ahead = covered(programs.statement(controller, index), Cover.WAIT)
+                led = [one for one in (sent, ahead) if one is not None]
+                link = ChainLink(at, controller, IS_QUEUED(command=waiting[-1].code))
+                found.append(Cause(link, Place(at, LAST, -1), partial(along, None, led), Cover.LEVEL))
+        return found
 
     def _unseen(self, pins: Iterable[str], at: Nanos, after: Nanos) -> Iterator[Cause]:
         """The last changes of inputs after a moment that were too short for their filters."""

@@ -188,6 +188,10 @@ class Programs(Protocol):
         """Command for which a hook was called, at that moment, where `location` knows none; None where nothing is given so."""
         ...
 
+    def queued(self) -> Sequence[GivenCommand]:
+        """Commands that came over a line by itself, and wait for the end of what is in execution."""
+        ...
+
     def depth(self) -> int:
         """How many calls and interrupts have not returned yet."""
         ...

@@ -201,6 +201,9 @@ class ChipPrograms:
             return ProgramState.KILLED
         return ProgramState.LIMITED if program.is_limited else ProgramState.RUNS
 
+    def queued(self) -> Sequence[GivenCommand]:
+        return [GivenCommand(str(command), use_of(command)) for command in self._chip.receiver.commands_waiting()]
+
     def depth(self) -> int:
         return 0 if self._chip.program.back is None else 1
 

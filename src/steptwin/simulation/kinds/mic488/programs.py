@@ -109,6 +109,9 @@ class WbcPrograms:
     def given(self, number: int) -> GivenCommand | None:
         return None  # statements come from texts only
 
+    def queued(self) -> Sequence[GivenCommand]:
+        return ()
+
     def depth(self) -> int:
         return len(self._device.program.interpreter.stack)
 
