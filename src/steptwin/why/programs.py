@@ -677,7 +677,10 @@ class ProgramCauses:
         held, index = self.held(controller, at), self._log.last_executed(controller, at)
         if held is None and index >= 0:
             return self.ended(controller, index, at)
-        if held is None or held.place.order >= 0:
+        if held is None:  # what ended the program of a chip was before
+            self._log.lack()
+            return None
+        if held.place.order >= 0:
             return held
         return self.alarm(controller, at) or held
 
