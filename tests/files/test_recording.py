@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from contextlib import suppress
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from hypothesis import strategies as st
 from steptwin.controller import MILLISECOND, SECOND
 from steptwin.errors import Misuse, SteptwinError
 from steptwin.files.recording import load, recording_of, save
+from steptwin.files.savedrecordings import path_of, usual_name
 from steptwin.files.world import World
 from steptwin.simulation.faults import read
 from steptwin.simulation.script import steps as do
@@ -56,6 +58,8 @@ def test_a_session_replays_from_its_file_alone(tmp_path: Path) -> None:
     save(recording, tmp_path / "s.json")
     loaded = load(tmp_path / "s.json")
     assert loaded == recording
+    text = (tmp_path / "s.json").read_text()
+    assert text == json.dumps(json.loads(text), indent=1) + "\n"
     assert loaded.firmware == {"table": "1.70", "drum": "B"}
     again = loaded.replay()
     assert again.trace.digest() == recording.digest
@@ -374,3 +378,10 @@ def test_a_session_of_other_values_is_refused_or_replayed(way: list[int], value:
         recording = load(path)
         if recording.until <= world.now:
             assert recording.replay().now == recording.until
+
+
+@pytest.mark.parametrize(("stem", "begin"), [("hall", "hall"), ("my hall ż", "my_hall__"), (".a", "_a"), ("n" * 300, "n" * 60)])
+def test_a_recording_without_a_name_has_one_that_is_permitted_whatever_its_world_is_called(stem: str, begin: str) -> None:
+    name = usual_name(stem, datetime(2026, 5, 4, 3, 2, 1, tzinfo=UTC))
+    assert name == f"{begin}-20260504-030201"
+    assert path_of(Path(), name).name == f"{name}.json"

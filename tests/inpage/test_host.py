@@ -15,8 +15,10 @@ from studio_rig import WORLD, check_message
 from virtual_loop import VirtualLoop, run_virtually
 
 from steptwin.controller import MILLISECOND, SECOND, Nanos
+from steptwin.files import recording as recordings
 from steptwin.inpage.editor import PageEditor
 from steptwin.inpage.host import PageTwin, open_twin
+from steptwin.inpage.recordings import INPUTS_AT_ONCE
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.studio.viewers import MOST_UNSENT
 from steptwin.subject.commands import VERSION
@@ -43,6 +45,7 @@ class Page:
         self.events: list[tuple[str, int]] = []
         self.errors: list[str] = []
         self.refusals: list[str] = []
+        self.downloads: list[tuple[str, str]] = []
         self.kept = b""
         self._id = 0
 
@@ -63,6 +66,9 @@ class Page:
     def keep(self, state: bytes) -> None:
         self.kept = state
 
+    def saveText(self, file: str, text: str) -> None:  # noqa: N802  as the page names it
+        self.downloads.append((file, text))
+
     def refused(self, text: str) -> None:
         self.refusals.append(text)
 
@@ -74,16 +80,23 @@ class Page:
         self.twin.connections.open(number)
         await self.ask("hello", number, version=VERSION, kinds=["plan", "status"])
 
-    async def ask(self, name: str, number: int = 1, **fields: object) -> Any:
+    async def ask(self, name: str, number: int = 1, /, **fields: object) -> Any:
+        answer = await self.answer(name, number, **fields)
+        assert "error" not in answer, answer
+        return answer["ok"]
+
+    async def refusal(self, name: str, /, **fields: object) -> Any:
+        return (await self.answer(name, 1, **fields))["error"]
+
+    async def answer(self, name: str, number: int, /, **fields: object) -> Any:
         assert self.twin is not None
-        self._id += 1
-        self.twin.connections.receive(number, json.dumps({"do": name, "id": self._id, **fields}))
+        self._id = asked = self._id + 1
+        self.twin.connections.receive(number, json.dumps({"do": name, "id": asked, **fields}))
         for _ in range(100):
             await asyncio.sleep(0.01)
             for one in self.messages:
-                if one.get("id") == self._id:
-                    assert "error" not in one, one
-                    return one["ok"]
+                if one.get("id") == asked:
+                    return one
         raise AssertionError(f"{name} was not answered")
 
 
@@ -104,9 +117,9 @@ def test_a_viewer_enters_moves_an_axis_and_leaves_while_the_world_goes_on() -> N
         assert hello["role"] == "engineer"
         assert hello["device_kinds"] == []
         # What needs a service, files or processes is not offered.
-        missing = {"connect", "ports", "scan", "end_points", "recordings", "branches", "gateways", "campaigns", "history"}
+        missing = {"connect", "ports", "scan", "end_points", "view_recording", "branches", "gateways", "campaigns", "history"}
         assert missing & set(hello["may"]) == set()
-        assert {"move", "fault", "show_moment", "why", "breakpoint", "download", "resume"} <= set(hello["may"])
+        assert {"move", "fault", "show_moment", "why", "breakpoint", "download", "resume", "save_recording"} <= set(hello["may"])
         await page.ask("enable", controller="table", axis=1, on=True)
         await page.ask("move", controller="table", axis=1, to=20.0)
         await asyncio.sleep(2)
@@ -211,6 +224,39 @@ def test_a_long_step_has_parts_as_short_as_slices() -> None:
     run_virtually(visit())
 
 
+def test_a_recording_becomes_a_download_while_a_stop_comes_between_its_parts(tmp_path: Path) -> None:
+    async def visit() -> None:
+        page = Page()
+        twin = make(page)
+        await page.enter()
+        await page.ask("enable", controller="table", axis=1, on=True)
+        for _ in range(3 * INPUTS_AT_ONCE):
+            await page.ask("write", values={"table.M1_ACC": 100.0})
+        saving = asyncio.create_task(page.ask("save_recording", name="mine"))
+        await asyncio.sleep(0)
+        await page.ask("stop_all")
+        assert page.downloads == []
+        answer = await saving
+        ((file, text),) = page.downloads
+        assert (file, answer["name"], answer["bytes"]) == ("mine.json", "mine", len(text))
+        recorded = tmp_path / file
+        recorded.write_text(text)
+        recording = recordings.load(recorded)
+        assert len(recording.inputs) > 3 * INPUTS_AT_ONCE
+        assert recording.replay().trace.digest() == recording.digest
+        recordings.save(recording, tmp_path / "again.json")
+        assert (tmp_path / "again.json").read_text() == text
+
+        found = await page.ask("recordings")
+        assert (found["folder"], found["saved"], found["formats"]) == (None, [], [])
+        assert found["recording"]["inputs"] > len(recording.inputs)  # with that of the stop
+        assert (await page.refusal("save_recording", name="../mine"))["code"] == "misuse"
+        assert (await page.refusal("save", file="/mine.json"))["message"].startswith("no folder for recordings here")
+        assert twin.world.keeps_inputs
+
+    run_virtually(visit())
+
+
 def test_a_wrong_description_is_refused_with_its_place() -> None:
     page = Page()
     assert open_twin(page, "hall", '[world]\nname = "hall"\n[[nonsense]]\n', {}) is None
@@ -264,6 +310,9 @@ def test_a_twin_goes_on_from_a_kept_state_with_what_was_downloaded() -> None:
         stood = again.world.now
         await asyncio.sleep(1)
         assert again.world.now == stood
+        # Its beginning is not known, so there is no recording of it.
+        assert (await other.ask("recordings"))["recording"] is None
+        assert "is not recorded" in (await other.refusal("save_recording"))["message"]
         await other.ask("resume")
         await asyncio.sleep(1)
         assert again.world.now > stood

@@ -17,6 +17,7 @@ from pages import PAGES, blocks
 from playwright.sync_api import Browser, FilePayload, Locator, Page, expect
 from pymodbus.client import ModbusTcpClient
 from studio_page import WAIT_MS, button, show
+from tests.conftest import STEPTWIN
 from tests.inpage.conftest import Handler
 from tests.peers.conftest import Master
 from tests.studio.conftest import browser, require_node, web_builder  # noqa: F401  fixtures
@@ -214,7 +215,6 @@ def test_the_demo_moves_in_a_page_without_a_service(demo: Demo) -> None:
     # What needs a service is named, and what it needs.
     for panel, words in {
         "Devices": "All other devices need the studio on a computer",
-        "Recordings": "files of a computer",
         "Gateways": "with ports",
     }.items():
         show(page, panel)
@@ -241,6 +241,29 @@ def test_the_demo_moves_in_a_page_without_a_service(demo: Demo) -> None:
     causes.get_by_role("listitem").first.get_by_role("button").click()
     expect(page.get_by_role("group", name="The past")).to_be_visible()
     button(page, "To the present").click()
+
+
+def test_the_recording_is_a_download_that_a_computer_replays_and_answers_why_from(demo: Demo, tmp_path: Path) -> None:
+    page = demo.page
+    expect(time_of(page)).to_contain_text("live", timeout=LOADING_MS)
+    show(page, "Faults")
+    page.get_by_label("Kind of fault").select_option("crc")
+    button(page, "Set fault").click()
+    expect(page.get_by_role("row", name=re.compile("^crc ")).last).to_be_visible()
+
+    show(page, "Recordings")
+    page.get_by_label("Name of the file").fill("mine")
+    with page.expect_download() as saved:
+        button(page, "Save recording").click()
+    expect(page.get_by_text("mine is saved")).to_be_visible()
+    assert saved.value.suggested_filename == "mine.json"
+    path = tmp_path / "mine.json"
+    saved.value.save_as(path)
+    assert json.loads(path.read_text())["inputs"]
+    replayed = subprocess.run([STEPTWIN, "replay", str(path)], capture_output=True, text=True, check=True)
+    assert "the same, digest" in replayed.stdout
+    asked = subprocess.run([STEPTWIN, "why", str(path), "table.M1.position"], capture_output=True, text=True, check=True)
+    assert "table.M1.position" in asked.stdout
 
 
 def test_the_panels_ask_the_twin_as_a_master_and_a_terminal_do(demo: Demo) -> None:

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import json
 from base64 import b64decode, b64encode
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
+from textwrap import indent
 from typing import Any, get_type_hints
 
 from steptwin import __version__
@@ -143,6 +144,11 @@ def recording_of(world: World) -> Recording:
 
 def save(recording: Recording, path: Path | str) -> None:
     """Write a recording, as JSON. Raises `Misuse` when the file cannot be written."""
+    write_bytes(Path(path), "".join(text_of(recording)).encode())
+
+
+def text_of(recording: Recording) -> Iterator[str]:
+    """Parts of its file, each of one input after the first: all of them may take seconds."""
     data = {
         "steptwin_session": FORMAT,
         "version": recording.version,
@@ -157,12 +163,14 @@ def save(recording: Recording, path: Path | str) -> None:
         "failed_saves": [
             {"time_ns": time, "machine": controller, "reason": text} for time, controller, text in recording.failed_saves
         ],
-        "inputs": [
-            {"time_ns": time, "settled": settled, "do": type(what).__name__, **_to_json(what)}
-            for time, what, settled in recording.inputs
-        ],
     }
-    write_bytes(Path(path), (json.dumps(data, indent=1) + "\n").encode())
+    yield json.dumps(data, indent=1).removesuffix("\n}") + ',\n "inputs": ['
+    between = "\n"
+    for time, what, settled in recording.inputs:
+        given = {"time_ns": time, "settled": settled, "do": type(what).__name__, **_to_json(what)}
+        yield between + indent(json.dumps(given, indent=1), "  ")
+        between = ",\n"
+    yield "\n ]\n}\n" if recording.inputs else "]\n}\n"
 
 
 RECORDING_OF_ANOTHER_FORMAT = Message(

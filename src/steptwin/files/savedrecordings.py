@@ -64,6 +64,11 @@ def read_saved(path: Path) -> SavedRecording:
 WRONG_NAME_OF_A_RECORDING = Message("files.wrong-name-of-a-recording", "name = {name!r}: permitted are {form}")
 
 
+def usual_name(stem: str, at: datetime) -> str:
+    """The name of a recording that has been given none. ``stem``: a name of its world, in which other characters become '_'."""
+    return f"{re.sub(r'[^A-Za-z0-9_.-]|^[.-]', '_', stem)[:60]}-{at:%Y%m%d-%H%M%S}"
+
+
 def path_of(folder: Path, name: str) -> Path:
     """Where the recording called ``name`` is, or would be. Raises `Misuse` for what is no name."""
     if not NAME.fullmatch(name):

@@ -26,6 +26,10 @@ class Page(Protocol):
         """A state from which a twin can go on that takes the place of this one."""
         ...
 
+    def saveText(self, file: str, text: str) -> None:  # noqa: N802  as the page names it
+        """A download of the browser."""
+        ...
+
     def refused(self, text: str) -> None:
         """There will be no twin, for this reason."""
         ...

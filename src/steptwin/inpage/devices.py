@@ -29,9 +29,7 @@ DOWNLOADS = Message("inpage.downloads", "{file}, among the downloads of the brow
 
 
 class DevicePage(Page, SerialPage, Protocol):
-    def saveText(self, file: str, text: str) -> None:  # noqa: N802  as the page names it
-        """A download of the browser."""
-        ...
+    """Messages to a page that has serial ports."""
 
 
 def offer_devices(twin: PageTwin, page: DevicePage) -> SerialPorts:

@@ -20,6 +20,7 @@ from steptwin.files.auditfile import wall_clock
 from steptwin.files.world import World
 from steptwin.inpage.connections import Connections, Page, report
 from steptwin.inpage.linked import LinkedTexts
+from steptwin.inpage.recordings import PageRecordings
 from steptwin.live.clock import Clock
 from steptwin.live.pace import Pace
 from steptwin.live.realtimedriver import RealTimeDriver
@@ -53,7 +54,7 @@ class PageTwin:
         kept: bytes | None = None,
     ) -> None:
         """``text``: a description; ``files``: those that it names; ``kept``: a state of this twin that the page was given, from
-        which it goes on instead. Raises `WorldError` for a wrong description."""
+        which it goes on instead, unrecorded, for its beginning is not known. Raises `WorldError` for a wrong description."""
         contents = {file: bytes(content) for file, content in files.items()}
         self.world = world = World.from_toml(text, contents, name=name) if kept is None else _world_at(name, kept)
         world.trace.let_go()
@@ -69,6 +70,7 @@ class PageTwin:
             audit=Audit(wall_clock),
             program=__version__,
             on_internal=partial(report, page),
+            recordings=PageRecordings(live, page, realtime.enter, self._leave),
         )
         self.subject = shown.subject
         self.hub = Hub(shown.subject, shown.subject, around)
@@ -96,16 +98,20 @@ class PageTwin:
 
     def _keep(self) -> None:
         state = replace(self.world.snapshot(with_inputs=False), trace=Mark(()))  # as a branch begins: without a past
-        self._live.is_dirty = True
-        self._realtime.leave()
+        self._leave()
         self._page.keep(pickle.dumps(state))
         asyncio.get_running_loop().call_later(KEPT_S, self._keep)
+
+    def _leave(self) -> None:
+        """The world has been looked at as a whole."""
+        self._live.is_dirty = True
+        self._realtime.leave()
 
 
 def _world_at(name: str, kept: bytes) -> World:
     state = pickle.loads(kept)  # pickled by `PageTwin._keep`; only the page has had it since
     text, seed, overrides, files = state.description
-    return World(Blueprint(read_world(name, text, seed, overrides, given_files(files)), files), at=state)
+    return World(Blueprint(read_world(name, text, seed, overrides, given_files(files)), files), keep_inputs=False, at=state)
 
 
 def open_twin(

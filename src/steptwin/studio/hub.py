@@ -24,12 +24,13 @@ from steptwin.studio.configurations import Configurations
 from steptwin.studio.controllers import Sheets
 from steptwin.studio.drawingrequests import Arrangement
 from steptwin.studio.eventlog import EventLog
-from steptwin.studio.recordingrequests import Recordings
+from steptwin.studio.recordingrequests import RecordingFiles, Recordings
 from steptwin.studio.requests import (
     OF_BRANCHES,
     OF_CAMPAIGNS,
     OF_DEVICES,
     OF_DRAWINGS,
+    OF_RECORDING_FILES,
     OF_RECORDINGS,
     OF_SERVICES,
     OF_TIME_TRAVEL,
@@ -106,6 +107,9 @@ class SharedState:
 
 
 NO_WORLD_TO_RECORD = Message("studio.no-world-to-record", "no world to record here")
+NO_FOLDER_FOR_RECORDINGS = Message(
+    "studio.no-folder-for-recordings", "no folder for recordings here: save_recording makes a download of the browser"
+)
 NO_WORLD_TO_BRANCH = Message("studio.no-world-to-branch", "no world to branch here: start the studio with the file of a world")
 NO_WORLD_TO_DRAW = Message("studio.no-world-to-draw", "no world to draw here: start the studio with the file of a world")
 NO_WORLD_WITH_GATEWAYS = Message("studio.no-world-with-gateways", "no world here, so no gateways and no history")
@@ -175,6 +179,13 @@ class Hub:
         if self.around.recordings is None:
             raise Refusal(NO_WORLD_TO_RECORD())
         return self.around.recordings
+
+    @property
+    def recording_files(self) -> RecordingFiles:
+        """Raises as `recordings`, and where they are in no folder."""
+        if self.around.recording_files is None:
+            raise Refusal(NO_WORLD_TO_RECORD() if self.around.recordings is None else NO_FOLDER_FOR_RECORDINGS())
+        return self.around.recording_files
 
     @property
     def branches(self) -> Branches:
@@ -252,6 +263,7 @@ class Hub:
         needed = (
             (around.time_travel, OF_TIME_TRAVEL),
             (around.recordings, OF_RECORDINGS),
+            (around.recording_files, OF_RECORDING_FILES),
             (around.branches, OF_BRANCHES),
             (around.arrangement, OF_DRAWINGS),
             (around.services, OF_SERVICES),

@@ -62,7 +62,7 @@ class RecordingsOfWorld:
     recording: Annotated[RecordingState | None, "Inputs from outside since the beginning; null: none is recorded."]
     past: Annotated[PastState | None, "What show_moment can show."]
     trace: Annotated[TraceState, "What happened, as --trace keeps it."]
-    folder: Annotated[str, "Where recordings are saved."]
+    folder: Annotated[str | None, "Where recordings are saved; null: each becomes a download of the browser."]
     saved: Annotated[tuple[RecordingFile, ...], "Sessions there, the newest first."]
     formats: Annotated[tuple[str, ...], "What GET /api/recordings/NAME.FORMAT makes of them."]
 
@@ -75,6 +75,10 @@ class Recordings(Protocol):
     async def save(self, name: str | None) -> RecordingFile:
         """Raises `Misuse`, and `Refusal` where there is a file of that name."""
         ...
+
+
+class RecordingFiles(Protocol):
+    """Recordings of one world as files in its folder. Awaits only `steptwin.later.Later`."""
 
     def place(self, file: str) -> str:
         """The absolute path at which the request ``save`` may write ``file``; a recording may be there already. Raises `Misuse`
@@ -99,7 +103,8 @@ class ReadRecordings:
 @request(
     "save_recording",
     KEEP,
-    "Save the recording up to now as a file beside the world. Nothing changes in the world.",
+    "Save the recording up to now as a file beside the world, or as a download of the browser that has the world in its page. "
+    "Nothing changes in the world.",
     RecordingFile,
 )
 @dataclass(frozen=True, slots=True)
@@ -125,4 +130,5 @@ class ViewRecording:
     name: Annotated[str, Meaning("Of a saved recording.")]
 
 
-RecordingRequest: TypeAlias = ReadRecordings | SaveRecording | ViewRecording
+RecordingRequest: TypeAlias = ReadRecordings | SaveRecording
+RecordingFileRequest: TypeAlias = ViewRecording

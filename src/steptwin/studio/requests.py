@@ -26,7 +26,7 @@ from steptwin.studio.branchrequests import BranchRequest
 from steptwin.studio.campaignrequests import CampaignRequest
 from steptwin.studio.devicerequests import DeviceRequest
 from steptwin.studio.drawingrequests import DrawingRequest
-from steptwin.studio.recordingrequests import RecordingRequest
+from steptwin.studio.recordingrequests import RecordingFileRequest, RecordingRequest
 from steptwin.studio.requesttype import ViewerRequestType, declared, request
 from steptwin.studio.servicerequests import ServiceRequest
 from steptwin.studio.toolrequests import ToolRequest
@@ -354,6 +354,7 @@ StudioRequest: TypeAlias = (
     | ToolRequest
     | WorkRequest
     | RecordingRequest
+    | RecordingFileRequest
     | BranchRequest
     | DrawingRequest
     | ServiceRequest
@@ -365,7 +366,7 @@ StudioRequest: TypeAlias = (
 
 
 def _names(union: Any) -> frozenset[str]:
-    return frozenset(declared(kind).name for kind in get_args(union))
+    return frozenset(declared(kind).name for kind in get_args(union) or (union,))
 
 
 REQUESTS: Mapping[str, ViewerRequestType] = {one.name: one for one in map(declared, get_args(StudioRequest))}
@@ -376,7 +377,9 @@ OF_TIME_TRAVEL = frozenset({"show_moment", "go_back", "past_events"})
 IN_THE_PAST = OF_TIME_TRAVEL | {"breakpoint", "clear_breakpoint", "stop_on", "step_program", "run", "look_at", "branch"}
 """Requests that change something and are possible while the past is shown: a debugger goes forwards from there, too."""
 OF_RECORDINGS = _names(RecordingRequest)
-"""Requests that need a world whose recordings are kept."""
+"""Requests that need a world that is recorded."""
+OF_RECORDING_FILES = _names(RecordingFileRequest)
+"""Requests that need a folder for recordings, too."""
 OF_BRANCHES, OF_DRAWINGS, OF_SERVICES = _names(BranchRequest), _names(DrawingRequest), _names(ServiceRequest)
 """Requests that need a world."""
 OF_CAMPAIGNS = _names(CampaignRequest)

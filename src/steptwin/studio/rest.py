@@ -82,7 +82,7 @@ class Rest:
         )
         for one in reading:
             one.add_to(app)
-        if self._hub.around.recordings is not None:
+        if self._hub.around.recording_files is not None:
             what = "A saved recording, or an export of one, as a file."
             _Reading("/api/recordings/{file}", self._recording, "get_recording", what, RECORDING_FILE, is_file=True).add_to(app)
         models = self._hub.around.models
@@ -128,7 +128,7 @@ class Rest:
 
     async def _recording(self, request: Request) -> Response:
         name = request.path_params["file"]
-        found = await self._file(request, lambda: self._hub.recordings.file(name))
+        found = await self._file(request, lambda: self._hub.recording_files.file(name))
         return found if isinstance(found, Response) else FileResponse(found, filename=name, media_type=FILE_TYPE, headers=UNKEPT)
 
     async def _model(self, models: ModelFiles, request: Request) -> Response:

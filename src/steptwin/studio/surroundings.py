@@ -17,7 +17,7 @@ from steptwin.studio.campaignrequests import Campaigns
 from steptwin.studio.drawingrequests import Arrangement
 from steptwin.studio.modelfiles import ModelFiles
 from steptwin.studio.programs import ProgramTexts
-from steptwin.studio.recordingrequests import Recordings
+from steptwin.studio.recordingrequests import RecordingFiles, Recordings
 from steptwin.studio.requests import LineUse
 from steptwin.studio.servicerequests import WorldServices
 from steptwin.studio.timetravel import TimeTravel
@@ -140,6 +140,8 @@ class Surroundings:
     """The past, where one is kept."""
     recordings: Recordings | None = None
     """None without a world."""
+    recording_files: RecordingFiles | None = None
+    """None where recordings are in no folder."""
     branches: Branches | None = None
     """None without a world."""
     arrangement: Arrangement | None = None

@@ -131,7 +131,7 @@ class ViewerSession:
             command.Jog: lambda wanted, _: self._jog(wanted),
             command.StopAxes: lambda wanted, _: hub.stop(wanted),
             command.StopAll: lambda _wanted, _: hub.stop_all(),
-            command.Save: lambda wanted, _: hub.subject.do(command.Save(hub.recordings.place(wanted.file))),
+            command.Save: lambda wanted, _: hub.subject.do(command.Save(hub.recording_files.place(wanted.file))),
             command.Subscribe: self._subscribe,
             command.Unsubscribe: lambda wanted, _: self._unsubscribe(wanted),
         }
@@ -202,7 +202,7 @@ class ViewerSession:
         return device.DeviceSettings(wanted.controller, await self._hub.connections.settings(wanted.controller))
 
     async def _view_recording(self, wanted: recording.ViewRecording) -> recording.ViewAddress:
-        return recording.ViewAddress(await self._hub.recordings.view(wanted.name))
+        return recording.ViewAddress(await self._hub.recording_files.view(wanted.name))
 
     async def _jog(self, wanted: command.Jog) -> Result:
         return self._hub.subject.result_of(to_json(await self._hub.begin_jog(self.viewer, wanted)))

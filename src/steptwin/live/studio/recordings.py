@@ -17,13 +17,13 @@ from steptwin.files import recording as recordings
 from steptwin.files.export import FORMATS
 from steptwin.files.loader import RECORDING_SUFFIX, is_recording
 from steptwin.files.ownfolder import path_in_folder
-from steptwin.files.savedrecordings import SavedRecording, path_of, read_saved, saved_recordings
+from steptwin.files.savedrecordings import SavedRecording, path_of, read_saved, saved_recordings, usual_name
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.live.studio.processes import ChildProcesses, Process, last_words
-from steptwin.live.world import MOST_INPUT_BYTES, MOST_INPUTS, LiveWorld
+from steptwin.live.studio.recordedextent import recordings_of
+from steptwin.live.world import LiveWorld
 from steptwin.messages import Message, text_of
-from steptwin.simulation.world import snapshotlog
-from steptwin.studio.recordingrequests import PastState, RecordingFile, RecordingsOfWorld, RecordingState, TraceState
+from steptwin.studio.recordingrequests import RecordingFile, RecordingsOfWorld
 
 EXPORT_S = 300.0
 """Longest duration of an export."""
@@ -38,7 +38,7 @@ UNKNOWN_RECORDING = Message("live.unknown-recording", "no recording is called {n
 
 
 class WorldRecordings:
-    """See `steptwin.studio.recordingrequests.Recordings`. A `Link` of the server.
+    """See `steptwin.studio.recordingrequests.Recordings` and `RecordingFiles`. A `Link` of the server.
 
     ``folder``: where recordings are saved; ``stem``: how their names begin; ``access``: options of views about tokens. Views are
     served at a loopback address; None: they cannot be reached, so there are none.
@@ -61,10 +61,10 @@ class WorldRecordings:
         saved = await later(asyncio.to_thread(saved_recordings, self._folder))
         files = tuple([RecordingFile(*one) for one in saved])
         formats = tuple([name for name, form in FORMATS.items() if form.is_available])
-        return RecordingsOfWorld(self._recorded(), self._past(), self._trace(), str(self._folder), files, formats)
+        return recordings_of(self._live, file=self._file, folder=self._folder, saved=files, formats=formats)
 
     async def save(self, name: str | None) -> RecordingFile:
-        path = path_in_folder(self._folder, path_of(self._folder, name or f"{self._stem}-{datetime.now(UTC):%Y%m%d-%H%M%S}").name)
+        path = path_in_folder(self._folder, path_of(self._folder, name or usual_name(self._stem, datetime.now(UTC))).name)
         self._realtime.enter()
         return RecordingFile(*await later(asyncio.to_thread(_save, self._live.recording(), path)))
 
@@ -98,26 +98,6 @@ class WorldRecordings:
             raise Misuse(UNKNOWN_RECORDING(name=name, folder=self._folder))
         read_saved(path)  # whatever else is there is nobody's business
         return path
-
-    # ------------------------------------------------------------------ what is recorded
-
-    def _recorded(self) -> RecordingState | None:
-        recorded = self._live.recorded
-        if recorded is None:
-            return None
-        file = None if self._file is None else str(self._file)
-        until, inputs, size, is_full = recorded
-        return RecordingState(until, inputs, MOST_INPUTS, size, MOST_INPUT_BYTES, is_full, file)
-
-    def _past(self) -> PastState | None:
-        past = self._live.snapshots
-        return None if past is None else PastState(past.begin, len(past), past.kept_inputs, snapshotlog.MOST_INPUTS)
-
-    def _trace(self) -> TraceState:
-        ring, file = self._live.ring, self._live.trace_file
-        if ring is not None:
-            return TraceState("ring", None if file is None else str(file), len(ring), ring.size, ring.begin)
-        return TraceState("none", None, None, None, None) if file is None else TraceState("file", str(file), None, None, None)
 
     async def close(self) -> None:
         await asyncio.to_thread(self._processes.close)

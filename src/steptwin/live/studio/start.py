@@ -215,6 +215,7 @@ class _Page:
             shown.surroundings,
             branches=branches,
             recordings=recordings,
+            recording_files=recordings,
             services=None if beside is None else LiveServices(running.gateways),
             campaigns=campaigns,
             models=models_of(live.subject.description, world),

@@ -3,7 +3,7 @@ import { texts } from "../../text";
 export const t = texts(
   {
     title: "Recordings",
-    notHere: "No recordings here: they are files of a computer, and need steptwin studio there.",
+    notHere: "Nothing is recorded here.",
     now: "What is recorded now",
     recording: "Recording",
     recordingMeaning:
@@ -28,6 +28,7 @@ export const t = texts(
     saving: "saving …",
     saved: "{name} is saved",
     folder: "Recordings in {folder}",
+    downloads: "Each recording is a download of the browser.",
     none: "No recording is saved there.",
     when: "Saved",
     length: "Length",
@@ -43,7 +44,7 @@ export const t = texts(
   },
   {
     title: "Nagrania",
-    notHere: "Nie ma tu nagrań: są plikami komputera i wymagają tam steptwin studio.",
+    notHere: "Tu nic nie jest nagrywane.",
     now: "Co jest teraz nagrywane",
     recording: "Nagranie",
     recordingMeaning: "Co przyszło z zewnątrz od początku. Powtórzone daje w każdej chwili tę samą maszynę.",
@@ -67,6 +68,7 @@ export const t = texts(
     saving: "zapisywanie …",
     saved: "{name} – zapisano",
     folder: "Sesje w {folder}",
+    downloads: "Każde nagranie trafia do plików pobranych przez przeglądarkę.",
     none: "Nie ma tam żadnej sesji.",
     when: "Zapisano",
     length: "Długość",
