@@ -257,6 +257,32 @@ def test_a_recording_becomes_a_download_while_a_stop_comes_between_its_parts(tmp
     run_virtually(visit())
 
 
+def test_time_stands_while_the_page_is_hidden_and_goes_on_only_if_it_went() -> None:
+    async def visit() -> None:
+        page = Page()
+        twin = make(page)
+        await page.enter()
+        await page.ask("resume", speed=20)
+
+        async def passed() -> float:
+            before = twin.world.now
+            await asyncio.sleep(1)
+            return (twin.world.now - before) / SECOND
+
+        twin.hide(True)
+        twin.hide(True)
+        assert await passed() == 0
+        assert (await page.ask("time"))["paused"] is True
+        twin.hide(False)
+        assert await passed() == pytest.approx(20, abs=1)  # up to what happened last
+        await page.ask("pause")
+        twin.hide(True)
+        twin.hide(False)
+        assert await passed() == 0
+
+    run_virtually(visit())
+
+
 def test_a_wrong_description_is_refused_with_its_place() -> None:
     page = Page()
     assert open_twin(page, "hall", '[world]\nname = "hall"\n[[nonsense]]\n', {}) is None

@@ -337,6 +337,34 @@ def test_a_long_step_goes_to_its_end(demo: Demo) -> None:
     expect(time_of(page)).to_contain_text("live")
 
 
+HIDE = """(hidden) => {
+  Object.defineProperty(document, "hidden", { value: hidden, configurable: true });
+  document.dispatchEvent(new Event("visibilitychange"));
+}"""
+"""A browser without windows hides no tab."""
+
+
+def test_a_hidden_tab_goes_on_or_pauses_as_chosen(demo: Demo) -> None:
+    page = demo.page
+    expect(time_of(page)).to_contain_text("live", timeout=LOADING_MS)
+    show(page, "Time")
+    choice = page.get_by_label("Pause while this tab is hidden")
+    expect(choice).not_to_be_checked()
+    page.evaluate(HIDE, True)
+    stood = page.get_by_label("World time").inner_text()
+    expect(page.get_by_label("World time")).not_to_have_text(stood)
+    expect(time_of(page)).to_contain_text("live")
+    page.evaluate(HIDE, False)
+
+    choice.check()
+    assert json.loads(page.evaluate("localStorage.getItem('steptwin.hidden.pauses')"))["value"] is True
+    page.evaluate(HIDE, True)
+    expect(time_of(page)).to_contain_text("paused")
+    page.evaluate(HIDE, False)
+    expect(time_of(page)).to_contain_text("live")
+    choice.uncheck()
+
+
 def until(page: Page, condition: Callable[[], bool], what: str) -> None:
     """Wait while bytes of the page pass."""
     for _ in range(1000):

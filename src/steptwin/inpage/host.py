@@ -61,6 +61,7 @@ class PageTwin:
         self._page = page
         self._text = text
         self._begins_at = 1.0 if kept is None else 0.0
+        self._stands_hidden = False
         self._live = live = LiveWorld(world)
         self._realtime = realtime = RealTimeDriver(live, Clock(wall_ns=clock, begin=world.now), SLICE_NS)
         self.pace = Pace(live, realtime, live.show, has_clients=False)
@@ -95,6 +96,15 @@ class PageTwin:
         """Time goes from now on; it stands at a state that was kept, for what came after it may happen again."""
         self.pace.begin(self._begins_at)
         self._keep()
+
+    def hide(self, is_hidden: bool) -> None:
+        """Stop time because the page is hidden; when it is seen again, time goes on if it went before."""
+        if is_hidden and not self.pace.is_paused:
+            self._stands_hidden = True
+            self.pace.pause()
+        elif not is_hidden and self._stands_hidden:
+            self._stands_hidden = False
+            self.pace.resume()
 
     def _keep(self) -> None:
         state = replace(self.world.snapshot(with_inputs=False), trace=Mark(()))  # as a branch begins: without a past

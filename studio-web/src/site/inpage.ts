@@ -1,6 +1,7 @@
 import type { Backend, FileKind, Link, LinkEvents, Loading, OpenLink } from "../lib/protocol/backend";
 import { errorOf, type Hello } from "../lib/protocol/connection";
 import { save } from "../lib/save";
+import { keep, restore } from "../lib/state/kept";
 import type { Answer } from "../lib/protocol/types";
 import { pack, type Linked } from "./links";
 import Offline from "./Offline.svelte";
@@ -12,6 +13,8 @@ interface Waiting<T> {
   failed(error: Error): void;
 }
 
+const [HIDDEN, VERSION] = ["hidden.pauses", 1];
+const isChoice = (value: unknown): value is boolean => typeof value === "boolean";
 const ENDED = "the worker of the twin has ended";
 
 /** A worker with Python in it. It goes on when a connection to it ends. */
@@ -56,6 +59,11 @@ class PythonWorker {
   link(): Promise<string> {
     this.tell({ link: true });
     return new Promise((done, failed) => this.askedForLink.push({ done, failed }));
+  }
+
+  /** Time stands while the page is hidden. */
+  hide(hidden: boolean): void {
+    this.tell({ hidden });
   }
 
   /** Gives the address of a serial port that the user has chosen; null where none was. */
@@ -129,6 +137,9 @@ export class InPage implements Backend {
     private readonly linked: Linked | null,
   ) {
     this.twin = this.start();
+    const tell = () => this.hidden.pauses && this.twin.hide(document.hidden);
+    document.addEventListener("visibilitychange", tell);
+    if (document.hidden) tell();
   }
 
   /** `kept`: a state of a twin that has ended, from which this one goes on. */
@@ -177,6 +188,15 @@ export class InPage implements Backend {
     problem: SerialPorts.problem,
     choose: () => this.twin.choosePort(),
     configure: (file: File) => this.twin.configure(file),
+  };
+
+  /** The tab is not hidden while somebody chooses. */
+  readonly hidden = {
+    pauses: restore(HIDDEN, VERSION, isChoice) ?? false,
+    choose(pauses: boolean) {
+      this.pauses = pauses;
+      keep(HIDDEN, VERSION, pauses);
+    },
   };
 
   restart(): void {

@@ -34,7 +34,9 @@ export type ToWorker =
   | { taken: number }
   | { close: number }
   | { texts: true }
-  | { link: true };
+  | { link: true }
+  /** Time stands while the page is hidden. */
+  | { hidden: boolean };
 
 export type FromWorker =
   | FromPort

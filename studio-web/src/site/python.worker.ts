@@ -29,6 +29,7 @@ interface Ports {
 interface Twin extends Editor {
   texts(): PyProxy;
   link(): string;
+  hide(isHidden: boolean): void;
 }
 
 const BOUND = 5000;
@@ -179,6 +180,7 @@ function take(host: Twin | Editor, message: ToWorker): void {
     const size = outgoing.get(message.taken)?.taken();
     if (size !== undefined) connections.taken(message.taken, size);
   } else if ("close" in message) connections.close(message.close);
+  else if ("hidden" in message && "hide" in host) host.hide(message.hidden);
   else if ("link" in message && "link" in host) tell({ link: host.link() });
   else if ("texts" in message && "texts" in host)
     tell({ texts: host.texts().toJs({ dict_converter: Object.fromEntries }) as Texts });

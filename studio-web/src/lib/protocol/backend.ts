@@ -32,6 +32,12 @@ export interface SerialPorts {
   configure(file: File): Promise<string>;
 }
 
+export interface WhileHidden {
+  /** Whether time stands then; else it goes on. It is remembered. */
+  readonly pauses: boolean;
+  choose(pauses: boolean): void;
+}
+
 /** The studio behind the page: a service, or a worker of the page. What it can do is in its hello, not here. */
 export interface Backend {
   open: OpenLink;
@@ -49,6 +55,8 @@ export interface Backend {
   serial: SerialPorts | null;
   /** Ends the twin, even where it does not answer, and begins another one at its last state; null where the page does not own it. */
   restart: (() => void) | null;
+  /** What time does while the tab is hidden; null where the page has no say in it. */
+  hidden: WhileHidden | null;
   /** Stop all where the studio does not accept this page: a stop needs no token. Rejects with the words of the studio. */
   stopAll(): Promise<void>;
 }

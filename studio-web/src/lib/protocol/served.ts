@@ -39,6 +39,7 @@ export const served: Backend = {
   share: null,
   origin: null,
   restart: null,
+  hidden: null,
   serial: null,
   open,
   follow: () => undefined,

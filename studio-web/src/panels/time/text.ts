@@ -34,6 +34,8 @@ export const t = texts(
     idle: "Nothing more happens by itself.",
     happened: "What happened in the step",
     nothing: "Nothing.",
+    pauses: "Pause while this tab is hidden",
+    pausesHelp: "Otherwise time goes on. Where the browser suspends a hidden tab, time stands until it is shown.",
     jogLimit: "A dead-man jog needs a speed of at most 5×.",
     now: "World time",
     past: "The past",
@@ -88,6 +90,9 @@ export const t = texts(
     idle: "Samo z siebie nic więcej się nie wydarzy.",
     happened: "Co wydarzyło się w kroku",
     nothing: "Nic.",
+    pauses: "Wstrzymuj, gdy ta karta jest ukryta",
+    pausesHelp:
+      "W przeciwnym razie czas płynie dalej. Gdy przeglądarka uśpi ukrytą kartę, czas stoi, aż karta zostanie pokazana.",
     jogLimit: "Ruch podtrzymywany wymaga tempa najwyżej 5×.",
     now: "Czas świata",
     past: "Przeszłość",
