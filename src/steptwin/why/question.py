@@ -182,11 +182,14 @@ class Why:
         for controller, wanted in self.past.changeable(signals, at):
             index = self.log.last_executed(controller, at)
             is_pin = wanted.kind is ResourceKind.PIN and controller in self.world.objects.line_of
-            if not is_pin or index < 0 or not programs.use(controller, index).waits:
+            if not is_pin or (index >= 0 and not programs.use(controller, index).waits):
                 continue
-            last = programs.written(controller, wanted, index + 1)
             other = yield from self.past.world_at(at)
             waiting = [one for one in other.programs[controller].queued() if wanted in one.use.writes]
+            if waiting and index < 0:  # what it waits behind was before
+                self.log.lack()
+                continue
+            last = programs.written(controller, wanted, index + 1)
             if waiting and (last is None or waiting[-1].code not in str(last.link.text).upper()):
                 sent = self.causes.controllers.sent(controller, waiting[-1].code, index + 1, at)
                 ahead = covered(programs.statement(controller, index), Cover.WAIT)
