@@ -63,8 +63,9 @@ from guard import guarded
 
 with guarded():
     subprocess.run([sys.executable, "-c", "pass"])
-    wait = "import threading; print('started', flush=True); threading.Event().wait()"
+    wait = "import threading; threading.Event().wait()"
     with subprocess.Popen([sys.executable, "-c", wait]) as child:
+        print("started", flush=True)  # and noted: killed a moment before, this run would leave it behind
         child.wait()
 """
 
