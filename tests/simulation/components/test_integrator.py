@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from world_rig import check_it_can_be_restored
 
 from steptwin.controller import SECOND
+from steptwin.errors import Runaway
 from steptwin.files.world import World
 from steptwin.simulation.toml.reader import WorldError
 
@@ -156,9 +157,7 @@ def test_what_is_on_it_moves_by_its_value() -> None:
     assert here.read("tank.value") == pytest.approx(32.0, abs=1e-6), "330 mm are 33 l, less the 10 mm of the float"
 
 
-def test_a_beam_that_sees_what_is_on_it_may_be_in_its_rate() -> None:
-    """It rises 140 mm at 50 mm/s; from then on the beam, which is 20 mm longer while it sees something, keeps it there."""
-    world = World.from_toml("""
+KEPT_BY_A_BEAM = """
 [[mic488]]
 name = "c"
 [[integrator]]
@@ -180,11 +179,25 @@ length = 50
 hysteresis = 20
 sees = ["surface"]
 to = "c.IN1"
-""")
+"""
+
+
+def test_a_beam_that_sees_what_is_on_it_may_be_in_its_rate() -> None:
+    """It rises 140 mm at 50 mm/s; from then on the beam, which is 20 mm longer while it sees something, keeps it there."""
+    world = World.from_toml(KEPT_BY_A_BEAM)
     world.run(for_=10)
     edges = [(record.time / SECOND, record.level()) for record in world.trace.of("edge") if record.subject == "IN1"]
     assert [level for _, level in edges[:4]] == [0.0, 1.0, 0.0, 1.0]
     assert [time for time, _ in edges[1:4]] == pytest.approx([2.8, 3.6, 4.0], abs=1e-7)
+
+
+def test_a_beam_that_switches_its_own_reason_off_at_once_ends_the_run() -> None:
+    """Without a hysteresis the level turns back each nanosecond: the run would come no further."""
+    world = World.from_toml(KEPT_BY_A_BEAM.replace("hysteresis = 20\n", ""))
+    with pytest.raises(
+        Runaway, match=r"eye changes again and again, 1000 times .* until 28000.* ns: .* a sensor needs a hysteresis"
+    ):
+        world.run(for_=10)
 
 
 @pytest.mark.parametrize(

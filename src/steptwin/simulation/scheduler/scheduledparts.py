@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import TypeAlias
 
+from steptwin.controller import Nanos
+from steptwin.errors import Runaway
+from steptwin.messages import Message
 from steptwin.simulation.scheduler.deadlines import Deadlines
 from steptwin.simulation.scheduler.order import successors, update_order
 from steptwin.simulation.scheduler.runqueue import RunQueue
@@ -13,6 +16,16 @@ from steptwin.simulation.scheduler.wires import Wire
 
 Depends: TypeAlias = "Iterable[str] | Callable[[], Iterable[str]] | None"
 """Names of controllers, lines and elements. A function gives them when all parts are there; None: everything."""
+
+AT_ONCE_NS: Nanos = 10
+"""Time in which a part of a machine changes nothing of importance twice."""
+MOST_AT_ONCE = 1000
+"""More changes of a part, each within `AT_ONCE_NS` of the one before, mean that what it does undoes its reason."""
+CHANGES_AGAIN_AND_AGAIN = Message(
+    "simulation.changes-again-and-again",
+    "{name} changes again and again, {most} times within microseconds until {now} ns: what it switches switches it off again; "
+    "a sensor needs a hysteresis for that, a level two limits, a relay a delay",
+)
 
 
 class ScheduledParts:
@@ -25,6 +38,7 @@ class ScheduledParts:
         "_depends_on",
         "_drives",
         "_reads",
+        "_runs",
         "all",
         "by_name",
         "computes",
@@ -54,6 +68,8 @@ class ScheduledParts:
         self.queue = RunQueue()
         """Those that are updated when the signals settle."""
         self.deadlines = Deadlines()
+        self._runs: dict[int, tuple[Nanos, int]] = {}
+        """When a part was due last, and how often it was so again and again within `AT_ONCE_NS`, by its number."""
         self.visited: set[int] = set()
         """Those whose deadlines may have changed since the signals last settled."""
 
@@ -74,6 +90,21 @@ class ScheduledParts:
         else:
             self._run_after(known, number)
         return number
+
+    def run_due(self, now: Nanos) -> None:
+        """Update those that are due when the signals settle. Raises `Runaway` for one that is due again and again."""
+        for number in self.deadlines.take(now):
+            self.queue.add(number)
+            last, count = self._runs.get(number, (now, 0))
+            count = count + 1 if 0 < now - last <= AT_ONCE_NS else 0  # a restored state may be earlier, or the same again
+            self._runs[number] = now, count
+            if count > MOST_AT_ONCE:
+                self._runs.clear()
+                raise Runaway(CHANGES_AGAIN_AND_AGAIN(name=self._name(number), most=MOST_AT_ONCE, now=now))
+
+    def _name(self, number: int) -> str:
+        """The element whose signals a part computes, or whose input it drives."""
+        return self.computes[number] or self._drives.get(number, "") or type(self.parts[number]).__name__
 
     def _run_after(self, names: Iterable[str], number: int) -> None:
         for name in names:

@@ -453,8 +453,7 @@ class Scheduler:
             if is_quiet:
                 self._find_due()
                 continue
-            for number in self._parts.deadlines.take(self.now):
-                self._parts.queue.add(number)
+            self._parts.run_due(self.now)
             if self.wires.delayed:
                 self.wires.arrive(self.now)
             self.propagate()
