@@ -215,9 +215,11 @@ class WorkpieceCauses:
             found = self._lacking(belt, contact.at_mm, passed, change, since)
         yield from (one for one in found if one is not None)
 
-    def _lacking(self, belt: str, place: float, seen: Collection[str], change: Change, since: Nanos) -> Iterator[FoundCause]:
+    def _lacking(
+        self, belt: str, place: float, seen: Collection[str], change: Change, since: Nanos, onto: frozenset[str] = frozenset()
+    ) -> Iterator[FoundCause]:
         """Reasons why no workpiece comes to a place of a belt, mm, before a change, as none has since a moment, but those that
-        have been ``seen``."""
+        have been ``seen``. ``onto``: the belts behind it, of which it may be the next one: belts may lie in a ring."""
         stopped = self._stopped(belt, change)
         if stopped is not None:
             yield stopped
@@ -247,8 +249,8 @@ class WorkpieceCauses:
             feed = list(self._all.sources(PinName(belt, FEED)))
             yield covered(self._all.last(feed, change.time, NOT_FED_SINCE(name=belt)) if feed else None, Cover.LEVEL)
             for name, spec in self._all.specs.items():
-                if getattr(spec, "next", None) == belt:
-                    yield from self._lacking(name, math.inf, seen, change, since)
+                if getattr(spec, "next", None) == belt and name not in onto:
+                    yield from self._lacking(name, math.inf, seen, change, since, onto | {belt, name})
 
     def _workpiece(self, event: Change) -> str:
         return str(dict(self._log.record(event).facts)["workpiece"])
