@@ -51,6 +51,11 @@ def covered(cause: FoundCause, by: Cover | None) -> FoundCause:
     return cause if cause is None or by is None else cause._replace(cover=by)
 
 
+def given(cause: FoundCause) -> FoundCause:
+    """A cause that is known already, for `functools.partial`."""
+    return cause
+
+
 def nothing() -> FoundCause:
     """The end of a chain: what comes from outside or holds from the beginning."""
     return None

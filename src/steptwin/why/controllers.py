@@ -249,8 +249,8 @@ class ControllerCauses:
         return Cause(link, Place(event.time, event.order), before, Cover.PROGRAM, besides)
 
     def begun_in_vain(self, controller: str, wanted: Resource | None, since: Nanos | None, at: Nanos) -> FoundCause:
-        """What began a controller anew between two moments, if nothing has started its program since, by which ``wanted`` would
-        change, or has switched that on or moved it. ``since``: by default when the program was stopped."""
+        """Event that began a controller anew between two moments, if nothing has started its program since, by which ``wanted``
+        would change, or has switched that on or moved it. ``since``: by default when the program was stopped."""
         event, held = self._log.last_begin(controller, at, LAST), self._all.programs.held(controller, at)
         since = held.place.time if since is None and held is not None and held.place.order >= 0 else since
         if event is None or event.position < 0 or since is None or event.time <= since:

@@ -129,7 +129,7 @@ class PastQuestions:
         return answer.at - since >= STANDS_NS or faults.acts[name].last >= since or bool(one is not None and one.doing)
 
     def _standing(self, answer: Answer) -> Generator[None, None, Sequence[Answer]]:
-        """What the programs stand at that an answer is about besides."""
+        """Answers about where the programs stand that an answer names."""
         names = (link.subject for link in answer.links if link.is_stand)
         found: dict[str, Answer] = {}
         for name in dict.fromkeys(names):

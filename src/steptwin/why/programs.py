@@ -11,7 +11,7 @@ from steptwin.datasheet import EventSeverity
 from steptwin.messages import Message
 from steptwin.simulation.kinds.programs import ProgramState, Resource, ResourceKind, StatementLocation, StatementUse
 from steptwin.why.answer import ChainLink, Cover
-from steptwin.why.chain import Cause, FoundCause, Place, covered, nothing, unknown
+from steptwin.why.chain import Cause, FoundCause, Place, covered, given, nothing, unknown
 from steptwin.why.log import LAST, Change, Executed, words_of
 from steptwin.why.programstates import OVER, StateChange
 from steptwin.why.sentences import statement, statement_at
@@ -144,7 +144,7 @@ class ProgramCauses:
         return found._replace(link=link, cover=Cover.WAIT, besides=besides)
 
     def prevented(self, controller: str, wanted: Resource, at: Nanos) -> FoundCause:
-        """What holds a program at a moment, or the condition that has decided against a statement that changes something; both
+        """Cause that holds a program at a moment, or the condition that decided against a statement that changes something; both
         where the program could not come to one any more when it was held."""
         held, index = self.stands(controller, at), self._log.last_executed(controller, at)
         if held is not None and (index < 0 or self.leads_to(controller, index, wanted)):
@@ -193,7 +193,7 @@ class ProgramCauses:
             moment = -1 if written is None else written.place.time
             if written is not None and moment > since and self._comes_again(controller, label, last, moment, at):
                 place = written.place._replace(number=written.place.number + 1)
-                by = partial(_given, covered(written, Cover.LEVEL))
+                by = partial(given, covered(written, Cover.LEVEL))
                 yield switch.name, Cause(ChainLink(moment, controller, words), place, by, Cover.LEVEL)
 
     def _comes_again(self, controller: str, label: StatementLocation, index: int, since: Nanos, until: Nanos) -> bool:
@@ -735,10 +735,6 @@ class ProgramCauses:
             return None
         first = self._log.executed[controller][0]
         return Cause(ChainLink(first.time, controller, PROGRAM_STARTED()), Place(first.time, first.order), nothing, Cover.PROGRAM)
-
-
-def _given(cause: FoundCause) -> FoundCause:
-    return cause
 
 
 def _moves(use: StatementUse) -> bool:

@@ -161,7 +161,7 @@ class Why:
         return self._after(present, states if says_more else [], answer)
 
     def _again(self, signals: Sequence[str], since: Nanos | None, at: Nanos) -> Iterator[Cause]:
-        """What began controllers anew that could have changed signals since, and has led to nothing."""
+        """Events that began controllers anew, could have changed signals since, and have led to nothing."""
         for controller, wanted in self.past.changeable(signals, at):
             found = self.causes.controllers.begun_in_vain(controller, wanted, since, at)
             if found is not None:

@@ -11,7 +11,7 @@ from steptwin.controller import Nanos
 from steptwin.simulation.kinds.programs import Resource, ResourceKind
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.axes import POSITION
-from steptwin.why.chain import Cause, FoundCause, Place, covered
+from steptwin.why.chain import Cause, FoundCause, Place, covered, given
 from steptwin.why.controllers import axis_of
 from steptwin.why.log import LAST
 from steptwin.why.notedpast import NotedPast
@@ -58,7 +58,7 @@ class RestingCauses:
             text = value_with_unit(name, other.read(name), other.signal(name).unit)
             place = Place(at, LAST, -1 - number)
             cause = self._of_standing(name, at)
-            before = self._past.causes.at_begin if cause is None else partial(_given, cause)
+            before = self._past.causes.at_begin if cause is None else partial(given, cause)
             found.append(Cause(ChainLink(at, name.partition(".")[0], text), place, before))
         return along(found[0], found[1:])
 
@@ -119,10 +119,6 @@ class RestingCauses:
     def _axes_of(self, signals: Iterable[str], at: Nanos) -> set[str]:
         """The axes whose position or switch is among signals, or drives one of them."""
         return {name.partition(".")[0] for name in self._past.behind(signals, at)} & set(self._world.axes)
-
-
-def _given(cause: Cause) -> Cause:
-    return cause
 
 
 def along(first: FoundCause, others: Sequence[FoundCause]) -> Cause | None:

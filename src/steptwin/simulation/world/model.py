@@ -72,7 +72,7 @@ class Model:
         self.failures = BoundedLog()
         """Expectations that did not hold."""
         self.overdue = BoundedLog()
-        """What scripts of the description waited for in vain: conditions and answers until their time-out, writes that were
+        """Things for which scripts waited in vain: conditions and answers until their time-out, writes that were
         refused."""
         self.synced_first: Sequence[Scheduler] = ()
         """Schedulers that are advanced before the others where the order is free, so that what observes them can read the

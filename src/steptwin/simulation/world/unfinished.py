@@ -88,7 +88,7 @@ class StandingPrograms:
                 yield LEVEL_IS(name=resource.name, level=value)
 
     def _motions(self, controller: str, resource: Resource) -> Iterator[MessageText]:
-        """Of all axes only those that move."""
+        """Motions of an axis, or of all that move, or the count of an encoder."""
         if resource.kind not in (ResourceKind.AXIS, ResourceKind.ENCODER):
             return
         number = resource.name
@@ -123,7 +123,7 @@ class StandingPrograms:
 
     @cached_property
     def _drivers(self) -> dict[str, list[str]]:
-        """What drives each pin."""
+        """Sources that drive each pin."""
         found: dict[str, list[str]] = {}
         for one in connections(self._world.objects):
             found.setdefault(str(one.target), []).append(one.source)
