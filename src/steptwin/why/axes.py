@@ -36,6 +36,8 @@ MOTION_ENDED = Message("why.motion-ended", "the motion of {axis} ended, which be
 STOPPED_AT_SOFT_LIMIT = Message("why.stopped-at-soft-limit", "{axis} stopped at its soft limit {limit}")
 BRAKES_NS: Nanos = SECOND // 10
 """How much later than a load stands its brake may have closed (`steptwin.simulation.components.brake`)."""
+MOST_SUMMED = 20
+"""Limit of the motions of which a place is the sum that are followed."""
 POSITION = "position"
 SETTINGS = ("VMAX", "ACC", "DEC")
 """Registers of an axis by which a motion is made."""
@@ -54,8 +56,11 @@ class AxisCauses:
         self._log = causes.log
         self._world = causes.log.world
 
-    def motion(self, controller: str, axis: str, until: Nanos, mechanics: str = "", before: int = LAST) -> FoundCause:
-        """The motion of an axis at a moment, begun before an order; of all axes the one that ends last, if ``axis`` is empty."""
+    def motion(
+        self, controller: str, axis: str, until: Nanos, mechanics: str = "", before: int = LAST, since: Nanos | None = None
+    ) -> FoundCause:
+        """The motion of an axis at a moment, begun before an order; of all axes the one that ends last, if ``axis`` is empty.
+        With ``mechanics``, the name of the axis, or ``since`` a moment, besides it those since then that led to where it began."""
         plan = max(self._log.plans_in_force(controller, axis, until, before), key=self._end, default=None)
         if plan is None:
             return None
@@ -66,7 +71,7 @@ class AxisCauses:
         if self._log.was_before(plan):
             there = self._all.of(profile.start)
             if there is not None:
-                return there.axes.motion(controller, record.subject, until, mechanics)
+                return there.axes.motion(controller, record.subject, until, mechanics, since=since)
         name = f"{controller}.M{record.subject}"
         shown = f"{mechanics} ({name})" if mechanics else name
         if self._log.was_before(plan):
@@ -96,6 +101,8 @@ class AxisCauses:
             return covered(self.followed(controller, record.subject, plan.time, plan.order, found), Cover.MOTION)
 
         def besides() -> Iterator[Cause]:
+            if (mechanics or since is not None) and self._shortened(controller, plan) is None:
+                yield from self._begun_from(controller, plan, since or 0)
             yield from self.settings(controller, record.subject, place.time, names)
             for one in self._all.controllers.acts_by(controller, plan, record.subject):
                 found = self._acted_by(controller, record.subject, one, plan)
@@ -104,6 +111,23 @@ class AxisCauses:
             yield from self._going_on(controller, plan, mechanics)
 
         return Cause(ChainLink(place.time, controller, text), place, planned, cover, besides)
+
+    def _begun_from(self, controller: str, plan: Change, since: Nanos) -> Iterator[Cause]:
+        """The motions from a moment on that brought an axis to where one by a distance, or with a velocity, began."""
+        axis = self._log.record(plan).subject
+        for _ in range(MOST_SUMMED):
+            is_to_place = any(one.kind is ResourceKind.ORIGIN for one in self._all.controllers.acts_by(controller, plan, axis))
+            end = self._end(plan)[0]
+            events = self._log.axis_events.get((controller, axis), ())
+            if is_to_place or any(one.time == end and self._log.record(one).subject == HOMED for one in events):
+                return
+            before = max(self._log.plans_in_force(controller, axis, plan.time, plan.order), key=self._end, default=None)
+            found = None if before is None else self.motion(controller, axis, plan.time, before=plan.order)
+            if before is None or found is None or found.place.time < since:
+                return
+            if found.cover is None:
+                yield found._replace(cover=Cover.LEVEL)
+            plan = before
 
     def _falls(self, controller: str, number: str, plan: Change, profile: Profile) -> bool:
         """Whether the load of an axis moves by itself when a motion of its pulses ends."""
@@ -168,7 +192,8 @@ class AxisCauses:
 
     def coordinate(self, controller: str, axis: str, until: Nanos) -> FoundCause:
         """Cause of the coordinate that an axis has at a moment: its motion, or who wrote it since; both, where it moved on."""
-        motion, origin = self.motion(controller, axis, until), self.origin(controller, axis, until)
+        origin = self.origin(controller, axis, until)
+        motion = self.motion(controller, axis, until, since=0 if origin is None else origin.place.time)
         if origin is None and (motion is None or motion.place.time < self._log.begin):
             self._log.lack()  # it may have been written since, before the log
         motion = motion and self._rests(controller, axis, motion, until)
@@ -241,7 +266,9 @@ class AxisCauses:
             return self.rotor_event(axis, event)._replace(along=tuple(one for one in others if one is not None))
         if is_unpowered and power is not None:
             let_go = self._let_go(axis, power, rests)
-            return let_go if is_off else self._regained(axis, let_go, power, motion)
+            in_vain = [] if motion is None else [motion._replace(cover=Cover.LEVEL)]
+            off = let_go._replace(along=(*let_go.along, *in_vain))
+            return off if is_off else self._regained(axis, let_go, power, motion)
         lost = self._lost_by_fault(axis, until, before, LOSES_PULSES)
         if motion is None and lost is None:
             return self._all.attempts.last(controller, number, until, before)

@@ -31,6 +31,7 @@ from steptwin.why.roots import SetFault
 from steptwin.why.workpieces import IS_WIRED_TO, WorkpieceCauses
 
 BECAME = Message("why.became", "{signal} became {value:g}{how}")
+BY = Message("why.by", " by {name}{how}")
 IS_SINCE = Message("why.is-since", "{signal} is {value:g} {since}{how}")
 IS_HELD = Message("why.is-held", "{signal} is {held} since {time:.6f} s")
 SINCE = Message("why.since", "since {time:.6f} s")
@@ -85,7 +86,10 @@ class Causes:
         owner, place = signal.partition(".")[0], Place(change.time, change.order)
         if self.log.is_first(signal, change):
             return self.first(signal, how, place)
-        text = BECAME(signal=signal, value=change.value, how=self._as_it_is(signal, how))
+        seen = self.log.meetings.seen.get((signal, change.time), ())
+        words = self._as_it_is(signal, how)
+        words = BY(name=seen[0], how=words) if len(seen) == 1 else words  # of a beam or sensor
+        text = BECAME(signal=signal, value=change.value, how=words)
         return Cause(ChainLink(change.time, owner, text), place, partial(self._of_change, signal, change))
 
     def _as_it_is(self, signal: str, how: MessageText | str | None) -> MessageText | str:

@@ -9,10 +9,13 @@ from typing import Any, TypeVar
 from steptwin.controller import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.brake import RELEASE, Brake
+from steptwin.simulation.components.counter import DOWN, UP, Counter
+from steptwin.simulation.components.cylinder import EXTEND, EXTENDED, RETRACT, Cylinder
 from steptwin.simulation.components.gate import Gate
 from steptwin.simulation.components.latch import RESET, SET, Latch
 from steptwin.simulation.components.relay import COIL, NC, Relay
 from steptwin.simulation.components.timer import IN, PULSE, Timer
+from steptwin.simulation.kinds.programs import Resource, ResourceKind
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.chain import Cause, Place, covered, nothing
@@ -63,17 +66,25 @@ class HoldingCauses:
             yield from self._although(name, at)
 
     def _although(self, signal: str, at: Nanos) -> Iterator[Cause]:
-        """The coil of a relay whose contact a fault keeps as it is, or what releases a brake, with the fault."""
+        """The coil of a relay whose contact a fault keeps as it is, what releases a brake, or what drives an input that a fault
+        holds; the last statement that set an output which one holds."""
         owner, _, terminal = signal.partition(".")
-        part = self._all.parts.get(owner)
-        if part is None or terminal.upper() not in part.block.outputs or type(part) not in _FOLLOWED:
+        part, level = self._all.parts.get(owner), bool(self._log.level(signal, at))
+        target, closed, delay = PinName(owner, terminal if part is None else terminal.upper()), level, 0
+        if part is not None and type(part) in _FOLLOWED and target.pin in part.block.outputs:
+            target = PinName(owner, _FOLLOWED[type(part)])
+            closed, delay = level is (terminal.upper() != NC), max(part.delays)
+        elif self._log.hold(signal, at) is None:
             return
-        coil = PinName(owner, _FOLLOWED[type(part)])
-        closed = bool(self._log.level(signal, at)) is (terminal.upper() != NC)
-        sources = list(self._all.sources(coil))
-        others = [one for one in sources if bool(self._log.level(one, at)) is not closed]
+        sources = list(self._all.sources(target))
+        if not sources and owner in self._world.programs:
+            pin = Resource(ResourceKind.PIN, terminal)
+            last = self._all.programs.written(owner, pin, self._log.last_executed(owner, at) + 1)
+            yield from () if last is None else (last._replace(cover=Cover.LEVEL),)
+            return
         last = self._all.last(sources, at)
-        if others and last is not None and self.level(coil, at) != closed and last.place.time + max(part.delays) < at:
+        if last is not None and self.level(target, at) != closed and last.place.time + delay < at:
+            others = [one for one in sources if bool(self._log.level(one, at)) is not closed] or sources
             text = ALTHOUGH(signal=signal, value=self._log.level(signal, at), other=self._all.state(others[0], at))
             besides = partial(self._faults, owner, at)
             yield Cause(ChainLink(at, owner, text), Place(at, LAST, -1), lambda: covered(last, Cover.LEVEL), besides=besides)
@@ -150,20 +161,56 @@ class HoldingCauses:
         """Those of the drivers of a signal that have a part in its level at a moment: not all inputs of a gate or latch have."""
         owner = signal.partition(".")[0]
         part = self._all.parts.get(owner)
-        if not isinstance(part, Gate | Latch) or self._log.hold(signal, at) is not None:
+        if part is None or self._log.hold(signal, at) is not None:
             return drivers
         levels = {name: self.level(PinName(owner, name), at) for name in part.block.levels if name not in part.block.outputs}
-        if isinstance(part, Latch):
-            # One that is on decides; else the other one, which would change it.
-            changes = RESET if self._log.level(signal, at) else SET
-            keeps = SET if changes == RESET else RESET
-            inputs = [keeps] if levels[keeps] else [changes]
-        elif part.kind in _DECISIVE and _DECISIVE[part.kind] in levels.values():
+        sets, resets = self._memory(signal, at)
+        if sets or resets:  # one that is on decides; else the other ones, which would change it
+            inputs = [name for name in sets if levels[name]] or resets
+        elif isinstance(part, Gate) and part.kind in _DECISIVE and _DECISIVE[part.kind] in levels.values():
             inputs = [name for name, level in levels.items() if level == _DECISIVE[part.kind]]
         else:
             return drivers
         own = {source for name in inputs for source in (*self._all.sources(PinName(owner, name)), f"{owner}.{name.lower()}")}
         return [one for one in drivers if one in own]
+
+    def _memory(self, signal: str, at: Nanos) -> tuple[Sequence[str], Sequence[str]]:
+        """The inputs of an element that give an output the level that it keeps, and those that would end it; none for one that
+        keeps no level by itself."""
+        owner, _, terminal = signal.partition(".")
+        is_on = bool(self._log.level(signal, at))
+        match self._all.parts.get(owner):
+            case Latch():
+                return ((SET,), (RESET,)) if is_on else ((RESET,), (SET,))
+            case Counter():
+                return ((), (RESET, DOWN)) if is_on else ((RESET,), (UP,))
+            case Cylinder(block=block) if RETRACT in block.levels:
+                is_out = is_on is (terminal.upper() == EXTENDED)
+                return ((EXTEND,), (RETRACT,)) if is_out else ((RETRACT,), (EXTEND,))
+        return (), ()
+
+    def remembers(self, signal: str, at: Nanos, known: dict[str, bool]) -> bool:
+        """Whether a signal is as it is because of what was before: a latch, counter, valve with two coils or delay keeps it,
+        or relays and gates of a ring keep each other. ``known``: of other signals, and True of those that it keeps."""
+        if signal not in known:
+            known[signal] = True
+            behind, (sets, resets) = self._keeping(signal, at, at), self._memory(signal, at)
+            owner, part = signal.partition(".")[0], self._all.parts.get(signal.partition(".")[0])
+            each = isinstance(part, Gate) and _DECISIVE.get(part.kind) in [self._log.level(one, at) for one in behind or ()]
+            found = (self.remembers(one, at, known) for one in behind or ())
+            could_end = any(True for one in resets for _ in self._all.sources(PinName(owner, one)))
+            keeps = could_end and not any(self.level(PinName(owner, one), at) for one in sets)
+            is_pulse = isinstance(part, Timer) and part.kind == PULSE and self._log.level(signal, at) > 0.0
+            is_delayed = is_pulse or (behind == [] and part is not None and self._is_due(owner, at))
+            known[signal] = keeps or is_delayed or (bool(behind) and (all if each else any)(found))
+        return known[signal]
+
+    def _is_due(self, owner: str, at: Nanos) -> bool:
+        """Whether a delay of an element may last at a moment."""
+        part = self._all.parts[owner]
+        sources = [one for name in part.block.levels for one in self._all.sources(PinName(owner, name))]
+        changed = max((since for one in sources if (since := self._log.since(one, at)) is not None), default=None)
+        return changed is not None and at < changed + max(part.delays, default=0)
 
     def _following(self, target: PinName, level: bool, at: Nanos, floor: Nanos) -> list[str]:
         """The sources of an input that an output follows after a delay; none while that lasts."""

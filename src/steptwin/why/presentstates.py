@@ -12,7 +12,7 @@ from steptwin.motion.divisions import profile_of
 from steptwin.simulation.components.brake import Brake
 from steptwin.simulation.components.cylinder import EXTENDED, RETRACTED, Cylinder
 from steptwin.simulation.components.relay import Relay
-from steptwin.simulation.components.timer import PULSE, Timer
+from steptwin.simulation.components.timer import Timer
 from steptwin.simulation.kinds.programs import Resource, ResourceKind, StatementLocation, StatementUse
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.why.answer import ChainLink
@@ -30,7 +30,7 @@ NO_AXIS_HAS_MOVED = Message("why.no-axis-has-moved", "no axis has moved until {t
 MOVES_WITHOUT_TARGET = Message("why.moves-without-target", "{axis} moves without a target")
 MOVES_UNTIL = Message("why.moves-until", "{axis} moves until {pin} ends it")
 IS_IN_A_LOOP = Message("why.is-in-a-loop", "{controller} is in the loop of {statement}")
-DELAY_LASTS = Message("why.delay-lasts", "the delay of {name} lasts until {time:.6f} s")
+DELAY_LASTS = Message("why.delay-lasts", "the time of {name} runs until {time:.6f} s")
 HAS_NO_INPUT = Message("why.has-no-input", "{axis} homes without end: no input is configured that could end it")
 
 _Asked: TypeAlias = "str | tuple[str, Resource]"
@@ -132,7 +132,7 @@ class PresentStates:
         part = next((parts[owner] for parts in self._world.objects.elements.values() if owner in parts), None)
         match part:
             case Relay() | Brake() | Timer():
-                due = None if isinstance(part, Timer) and part.kind == PULSE else part.deadline()
+                due = part.deadline()
                 if due is not None and due > self._at and terminal.upper() in part.block.outputs:
                     yield ChainLink(self._at, owner, DELAY_LASTS(name=owner, time=due / SECOND))
             case Cylinder() if part.blockers and terminal.upper() == (EXTENDED if part.wanted > 0 else RETRACTED):

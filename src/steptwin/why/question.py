@@ -134,7 +134,9 @@ class Why:
             off = yield from self._switched_off(self.past.changeable(signals, at), at)
             queued = yield from self._queued(signals, at)
             first = along(first, [*holding, *others, *off, *queued])
-            return (yield from self._answer(text, at, state, since, first))
+            present, holding = (yield from self._present(at)), self.causes.holding
+            states = present.of([one for one in signals if self.log.has(one) and holding.remembers(one, at, {})])
+            return self._after(present, list(states), (yield from self._answer(text, at, state, since, first)))
         waited = (*signals, *self.resting.awaited_pins(signals, at))
         resting = (yield from self.resting.moved(waited, at)) or self.resting.held(waited, at)
         resting = resting or (yield from self.resting.standing(signals, at))
