@@ -60,7 +60,7 @@ class AxisCauses:
         self, controller: str, axis: str, until: Nanos, mechanics: str = "", before: int = LAST, since: Nanos | None = None
     ) -> FoundCause:
         """The motion of an axis at a moment, begun before an order; of all axes the one that ends last, if ``axis`` is empty.
-        With ``mechanics``, the name of the axis, or ``since`` a moment, besides it those since then that led to where it began."""
+        With ``mechanics``, the name of the axis, or ``since`` a moment, also those since then that led to where it began."""
         plan = max(self._log.plans_in_force(controller, axis, until, before), key=self._end, default=None)
         if plan is None:
             return None
