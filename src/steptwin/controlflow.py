@@ -85,6 +85,17 @@ class ControlFlow:
                 work += self.within(number)
         return seen
 
+    def later(self, starts: Iterable[int]) -> set[int]:
+        """As `reached`, also behind the calls that can have led to those at ``starts``."""
+        seen: set[int] = set()
+        work = list(starts)
+        while work:
+            number = work.pop()
+            if number not in seen:
+                seen.add(number)
+                work += self.next[number] if number < len(self.next) else ()
+        return seen
+
     @cached_property
     def next(self) -> list[tuple[int, ...]]:
         """Statements that can be executed right after each statement.

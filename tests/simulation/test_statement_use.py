@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from mic488_rig import loaded
 
+from steptwin.m1486.commanduse import ChipState
 from steptwin.m1486.syntax import parse
 from steptwin.simulation.kinds.m1486.statement_use import use_of as use_of_chip
 from steptwin.simulation.kinds.mic488.statement_use import use_of
@@ -31,8 +32,8 @@ ANY_AXIS, ANY_PIN = axis(""), pin("")
 PROGRAM = Resource(ResourceKind.PROGRAM, "")
 SIGNALS = pin("BOOST"), pin("DIRECTION"), pin("B1")
 SPEEDS = tuple(map(value, ("start_stop", "acceleration", "velocity", "profile")))
-OPERANDS = ANY_PIN, value("variable"), value("register5")
-"""Of + - * /: functions 46 and 58 make lines or a register of the number."""
+OPERANDS = (value("variable"),)
+"""Of + - * /, while functions 46 and 58 make no lines and no register of the number."""
 
 WBC = """\
 x = AIN2 + $D4
@@ -144,3 +145,9 @@ def test_statements_of_wbc() -> None:
 def test_commands_of_a_chip(text: str, use: StatementUse) -> None:
     (command,) = parse(text).program.all_commands
     assert use_of_chip(command) == use
+
+
+def test_operands_of_calculations() -> None:
+    (command,) = parse("+5").program.all_commands
+    reads = use_of_chip(command, ChipState.LINES | ChipState.REGISTERS).reads
+    assert reads == (ANY_PIN, value("variable"), value("register5"))

@@ -260,7 +260,7 @@ class Adapter:
             word, _, rest = text.partition(" ")
             if word == "why":
                 controller = self._debugged.controller_of_frame(arguments.get("frameId"))
-                return {"result": _why(debugger, controller, rest.strip()).text(), "variablesReference": 0}
+                return {"result": _why(debugger, controller, rest.strip()).text(more=""), "variablesReference": 0}
             if word == "help":
                 return {"result": _HELP, "variablesReference": 0}
             if word == "branch" and not rest:

@@ -305,9 +305,7 @@ class Receiver(Stateful):
 
     def commands_waiting(self) -> Sequence[ChipCommand]:
         """Commands of the whole lines in the buffer."""
-        lines = bytes(self._buffer).decode("latin-1").split("\r")[: self._lines]
-        commands = (_read(line, self._chip.variant) for line in lines)
-        return [command for command in commands if isinstance(command, ChipCommand)]
+        return commands_of(bytes(self._buffer), self._chip.variant)
 
     def _is_stopped_by_motor(self) -> bool:
         """Whether compression pauses because the motor runs; inside ``[ ]`` it continues."""
@@ -376,6 +374,12 @@ class Receiver(Stateful):
 
 NO_COMMAND = Message("m1486.empty-command", "no command")
 WRONG_LINE = Message("m1486.wrong-line", "{text}: {problem}")
+
+
+def commands_of(data: bytes, variant: Variant) -> Sequence[ChipCommand]:
+    """Commands of the whole lines among characters."""
+    commands = (_read(line, variant) for line in data.decode("latin-1").split("\r")[:-1])
+    return [command for command in commands if isinstance(command, ChipCommand)]
 
 
 @lru_cache(_LINES_KEPT)

@@ -105,8 +105,8 @@ class Answer(NamedTuple):
     has_all_states: bool = True
     """Whether it has the present states of all on which what was asked about depends."""
 
-    def text(self) -> str:
-        """The answer in lines."""
+    def text(self, more: str = ": --all shows more") -> str:
+        """The answer in lines. ``more``: how further ones are shown, behind that there are any."""
         begin = since_before(self.known_from) if self.since is None else f"since {self.since / SECOND:.6f} s"
         lines = [f"{self.state}, {begin} (at {self.at / SECOND:g} s)"]
         lines += map(_line, self.links)
@@ -114,7 +114,7 @@ class Answer(NamedTuple):
             lines.append(f"{'':12}    (what was before {self.known_from / SECOND:.6f} s is not known)")
         left_out = ["present states"] * (not self.has_all_states) + ["causes"] * (not self.is_complete and not self.is_cut)
         if left_out:
-            lines.append(f"{'':12}    (further {' and '.join(left_out)} are not shown: --all shows more)")
+            lines.append(f"{'':12}    (further {' and '.join(left_out)} are not shown{more})")
         lines += [WITHOUT(), *(f"{_line(trial.link)} -> {trial.text}" for trial in self.trials)] if self.trials else []
         return "\n".join(lines)
 

@@ -47,7 +47,13 @@ class Attempts:
         if self._all.axes.motion(controller, number, until) is not None:
             return None
         found = self.last(controller, number, until)
-        found = found or self._all.programs.before(controller, Resource(ResourceKind.AXIS, number), until)
+        axis = Resource(ResourceKind.AXIS, number)
+        found = found or self._all.controllers.unheard(controller, axis, until)
+        found = (
+            found
+            or self._all.programs.before(controller, axis, until)
+            or self._all.programs.made_in_vain(controller, axis, until)
+        )
         if found is not None or not self._log.never_happened(f"event of axis {number}"):
             return found
         if controller in self._world.objects.line_of:

@@ -51,6 +51,14 @@ def covered(cause: FoundCause, by: Cover | None) -> FoundCause:
     return cause if cause is None or by is None else cause._replace(cover=by)
 
 
+def along(first: FoundCause, others: Sequence[FoundCause]) -> Cause | None:
+    """A cause along with others, of which each is there once."""
+    every = [one for one in (first, *others) if one is not None]
+    if not every:
+        return None
+    return every[0]._replace(along=(*every[0].along, *(one for one in every[1:] if one.link != every[0].link)))
+
+
 def given(cause: FoundCause) -> FoundCause:
     """A cause that is known already, for `functools.partial`."""
     return cause

@@ -35,6 +35,7 @@ HOMED = "homed"
 """Event of an axis that is at its home position."""
 POSITION_ERROR = "position-error"
 """Event of an axis that did not reach its position."""
+NOT_HEARD = Message("why.not-heard", "`{command}` was sent while {controller} was not selected")
 REFUSED = Message("why.refused", "{request}: refused, {reason}")
 NOT_STARTED_SINCE = Message("why.not-started-since", "{event}, and nothing has started the program since")
 NOT_SWITCHED_ON_SINCE = Message("why.not-switched-on-since", "{event}, and nothing has switched {name} on since")
@@ -223,6 +224,29 @@ class ControllerCauses:
                 return covered(found._replace(link=replace(found.link, text=text)), Cover.LEVEL)
         if after < self._log.begin and controller in self._world.objects.line_of:
             self._log.lack()  # a request may have been refused before
+        return None
+
+    def unheard(self, controller: str, wanted: Resource | None, until: Nanos, after: Nanos = -1) -> FoundCause:
+        """The last frame between two moments with a command that would have changed something, and that a controller did not
+        hear, with the one that had chosen others to listen."""
+        on, frames, programs = self._world.objects.line_of.get(controller), self._log.frames, self._world.programs.get(controller)
+        beside = sum(line is on[0] for line, _ in self._world.objects.line_of.values()) if on is not None else 0
+        if on is None or programs is None or beside < 2 or self._world.kind(controller).registers is not None:
+            return None
+        for order, record in reversed(frames.sent.items()):
+            if record.controller != on[0].name or record.time > until or on[1] in frames.requests.get(order, ()):
+                continue
+            if record.time <= after:
+                return None
+            given = next((one for one in programs.commands(record.data()) if _matches(one.use.writes, wanted)), None)
+            if given is not None:
+                chose = max((one for one in frames.selecting if one < order), default=None)
+                led = [] if chose is None else [covered(self._frame(frames.selecting[chose], chose), Cover.LEVEL)]
+                link = ChainLink(record.time, controller, NOT_HEARD(command=given.code, controller=controller))
+                by, place = partial(self._frame, record, order), Place(record.time, order, 1)
+                return Cause(link, place, by, Cover.LEVEL, partial(iter, [one for one in led if one is not None]))
+        if after < self._log.begin:
+            self._log.lack()
         return None
 
     def of_program(self, controller: str, change: StateChange) -> FoundCause:

@@ -29,6 +29,10 @@ class Frames:
         """The last request of each client, with its order, by line."""
         self.requests: dict[int, Collection[int]] = {}
         """Addresses of the controllers that a frame may change, by its order."""
+        self.sent: dict[int, TraceRecord] = {}
+        """All requests to lines whose controllers choose themselves what they hear."""
+        self.selecting: dict[int, TraceRecord] = {}
+        """Those that chose who listens to the ones after them."""
         self.refused: dict[int, Refused] = {}
         """By the order of the request."""
         self.traffic: dict[str, TrafficLog] = {
@@ -53,6 +57,9 @@ class Frames:
             self._asked[record.controller, client] = order, record
             if changed := traffic.changes(client, data):
                 self.requests[order] = changed
+            if traffic.selects(data):
+                self.selecting[order] = record
+            self.sent[order] = record
         elif (reason := traffic.refusal(client, data)) is not None and (record.controller, client) in self._asked:
             asked, request = self._asked[record.controller, client]
             self.refused[asked] = Refused(request, reason)

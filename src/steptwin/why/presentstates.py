@@ -25,6 +25,7 @@ DEPENDS_ON = Message("why.depends-on", "it depends on {name}")
 IS_NOT_SET = Message("why.is-not-set", "{name} is {value:g}: nothing has set it")
 IS_STILL = Message("why.is-still", "{name} is {value:g} since {time:.6f} s")
 IS_DEFERRED = Message("why.is-deferred", "{statement} has come, and waits for the end of what is in execution")
+NOT_REACHED = Message("why.not-reached", "no way leads from {here} to {there}")
 ANY_PIN = Message("why.any-pin", "any pin")
 NO_AXIS_HAS_MOVED = Message("why.no-axis-has-moved", "no axis has moved until {time:g} s")
 MOVES_WITHOUT_TARGET = Message("why.moves-without-target", "{axis} moves without a target")
@@ -47,6 +48,8 @@ class PresentStates:
         self._world = world
         self._at: Nanos = world.now
         self._most = most
+        self._off: set[tuple[str, StatementLocation]] = set()
+        """Statements of interrupts that are off, of which that is known."""
         self.has_all = True
         """Whether none have been left out because of ``most``."""
 
@@ -167,9 +170,12 @@ class PresentStates:
         """The switches of the interrupts that change something, and who set them. Returns the events of those that are on."""
         events: list[_Asked] = []
         for use, writing in self._causes.programs.interrupts(controller, wanted):
-            disabled = list(self._disabled(controller, use, writing))
+            disabled = list(self._disabled(controller, use, writing)) if wanted not in use.acts_by else []
             if disabled:
                 yield from disabled
+                for switch in use.acts_by if (controller, writing) not in self._off else ():
+                    self._off.add((controller, writing))
+                    events += yield from self._before(controller, switch)
                 continue
             events += ((controller, one) for one in use.reads)
             for switch in use.acts_by:
@@ -215,6 +221,16 @@ class PresentStates:
             return ()
         return (yield from self._before(owner, Resource(ResourceKind.PIN, pin)))
 
+    def _unreached(self, controller: str, index: int, wanted: Resource) -> Iterator[ChainLink]:
+        """The statement that would change something, if no way leads there."""
+        here, programs = self._log.executed[controller][index], self._world.programs[controller]
+        if here.location.text in programs.texts:
+            places = [StatementLocation(here.location.text, one) for one in range(len(programs.statements(here.location.text)))]
+            writing = next((one for one in places if wanted in programs.use(one).writes), None)
+            if writing is not None:
+                words = NOT_REACHED(here=statement(self._log, here), there=statement_at(programs, writing))
+                yield ChainLink(self._at, controller, words)
+
     def before(self, controller: str, wanted: Resource) -> Iterator[ChainLink]:
         """Reason why a program has not changed something, and the states on which that depends."""
         waiting = yield from self._before(controller, wanted)
@@ -234,6 +250,9 @@ class PresentStates:
             if comes or index < 0:
                 return ()
         elif owner in self._world.programs and not comes:
+            is_missed = index >= 0 and programs.written(owner, wanted, index + 1) is None
+            if is_missed and not any(programs.interrupts(owner, wanted)) and not programs.decided_against(owner, wanted, at):
+                yield from self._unreached(owner, index, wanted)
             return (yield from self._interrupts(owner, wanted))
         if index < 0:
             return ()

@@ -8,20 +8,22 @@ from typing import Any
 
 from steptwin.controller import MILLISECOND, Nanos
 from steptwin.datasheet import EventSeverity
-from steptwin.messages import Message
+from steptwin.messages import Message, MessageText
 from steptwin.simulation.kinds.programs import ProgramState, Resource, ResourceKind, StatementLocation, StatementUse
 from steptwin.why.answer import ChainLink, Cover
-from steptwin.why.chain import Cause, FoundCause, Place, covered, given, nothing, unknown
+from steptwin.why.chain import Cause, FoundCause, Place, along, covered, given, nothing, unknown
 from steptwin.why.log import LAST, Change, Executed, words_of
 from steptwin.why.programstates import OVER, StateChange
-from steptwin.why.sentences import statement, statement_at
+from steptwin.why.sentences import END_OF_PROGRAM, statement, statement_at
 
 WAS_EXECUTED = Message("why.was-executed", "{statement} was executed")
 WAS_IN_EXECUTION = Message("why.was-in-execution", "{statement} was in execution before")
 WAITS = Message("why.waits", "{controller} waits at {statement}")
 ENDED = Message("why.ended", "{statement} ended")
 DID_NOT_WAIT = Message("why.did-not-wait", "{statement} did not wait: {levels}")
-DECIDED = Message("why.decided", "{statement} decided")
+WAS_OVER = Message("why.was-over", "{statement} did not wait")
+DECIDED = Message("why.decided", "{statement} decided: {next} came next")
+CAME = Message("why.came", "{statement} came")
 FARTHER = Message("why.farther", "the last {most} statements did not decide it: those before were not searched")
 OF_INTERRUPT = Message("why.of-interrupt", "{statement} is executed by an interrupt that is off")
 NEVER_SET = Message("why.never-set", "nothing has set {name}")
@@ -34,6 +36,7 @@ HELD = {
     ProgramState.SHUT_DOWN: Message("why.program-is-shut-down", "the controller is off or shut down{where}"),
 }
 WHERE = Message("why.where", " at {statement}")
+CAME_TO_ITS_END = Message("why.came-to-its-end", "the program came to its end{where}")
 FILTERED = Message("why.filtered", ", which the filter of the input lets in after {ms:g} ms")
 TOO_SHORT = Message("why.too-short", ", for {lasts:g} ms: the filter of the input lets in what lasts {ms:g} ms")
 GOES_ON = Message("why.program-goes-on", "the program goes on")
@@ -105,7 +108,7 @@ class ProgramCauses:
             return None
         here, place = executed[index], Place(executed[index].time, executed[index].order, 3 * index + 2)
         link, reads = (
-            ChainLink(here.time, controller, DECIDED(statement=statement(self._log, here))),
+            ChainLink(here.time, controller, self._decision(controller, index)),
             self._all_read(controller, index, place),
         )
         before = (lambda: reads[0]) if reads else self._all.at_begin
@@ -137,6 +140,20 @@ class ProgramCauses:
         index = self._log.last_executed(controller, at)
         if held is not None or index < 0 or not self.use(controller, index).waits or not self.leads_to(controller, index, wanted):
             return held
+        return self.waiting(controller, index)
+
+    def made_in_vain(self, controller: str, wanted: Resource, at: Nanos) -> FoundCause:
+        """The last statement by a moment that would have changed something, and changed nothing."""
+        if controller not in self._world.programs:
+            return None
+        index = self._log.last_of(controller, self._writing(controller, wanted), self._log.last_executed(controller, at) + 1)
+        if index is None:
+            return None
+        is_over = self.use(controller, index).waits and index < self._log.last_executed(controller, at)
+        return covered((self._did_not_wait if is_over else self.statement)(controller, index), Cover.LEVEL)
+
+    def waiting(self, controller: str, index: int) -> Cause:
+        """A wait that is not over, and what it waits for."""
         found, here = self.statement(controller, index), self._log.executed[controller][index]
         text = WAITS(controller=controller, statement=statement(self._log, here))
         besides = partial(self._unchanged, controller, index, found.place)
@@ -340,21 +357,21 @@ class ProgramCauses:
                 came = self._came(controller, after)
                 if came is not None and came.place.time >= ended.time:
                     return came  # the wait was over before that
-                return self._decided(controller, earlier, Place(ended.time, ended.order, 3 * after), ENDED)
+                return self._decided(controller, earlier, Place(ended.time, ended.order, 3 * after), True)
             resumed = self._resumed(controller, here.order, ended)
             if resumed is not None:
                 return resumed
             if use.waits and not use.governs and any(one.kind is not ResourceKind.AXIS for one in use.reads):
-                first, there = self._begin_of_wait(controller, earlier, handlers), Place(ended.time, ended.order, 3 * after)
+                first, there = self.begin_of_wait(controller, earlier), Place(ended.time, ended.order, 3 * after)
                 began = Place(executed[first].time, executed[first].order, 3 * first)
                 came = any(cause.place > began for cause in self._read(controller, first, there))
-                return self._decided(controller, first, there, ENDED) if came else self._did_not_wait(controller, earlier)
+                return self._decided(controller, first, there, True) if came else self._did_not_wait(controller, earlier)
             if use.waits and (ignored := self._ignored(controller, earlier)) is not None:
                 text = DID_NOT_WAIT(statement=statement(self._log, here), levels=[ignored.link.text])
                 place = Place(here.time, here.order, 3 * earlier + 2)
                 return Cause(ChainLink(here.time, controller, text), place, lambda: ignored, Cover.PROGRAM)
             if number in use.governs or (use.is_loop and ended.location.number >= use.governs.stop):
-                return self._decided(controller, earlier, Place(here.time, here.order, 3 * earlier + 2), DECIDED)
+                return self._decided(controller, earlier, Place(here.time, here.order, 3 * earlier + 2))
             after = earlier
         if index >= MOST_UNDECIDED:
             here, text = executed[after], FARTHER(most=MOST_UNDECIDED)
@@ -376,11 +393,12 @@ class ProgramCauses:
             return None
         return covered(self._all.controllers.axis_event(controller, event, Place(event.time, event.order)), Cover.PROGRAM)
 
-    def _begin_of_wait(self, controller: str, index: int, handlers: Sequence[range]) -> int:
+    def begin_of_wait(self, controller: str, index: int) -> int:
         """The number of the statement at which a wait began, which goes on after each interrupt."""
         locations = self._log.executed[controller].locations
         first, earlier = index, index - 1
         here = self._log.executed[controller][index]
+        handlers = self._handlers(controller, here.location.text) if self._log.is_of_present_text(here) else ()
         begun = self._log.last_begin(controller, here.time, here.order)
         orders = self._log.executed[controller].orders
         while (earlier >= 0 and (begun is None or orders[earlier] > begun.order)) and (
@@ -392,10 +410,21 @@ class ProgramCauses:
             self._log.lack()
         return first
 
-    def _decided(self, controller: str, index: int, place: Place, how: Message) -> Cause:
-        use = self.use(controller, index)
-        link = ChainLink(place.time, controller, how(statement=statement(self._log, self.written_at(controller, index))))
-        if how is ENDED:
+    def _decision(self, controller: str, index: int) -> MessageText:
+        """A condition, with the statement at which the program went on; the label of an interrupt."""
+        executed, use, words = self._log.executed[controller], self.use(controller, index), self.written_at(controller, index)
+        is_inside = self.is_of_interrupt(controller, index)
+        later = (one for one in range(index + 1, len(executed)) if is_inside or not self.is_of_interrupt(controller, one))
+        after = None if use.waits and use.governs else next(later, None)
+        if after is None:
+            return CAME(statement=statement(self._log, words))
+        return DECIDED(statement=statement(self._log, words), next=statement(self._log, executed[after]))
+
+    def _decided(self, controller: str, index: int, place: Place, has_ended: bool = False) -> Cause:
+        use, words = self.use(controller, index), statement(self._log, self.written_at(controller, index))
+        text = ENDED(statement=words) if has_ended else self._decision(controller, index)
+        link = ChainLink(place.time, controller, text)
+        if has_ended:
             return Cause(link, place, partial(self._of_wait, controller, index, place), Cover.PROGRAM)
         if use.waits and use.governs and not use.reads:  # an interrupt that comes with the time
             return Cause(link, place, nothing, Cover.PROGRAM, partial(self._enabled, controller, index, place))
@@ -432,7 +461,8 @@ class ProgramCauses:
                     yield short
 
     def _is_variable(self, controller: str, name: str) -> bool:
-        return name in self._world.programs[controller].variables(self._world.now)
+        programs = self._world.programs[controller]
+        return name in programs.variables(self._world.now) or not programs.has_name(name)
 
     def _did_not_wait(self, controller: str, index: int) -> Cause:
         """A wait for something that was there already: for that, or for what led to the wait, whichever came later."""
@@ -440,7 +470,7 @@ class ProgramCauses:
         place = Place(here.time, here.order, 3 * index + 2)
         pins = [f"{controller}.{one.name}" for one in use.reads if one.kind is ResourceKind.PIN and one.name]
         levels, words = [self._all.state(pin, here.time) for pin in pins], statement(self._log, here)
-        text = DID_NOT_WAIT(statement=words, levels=levels) if levels else DECIDED(statement=words)
+        text = DID_NOT_WAIT(statement=words, levels=levels) if levels else WAS_OVER(statement=words)
 
         def found() -> Sequence[Cause]:
             there = [cause._replace(cover=Cover.LEVEL) for cause in self._read(controller, index, place)]
@@ -494,7 +524,10 @@ class ProgramCauses:
                 cause for cause in self._read(controller, index, place) if cause.place > Place(began.time, began.order, 3 * index)
             ]
             last = max((*came, *others), key=lambda cause: cause.place, default=None)
-            return covered(last if reads or last else self._of_statement(controller, index), Cover.WAIT)
+            if last is None:  # a time has passed, since a timer was set or the wait began
+                led = self._of_statement(controller, index)
+                last = along(next(iter(self._all_read(controller, index, place)), None), [led])
+            return covered(last, Cover.WAIT)
         latest = place.time - LONGEST_REACTION_NS
         passes = any(resource.kind is ResourceKind.AXIS and resource.name for resource in reads)  # a place, not the end
         is_turned = any(resource.kind is ResourceKind.ENCODER for resource in reads)
@@ -638,9 +671,39 @@ class ProgramCauses:
         if change.state is not ProgramState.STOPPED and index >= 0:
             where = WHERE(statement=statement(self._log, self._log.executed[controller][index]))
         text = HELD[change.state](where=where)
+        if change.state is ProgramState.STOPPED and index >= 0 and self._is_end(controller, index, change):
+            text = self.end(controller, index)
         link = ChainLink(change.time, controller, text)
         by = partial(self._all.controllers.of_program, controller, change)
         return Cause(link, Place(change.time, change.order), by, Cover.LEVEL, partial(self._holding, controller, change))
+
+    def _is_end(self, controller: str, index: int, change: StateChange) -> bool:
+        """Whether the statement that was executed last ended its program when that was stopped."""
+        here = self._log.executed[controller][index]
+        is_last = here.time == change.time and here.order < change.order
+        return is_last and any(map(_is_program, self.use(controller, index).writes))
+
+    def end(self, controller: str, index: int) -> MessageText:
+        """Sentence about a program of which a statement was the last one."""
+        words = statement(self._log, self._log.executed[controller][index])
+        return CAME_TO_ITS_END(where="" if words.id == END_OF_PROGRAM.id else WHERE(statement=words))
+
+    def is_last(self, controller: str, index: int) -> bool:
+        """Whether only the end of its text comes after an executed statement."""
+        executed, programs = self._log.executed[controller][index], self._world.programs[controller]
+        text, number = executed.location
+        if number < 0 or not self._log.is_of_present_text(executed):
+            return False
+        return tuple(programs.after(text).get(number, ())) == (len(programs.statements(text)),)
+
+    def is_over(self, controller: str, index: int, at: Nanos) -> bool:
+        """Whether a program has come to its end by a moment, and is not known to wait there."""
+        change, use = self._log.states.last(controller, at, LAST), self.use(controller, index)
+        if change is not None and change.state is not ProgramState.RUNS:
+            return change.state is ProgramState.STOPPED and self._is_end(controller, index, change)
+        is_of_axes = bool(use.reads) and all(one.kind is ResourceKind.AXIS for one in use.reads)
+        waits = use.waits and not (is_of_axes and not self._all.axes.is_moving(controller, "", at))
+        return not waits and self.is_last(controller, index)
 
     def ended(self, controller: str, index: int, at: Nanos) -> FoundCause:
         """The alarm by a moment with which a program was ended after the statement that it executed last; None if none was."""

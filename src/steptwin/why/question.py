@@ -15,14 +15,15 @@ from steptwin.simulation.logic.expression import deciding, parse_condition
 from steptwin.simulation.logic.signal import SignalOf
 from steptwin.simulation.world.snapshotlog import outside_past
 from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Cover
+from steptwin.why.attempts import NOTHING_HAS_COMMANDED
 from steptwin.why.causes import Causes
-from steptwin.why.chain import Cause, Chain, FoundCause, Place, covered
+from steptwin.why.chain import Cause, Chain, FoundCause, Place, along, covered
 from steptwin.why.controllers import axis_of
 from steptwin.why.log import LAST
 from steptwin.why.notedpast import NotedPast, text_of_question, without_not
 from steptwin.why.presentstates import PresentStates
 from steptwin.why.programs import WAITS
-from steptwin.why.resting import RestingCauses, along
+from steptwin.why.resting import RestingCauses
 from steptwin.why.sentences import IS_NUMBER, statement, value_with_unit
 from steptwin.why.states import is_constant, rest_of
 from steptwin.why.values import SignalValues
@@ -148,12 +149,13 @@ class Why:
             decides = self._deciding(asked, canonical, at)
             holding = self.causes.holding.of((*decides, *self.resting.awaited_pins(decides, at)), at, None)
             resting = along(resting, list(holding))
-        again = list(self._again(signals, None, at))
+        again = [*self._again(signals, None, at), *self._at_begin(signals, at)]
         awaited = list(self.resting.awaited(signals, at)) if resting is None else []
         came = [self.causes.programs.resource(*one, self.log.last_executed(one[0], at) + 1, at) for one in awaited]
         unseen = list(self._unseen((*shown, *waited[len(signals) :]), at, -1))
         off = yield from self._switched_off(awaited, at)
         queued = yield from self._queued(signals, at)
+        resting = self._commanded(resting, queued)
         resting = along(resting, [*(covered(one, Cover.LEVEL) for one in came), *off, *queued, *again, *unseen])
         answer = yield from self._answer(text, at, state, None, resting)
         present, named = (yield from self._present(at)), [name for name in signals if self.log.has(name)]
@@ -169,6 +171,13 @@ class Why:
             if found is not None:
                 yield found
 
+    def _at_begin(self, signals: Sequence[str], at: Nanos) -> Iterator[Cause]:
+        """The statements at the very beginning that gave signals the values that they have from then on."""
+        for controller, wanted in self.past.changeable(signals, at):
+            written = self.causes.programs.written(controller, wanted, self.log.last_executed(controller, at) + 1)
+            if written is not None and not written.place.time:
+                yield written
+
     def _switched_off(self, changeable: Iterable[tuple[str, Resource]], at: Nanos) -> Generator[None, None, Sequence[Cause]]:
         """The switches that are off of the interrupts that would have changed something again."""
         every = [(owner, *found) for owner, one in changeable for found in self.causes.programs.switched(owner, one, at)]
@@ -178,13 +187,17 @@ class Why:
         return [cause for owner, switch, cause in every if not other.programs[owner].read(switch, at)]
 
     def _queued(self, signals: Sequence[str], at: Nanos) -> Generator[None, None, Sequence[Cause]]:
-        """Commands that would have changed outputs otherwise than they were changed last, and wait behind others."""
+        """Commands that would have changed something otherwise than it was changed last, and wait behind others, or that its
+        controller did not hear."""
         found: list[Cause] = []
         programs = self.causes.programs
         for controller, wanted in self.past.changeable(signals, at):
             index = self.log.last_executed(controller, at)
-            is_pin = wanted.kind is ResourceKind.PIN and controller in self.world.objects.line_of
-            if not is_pin or (index >= 0 and not programs.use(controller, index).waits):
+            since = self.log.since(f"{controller}.{wanted.name}", at) if wanted.kind is ResourceKind.PIN else None
+            unheard = self.causes.controllers.unheard(controller, wanted, at, -1 if since is None else since)
+            found += [] if unheard is None else [unheard]
+            is_asked = wanted.kind is not ResourceKind.VALUE and controller in self.world.objects.line_of
+            if not is_asked or (index >= 0 and not programs.use(controller, index).waits):
                 continue
             other = yield from self.past.world_at(at)
             waiting = [one for one in other.programs[controller].queued() if wanted in one.use.writes]
@@ -194,11 +207,16 @@ class Why:
             last = programs.written(controller, wanted, index + 1)
             if waiting and (last is None or waiting[-1].code not in str(last.link.text).upper()):
                 sent = self.causes.controllers.sent(controller, waiting[-1].code, index + 1, at)
-                ahead = covered(programs.statement(controller, index), Cover.WAIT)
+                ahead = programs.waiting(controller, index)
                 led = [one for one in (sent, ahead) if one is not None]
                 link = ChainLink(at, controller, IS_QUEUED(command=waiting[-1].code))
                 found.append(Cause(link, Place(at, LAST, -1), partial(along, None, led), Cover.LEVEL))
         return found
+
+    def _commanded(self, cause: FoundCause, queued: Sequence[Cause]) -> FoundCause:
+        """A cause that an axis was not commanded to move, unless a command waits."""
+        is_none = cause is not None and cause.link.text.id == NOTHING_HAS_COMMANDED.id
+        return None if is_none and queued else cause
 
     def _unseen(self, pins: Iterable[str], at: Nanos, after: Nanos) -> Iterator[Cause]:
         """The last changes of inputs after a moment that were too short for their filters."""
@@ -245,10 +263,15 @@ class Why:
         waiting |= set(self._kept(names, at))
         for controller, wanted in self.past.changeable(names, at):
             index, since = log.last_executed(controller, at), self._since(controller, wanted, answer)
-            if index < 0 or not programs.leads_to(controller, index, wanted):
+            is_over = (
+                wanted.kind is ResourceKind.AXIS and since is not None and index >= 0 and programs.is_over(controller, index, at)
+            )
+            if index < 0 or not (is_over or programs.leads_to(controller, index, wanted)):
                 continue
             held = programs.held(controller, at) or programs.ended(controller, index, at)
-            if held is not None:
+            if is_over and held is None and programs.is_written(controller, wanted):
+                found[controller] = False
+            elif held is not None:
                 is_later = since is None or held.place.order < 0 or held.place.time > since
                 if (is_later or wanted.kind is ResourceKind.AXIS) and self.past.tried(controller, wanted, at) is None:
                     found[controller] = True
@@ -318,7 +341,8 @@ class Why:
                 is_turned = (axis_of(full.partition(".")[2]) or (None,))[0] is ResourceKind.ENCODER
                 changed = self.resting.ignored((full,), at) if since is None else self.past.changed((full,), since)
                 changed = self.past.unrecorded(full, at) if changed is None and is_turned else changed
-            changed = along(changed, list(self._again((full,), since, at)))
+            queued = yield from self._queued((full,), at)
+            changed = along(self._commanded(changed, queued), [*queued, *self._again((full,), since, at)])
             return (yield from self._answer(signal, at, state, since, changed))
         since: Nanos | None = at
         if isinstance(standing, SignalOf) and is_constant(standing, at):
@@ -343,12 +367,15 @@ class Why:
             return self._after(present, states, (yield from self._answer(controller, at, state, since, first)))
         if index < 0:
             log.lack()
-            return (yield from self._answer(controller, at, NOTHING_EXECUTED(controller=controller), None, None))
+            unheard = causes.controllers.unheard(controller, None, at)
+            return (yield from self._answer(controller, at, NOTHING_EXECUTED(controller=controller), None, unheard))
         here, begun = log.executed[controller][index], log.last_begin(controller, at, LAST)
         if begun is not None and begun.order > here.order:
             led, state = causes.controllers.begun(controller, begun), NOTHING_EXECUTED(controller=controller)
             return (yield from self._answer(controller, at, state, begun.time, led))
         use = causes.programs.use(controller, index)
+        if use.waits and (first_index := causes.programs.begin_of_wait(controller, index)) != index:
+            index, here = first_index, log.executed[controller][first_index]
         text, since = statement(log, here), None if log.is_in_progress(here) else here.time
         ended = causes.programs.ended(controller, index, at)
         if ended is not None:
@@ -356,8 +383,14 @@ class Why:
             return (yield from self._answer(controller, at, state, ended.link.time, _led_to(ended)))
         present = yield from self._present(at)
         links = list(present.awaited(controller))
-        if not use.waits or at - here.time <= log.world.programs[controller].statement_time:
+        is_done = at - here.time > log.world.programs[controller].statement_time
+        if is_done and use.waits and present.waits(controller, use):
+            state = WAITS(controller=controller, statement=text)
+        elif is_done and causes.programs.is_last(controller, index):
+            state = PROGRAM_IS(controller=controller, held=causes.programs.end(controller, index))
+        else:
             state = DOES_NOT_WAIT(controller=controller, statement=text)
+        if not use.waits or not is_done:
             first = covered(causes.programs.statement(controller, index), Cover.PROGRAM)
             loop = causes.programs.conditions_of_loop(controller, index, has_waits=True)
             read = [(one, number) for number in loop for one in causes.programs.use(controller, number).reads]
@@ -371,6 +404,7 @@ class Why:
         others = [cause._replace(cover=Cover.LEVEL) for one, cause in known.items() if not self._is_held(controller, one, at)]
         changed = [cause for cause in found.values() if cause.link.time > here.time]
         last = max(changed, key=lambda cause: cause.link.time, default=None)
+        since = last.link.time if last is not None and state.id == PROGRAM_IS.id else since
         pins = [f"{controller}.{resource.name}" for resource in use.reads if resource.kind is ResourceKind.PIN and resource.name]
         resting = ((yield from self.resting.moved(pins, at)) or self.resting.held(pins, at)) if last is None else None
         holding = [one for pin in pins for one in self.causes.holding.of((pin,), at, self.log.since(pin, at))]
@@ -379,7 +413,6 @@ class Why:
         standing = (yield from self.resting.standing(pins, at)) if last is None and resting is None else None
         lasting = (*(() if standing is None else (standing, *standing.along)), *holding, *self._unseen(pins, at, here.time))
         first = along(first, [waiting, *lasting])
-        state = (WAITS if present.waits(controller, use) else DOES_NOT_WAIT)(controller=controller, statement=text)
         return self._after(present, links, (yield from self._answer(controller, at, state, since, first)))
 
     def _is_held(self, controller: str, resource: Resource, at: Nanos) -> bool:

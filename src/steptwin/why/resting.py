@@ -11,7 +11,7 @@ from steptwin.controller import Nanos
 from steptwin.simulation.kinds.programs import Resource, ResourceKind
 from steptwin.why.answer import ChainLink, Cover
 from steptwin.why.axes import POSITION
-from steptwin.why.chain import Cause, FoundCause, Place, covered, given
+from steptwin.why.chain import Cause, FoundCause, Place, along, covered, given
 from steptwin.why.controllers import axis_of
 from steptwin.why.log import LAST
 from steptwin.why.notedpast import NotedPast
@@ -119,11 +119,3 @@ class RestingCauses:
     def _axes_of(self, signals: Iterable[str], at: Nanos) -> set[str]:
         """The axes whose position or switch is among signals, or drives one of them."""
         return {name.partition(".")[0] for name in self._past.behind(signals, at)} & set(self._world.axes)
-
-
-def along(first: FoundCause, others: Sequence[FoundCause]) -> Cause | None:
-    """A cause along with others, of which each is there once."""
-    every = [one for one in (first, *others) if one is not None]
-    if not every:
-        return None
-    return every[0]._replace(along=(*every[0].along, *(one for one in every[1:] if one.link != every[0].link)))

@@ -78,6 +78,9 @@ class ToyTrafficLog:
     def changes(self, client: str, data: bytes) -> Collection[int]:
         return self._units
 
+    def selects(self, data: bytes) -> bool:
+        return False
+
     def refusal(self, client: str, data: bytes) -> str | None:
         return None
 

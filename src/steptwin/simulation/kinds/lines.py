@@ -79,6 +79,10 @@ class TrafficLog(FrameSubscriber, Protocol):
         """The addresses of the controllers that a request or characters of a program may change."""
         ...
 
+    def selects(self, data: bytes) -> bool:
+        """Whether characters choose the controllers that listen to those after them."""
+        ...
+
     def refusal(self, client: str, data: bytes) -> str | None:
         """The reason that an answer gives for a request that was refused; None for another answer."""
         ...

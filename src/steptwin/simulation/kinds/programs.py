@@ -152,8 +152,8 @@ class Programs(Protocol):
         ...
 
     def reached(self, text: str, starts: Collection[int]) -> Collection[int]:
-        """The statements of a text, by number, that can be executed after those at ``starts``, by any way and in interrupts;
-        these included."""
+        """The statements of a text, by number, that can be executed after those at ``starts``, by any way, behind the calls that
+        can have led there, and in interrupts; these included."""
         ...
 
     def labels(self, text: str) -> Mapping[str, int]:
@@ -190,6 +190,10 @@ class Programs(Protocol):
 
     def queued(self) -> Sequence[GivenCommand]:
         """Commands that came over a line by itself, and wait for the end of what is in execution."""
+        ...
+
+    def commands(self, data: bytes) -> Sequence[GivenCommand]:
+        """Commands in characters of a line; none where they give none by themselves."""
         ...
 
     def depth(self) -> int:

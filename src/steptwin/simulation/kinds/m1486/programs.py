@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from functools import reduce
+from operator import or_
 
 from steptwin.controlflow import ControlFlow
 from steptwin.controller import Nanos
@@ -11,10 +13,12 @@ from steptwin.diagnostics import SourceText
 from steptwin.errors import Misuse
 from steptwin.m1486.chip import M1486Chip
 from steptwin.m1486.commands import When, when
+from steptwin.m1486.commanduse import NOTHING, ChipState
 from steptwin.m1486.encoding import decode, encode
-from steptwin.m1486.functions import EDGE, LIMITOFF, RECOVER
+from steptwin.m1486.functions import EDGE, INPUT, LIMITOFF, RECOVER, REGISTER
 from steptwin.m1486.points import live_point
 from steptwin.m1486.program import WaitReason
+from steptwin.m1486.receiver import commands_of
 from steptwin.m1486.registers import GENERAL
 from steptwin.m1486.structure import CommandStream, streams
 from steptwin.m1486.successors import flow_of
@@ -40,6 +44,7 @@ BEGIN = "program"
 """The name of what is executed before the first label."""
 REGISTER_MAX = 0xFFFF
 RESET = "\\"
+_OPERAND_OF = {INPUT: ChipState.LINES, REGISTER: ChipState.REGISTERS}
 
 
 class _Text:
@@ -96,7 +101,7 @@ class _Text:
     def reached(self, starts: Collection[int]) -> Collection[int]:
         if self._stream is None:
             return ()
-        found = self._flow(self._stream).reached([self._indices[number] for number in starts if number < len(self._indices)])
+        found = self._flow(self._stream).later([self._indices[number] for number in starts if number < len(self._indices)])
         return [number for number, index in enumerate(self._indices) if index in found]
 
     def _flow(self, stream: CommandStream) -> ControlFlow:
@@ -183,7 +188,7 @@ class ChipPrograms:
 
     def given(self, number: int) -> GivenCommand | None:
         stored = decode(self._chip.memory.fetch(number))
-        return None if stored is None else GivenCommand(str(stored.command), use_of(stored.command))
+        return None if stored is None else GivenCommand(str(stored.command), use_of(stored.command, self._operands()))
 
     def begun(self, now: Nanos) -> Sequence[int]:
         program = self._chip.program
@@ -202,7 +207,18 @@ class ChipPrograms:
         return ProgramState.LIMITED if program.is_limited else ProgramState.RUNS
 
     def queued(self) -> Sequence[GivenCommand]:
-        return [GivenCommand(str(command), use_of(command)) for command in self._chip.receiver.commands_waiting()]
+        return [GivenCommand(str(one), use_of(one)) for one in (*self._stored(), *self._chip.receiver.commands_waiting())]
+
+    def _stored(self) -> Iterator[ChipCommand]:
+        """Commands in the memory that come next, and from no text."""
+        memory, place = self._chip.memory, self._chip.program.pc
+        while place != memory.end and (found := decode(memory.fetch(place))) is not None:
+            if self.location(place) is None:
+                yield found[0]
+            place = (place + found[1]) % memory.span
+
+    def commands(self, data: bytes) -> Sequence[GivenCommand]:
+        return [GivenCommand(str(one), use_of(one)) for one in commands_of(data, self._chip.variant)]
 
     def depth(self) -> int:
         return 0 if self._chip.program.back is None else 1
@@ -220,7 +236,13 @@ class ChipPrograms:
         return True
 
     def use(self, location: StatementLocation) -> StatementUse:
-        return use_of(self._text.commands[location.number])
+        return use_of(self._text.commands[location.number], self._operands())
+
+    def _operands(self) -> ChipState:
+        """What calculations may read besides their numbers: by a function that is ON, or a command of the text."""
+        switched = {command.number for command in self._text.commands if command.use.level}
+        on = {number for number in _OPERAND_OF if number in switched or self._chip.unit.on(number)}
+        return reduce(or_, (_OPERAND_OF[number] for number in on), NOTHING)
 
     def stack(self, now: Nanos) -> Sequence[Frame]:
         program = self._chip.program

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 
 from steptwin.m1486.commanduse import NOTHING, ChipState, Control, Motion, Setting, Wait
 from steptwin.m1486.functions import CARRY, FUNCTIONS, USER_FLAGS
@@ -23,12 +24,20 @@ _SPEEDS = {
 """Settings that decide how fast a motion is."""
 _EVERYTHING = range(1 << 16)
 """A jump that depends on something decides about what comes after it, wherever that is."""
+_CALCULATIONS = frozenset("+-*/")
+OPERANDS = ChipState.LINES | ChipState.REGISTERS
+"""What calculations read while functions 46 and 58 are ON."""
 _KEPT = ChipState.FLAGS | ChipState.CARRY
 
 
-def use_of(command: ChipCommand) -> StatementUse:
-    """A move holds the program until its end."""
+def use_of(command: ChipCommand, operands: ChipState = NOTHING) -> StatementUse:
+    """A move holds the program until its end. ``operands``: which of lines and registers calculations may read besides the
+    number."""
     use = command.use
+    if command.key in _CALCULATIONS:
+        use = replace(use, reads=use.reads & ~OPERANDS | operands)
+    elif use.control is Control.REPEAT:
+        use = replace(use, writes=NOTHING)  # what L began is counted to its end
     # What is sent does not decide how long that waits; which functions are read is not known.
     reads = NOTHING if use.waits is Wait.SENDING else use.reads & ~ChipState.FUNCTIONS
     writes = _resources(use.writes, command)
@@ -36,7 +45,7 @@ def use_of(command: ChipCommand) -> StatementUse:
         _resources(reads, command),
         (*writes, _DISTANCE) if ChipState.DISTANCE in use.writes else writes,
         waits=use.waits is not Wait.NOTHING,
-        governs=_EVERYTHING if is_computed(command) or use.control is Control.BRANCH else range(0),
+        governs=_EVERYTHING if is_computed(command) or use.control in (Control.BRANCH, Control.REPEAT) else range(0),
         acts_by=(_DISTANCE,) if ChipState.DISTANCE in use.reads else (),
         made_by=tuple(_value(one.value) for one in _SPEEDS.get(use.motion, ())),
         keeps=bool(use.writes & _KEPT),
@@ -98,7 +107,8 @@ _RESOURCES: Mapping[ChipState, Callable[[ChipCommand], Iterable[Resource]]] = co
         ChipState.SETTINGS: lambda command: (_value(command.use.sets.value),) if command.use.sets else (),
         # Neither pins nor axes, nor what a program calculates with.
         ChipState.HELD: _always(Resource(ResourceKind.PROGRAM, "")),
-        **dict.fromkeys((ChipState.LOOPS, ChipState.CALL, ChipState.SENDING), _always()),
+        ChipState.LOOPS: _always(_value("loop")),
+        **dict.fromkeys((ChipState.CALL, ChipState.SENDING), _always()),
         **dict.fromkeys((ChipState.LISTENING, ChipState.MEMORY), _always()),
     },
 )

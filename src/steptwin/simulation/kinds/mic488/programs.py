@@ -112,6 +112,9 @@ class WbcPrograms:
     def queued(self) -> Sequence[GivenCommand]:
         return ()
 
+    def commands(self, data: bytes) -> Sequence[GivenCommand]:
+        return ()
+
     def depth(self) -> int:
         return len(self._device.program.interpreter.stack)
 
@@ -230,7 +233,7 @@ class _Bank:
         return {number: following[number] for number, step in enumerate(self.program.steps) if not isinstance(step, BLOCK_MARKS)}
 
     def reached(self, starts: Collection[int]) -> Collection[int]:
-        return self._flow.reached((*starts, *self._flow.interrupts))
+        return self._flow.later((*starts, *self._flow.interrupts))
 
     @cached_property
     def _flow(self) -> ControlFlow:

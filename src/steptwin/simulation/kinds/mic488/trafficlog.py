@@ -44,6 +44,9 @@ class ModbusTrafficLog:
             return ()
         return (unit,) if unit in self._line.units else self._line.units
 
+    def selects(self, data: bytes) -> bool:
+        return False  # each request has its address
+
     def refusal(self, client: str, data: bytes) -> str | None:
         pdu = data[7:] if self._is_tcp(client, data) else data[1:-2]
         return EXCEPTION_NAMES.get(pdu[1], "") if len(pdu) > 1 and pdu[0] & REFUSED else None
