@@ -20,12 +20,13 @@ from campaigns import CAMPAIGN, campaign_file
 from tests.conftest import until
 
 from steptwin.campaign import execution
+from steptwin.campaign.batches import Workers, run_batch
 from steptwin.campaign.campaign import RESULTS, SUMMARY, Campaign, CampaignProgress
 from steptwin.campaign.case import Case
 from steptwin.campaign.execution import CaseExecution
+from steptwin.campaign.results import StoredCase
 from steptwin.campaign.runner import CaseRunner
-from steptwin.campaign.store import StoredCase
-from steptwin.campaign.workers import LOCAL, Workers, run_batch, workers
+from steptwin.campaign.workers import LOCAL, workers
 from steptwin.errors import LineFailure, Misuse
 from steptwin.files.world import World
 

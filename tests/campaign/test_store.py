@@ -1,4 +1,4 @@
-"""Results in a database: SQLite and PostgreSQL alike."""
+"""Results in a database, SQLite and PostgreSQL alike, and in memory."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from sqlalchemy import update
 
 from steptwin.campaign.case import Case, CaseResult, Verdict
 from steptwin.campaign.parquet import write_cases
-from steptwin.campaign.store import CAMPAIGN, METADATA, CampaignStore, StoredCase, gaps
+from steptwin.campaign.results import MemoryStore, ResultStore, StoredCase, gaps
+from steptwin.campaign.store import CAMPAIGN, METADATA, CampaignStore
 from steptwin.coverage.counts import Coverage
 from steptwin.errors import DatabaseFailure, LineFailure, Misuse
 from steptwin.history.database import engine_of, read_url
@@ -32,6 +33,10 @@ def postgres(require_peer: Callable[[str], str]) -> Iterator[str]:
 
 @pytest.fixture(params=["sqlite", "postgresql"])
 def url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    return url_of(request, tmp_path)
+
+
+def url_of(request: pytest.FixtureRequest, tmp_path: Path) -> str:
     return f"sqlite:///{tmp_path / 'r.db'}" if request.param == "sqlite" else str(request.getfixturevalue("postgres"))
 
 
@@ -44,8 +49,13 @@ def stored(number: int, *, holds: bool = True, **measures: float) -> StoredCase:
     return StoredCase(case, CaseResult(number, (Verdict("p", holds, 0.5 if holds else -0.5, 7, ""),), "d", 100, measures))
 
 
-def test_results_come_back_in_the_order_of_their_numbers(url: str) -> None:
-    store = opened(url, "order")
+@pytest.fixture(params=["sqlite", "postgresql", "memory"])
+def store(request: pytest.FixtureRequest, tmp_path: Path) -> ResultStore:
+    """To be closed."""
+    return MemoryStore() if request.param == "memory" else opened(url_of(request, tmp_path), request.function.__name__[-32:])
+
+
+def test_results_come_back_in_the_order_of_their_numbers(store: ResultStore) -> None:
     given = [stored(n, holds=n != 2, m=n / 3) for n in range(5)]
     store.add(given[3:])
     store.add(given[:3])
@@ -53,7 +63,8 @@ def test_results_come_back_in_the_order_of_their_numbers(url: str) -> None:
     assert list(store.results()) == given
     assert list(store.results(before=2)) == given[:2]
     assert list(store.results(failed=True)) == [given[2]]
-    assert (store.numbers(), store.first_failure()) == (array("q", range(5)), 2)
+    assert list(store.results(failed=False)) == [*given[:2], *given[3:]]
+    assert (store.numbers(), store.failed(), store.first_failure()) == (array("q", range(5)), 1, 2)
     store.close()
 
 
@@ -71,8 +82,7 @@ def test_campaigns_do_not_mix(url: str) -> None:
     other.close()
 
 
-def test_coverage_is_kept_with_the_cases_that_it_counts(url: str) -> None:
-    store = opened(url, "covered")
+def test_coverage_is_kept_with_the_cases_that_it_counts(store: ResultStore) -> None:
     store.add([stored(0)])
     store.add([stored(1), stored(2)], Coverage())
     coverage, count = store.coverage()

@@ -12,7 +12,8 @@ from postgres import postgres_server, programs
 from shell import Shell
 
 from steptwin.campaign.campaign import Campaign
-from steptwin.campaign.store import CampaignStore, StoredCase
+from steptwin.campaign.results import StoredCase
+from steptwin.campaign.store import CampaignStore
 from steptwin.coverage.counts import Coverage
 
 

@@ -16,16 +16,17 @@ from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from steptwin.campaign.batches import HERE, Workers
 from steptwin.campaign.case import Case, CaseResult
 from steptwin.campaign.cases import Cases
 from steptwin.campaign.description import SEARCHES, CampaignDescription
 from steptwin.campaign.execution import CaseExecution, Done
 from steptwin.campaign.reading import load_campaign, read_campaign
+from steptwin.campaign.results import MemoryStore, ResultStore, StoredCase, gaps
 from steptwin.campaign.runner import CaseRunner
 from steptwin.campaign.search.exhaustive import ExhaustiveCases, without_faults
 from steptwin.campaign.search.guided import WAVE, GuidedSearch, distance
 from steptwin.campaign.summary import CampaignSummary
-from steptwin.campaign.workers import Workers, workers
 from steptwin.controller import SECOND
 from steptwin.coverage.counts import Coverage
 from steptwin.durations import duration
@@ -36,8 +37,6 @@ from steptwin.files.world import World
 
 if TYPE_CHECKING:
     from collections.abc import Generator
-
-    from steptwin.campaign.store import CampaignStore
 
 RESULTS, SUMMARY = "results.db", "summary.json"
 SUFFIX = ".results"
@@ -70,6 +69,8 @@ class Campaign:
         """In how many runs what programs execute was counted."""
         self.coverage = Coverage()
         """Statements that they executed, after a `run` that counts them."""
+        self.memory: MemoryStore | None = None
+        """Where results are kept instead of in a folder."""
         self._runner: CaseRunner | None = None
 
     @classmethod
@@ -111,6 +112,11 @@ class Campaign:
             )
         )
 
+    @property
+    def count(self) -> int | None:
+        """How many cases there are; None: without end. Raises `Misuse` where nothing says when to end."""
+        return self._chosen.count
+
     # ------------------------------------------------------------------ single runs
 
     @property
@@ -151,8 +157,8 @@ class Campaign:
         count what programs execute. Raises `Misuse`, and `LineFailure` for a database or cluster that fails. Once interrupted,
         the same call goes on where it was.
         """
-        total = self._chosen.count
-        with self._store(out) as store, workers(jobs, dask) as there:
+        total = self.count
+        with self._store(out) as store, _workers(jobs, dask) as there:
             summary = self._run(store, there, total, coverage=coverage, progress=progress)
             if coverage:
                 self.coverage, self.covered = store.coverage()
@@ -161,15 +167,19 @@ class Campaign:
         return summary
 
     @contextmanager
-    def _store(self, out: str | Path | None) -> Generator[CampaignStore]:
+    def _store(self, out: str | Path | None) -> Generator[ResultStore]:
         store = self.open_store(out)
         try:
             yield store
         finally:
             store.close()
 
-    def open_store(self, out: str | Path | None) -> CampaignStore:
+    def open_store(self, out: str | Path | None) -> ResultStore:
         """The results in a folder, in the database that the description names, or, without either, in memory. To be closed."""
+        if self.memory is not None:
+            return self.memory
+        if out is None and self.description.database is None:
+            return MemoryStore()
         try:
             from sqlalchemy.engine import URL
 
@@ -183,22 +193,20 @@ class Campaign:
         if self.description.database is not None:
             url = read_url(self.description.database, folder or Path())
         else:
-            url = URL.create(SQLITE, database=None if folder is None else str(folder / RESULTS))
+            url = URL.create(SQLITE, database=str((folder or Path()) / RESULTS))
         description = self.description
         is_own = self.description.database is None
         return CampaignStore(url, description.digest, description.name, description.seed, is_own=is_own)
 
     def _run(
         self,
-        store: CampaignStore,
+        store: ResultStore,
         there: Workers,
         total: int | None,
         *,
         coverage: bool,
         progress: Callable[[CampaignProgress], object],
     ) -> CampaignSummary:
-        from steptwin.campaign.store import StoredCase, gaps
-
         description = self.description
         first = store.first_failure() if description.until_failure else None
         done = store.numbers()
@@ -256,6 +264,17 @@ class Campaign:
                 return
             search.tell([known[case.number] for case in wave])
             left = None if left is None else left - len(wave)
+
+
+@contextmanager
+def _workers(jobs: int | None, dask: str | None) -> Generator[Workers]:
+    if jobs == 1 and dask is None:
+        yield HERE
+        return
+    from steptwin.campaign.workers import workers
+
+    with workers(jobs, dask) as found:
+        yield found
 
 
 def _make_folder(folder: Path) -> None:

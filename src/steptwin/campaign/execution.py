@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
+from steptwin.campaign.batches import BatchResult, Workers, run_batch
 from steptwin.campaign.case import Case, CaseResult
 from steptwin.campaign.description import CampaignDescription
-from steptwin.campaign.workers import BatchResult, Workers, run_batch
 
 TASK_S = 0.25
 """Aim for the duration of a task: a tenth of a second at least, for the cost of its way to a worker and back."""

@@ -9,7 +9,7 @@ from typing import IO, Any
 import pyarrow as pa
 from pyarrow import parquet
 
-from steptwin.campaign.store import StoredCase, export_rows
+from steptwin.campaign.results import StoredCase, export_rows
 
 _ROWS = 10_000
 """Rows in a group."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 from array import array
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from sqlalchemy import (
     BigInteger,
@@ -31,6 +31,7 @@ from sqlalchemy.engine import URL
 from sqlalchemy.exc import DBAPIError
 
 from steptwin.campaign.case import Case, CaseResult
+from steptwin.campaign.results import StoredCase
 from steptwin.coverage.counts import Coverage
 from steptwin.errors import Misuse
 from steptwin.history.database import POSTGRESQL, SQLITE, engine_of, failure, format_url
@@ -68,14 +69,9 @@ CASE = Table(
 )
 
 
-class StoredCase(NamedTuple):
-    case: Case
-    result: CaseResult
-
-
 class CampaignStore:
-    """The results of one campaign. ``is_own``: the database is for it alone. Raises `LineFailure` where there is no database, and
-    `Misuse` for one of another campaign or version."""
+    """See `steptwin.campaign.results.ResultStore`. ``is_own``: the database is for it alone. Raises `LineFailure` where there is
+    no database, and `Misuse` for one of another campaign or version."""
 
     def __init__(self, url: URL, digest: str, name: str, seed: int, *, is_own: bool) -> None:
         self._url = url
@@ -118,8 +114,6 @@ class CampaignStore:
     # ------------------------------------------------------------------ writing
 
     def add(self, found: Sequence[StoredCase], coverage: Coverage | None = None) -> None:
-        """Keep results, all or none of them. A case that is there stays as it is: its results would be the same. ``coverage``:
-        all that has been counted so far."""
         rows = [
             {
                 "campaign_id": self._id,
@@ -142,7 +136,6 @@ class CampaignStore:
     # ------------------------------------------------------------------ reading
 
     def numbers(self) -> array[int]:
-        """The numbers of the cases that are there, in order."""
         with self._begin() as connection:
             wanted = select(CASE.c.number).where(CASE.c.campaign_id == self._id).order_by(CASE.c.number)
             return array("q", connection.execute(wanted, execution_options={"yield_per": _STREAMED}).scalars())
@@ -159,19 +152,16 @@ class CampaignStore:
                 yield StoredCase(Case.from_json(json.loads(given)), CaseResult.from_json(json.loads(result)))
 
     def failed(self) -> int:
-        """How many of the cases failed."""
         wanted = select(func.count()).where(CASE.c.campaign_id == self._id, CASE.c.failed)
         with self._begin() as connection:
             return connection.execute(wanted).scalar_one()
 
     def first_failure(self) -> int | None:
-        """The lowest number of a case that failed."""
         wanted = select(CASE.c.number).where(CASE.c.campaign_id == self._id, CASE.c.failed).order_by(CASE.c.number).limit(1)
         with self._begin() as connection:
             return connection.execute(wanted).scalar()
 
     def coverage(self) -> tuple[Coverage, int]:
-        """Counts, and the number of their cases."""
         with self._begin() as connection:
             row = connection.execute(select(CAMPAIGN.c.coverage, CAMPAIGN.c.covered).where(CAMPAIGN.c.id == self._id)).one()
             return Coverage.from_json(json.loads(row.coverage or "[]")), int(row.covered)
@@ -203,30 +193,3 @@ def _lock(connection: Connection) -> None:
 
 
 _json = json.JSONEncoder(ensure_ascii=False, separators=(",", ":")).encode
-
-
-def gaps(done: Sequence[int], count: int | None) -> Iterator[int]:
-    """The numbers from 0 to below ``count`` that are not in ``done``, which is in order; without a count they go on for ever."""
-    place, number = 0, 0
-    while count is None or number < count:
-        if place < len(done) and done[place] == number:
-            place += 1
-        else:
-            yield number
-        number += 1
-
-
-def export_rows(found: Iterable[StoredCase]) -> Iterator[dict[str, Any]]:
-    """Flat rows, for tables: numbers, values, measures and the robustness of each property."""
-    for case, result in found:
-        yield {
-            "number": case.number,
-            "failed": result.failed,
-            "error": result.error,
-            "digest": result.digest,
-            "end_s": result.end_ns / 1e9,
-            **{f"value {name}": value for name, value in case.values.items()},
-            **{f"measure {name}": value for name, value in result.measures.items()},
-            **{f"robustness {one.name}": one.robustness for one in result.verdicts},
-            **{f"holds {one.name}": one.holds for one in result.verdicts},
-        }

@@ -19,8 +19,8 @@ from steptwin.campaign.report.campaignpage import CampaignReport
 from steptwin.campaign.report.comparison import compare, lines
 from steptwin.campaign.report.statistics import RunColumns, histogram, influences
 from steptwin.campaign.report.write import write_report
+from steptwin.campaign.results import StoredCase
 from steptwin.campaign.shrink import failures_of
-from steptwin.campaign.store import StoredCase
 from steptwin.campaign.summary import CampaignSummary
 from steptwin.errors import Misuse
 
@@ -73,6 +73,7 @@ def test_the_page_needs_no_network_and_links_what_is_there(report: tuple[Campaig
 
 def test_the_fault_matters_most(report: tuple[CampaignReport, Path]) -> None:
     found, _ = report
+    assert found.influences
     assert found.influences[0].name == "fault jam element=ram"
     assert found.influences[0].correlation < -0.5
     assert [one.name for one in found.histograms] == ["down after <s>"]
@@ -150,6 +151,13 @@ def test_without_numbers_there_is_no_histogram() -> None:
     one = histogram("x", [2.0])
     assert one is not None
     assert one.counts == (1,)
+
+
+def test_the_greatest_number_is_in_the_last_bar_of_a_histogram() -> None:
+    one = histogram("x", [0.0, 1.0, 4.0, 3.9, float("inf")])
+    assert one is not None
+    assert (one.edges, one.counts) == ((0.0, 1.0, 2.0, 3.0, 4.0), (1, 1, 0, 2))
+    assert (one.count, one.least, one.mean, one.most) == (4, 0.0, 2.225, 4.0)
 
 
 TEST = """

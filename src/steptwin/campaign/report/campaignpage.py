@@ -28,7 +28,8 @@ _STYLE = "rect { fill: var(--note); } .bad { color: var(--bad); } .good { color:
 class CampaignReport:
     summary: CampaignSummary
     found: Sequence[FoundFailure]
-    influences: Sequence[Influence]
+    influences: Sequence[Influence] | None
+    """None without the libraries for them."""
     indices: Sequence[SobolIndex] = ()
     """Sobol indices of the design that gives them."""
     histograms: Sequence[Histogram]
@@ -40,7 +41,7 @@ class CampaignReport:
             **self.summary.to_json(),
             "search": self.search,
             "causes": [one.to_json(folder) for one in self.found],
-            "influences": [one._asdict() for one in self.influences],
+            "influences": [one._asdict() for one in self.influences or ()],
             "sobol_indices": [one._asdict() for one in self.indices],
             "measures": [one._asdict() for one in self.histograms],
         }
@@ -83,8 +84,10 @@ class CampaignReport:
             body += f"<h2>Failures by cause</h2>\n{self._causes(folder)}"
         if self.indices:
             body += f"<h2>What matters most</h2>\n{self._indices()}"
+        elif self.influences is None:
+            body += "<h2>What matters most</h2>\n<p>This needs scipy, which is not here.</p>\n"
         elif self.influences:
-            body += f"<h2>What matters most</h2>\n{self._influences()}"
+            body += f"<h2>What matters most</h2>\n{self._influences(self.influences)}"
         if self.histograms:
             body += f"<h2>Measures</h2>\n{''.join(_figure(one) for one in self.histograms)}\n"
         return page(f"Campaign {one.name}", body, _STYLE)
@@ -112,9 +115,9 @@ class CampaignReport:
             rows.append((escape(one.failure.property), str(len(one.numbers)), what, escape(_simplest(one)), links))
         return table(("property", "runs", "what", "simplest case", ""), rows, (1,))
 
-    def _influences(self) -> str:
-        rows = [(escape(one.name), f"{one.correlation:+.3f}", f"{one.p_value:.2g}") for one in self.influences]
-        of = _OF[self.influences[0].of]
+    def _influences(self, found: Sequence[Influence]) -> str:
+        rows = [(escape(one.name), f"{one.correlation:+.3f}", f"{one.p_value:.2g}") for one in found]
+        of = _OF[found[0].of]
         return f"<p>Spearman's rank correlation with {of}.</p>\n" + table(("value", "correlation", "p"), rows, (1, 2))
 
     def _indices(self) -> str:

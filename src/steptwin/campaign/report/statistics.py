@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from array import array
+from bisect import bisect_right
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import isfinite
+from statistics import fmean
 from typing import Any, NamedTuple
 
 from steptwin.campaign.case import Case, CaseResult
@@ -96,19 +99,20 @@ def influences(columns: RunColumns) -> list[Influence]:
 
 def histogram(name: str, numbers: Iterable[float], unit: str = "") -> Histogram | None:
     """None where there are no numbers."""
-    import numpy as np
-
-    given = np.asarray([one for one in numbers if isfinite(one)])
-    if not given.size:
+    given = [one for one in numbers if isfinite(one)]
+    if not given:
         return None
-    counts, edges = np.histogram(given, bins=min(BINS, max(1, given.size)))
+    least, most, bins = min(given), max(given), min(BINS, len(given))
+    low, high = (least, most) if least < most else (least - 0.5, most + 0.5)
+    inner = [low + (high - low) * n / bins for n in range(1, bins)]
+    counts = Counter(bisect_right(inner, one) for one in given)
     return Histogram(
         name,
-        int(given.size),
-        float(given.min()),
-        float(given.mean()),
-        float(given.max()),
-        tuple(edges.tolist()),
-        tuple(counts.tolist()),
+        len(given),
+        least,
+        fmean(given),
+        most,
+        (low, *inner, high),
+        tuple(counts[n] for n in range(bins)),
         unit,
     )

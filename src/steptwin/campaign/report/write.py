@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterator, Mapping
+from importlib.util import find_spec
 from itertools import islice
 from pathlib import Path
 
@@ -51,7 +52,7 @@ def write_report(campaign: Campaign, summary: CampaignSummary, folder: Path, fil
     report = CampaignReport(
         summary=summary,
         found=found,
-        influences=influences(columns),
+        influences=influences(columns) if find_spec("scipy") else None,
         indices=_indices(campaign, columns),
         histograms=[one for one in shown if one is not None],
         search=campaign.description.search,
