@@ -1,5 +1,5 @@
 import type { Studio } from "../../lib/state/studio.svelte";
-import { draftOf, keepDraft, ownDrafts } from "./drafts";
+import { draftOf, keepDraft, ownDrafts } from "../../lib/state/drafts";
 import { t } from "./text";
 import { withRow } from "./rows";
 

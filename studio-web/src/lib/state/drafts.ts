@@ -1,6 +1,6 @@
-import { keep, restore } from "../../lib/state/kept";
+import { keep, restore } from "./kept";
 
-/** Texts that were changed and not downloaded, by the name of the world and their addresses. */
+/** Texts that were changed and are only in the page, by the name of the world and their addresses. */
 type Kept = Record<string, string>;
 
 const KEY = "drafts";
