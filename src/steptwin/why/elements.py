@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
+from itertools import islice
 from typing import Any
 
 from steptwin.controller import SECOND, Nanos
@@ -11,6 +13,7 @@ from steptwin.messages import Message
 from steptwin.simulation.components.brake import BrakeSpec
 from steptwin.simulation.components.carriage import CarriageSpec
 from steptwin.simulation.components.conveyortable import FEED, RUN, ConveyorSpec
+from steptwin.simulation.components.counter import DOWN, RESET, UP, Counter
 from steptwin.simulation.components.follower import FollowerSpec
 from steptwin.simulation.components.gantry import GantrySpec
 from steptwin.simulation.components.load import LoadSpec
@@ -32,6 +35,8 @@ FOLLOWS_AFTER = Message("why.follows-after", ", {name} follows after {delay_ms:g
 ITS_RATE_IS = Message("why.its-rate-is", "the rate of {name} is {rate:g} {unit}")
 COMES_WITH_TIME = Message("why.comes-with-time", "the time has come for {name}: {condition}")
 MOVED_BY_AXES = CarriageSpec, FollowerSpec, GantrySpec, ShaftSpec, ToolSpec
+MOST_COUNTED = 40
+"""Limit of the changes at an input of a counter that are searched for what it counted."""
 TIME = "time"
 """States of an element that are over at a moment and are no signal."""
 
@@ -81,7 +86,25 @@ class ElementCauses:
 
     def of_inputs(self, name: str, change: Change, signal: str = "") -> FoundCause:
         """Cause of a change of an element's output, ``signal`` if that is given: an input at the same moment, or one before, as
-        much earlier as it delays."""
+        much earlier as it delays; of a counter, besides it what it had counted before."""
+        found = self._of_inputs(name, change, signal)
+        if found is None or not isinstance(self._all.parts[name], Counter):
+            return found
+        return found._replace(besides=partial(self._counted, name, found.place))
+
+    def _counted(self, name: str, last: Place) -> Iterator[Cause]:
+        """The changes that a counter had counted before the last one since it was reset."""
+        reset = self._all.last(list(self._all.sources(PinName(name, RESET))), last.time)
+        since = Place(-1) if reset is None else reset.place
+        for terminal in (UP, DOWN):
+            for source in self._all.sources(PinName(name, terminal)):
+                for one in islice(self._log.changes_before(source, last.time, last.order), MOST_COUNTED):
+                    if one.value and since < Place(one.time, one.order):
+                        yield self._all.change(source, one)._replace(cover=Cover.LEVEL)
+        if reset is None:
+            self._log.lack()
+
+    def _of_inputs(self, name: str, change: Change, signal: str) -> FoundCause:
         part = self._all.parts[name]
         sources = [source for terminal in inputs(part) for source in self._all.sources(PinName(name, terminal))]
         last = list(self._that_act(name, signal, change, change.time))
@@ -105,18 +128,20 @@ class ElementCauses:
         if followed is not None and all(followed.place > Place(one.time, one.order) for one, _ in last):
             return followed
         acts = Cover.ACTION if type(part).deadline is not TerminalComponent.deadline else None
-        begun = self._log.actions.begun(name, change.time)
+        begun, came = self._log.actions.begun(name, change.time), last
         if begun is not None:  # inputs that came later have not changed what it does
             change = Change(begun, 0.0, change.group, self._log.position(change.group, begun), LAST)
             last = list(self._that_act(name, signal, change, begun))
         elif self._log.actions.has(name):
             self._log.lack()
         latest, source = max(last, key=lambda found: (found[0].time, found[0].order), default=(None, ""))
+        in_vain = [self._all.change(one, later) for later, one in came if later.time > change.time]
         fault = self._log.last_fault(name, change.time, change.order)
         if fault is not None and (latest is None or (fault.time, fault.order) > (latest.time, latest.order)):
             record = self._log.record(fault)
             link = self._all.fault_link(record)
-            return Cause(link, Place(fault.time, fault.order), self._all.of_fault(record, fault.order), acts)
+            along = tuple(one._replace(cover=Cover.LEVEL) for one in in_vain)
+            return Cause(link, Place(fault.time, fault.order), self._all.of_fault(record, fault.order), acts, along=along)
         on = [source for source in sources if self._log.level(source, change.time)] if latest is None else []
         if on and self._log.reaches_begin():
             first, *others = [self._all.first(one, HAS_ACTED_SINCE(name=name))._replace(cover=acts) for one in on]
@@ -231,7 +256,21 @@ class ElementCauses:
             cause = found.get(signal) or (None if is_integrator else self._of_signal(signal, change, change.time))
             if cause is not None and signal != best:
                 others.append(cause)
-        return found[best]._replace(along=tuple(others))
+        added = partial(self._added_up, name, names, change, found[best]) if is_integrator else found[best].besides
+        return found[best]._replace(along=tuple(others), besides=added)
+
+    def _added_up(self, name: str, drivers: Sequence[str], change: Change, last: Cause) -> Iterator[Cause]:
+        """The signals that began to move the value of an integrator as it moved last before a change, and what had moved it
+        before, all of them before the ``last`` one."""
+        yield from last.besides()
+        began = self._log.rates.last(name, change.time).time
+        earlier = Change(began, 0.0, change.group, self._log.position(change.group, began), LAST)
+        reset = self._all.last(list(self._all.sources(PinName(name, RESET))), change.time)
+        if began >= change.time or (reset is not None and reset.place.time >= began):
+            return
+        found = [self._all.last([one], began) for one in drivers if self._log.has(one)]
+        found += [self.of_followed(name, earlier)] if self._log.rates.drivers(name, began) else []
+        yield from (one._replace(cover=Cover.LEVEL) for one in found if one is not None and one.place < last.place)
 
     def _unmoved(self, signals: Iterable[str], change: Change) -> dict[str, Cause]:
         """Reasons why axes have not moved before a change."""

@@ -86,14 +86,16 @@ class HoldingCauses:
         if last is not None and self.level(target, at) != closed and last.place.time + delay < at:
             others = [one for one in sources if bool(self._log.level(one, at)) is not closed] or sources
             text = ALTHOUGH(signal=signal, value=self._log.level(signal, at), other=self._all.state(others[0], at))
-            besides = partial(self._faults, owner, at)
+            besides = partial(self.faults, owner, at)
             yield Cause(ChainLink(at, owner, text), Place(at, LAST, -1), lambda: covered(last, Cover.LEVEL), besides=besides)
 
-    def _faults(self, owner: str, at: Nanos) -> Iterator[Cause]:
-        """The fault of an element that has acted by a moment and holds no terminal, if there is one only."""
+    def faults(self, owner: str, at: Nanos, *kinds: str) -> Iterator[Cause]:
+        """The fault of an element, of one of these kinds if some are given, that has acted by a moment and holds no terminal, if
+        there is one only."""
         faults = self._world.objects.faults
         there = (one for one in faults.of_element(owner) if one.begin <= at and (one.end is None or at < one.end))
-        acting = [one.name for one in there if not one.fault.kind.effect.holds and one.name in faults.acts]
+        acting = [one for one in there if not one.fault.kind.effect.holds and one.name in faults.acts]
+        acting = [one.name for one in acting if not kinds or one.fault.kind.name in kinds]
         if len(acting) == 1 and faults.acts[acting[0]].first <= at:
             link = self.fault_link(acting[0], at)
             act = self._all.fault_root(acting[0], at).by

@@ -481,6 +481,11 @@ class CauseLog:
         last = next((hold for hold in reversed(self._holds.get(signal, ())) if hold.time <= at and hold.order < before), None)
         return None if last is None or last.held is None else last
 
+    def holding(self, at: Nanos) -> set[str]:
+        """The faults that hold signals at a moment."""
+        holds = (self.hold(signal, at) for signal in self._holds)
+        return {hold.held.fault for hold in holds if hold is not None and hold.held is not None}
+
     def changes_in(self, signal: str, after: Nanos, until: Nanos) -> Iterator[Nanos]:
         """The moments at which a signal took another value, after one until another."""
         series = self.points.series(signal)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import partial, reduce
 from typing import Protocol, TypeVar
 
 from steptwin.controller import SECOND, Nanos
@@ -18,7 +18,7 @@ from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
 from steptwin.simulation.world.snapshotlog import SLICE_NS, outside_past
 from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Effect, Trial
-from steptwin.why.causes import Causes
+from steptwin.why.causes import AND, Causes
 from steptwin.why.lacking import Found, Lacking
 from steptwin.why.notedpast import NotedPast
 from steptwin.why.question import Asking, Why
@@ -39,6 +39,7 @@ STANDS_NS: Nanos = SECOND
 MOST_SUSPECTS = 4
 """Limit of the faults that are tried for one question, the last ones first."""
 WITHOUT_IT = Message("why.without-it", "{what}; without it: {state}")
+WITHOUT_THEM = Message("why.without-them", "{what}; without it and {others}: {state}")
 MOST_NOTED = 500_000
 """Limit of the records and statements that are noted: some 100 MB."""
 
@@ -98,7 +99,8 @@ class PastQuestions:
                 tried[name] = first
             else:
                 held_back += [one for one in others if one.effect is Effect.OTHERWISE][:1]
-        links = _with(answer.links[len(lacking) :], (*tried.values(), *held_back))
+        masked = () if tried or held_back or not suspects else (yield from self._masking(suspects, answer))
+        links = _between(_with(answer.links[len(lacking) :], (*tried.values(), *held_back)), masked)
         answer = answer._replace(links=tuple(dict.fromkeys((*lacking, *links))))
         if not try_without:
             return answer
@@ -142,6 +144,40 @@ class PastQuestions:
         link = yield from self._settled(lambda known: known.find(lambda why: why.fault_link(name, answers[0].at)))
         around = 0 if self._is_near(name, answers[0]) else STANDS_NS
         return (yield from trying_without(self._snapshots, link, answers, self._most, around=around))
+
+    def _masking(self, suspects: Sequence[str], answer: Answer) -> Generator[None, None, Sequence[ChainLink]]:
+        """Those of the suspects, and of the faults that hold signals, of which each is enough: without one something is the same,
+        without all it is otherwise."""
+        faults = {link.root.name: link for link in answer.links if isinstance(link.root, SetFault)}
+        held = self._logs[0].past.log.holding(answer.at)
+        suspects = [*suspects, *sorted(name for name in held if name not in faults and name not in suspects)]
+        for name in suspects:
+            faults[name] = yield from self._settled(
+                lambda known, name=name: known.find(lambda why: why.fault_link(name, answer.at))
+            )
+        if len(faults) == 1:
+            return ()
+        without_all = yield from self._without_all([*faults.values()], answer)
+        if without_all.effect is not Effect.OTHERWISE:
+            return ()
+        for name in suspects:
+            others = [link for other, link in faults.items() if other != name]
+            if (yield from self._without_all(others, answer)).effect is Effect.OTHERWISE:
+                del faults[name]
+        if len(faults) == 1:
+            return ()
+        found: list[ChainLink] = []
+        for name in suspects:
+            if name in faults:
+                others = reduce(lambda one, other: AND(one=one, other=other), [one for one in faults if one != name])
+                text = WITHOUT_THEM(what=faults[name].text, others=others, state=without_all.text)
+                found.append(replace(faults[name], text=text))
+        return found
+
+    def _without_all(self, links: Sequence[ChainLink], answer: Answer) -> Generator[None, None, Trial]:
+        """The run without the roots of links."""
+        others = [link.root for link in links[1:] if link.root is not None]
+        return (yield from trying_without(self._snapshots, links[0], (answer,), self._most, others=others))[0]
 
     def _with_held(self, answer: Answer) -> Asking:
         """An answer with what the programs stand at, or are held by, that could have changed what it is about since."""

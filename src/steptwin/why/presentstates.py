@@ -10,6 +10,7 @@ from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message, MessageText
 from steptwin.motion.divisions import profile_of
 from steptwin.simulation.components.brake import Brake
+from steptwin.simulation.components.counter import Counter
 from steptwin.simulation.components.cylinder import EXTENDED, RETRACTED, Cylinder
 from steptwin.simulation.components.relay import Relay
 from steptwin.simulation.components.timer import Timer
@@ -32,6 +33,7 @@ MOVES_WITHOUT_TARGET = Message("why.moves-without-target", "{axis} moves without
 MOVES_UNTIL = Message("why.moves-until", "{axis} moves until {pin} ends it")
 IS_IN_A_LOOP = Message("why.is-in-a-loop", "{controller} is in the loop of {statement}")
 DELAY_LASTS = Message("why.delay-lasts", "the time of {name} runs until {time:.6f} s")
+HAS_COUNTED = Message("why.has-counted", "{name} has counted {count} of {preset}")
 HAS_NO_INPUT = Message("why.has-no-input", "{axis} homes without end: no input is configured that could end it")
 
 _Asked: TypeAlias = "str | tuple[str, Resource]"
@@ -138,6 +140,8 @@ class PresentStates:
                 due = part.deadline()
                 if due is not None and due > self._at and terminal.upper() in part.block.outputs:
                     yield ChainLink(self._at, owner, DELAY_LASTS(name=owner, time=due / SECOND))
+            case Counter() if not self._log.level(name, self._at):
+                yield ChainLink(self._at, owner, HAS_COUNTED(name=owner, count=part.count, preset=part.preset))
             case Cylinder() if part.blockers and terminal.upper() == (EXTENDED if part.wanted > 0 else RETRACTED):
                 jams = [one for one in self._causes.axes.jams(owner) if one.time <= self._at]
                 axes = self._causes.axes

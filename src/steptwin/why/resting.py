@@ -66,8 +66,6 @@ class RestingCauses:
         """Cause for which a quantity has a value that it has from the beginning."""
         if name.partition(".")[0] in self._world.axes:
             return self.ignored((name,), at)
-        if self._log.rates.has(name.partition(".")[0]):
-            return self._past.causes.elements.rate(name.partition(".")[0], at)
         ignored = self.ignored((name,), at)
         return ignored if ignored is not None else covered(self._past.unrecorded(name, at), Cover.LEVEL)
 

@@ -5,7 +5,7 @@ A run is deterministic: what differs then, differs because of that root.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from functools import partial
 from typing import Protocol, TypeAlias
 
@@ -42,24 +42,37 @@ class SnapshotsWithInputs(Snapshots, Protocol):
 
 
 def trying_without(
-    snapshots: SnapshotsWithInputs, link: ChainLink, answers: Sequence[Answer], most: int, *, around: Nanos = 0
+    snapshots: SnapshotsWithInputs,
+    link: ChainLink,
+    answers: Sequence[Answer],
+    most: int,
+    *,
+    around: Nanos = 0,
+    others: Sequence[Root] = (),
 ) -> Trying:
-    """Whether each of some answers about one moment would be otherwise without the root of a link, in parts. ``most``: limit of
-    what is noted; ``around``: how long before and after the moment the first one must be otherwise."""
+    """Whether each of some answers about one moment would be otherwise without the root of a link, and ``others``, in parts.
+    ``most``: limit of what is noted; ``around``: how long before and after the moment the first one must be otherwise."""
     try:
-        return (yield from _trying(snapshots, link, answers, most, around))
+        return (yield from _trying(snapshots, link, answers, most, around, others))
     except SteptwinError as error:
         return [Trial(link, Effect.UNKNOWN, NOT_TRIED(problem=text_of(error)))]
 
 
-def _trying(snapshots: SnapshotsWithInputs, link: ChainLink, answers: Sequence[Answer], most: int, around: Nanos) -> Trying:
-    root = link.root
-    if root is None:
+def _trying(
+    snapshots: SnapshotsWithInputs,
+    link: ChainLink,
+    answers: Sequence[Answer],
+    most: int,
+    around: Nanos,
+    others: Sequence[Root],
+) -> Trying:
+    if link.root is None:
         raise Misuse(NOT_FOUND_AGAIN())
-    state = snapshots.state_at(max(snapshots.begin, _began(snapshots, root) - 1))
-    if state.snapshot.now > root.time:
+    roots = (link.root, *others)
+    state = snapshots.state_at(max(snapshots.begin, min(_began(snapshots, root) for root in roots) - 1))
+    if state.snapshot.now > min(root.time for root in roots):
         raise Misuse(PAST_BEFORE_IT_IS_NOT_KEPT())
-    run = _RunWithout(snapshots.world, state.snapshot, root)
+    run = _RunWithout(snapshots.world, state.snapshot, roots)
     at = answers[0].at + around
     inputs = run.inputs([one for one in snapshots.inputs_from(state.inputs) if one.time <= at])
     other = Why(NotedPast(run.make, inputs, at, most))
@@ -98,52 +111,70 @@ def _is_of(given: RecordedInput, root: Sent) -> bool:
 
 
 class _RunWithout:
-    """Makes worlds like ``world`` at a snapshot in which ``root`` never comes."""
+    """Makes worlds like ``world`` at a snapshot in which ``roots`` never come."""
 
-    def __init__(self, world: Simulation, snapshot: SimulationSnapshot, root: Root) -> None:
+    def __init__(self, world: Simulation, snapshot: SimulationSnapshot, roots: Sequence[Root]) -> None:
         self._blueprint = world.blueprint
         self._snapshot = snapshot
-        self._root = root
-        self.is_without = False
-        """Whether the root has been left out."""
+        self._roots = roots
+        self._without: list[Root] = []
+        """Those that have been left out."""
+
+    @property
+    def is_without(self) -> bool:
+        """Whether all roots have been left out."""
+        return all(root in self._without for root in self._roots)
 
     def make(self) -> Simulation:
-        """A world in which it is left out."""
-        root = self._root
+        """A world in which they are left out."""
         world = Simulation(self._blueprint, keep_trace=False, keep_inputs=False, at=self._snapshot)
         world.trace.stop()
-        if isinstance(root, SetFault) and world.objects.faults.find(root.name) is not None:
-            world.perform(do.ClearFault(root.name))
-            self.is_without = True
-        act = root if isinstance(root, Act) else root.by if isinstance(root, SetFault) else None
-        fault = root.name if isinstance(root, SetFault) else "" if act is None else act.fault
-        if fault:  # others keep the names that they have
-            world.objects.faults.reserved.add(fault)
-        if fault or (act is not None and act.script):
-            world.leave_out(partial(self._is_left_out, world, act, do.ClearFault(fault)))
+        leaves_out: list[Callable[[str, do.Step], bool]] = []
+        for root in self._roots:
+            if isinstance(root, SetFault) and world.objects.faults.find(root.name) is not None:
+                world.perform(do.ClearFault(root.name))
+                self._without.append(root)
+            act = root if isinstance(root, Act) else root.by if isinstance(root, SetFault) else None
+            fault = root.name if isinstance(root, SetFault) else "" if act is None else act.fault
+            if fault:  # others keep the names that they have
+                world.objects.faults.reserved.add(fault)
+            if fault or (act is not None and act.script):
+                leaves_out.append(partial(self._is_left_out, world, root, act, do.ClearFault(fault)))
+        if leaves_out:
+            world.leave_out(lambda script, step: True in [one(script, step) for one in leaves_out])
         return world
 
-    def _is_left_out(self, world: Simulation, act: Act | None, clears: do.ClearFault, script: str, step: do.Step) -> bool:
+    def _is_left_out(
+        self, world: Simulation, root: Root, act: Act | None, clears: do.ClearFault, script: str, step: do.Step
+    ) -> bool:
         is_left_out = act is not None and (world.now, script, step) == act[:3]
         if step == clears and clears.name in world.objects.faults.reserved:
             world.objects.faults.reserved.remove(clears.name)
             return True
-        self.is_without |= is_left_out
+        if is_left_out:
+            self._without.append(root)
         return is_left_out
 
     def inputs(self, inputs: Sequence[RecordedInput]) -> list[RecordedInput]:
-        """Inputs from outside, without it."""
-        root = self._root
+        """Inputs from outside, without them."""
+        found: list[RecordedInput] = []
+        for root in self._roots:
+            left_out = self._inputs_of(root, inputs)
+            found += left_out
+            if left_out:
+                self._without.append(root)
+        return [one for one in inputs if not any(one is other for other in found)]
+
+    @staticmethod
+    def _inputs_of(root: Root, inputs: Sequence[RecordedInput]) -> list[RecordedInput]:
+        """Those by which a root comes, and those that end it."""
         match root:
             case Sent(time):
-                left_out = [one for one in reversed(inputs) if _is_of(one, root) and one.time <= time][:1]
+                return [one for one in reversed(inputs) if _is_of(one, root) and one.time <= time][:1]
             case Act(time, "", what, fault=fault):
-                left_out = [one for one in inputs if (one.time, one.what) == (time, what)][:1]
-                left_out += [one for one in inputs if one.what == do.ClearFault(fault)]
+                given = [one for one in inputs if (one.time, one.what) == (time, what)][:1]
+                return [*given, *(one for one in inputs if one.what == do.ClearFault(fault))]
             case SetFault(_, name, by):
-                given = (by.time, by.what) if by is not None and not by.script else None
-                left_out = [one for one in inputs if (one.time, one.what) == given or one.what == do.ClearFault(name)]
-            case _:
-                left_out = []
-        self.is_without |= bool(left_out)
-        return [one for one in inputs if not any(one is other for other in left_out)]
+                act = (by.time, by.what) if by is not None and not by.script else None
+                return [one for one in inputs if (one.time, one.what) == act or one.what == do.ClearFault(name)]
+        return []

@@ -11,7 +11,7 @@ from typing import Any
 from steptwin.controller import Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.beltsensor import Sensor
-from steptwin.simulation.components.conveyortable import FEED, RUN, ConveyorSpec
+from steptwin.simulation.components.conveyortable import BELT_STOP, FEED, RUN, ConveyorSpec
 from steptwin.simulation.scheduler.trace import TraceRecord
 from steptwin.simulation.scheduler.wires import PinName
 from steptwin.simulation.script import steps as do
@@ -193,8 +193,11 @@ class WorkpieceCauses:
         run = PinName(belt, RUN)
         is_on = self._all.holding.level(run, change.time)
         sources = list(self._all.sources(run))
+        held = self._all.lasting([f"{belt}.{RUN.lower()}"], change.time, None)
+        if held is not None:
+            return None if self._log.level(f"{belt}.{RUN.lower()}", change.time) else covered(held, Cover.FAULT)
         if is_on or not sources:
-            return None
+            return next(self._all.holding.faults(belt, change.time, BELT_STOP), None)
         stopped = self._switched(belt, change, runs=False)
         return covered(stopped or self._all.unchanged(sources[0], Place(change.time, change.order, -1)), Cover.LEVEL)
 

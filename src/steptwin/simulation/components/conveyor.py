@@ -18,7 +18,15 @@ from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.simulation.components.axis import find_axis, turning_points_of_axis
 from steptwin.simulation.components.beltsensor import Sensor, SensorSpec
-from steptwin.simulation.components.conveyortable import FEED, RUN, ConveyorSpec, NearSpec, near_ones, stop_terminal
+from steptwin.simulation.components.conveyortable import (
+    BELT_STOP,
+    FEED,
+    RUN,
+    ConveyorSpec,
+    NearSpec,
+    near_ones,
+    stop_terminal,
+)
 from steptwin.simulation.components.driveencoder import Turned, fit_encoders
 from steptwin.simulation.components.element import Stands
 from steptwin.simulation.components.elementcontext import ElementContext
@@ -576,7 +584,7 @@ CONVEYOR = with_terminals(
     faults=(
         STUCK_INPUT,
         FaultKind(
-            "belt-stop",
+            BELT_STOP,
             Layer.ELEMENT,
             Occasion.ALWAYS,
             "A conveyor with a speed stands, although it is switched on.",

@@ -30,6 +30,8 @@ from steptwin.simulation.toml.values import (
 )
 
 RUN, FEED = "RUN", "FEED"
+BELT_STOP = "belt-stop"
+"""Fault by which a belt stands although it should run."""
 
 
 @table("[[conveyor.stop]]")

@@ -38,12 +38,12 @@ class CounterSpec(TerminalComponentSpec):
 class Counter(TerminalComponent):
     """Counts edges from 0 to 1, from 0 to `MOST`, and begins anew at 0 while RESET is on. OUT is on from ``preset`` on."""
 
-    FIXED: ClassVar[tuple[str, ...]] = ("_preset",)
+    FIXED: ClassVar[tuple[str, ...]] = ("preset",)
     __slots__ = (*FIXED, "_levels", "count")
 
     def __init__(self, block: TerminalBlock, preset: int) -> None:
         super().__init__(block)
-        self._preset = preset
+        self.preset = preset
         self._levels = (False, False)
         self.count = 0
 
@@ -51,7 +51,7 @@ class Counter(TerminalComponent):
         before, self._levels = self._levels, (self.block.is_on(UP), self.block.is_on(DOWN))
         up, down = (after and not level for level, after in zip(before, self._levels, strict=True))
         self.count = 0 if self.block.is_on(RESET) else min(max(self.count + up - down, 0), MOST)
-        self.block.put(OUT, float(self.count >= self._preset))
+        self.block.put(OUT, float(self.count >= self.preset))
 
 
 def _signals(counter: Counter) -> Mapping[str, SignalOf]:
