@@ -140,7 +140,8 @@ class ElementCauses:
         if fault is not None and (latest is None or (fault.time, fault.order) > (latest.time, latest.order)):
             record = self._log.record(fault)
             link = self._all.fault_link(record)
-            along = tuple(one._replace(cover=Cover.LEVEL) for one in in_vain)
+            moved = [self._all.change(source, latest, HAS_ACTED_SINCE(name=name))] if latest and not self._log.has(signal) else []
+            along = tuple(one._replace(cover=Cover.LEVEL) for one in (*in_vain, *moved))
             return Cause(link, Place(fault.time, fault.order), self._all.of_fault(record, fault.order), acts, along=along)
         on = [source for source in sources if self._log.level(source, change.time)] if latest is None else []
         if on and self._log.reaches_begin():
