@@ -251,7 +251,7 @@ class AxisCauses:
         if event is None:
             self._log.never_happened(*EVENTS_OF_ROTORS)
         rests = until if since is None else min(until, since + BRAKES_NS)
-        is_off = power is not None and not self._log.level(self._power_of(axis), until)
+        is_off = power is not None and not self._log.level(self.power_of(axis), until)
         is_unpowered = power is not None and (is_off or motion is None or motion.link.time < power.link.time)
         if power is not None and is_unpowered:
             there = self._all if is_off else self._all.of(power.link.time) or self._all
@@ -320,7 +320,7 @@ class AxisCauses:
     def power(self, axis: str, until: Nanos, before: int = LAST) -> FoundCause:
         """The last change by a moment, before an order, of the output that gives the motor of an axis power; None for one that
         always has some."""
-        signal = self._power_of(axis)
+        signal = self.power_of(axis)
         found = self._all.last((signal,), until, GIVES_POWER(axis=axis), before) if signal else None
         if signal and found is None and (not self._log.level(signal, until) or self._log.before(signal).since is not None):
             found = self._all.first(signal, GIVES_POWER(axis=axis))  # since before the log, or it has never had any
@@ -343,7 +343,7 @@ class AxisCauses:
         found = (covered(self._all.last((f"{name}.{RELEASED.lower()}",), until), Cover.MOTION) for name in brakes)
         yield from (one for one in found if one is not None)
 
-    def _power_of(self, axis: str) -> str:
+    def power_of(self, axis: str) -> str:
         """The output that gives the motor of an axis power; empty for one that always has some."""
         power = self._world.axes[axis].spec.power
         return "" if power is None else self._all.name(PinName(*power))
@@ -458,7 +458,7 @@ class AxisCauses:
     def _without_current(self, axis: str, event: Change) -> FoundCause:
         """The last that took the current of a motor by an event: its power, or its controller."""
         controller, name = self._world.axes[axis].spec.drive
-        signals = [one for one in (self._power_of(axis), f"{controller}.{name}_EN") if one and self._log.has(one)]
+        signals = [one for one in (self.power_of(axis), f"{controller}.{name}_EN") if one and self._log.has(one)]
         off = [one for one in signals if not self._log.level(one, event.time)]
         self._log.lack()
         found = self._all.last(off, event.time, GIVES_POWER(axis=axis))

@@ -14,6 +14,7 @@ from steptwin.simulation.components.brake import BrakeSpec
 from steptwin.simulation.components.carriage import CarriageSpec
 from steptwin.simulation.components.conveyortable import FEED, RUN, ConveyorSpec
 from steptwin.simulation.components.counter import DOWN, RESET, UP, Counter
+from steptwin.simulation.components.cylinder import Cylinder
 from steptwin.simulation.components.follower import FollowerSpec
 from steptwin.simulation.components.gantry import GantrySpec
 from steptwin.simulation.components.load import LoadSpec
@@ -143,6 +144,10 @@ class ElementCauses:
             moved = [self._all.change(source, latest, HAS_ACTED_SINCE(name=name))] if latest and not self._log.has(signal) else []
             along = tuple(one._replace(cover=Cover.LEVEL) for one in (*in_vain, *moved))
             return Cause(link, Place(fault.time, fault.order), self._all.of_fault(record, fault.order), acts, along=along)
+        is_still = isinstance(part, Cylinder) and latest is not None and not self._log.has(signal)
+        still = next(self._all.holding.faults(name, change.time), None) if is_still else None
+        if still is not None and latest is not None:  # that came in vain
+            return covered(self._all.change(source, latest)._replace(along=(still,)), acts)
         on = [source for source in sources if self._log.level(source, change.time)] if latest is None else []
         if on and self._log.reaches_begin():
             first, *others = [self._all.first(one, HAS_ACTED_SINCE(name=name))._replace(cover=acts) for one in on]

@@ -136,7 +136,9 @@ class Why:
             queued = yield from self._queued(signals, at)
             first = along(first, [*holding, *others, *off, *queued])
             present, holding = (yield from self._present(at)), self.causes.holding
-            states = present.of([one for one in signals if self.log.has(one) and holding.remembers(one, at, {})])
+            owners = {one: self.world.axes.get(one.removesuffix(".power")) for one in signals}
+            given = [one if owners[one] is None else self.causes.axes.power_of(one.removesuffix(".power")) for one in signals]
+            states = present.of([one for one in given if self.log.has(one) and holding.remembers(one, at, {})])
             return self._after(present, list(states), (yield from self._answer(text, at, state, since, first)))
         waited = (*signals, *self.resting.awaited_pins(signals, at))
         resting = (yield from self.resting.moved(waited, at)) or self.resting.held(waited, at)
