@@ -87,14 +87,7 @@ class ControlFlow:
 
     def later(self, starts: Iterable[int]) -> set[int]:
         """As `reached`, also behind the calls that can have led to those at ``starts``."""
-        seen: set[int] = set()
-        work = list(starts)
-        while work:
-            number = work.pop()
-            if number not in seen:
-                seen.add(number)
-                work += self.next[number] if number < len(self.next) else ()
-        return seen
+        return {number for component in self.components(starts) for number in component}
 
     @cached_property
     def next(self) -> list[tuple[int, ...]]:

@@ -317,6 +317,11 @@ class ControllerCauses:
         self._log.lack_faults()
         return None
 
+    def frame_at(self, controller: str, time: Nanos, before: int) -> FoundCause:
+        """The last request at a moment, before an order."""
+        group = self._log.group(controller)
+        return self._from_outside(controller, Change(time, 0.0, group, self._log.position(group, time), before), -1, "")
+
     def given(self, controller: str, index: int) -> FoundCause:
         """The frame with a command that came over the line by itself."""
         here = self._log.executed[controller][index]

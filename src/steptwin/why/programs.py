@@ -102,7 +102,7 @@ class ProgramCauses:
         index = self._log.last_of(controller, governing, self._log.last_executed(controller, at) + 1)
         before = self._log.executed_before(controller, governing) if index is None else None
         if before is not None:
-            there = self._all.of(before)
+            there = self._all.of(min(before + self._world.programs[controller].statement_time, at))  # with the next one
             return None if there is None else there.programs.decided_against(controller, wanted, before)
         if index is None or not self._log.is_of_present_text(executed[index]):
             return None
@@ -326,12 +326,21 @@ class ProgramCauses:
         wait behind which it stood."""
         led = self._led(controller, index)
         came = self._came(controller, index)
-        if came is None or led is None:
-            return came or led
+        if came is None:
+            return led
         is_at_once = came.place.time >= self._log.executed[controller].times[index]
-        if is_at_once or led.place <= came.place or led.link.text == PROGRAM_STARTED():
-            return came
+        if is_at_once or led is None or led.place <= came.place or led.link.text == PROGRAM_STARTED():
+            return came if is_at_once else self._released(controller, index, came)
         return led._replace(along=(came,))
+
+    def _released(self, controller: str, index: int, came: Cause) -> Cause:
+        """The frame with a command, or the one that let it be executed later, such as the end of its file."""
+        times = self._log.executed[controller].times
+        while index and times[index] - times[index - 1] <= self._world.programs[controller].statement_time:
+            index -= 1
+        here = self._log.executed[controller][index]
+        last = self._all.controllers.frame_at(controller, here.time, here.order)
+        return came if last is None else last._replace(along=(came,))
 
     def _came(self, controller: str, index: int) -> FoundCause:
         """The frame with an executed statement that came over a line by itself."""
@@ -413,11 +422,13 @@ class ProgramCauses:
     def _decision(self, controller: str, index: int) -> MessageText:
         """A condition, with the statement at which the program went on; the label of an interrupt."""
         executed, use, words = self._log.executed[controller], self.use(controller, index), self.written_at(controller, index)
+        if use.waits and use.governs:
+            return CAME(statement=statement(self._log, words))
         is_inside = self.is_of_interrupt(controller, index)
         later = (one for one in range(index + 1, len(executed)) if is_inside or not self.is_of_interrupt(controller, one))
-        after = None if use.waits and use.governs else next(later, None)
+        after = next(later, None)
         if after is None:
-            return CAME(statement=statement(self._log, words))
+            return WAS_EXECUTED(statement=statement(self._log, words))
         return DECIDED(statement=statement(self._log, words), next=statement(self._log, executed[after]))
 
     def _decided(self, controller: str, index: int, place: Place, has_ended: bool = False) -> Cause:

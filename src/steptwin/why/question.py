@@ -52,6 +52,7 @@ def _led_to(effect: Cause) -> Cause | None:
 
 
 IS_QUEUED = Message("why.is-queued", "`{command}` waits for the end of what is in execution")
+IS_FILED = Message("why.is-filed", "`{command}` is in a file that has not ended")
 IS_TRUE = Message("why.is-true", "{name} is true")
 IS_FALSE = Message("why.is-false", "{name} is false")
 DOES_NOT_WAIT = Message("why.does-not-wait", "{controller} does not wait: {statement}")
@@ -174,11 +175,15 @@ class Why:
                 yield found
 
     def _at_begin(self, signals: Sequence[str], at: Nanos) -> Iterator[Cause]:
-        """The statements at the very beginning that gave signals the values that they have from then on."""
+        """The statements at the very beginning that gave signals the values that they have from then on, and those that gave all
+        outputs their values and did not change these."""
         for controller, wanted in self.past.changeable(signals, at):
-            written = self.causes.programs.written(controller, wanted, self.log.last_executed(controller, at) + 1)
+            index, of_all = self.log.last_executed(controller, at) + 1, wanted._replace(name="")
+            written = self.causes.programs.written(controller, wanted, index)
             if written is not None and not written.place.time:
                 yield written
+            elif written is None and self.causes.programs.is_written(controller, wanted):
+                yield from filter(None, [self.causes.programs.written(controller, of_all, index)])
 
     def _switched_off(self, changeable: Iterable[tuple[str, Resource]], at: Nanos) -> Generator[None, None, Sequence[Cause]]:
         """The switches that are off of the interrupts that would have changed something again."""
@@ -198,21 +203,21 @@ class Why:
             since = self.log.since(f"{controller}.{wanted.name}", at) if wanted.kind is ResourceKind.PIN else None
             unheard = self.causes.controllers.unheard(controller, wanted, at, -1 if since is None else since)
             found += [] if unheard is None else [unheard]
-            is_asked = wanted.kind is not ResourceKind.VALUE and controller in self.world.objects.line_of
-            if not is_asked or (index >= 0 and not programs.use(controller, index).waits):
+            if wanted.kind is ResourceKind.VALUE or controller not in self.world.objects.line_of:
                 continue
             other = yield from self.past.world_at(at)
-            waiting = [one for one in other.programs[controller].queued() if wanted in one.use.writes]
-            if waiting and index < 0:  # what it waits behind was before
-                self.log.lack()
-                continue
+            waiting = next((one for one in reversed(other.programs[controller].queued()) if wanted in one.use.writes), None)
             last = programs.written(controller, wanted, index + 1)
-            if waiting and (last is None or waiting[-1].code not in str(last.link.text).upper()):
-                sent = self.causes.controllers.sent(controller, waiting[-1].code, index + 1, at)
-                ahead = programs.waiting(controller, index)
-                led = [one for one in (sent, ahead) if one is not None]
-                link = ChainLink(at, controller, IS_QUEUED(command=waiting[-1].code))
-                found.append(Cause(link, Place(at, LAST, -1), partial(along, None, led), Cover.LEVEL))
+            if waiting is None or (last is not None and waiting.code in str(last.link.text).upper()):
+                continue
+            if index < 0 and not waiting.is_filed:  # what it waits behind was before
+                self.log.lack()
+            elif waiting.is_filed or programs.use(controller, index).waits:
+                ahead = None if waiting.is_filed else programs.waiting(controller, index)
+                sent = self.causes.controllers.sent(controller, waiting.code, index + 1, at)
+                text = (IS_FILED if waiting.is_filed else IS_QUEUED)(command=waiting.code)
+                led = partial(along, sent, [ahead])
+                found.append(Cause(ChainLink(at, controller, text), Place(at, LAST, -1), led, Cover.LEVEL))
         return found
 
     def _commanded(self, cause: FoundCause, queued: Sequence[Cause]) -> FoundCause:

@@ -104,6 +104,8 @@ class GivenCommand(NamedTuple):
 
     code: str
     use: StatementUse
+    is_filed: bool = False
+    """Whether it is in a file that is still open."""
 
 
 class ProgramState(enum.Enum):
@@ -189,7 +191,7 @@ class Programs(Protocol):
         ...
 
     def queued(self) -> Sequence[GivenCommand]:
-        """Commands that came over a line by itself, and wait for the end of what is in execution."""
+        """Commands that came over a line by itself, and wait for the end of what is in execution, or of their file."""
         ...
 
     def commands(self, data: bytes) -> Sequence[GivenCommand]:

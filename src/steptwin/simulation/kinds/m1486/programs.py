@@ -207,12 +207,15 @@ class ChipPrograms:
         return ProgramState.LIMITED if program.is_limited else ProgramState.RUNS
 
     def queued(self) -> Sequence[GivenCommand]:
-        return [GivenCommand(str(one), use_of(one)) for one in (*self._stored(), *self._chip.receiver.commands_waiting())]
+        memory = self._chip.memory
+        after = [GivenCommand(str(one), use_of(one)) for one in self._stored(self._chip.program.pc, memory.end)]
+        filed = [GivenCommand(str(one), use_of(one), is_filed=True) for one in self._stored(memory.end, memory.write)]
+        return [*after, *filed, *(GivenCommand(str(one), use_of(one)) for one in self._chip.receiver.commands_waiting())]
 
-    def _stored(self) -> Iterator[ChipCommand]:
-        """Commands in the memory that come next, and from no text."""
-        memory, place = self._chip.memory, self._chip.program.pc
-        while place != memory.end and (found := decode(memory.fetch(place))) is not None:
+    def _stored(self, place: int, end: int) -> Iterator[ChipCommand]:
+        """Commands in a part of the memory, from no text."""
+        memory = self._chip.memory
+        while place != end and (found := decode(memory.fetch(place))) is not None:
             if self.location(place) is None:
                 yield found[0]
             place = (place + found[1]) % memory.span
