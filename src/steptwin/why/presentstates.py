@@ -18,7 +18,7 @@ from steptwin.simulation.kinds.programs import Resource, ResourceKind, Statement
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.why.answer import ChainLink
 from steptwin.why.causes import IS, Causes
-from steptwin.why.programs import OF_INTERRUPT, WAITS
+from steptwin.why.programs import NEVER_SET, OF_INTERRUPT, WAITS
 from steptwin.why.sentences import statement, statement_at
 
 WAITS_FOR_A_TIME = Message("why.waits-for-a-time", "it waits for a time only")
@@ -166,7 +166,10 @@ class PresentStates:
             elif motion is not None:
                 yield motion.link
             return (yield from self.motion(controller, resource.name))
-        if resource.kind not in (ResourceKind.ORIGIN, ResourceKind.REQUEST):
+        if resource.kind is ResourceKind.REQUEST and self._log.reaches_begin():
+            if self._causes.controllers.written(controller, resource.name, self._at) is None:
+                yield ChainLink(self._at, controller, NEVER_SET(name=resource.name))
+        elif resource.kind not in (ResourceKind.ORIGIN, ResourceKind.REQUEST):
             yield ChainLink(self._at, controller, self._value(controller, resource))
         return (yield from self._interrupts(controller, resource))
 

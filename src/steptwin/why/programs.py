@@ -507,7 +507,11 @@ class ProgramCauses:
         came later."""
         reads = self._all_read(controller, index, place)
         if self.use(controller, index).waits and self.use(controller, index).governs:
-            return reads or (None,)  # what it broke into has not led to an interrupt
+            times, axes = self._log.executed[controller].times, [one for one in self.use(controller, index).reads if one.name]
+            before = (one for one in range(index - 1, -1, -1) if times[one] == place.time)
+            acted = next((one for one in before if set(axes) & set(self.use(controller, one).writes)), None)
+            by = None if acted is None else self.statement(controller, acted)
+            return reads or (by,)  # what it broke into has not led to an interrupt
         before = None if self.use(controller, index).waits else self._executed_before(controller, index)
         latest = place.time - LONGEST_REACTION_NS
         is_recent = reads and (before is None or reads[0].place > before or reads[0].place.time > latest)
