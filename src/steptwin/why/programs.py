@@ -143,14 +143,14 @@ class ProgramCauses:
         return self.waiting(controller, index)
 
     def made_in_vain(self, controller: str, wanted: Resource, at: Nanos) -> FoundCause:
-        """The last statement by a moment that would have changed something, and changed nothing."""
+        """The last statement by a moment that would have changed something until what it waited for was there, which it was."""
         if controller not in self._world.programs:
             return None
         index = self._log.last_of(controller, self._writing(controller, wanted), self._log.last_executed(controller, at) + 1)
         if index is None:
             return None
         is_over = self.use(controller, index).waits and index < self._log.last_executed(controller, at)
-        return covered((self._did_not_wait if is_over else self.statement)(controller, index), Cover.LEVEL)
+        return covered(self._did_not_wait(controller, index), Cover.LEVEL) if is_over else None
 
     def waiting(self, controller: str, index: int) -> Cause:
         """A wait that is not over, and what it waits for."""
@@ -340,7 +340,7 @@ class ProgramCauses:
             index -= 1
         here = self._log.executed[controller][index]
         last = self._all.controllers.frame_at(controller, here.time, here.order)
-        return came if last is None else last._replace(along=(came,))
+        return came if last is None or last.link == came.link else last._replace(along=(came,), cover=Cover.FRAME)
 
     def _came(self, controller: str, index: int) -> FoundCause:
         """The frame with an executed statement that came over a line by itself."""
