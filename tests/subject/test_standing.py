@@ -10,7 +10,7 @@ from steptwin.controller import MILLISECOND, SECOND, Nanos
 from steptwin.files.world import World
 from steptwin.simulation.faults import read
 from steptwin.simulation.script import steps as do
-from steptwin.simulation.script.control import Enable, Halt, Move
+from steptwin.simulation.script.control import Enable, Halt, Home, Move
 from steptwin.subject.standing import StandingKind, StandingState
 from steptwin.subject.world import WorldSubject
 
@@ -50,6 +50,23 @@ length = 100.0
 speed = 50.0
 workpiece = 20.0
 run = "cell.OUT4"
+[[relay]]
+name = "contactor"
+coil = "cell.OUT5"
+[[dcmotor]]
+name = "fan"
+speed = 60.0
+run = "cell.OUT6"
+[[axis]]
+name = "y"
+drive = "cell.M2"
+pitch = 5.0
+motor = { torque = [[0, 2.0], [600, 1.6]], inertia = 3e-5, mass = 5.0, start_speed = 120, when_off = "free" }
+[[brake]]
+name = "hold"
+axis = "y"
+torque = 1.2
+release = "cell.OUT7"
 """
 
 
@@ -135,12 +152,16 @@ def test_an_alarm_of_a_program_says_where_it_is(tmp_path: Path) -> None:
         ("", 2, "cup", "is switched on, and holds nothing"),
         ("", 3, "jaws", "is closed, and holds nothing"),
         ("belt-stop element=belt", 4, "belt", "is switched on, and stands"),
+        ("open-coil element=contactor", 5, "contactor", "is switched on, and stays open"),
+        ("dead-motor element=fan", 6, "fan", "is switched on, and stands"),
+        ("stuck-brake element=hold", 7, "hold", "is to let go, and brakes"),
     ],
 )
 def test_an_element_that_does_not_do_what_it_is_switched_to_stands_since_then(
     fault: str, output: int, name: str, text: str
 ) -> None:
     world = World.from_toml(CELL)
+    world.keep_states()
     subject = WorldSubject(world)
     assert list(subject.standing()) == []
     if fault:
@@ -155,8 +176,11 @@ def test_an_element_that_does_not_do_what_it_is_switched_to_stands_since_then(
     assert (one.name, one.text) == (name, text)
     assert one.since_ns is not None
     assert 0 <= one.since_ns - switched <= 300 * MILLISECOND  # jaws have to close first
-    assert one.question is not None
-    subject.read(one.question)
+    for stands in subject.standing():
+        assert stands.question is not None
+        answer = world.why(stands.question)
+        assert f"OUT{output}" in answer.text()
+        assert not fault or stands is not one or f"fault {fault.partition(' ')[0]}:" in answer.text()
     subject.do(do.Write((("cell", f"OUT{output}", 0),)))
     world.run(for_=1.5)
     assert standing(subject, StandingKind.ELEMENT) == []
@@ -165,6 +189,7 @@ def test_an_element_that_does_not_do_what_it_is_switched_to_stands_since_then(
 def test_an_axis_says_how_far_it_is_beside_what_is_counted() -> None:
     world = World.from_toml(CELL)
     subject = WorldSubject(world)
+    assert list(subject.standing()) == []
     subject.do(Enable("cell", 1, on=True))
     subject.do(Move("cell", 1, to=12.5))
     world.run(for_=3.0)
@@ -172,13 +197,41 @@ def test_an_axis_says_how_far_it_is_beside_what_is_counted() -> None:
     beside = 12.5 - world.read("x.position")
     assert 2.4 < beside < 2.6
     assert (one.name, one.text, one.question) == ("x", f"is {beside:g} mm beside what its controller counts", "x.lost")
+    _, stops = [record.time for record in world.trace.events() if record.subject == "hard-stop"]
+    assert one.since_ns == stops
+    subject.do(do.SetFault(read("lost-steps axis=1 pulses=40 at_s=2 period_s=2")))
+    world.run(for_=5.5)
+    (one,) = standing(subject, StandingKind.ELEMENT)
+    assert one.since_ns == 7 * SECOND
+
+
+def test_an_axis_that_was_homed_is_not_beside_what_is_counted_by_what_it_had_lost_before() -> None:
+    switch = '[[axis.switch]]\nbelow = 0.0\nto = "cell.IN1"\n[[cylinder]]'
+    text = CELL.replace("[[cylinder]]", switch, 1).replace("dec = 400.0", 'dec = 400.0\nin_kl = "IN1"\nhome_mode = "HOME1"')
+    world = World.from_toml(text)
+    subject = WorldSubject(world)
+    assert list(subject.standing()) == []
+    subject.do(Enable("cell", 1, on=True))
+    subject.do(Move("cell", 1, to=5.0))
+    subject.do(do.SetFault(read("lost-steps axis=1 pulses=40 at_s=0.1 name=f")))
+    world.run(for_=3.0)
+    subject.do(do.ClearFault("f"))
+    assert [one.name for one in standing(subject, StandingKind.ELEMENT)] == ["x"]
+    subject.do(Home("cell", 1, -20.0))
+    world.run(for_=3.0)
+    assert standing(subject, StandingKind.ELEMENT) == []
+    subject.do(do.SetFault(read("lost-steps axis=1 pulses=20")))
+    world.run(for_=2.0)
+    (one,) = standing(subject, StandingKind.ELEMENT)
+    assert one.text == "is 0.2 mm beside what its controller counts"
 
 
 def test_faults_stand_at_what_they_are_set_on_at_once() -> None:
     world = World.from_toml(CELL)
     subject = WorldSubject(world)
     world.run(for_=1.0)
-    for fault in ("stuck pin=IN3 value=1", "leak element=cup", "crc unit=1", "lost-steps axis=1 pulses=5 at_s=9"):
+    later = "jam element=lift from_s=1"
+    for fault in ("stuck pin=IN3 value=1", "leak element=cup", later, "crc unit=1", "lost-steps axis=1 pulses=5 at_s=9"):
         subject.do(do.SetFault(read(fault)))
     found = {one.name: one.question for one in standing(subject, StandingKind.FAULT) if one.since_ns == SECOND}
     assert found == {"cell.IN3": "cell.IN3", "cup": "cup.held", "": None, "cell.M1": "cell.M1.status"}

@@ -161,3 +161,36 @@ def test_a_step_that_is_left_out_lets_its_script_go_on() -> None:
     left_out.run(2.0)
     assert left_out.read("c.M1_EN") == 0
     assert [record.value for record in left_out.trace if record.subject == "note"] == ["later"]
+
+
+SHUTTLE = """
+[world]
+name = "w"
+[[line]]
+name = "bus"
+kind = "modbus"
+[[mic488]]
+name = "c"
+line = "bus"
+unit = 1
+[[script]]
+name = "operator"
+steps = [
+  { write = { "c.M1_EN" = 1 } },
+  { repeat = 100, steps = [{ write = { "c.M1_POS_REL" = 10.0 } }, { wait = "1 s" }] },
+]
+"""
+
+
+def test_a_fault_that_keeps_a_cycle_where_it_would_be_again_is_in_the_answer() -> None:
+    """The axis has reached its position most of the time, with and without the fault; but without it not since then."""
+    world = World.from_toml(SHUTTLE)
+    world.keep_states()
+    world.run(for_=2.9)
+    world.fault("exception line=bus link=script")
+    world.run(for_=3.0)
+    answer = world.why("c.M1.status")
+    assert answer.since is not None
+    assert answer.since / 1e9 < 2.9
+    (fault,) = [link.text for link in answer.links if link.text.startswith("fault exception")]
+    assert "without it: the same, but since 5." in fault

@@ -12,6 +12,7 @@ from steptwin.controller import SECOND, Nanos
 from steptwin.controllerstate import ProgramActivity, StatusLevel
 from steptwin.jsonvalues import Moment, Sentence
 from steptwin.messages import Message, MessageText, text_of
+from steptwin.simulation.components.axis import LOST, BuiltAxis, is_beside
 from steptwin.simulation.components.element import Stands
 from steptwin.simulation.components.registry import ELEMENTS
 from steptwin.simulation.faults import ActiveFault, Layer
@@ -78,7 +79,10 @@ class Standing:
         self._world = world
         self._programs = StandingPrograms(world)
         self._changed: dict[str, Nanos] = {}
-        """By a pin or terminal (``table.OUT1``), a controller or its axis (``table.M1``): its last edge or event."""
+        """By a pin or terminal (``table.OUT1``), a controller or its axis (``table.M1``): its last edge or event; by an
+        ``[[axis]]`` when it began or ended to lose pulses."""
+        self._homed: dict[str, tuple[Nanos, int | None]] = {}
+        """By an axis of a controller: when it was homed last, and the pulses that it had lost by then, once these are known."""
         self._around = defaultdict[str, set[str]](set)
         """Drivers of the inputs of an element, and its own outputs, by its name."""
         for one in connections(world.objects):
@@ -91,12 +95,18 @@ class Standing:
         if record.kind == "edge":
             self._changed[record.subject if "." in record.subject else f"{record.controller}.{record.subject}"] = record.time
         elif record.kind == "event":
-            axis = dict(record.facts).get("axis")
+            facts = dict(record.facts)
+            axis = facts.get("axis")
             self._changed[record.controller if axis is None else f"{record.controller}.M{axis}"] = record.time
+            if record.subject == "homed":
+                self._homed[f"{record.controller}.M{axis}"] = record.time, None
+            if "lost" in facts:
+                self._changed[str(facts["element"])] = record.time
 
     def went_back(self) -> None:
         """Time has gone back to now: what came then and later has not happened."""
         self._changed = {name: moment for name, moment in self._changed.items() if moment < self._world.now}
+        self._homed = {name: homed for name, homed in self._homed.items() if homed[0] < self._world.now}
 
     def states(self) -> Iterator[StandingState]:
         """Those of now: first what is wrong, then what waits."""
@@ -141,29 +151,59 @@ class Standing:
                 continue
             for name, one in built.items():
                 found = stands(one, now)
+                if found is not None and found.signal == LOST:
+                    found = self._beside(name, one, now, found)
                 if found is not None:
-                    since, question = self._since_all(name, found, now), f"{name}.{found.signal or self._output(name)}"
+                    since, question = self._since_all(name, found, now), f"{name}.{found.signal or self._shown_by(name)}"
                     yield StandingState(StandingKind.ELEMENT, name, found.text, since, question)
+
+    def _beside(self, name: str, axis: BuiltAxis, now: Nanos, found: Stands) -> Stands | None:
+        """Without what it had lost before its controller homed it."""
+        drive, lost = ".".join(axis.spec.drive), axis.mechanism.lost(now)
+        homed = self._homed.get(drive)
+        if homed is None:
+            return found
+        at, before = homed
+        if before is None:
+            since = self._since_all(name, found, now)
+            before = 0 if since is not None and since > at else lost
+            self._homed[drive] = at, before
+        return is_beside(axis, lost - before)
 
     def _since_all(self, name: str, found: Stands, now: Nanos) -> Nanos | None:
         """The last change of anything that it may depend on."""
-        faults = [fault.begin for fault in self._world.objects.faults.active if place_of(self._world, fault) == name]
-        around = [moment for one in self._around[name] if (moment := self._since(now, one)) is not None]
+        faults = [*self._faults_since(name)]
+        around = [moment for one in (name, *self._around[name]) if (moment := self._since(now, one)) is not None]
         return max([*faults, *around, *(() if found.since is None else (found.since,))], default=None)
 
-    def _output(self, name: str) -> str:
-        terminals = self._world.objects.terminals.get(name)
-        return "" if terminals is None or not terminals.outputs else terminals.outputs[0].lower()
+    def _faults_since(self, name: str) -> Iterator[Nanos]:
+        """When faults of an element began; and when those of the drive of an axis acted last: some come again and again."""
+        faults, axis = self._world.objects.faults, self._world.axes.get(name)
+        for fault in faults.active:
+            place = place_of(self._world, fault)
+            if place == name:
+                yield fault.begin
+            elif axis is not None and place == ".".join(axis.spec.drive) and fault.name in faults.acts:
+                yield faults.acts[fault.name].last
+
+    def _shown_by(self, name: str) -> str:
+        """What shows how an element is: its first output, else its first number; empty where it has neither."""
+        objects = self._world.objects
+        terminals = objects.terminals.get(name)
+        named = () if terminals is None else terminals.outputs
+        return next((one.lower() for one in (*named, *(objects.element_signals(name) or ()))), "")
 
     def _faults(self) -> Iterator[StandingState]:
         for fault in self._world.objects.faults.active:
+            if fault.begin > self._world.now:
+                continue
             name = place_of(self._world, fault)
             question: str | None = None
             if name.partition(".")[0] in self._world.controllers:
                 question = f"{name}.status" if fault.fault.get("axis") is not None else name
             if name in self._world.objects.element_names:
-                output = self._output(name)
-                question = f"{name}.{output}" if output else None
+                shown = self._shown_by(name)
+                question = f"{name}.{shown}" if shown else None
             yield StandingState(StandingKind.FAULT, name, FAULT_IS_SET(fault=str(fault.fault)), fault.begin, question)
 
     def _since(self, now: Nanos, name: str) -> Nanos | None:

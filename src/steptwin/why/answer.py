@@ -74,11 +74,12 @@ class Effect(enum.StrEnum):
 
 
 class Trial(NamedTuple):
-    """The run repeated without the root of ``link``. ``text``: what would be then."""
+    """The run repeated without the root of ``link``. ``text``: what would be then; ``since``: since when the same would be so."""
 
     link: ChainLink
     effect: Effect
     text: MessageText
+    since: Nanos | None = None
 
     def to_json(self) -> dict[str, Any]:
         return with_messages({**self.link.to_json(), "effect": self.effect.value, "without": self.text})

@@ -95,10 +95,10 @@ class PastQuestions:
         programs = yield from self._standing(answer if suspects else answer._replace(links=()))
         for name in suspects:
             first, *others = yield from self._without_fault(name, (answer, *programs))
-            if first.effect is Effect.OTHERWISE:
+            if _decides(first, answer):
                 tried[name] = first
             else:
-                held_back += [one for one in others if one.effect is Effect.OTHERWISE][:1]
+                held_back += [one for one, stand in zip(others, programs, strict=True) if _decides(one, stand)][:1]
         masked = () if tried or held_back or not suspects else (yield from self._masking(suspects, answer))
         links = _between(_with(answer.links[len(lacking) :], (*tried.values(), *held_back)), masked)
         answer = answer._replace(links=tuple(dict.fromkeys((*lacking, *links))))
@@ -360,6 +360,13 @@ def _between(links: Sequence[ChainLink], others: Iterable[ChainLink]) -> tuple[C
         place = next((number for number, link in enumerate(found) if link.time < other.time), len(found))
         found.insert(place, other)
     return tuple(found)
+
+
+def _decides(trial: Trial, answer: Answer) -> bool:
+    """Whether something is so because of a fault: without it, it would be otherwise; or over meanwhile, and so again only since
+    later, as a wait of a machine that goes on in its cycle."""
+    later = None if trial.since is None or answer.since is None else trial.since - answer.since
+    return trial.effect is Effect.OTHERWISE or (later is not None and later >= STANDS_NS)
 
 
 def _with(links: Sequence[ChainLink], trials: Iterable[Trial]) -> tuple[ChainLink, ...]:

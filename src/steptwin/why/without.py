@@ -94,7 +94,7 @@ def _compared(link: ChainLink, answer: Answer, other: Answer, begin: Nanos, arou
     if other.since == since:
         return Trial(link, Effect.SAME, WOULD_BE_THE_SAME())
     told = WOULD_BE_SINCE_BEFORE(time=begin / SECOND) if other.since is None else WOULD_BE_SINCE(time=other.since / SECOND)
-    return Trial(link, Effect.OTHER_TIME, told)
+    return Trial(link, Effect.OTHER_TIME, told, other.since)
 
 
 def _began(snapshots: SnapshotsWithInputs, root: Root) -> Nanos:

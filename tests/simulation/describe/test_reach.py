@@ -170,3 +170,5 @@ def test_switches_beyond_the_travel_are_warned_of(switch: str, messages: list[tu
 def test_switches_beyond_the_stroke_are_warned_of() -> None:
     text = AXES + '[[cylinder.switch]]\nto = "m.IN1"\nabove = 51.0\n'
     assert warnings(text) == [("this switch is never on: lift goes from 0 to 50", "above = 51.0")]
+    (one,) = diagnose("m.toml", text, no_files).findings
+    assert one.hint == "let it change between 0 and 50, or give lift another travel"

@@ -326,6 +326,7 @@ def _signals(fitted: BuiltAxis) -> Mapping[str, SignalOf]:
 
 
 IS_STALLED = Message("simulation.axis-is-stalled", "its motor is stalled")
+LOST = "lost"
 HAS_LOST = Message("simulation.axis-has-lost", "is {distance:g} {unit} beside what its controller counts")
 
 
@@ -334,8 +335,12 @@ def _stands(fitted: BuiltAxis, now: Nanos) -> Stands | None:
     at = trajectory.at(now)
     if at.stalled:
         return Stands(IS_STALLED(), signal="stalled")
-    lost = trajectory.field(now) - at.rotor
-    return Stands(HAS_LOST(distance=fitted.units(lost), unit=fitted.scale.unit), signal="lost") if lost else None
+    return is_beside(fitted, trajectory.field(now) - at.rotor)
+
+
+def is_beside(fitted: BuiltAxis, lost: int) -> Stands | None:
+    """What stands of an axis that has lost so many pulses since its controller knew where it is."""
+    return Stands(HAS_LOST(distance=fitted.units(lost), unit=fitted.scale.unit), signal=LOST) if lost else None
 
 
 def _per_torque(axis: BuiltAxis) -> tuple[float, str]:

@@ -9,6 +9,7 @@ from steptwin.controller import MILLISECOND, Nanos
 from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.simulation.components.axis import find_axis
+from steptwin.simulation.components.element import Stands
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import ElementSpecs
 from steptwin.simulation.components.logic import STUCK, Joint, TerminalComponent, TerminalComponentSpec, with_terminals
@@ -133,6 +134,13 @@ def _is_kept_closed(active: ActiveFault, brake: Brake, now: Nanos) -> bool:
     return brake.does_not_let_go
 
 
+TO_LET_GO_AND_BRAKES = Message("simulation.to-let-go-and-brakes", "is to let go, and brakes")
+
+
+def _stands(brake: Brake, now: Nanos) -> Stands | None:
+    return Stands(TO_LET_GO_AND_BRAKES()) if brake.does_not_let_go else None
+
+
 def _make(spec: BrakeSpec, context: ElementContext) -> Brake:
     mechanism = find_axis(spec.axis, context).mechanism
     motor = mechanism.build.motor
@@ -148,6 +156,7 @@ def _make(spec: BrakeSpec, context: ElementContext) -> Brake:
 BRAKE = with_terminals(
     BrakeSpec,
     make=_make,
+    stands=_stands,
     faults=(
         *STUCK,
         FaultKind(

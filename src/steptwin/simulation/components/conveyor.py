@@ -28,7 +28,7 @@ from steptwin.simulation.components.conveyortable import (
     stop_terminal,
 )
 from steptwin.simulation.components.driveencoder import Turned, fit_encoders
-from steptwin.simulation.components.element import Stands
+from steptwin.simulation.components.element import ON_AND_STANDS, Stands
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import Reference
 from steptwin.simulation.components.logic import STUCK_INPUT, TerminalComponent, with_terminals
@@ -82,13 +82,13 @@ class Conveyor(TerminalComponent):
         "_near",
         "_seen",
         "_stops",
-        "_turning_points",
         "drop",
         "following",
         "mass_on",
         "preceding",
         "spec",
         "takes_along",
+        "turning_points",
     )
     __slots__ = (
         *FIXED,
@@ -125,7 +125,7 @@ class Conveyor(TerminalComponent):
         self._stops = tuple((stop_terminal(n), belt.to_grid(stop.at)) for n, stop in enumerate(spec.stops, start=1))
         self._own = belt.own
         self._moved_by = moved_by
-        self._turning_points = turning_points
+        self.turning_points = turning_points
         self._then = belt.position(block.scheduler.now)
         """The position of the belt at the last update: since then it has moved one way while anything stands."""
         self.drop: Callable[[Placed, Nanos], bool] = lambda placed, now: False
@@ -415,7 +415,7 @@ class Conveyor(TerminalComponent):
         if self._waits:
             moments += [belt.next_change(place, now) for place in (0, -belt.from_nm(nanometres(self.spec.workpiece[0])))]
         if len(moving) < len(belt.workpieces):
-            moments += [next(self._turning_points(now), None), belt.drive.reaches(position - 1, now, -1)]
+            moments += [next(self.turning_points(now), None), belt.drive.reaches(position - 1, now, -1)]
         return min((moment for moment in moments if moment is not None), default=None)
 
     def _way(self, placed: Placed, position: int, now: Nanos, *, is_first: bool) -> int:
@@ -532,11 +532,8 @@ def _put_sensor(conveyor: Conveyor, spec: SensorSpec, channel: str, context: Ele
     scheduler.add_part(sensor, conveyor.line, drives=circuit.target.controller)
 
 
-BELT_STANDS = Message("simulation.belt-stands", "is switched on, and stands")
-
-
 def _stands(conveyor: Conveyor, now: Nanos) -> Stands | None:
-    return Stands(BELT_STANDS(), signal="travel") if conveyor.is_stopped and conveyor.block.is_on(RUN) else None
+    return Stands(ON_AND_STANDS(), signal="travel") if conveyor.is_stopped and conveyor.block.is_on(RUN) else None
 
 
 def _place_names(spec: ConveyorSpec) -> tuple[str, ...]:
@@ -563,13 +560,13 @@ def _signals(conveyor: Conveyor) -> Mapping[str, SignalOf]:
         for n, name in enumerate(_place_names(conveyor.spec))
     }
     return {
-        **places,
-        "travel": SignalOf(source, conveyor.travel, unit="mm", check=_refuse_place),
         "count": SignalOf(source, lambda now: float(len(conveyor.belt.workpieces))),
         "fed": SignalOf(source, lambda now: float(conveyor.fed)),
         "delivered": SignalOf(source, lambda now: float(conveyor.delivered)),
         "missed": SignalOf(source, lambda now: float(conveyor.missed)),
         "mass": SignalOf(source, conveyor.mass, unit="kg"),
+        "travel": SignalOf(source, conveyor.travel, conveyor.turning_points, conveyor.belt.version, "mm"),
+        **places,
     }
 
 

@@ -9,6 +9,7 @@ from typing import ClassVar
 from steptwin.controller import SECOND, Nanos
 from steptwin.messages import Message
 from steptwin.simulation.components.driveencoder import Turned, fit_encoders
+from steptwin.simulation.components.element import ON_AND_STANDS, Stands
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.logic import STUCK_INPUT, Joint, TerminalComponent, TerminalComponentSpec, with_terminals
 from steptwin.simulation.components.mount import UPRIGHT, Movement, MoverSpec
@@ -107,6 +108,11 @@ def _should_run(active: ActiveFault, motor: DcMotor, now: Nanos) -> bool:
     return motor.is_dead and motor.block.is_on(RUN)
 
 
+def _stands(motor: DcMotor, now: Nanos) -> Stands | None:
+    is_on = motor.block.is_on(RUN) and not motor.drive.runs
+    return Stands(ON_AND_STANDS(), signal="angle") if is_on and not motor.speed(now) else None
+
+
 def _make(spec: DcMotorSpec, context: ElementContext) -> DcMotor:
     return DcMotor(context.terminal_block(spec.name), spec)
 
@@ -137,6 +143,7 @@ DCMOTOR = with_terminals(
     signals=_signals,
     drawing=lambda motor: Drawing(DIAL, float(TURN), ("angle",)),
     moves=_moves,
+    stands=_stands,
     faults=(
         STUCK_INPUT,
         FaultKind(

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple, TypeAlias, cast
 
 from steptwin.controller import Nanos
-from steptwin.messages import MessageText
+from steptwin.messages import Message, MessageText
 from steptwin.simulation.components.elementcontext import ElementContext
 from steptwin.simulation.components.elementspec import B, ElementSpecs, ElementTable, NamedSpec, Reference, S
 from steptwin.simulation.components.mount import Movement
@@ -103,5 +103,7 @@ class Stands(NamedTuple):
     signal: str = ""
     """Signal that shows it; its first output without."""
 
+
+ON_AND_STANDS = Message("simulation.on-and-stands", "is switched on, and stands")
 
 AnyElement: TypeAlias = Element[Any, Any]

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from steptwin.controller import Nanos
 from steptwin.messages import Message
+from steptwin.simulation.components.element import Stands
 from steptwin.simulation.components.logic import STUCK, Joint, TerminalComponent, TerminalComponentSpec, with_terminals
 from steptwin.simulation.faults import ActiveFault, FaultKind, Layer, Occasion
 from steptwin.simulation.faults.effects import ElementEffect
@@ -113,9 +114,20 @@ def _is_wanted(active: ActiveFault, relay: Relay, now: Nanos) -> bool:
     return relay.is_open and relay.block.is_on(COIL)
 
 
+STAYS_OPEN = Message("simulation.relay-stays-open", "is switched on, and stays open")
+STAYS_CLOSED = Message("simulation.relay-stays-closed", "is switched off, and stays closed")
+
+
+def _stands(relay: Relay, now: Nanos) -> Stands | None:
+    if relay.is_kept_closed:
+        return Stands(STAYS_CLOSED())
+    return Stands(STAYS_OPEN()) if relay.is_open and relay.block.is_on(COIL) else None
+
+
 RELAY = with_terminals(
     RelaySpec,
     make=lambda spec, context: Relay(context.terminal_block(spec.name), spec.pull_in, spec.drop_out),
+    stands=_stands,
     faults=(
         *STUCK,
         FaultKind(

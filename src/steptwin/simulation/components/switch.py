@@ -50,6 +50,9 @@ class SwitchSpec(ContactSpec):
 
 NEVER_ON = Message("simulation.switch-never-on", "this switch is never on: {name} goes from {low:g} to {high:g}")
 ALWAYS_ON = Message("simulation.switch-always-on", "this switch is always on: {name} goes from {low:g} to {high:g}")
+CHANGE_WITHIN = Message(
+    "simulation.switch-within-hint", "let it change between {low:g} and {high:g}, or give {name} another travel"
+)
 
 
 def warn_of_useless(text: TomlText, switches: Iterable[SwitchSpec], name: str, travel: tuple[float, float]) -> None:
@@ -64,7 +67,7 @@ def warn_of_useless(text: TomlText, switches: Iterable[SwitchSpec], name: str, t
         given = next((key for key in ("below", "above", "position") if text.is_given((*one.path, key))), None)
         if given is not None and is_never is not is_always:
             message = (NEVER_ON if is_never else ALWAYS_ON)(name=name, low=least, high=most)
-            text.warn((*one.path, given), "D011", message)
+            text.warn((*one.path, given), "D011", message, CHANGE_WITHIN(name=name, low=least, high=most))
 
 
 def channel_of(axis: str, number: int) -> str:

@@ -12,6 +12,7 @@ const model = {
   elements: [
     { name: "cup", outputs: ["HELD"], signals: [{ name: "pressure" }] },
     { name: "infeed", outputs: [], signals: [{ name: "count" }] },
+    { name: "outfeed", outputs: ["sensor1"], signals: [{ name: "count" }] },
   ],
 } as unknown as Model;
 
@@ -24,6 +25,9 @@ test("an event is asked about by what it is about", () => {
   expect(status("drum", "1")).toBe("drum");
   expect(status("table", null, { element: "cup" })).toBe("cup.HELD");
   expect(status("table", null, { element: "infeed" })).toBe("infeed.count");
+  expect(status("table", null, { element: "outfeed", workpiece: "a.1" })).toBe("outfeed.count");
+  expect(status("table", null, { element: "cup", workpiece: "a.1" })).toBe("cup.HELD");
+  expect(status("table", null, { element: "workpieces", workpiece: "a.1" })).toBe(null);
   expect(questionOf({ kind: "edge", controller: "table", pin: "IN3" } as SubjectEvent, model)).toBe("table.IN3");
   expect(questionOf({ kind: "pace" } as SubjectEvent, model)).toBe(null);
 });

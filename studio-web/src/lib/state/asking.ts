@@ -14,7 +14,11 @@ export function questionOf(event: SubjectEvent, model: Model): string | null {
   if (event.kind !== "status") return null;
   const owner = ownerOf(event);
   const element = model.elements.find(({ name }) => name === owner);
+  // Workpieces come and go: of a belt that is their number, not what its first sensor sees.
+  if (event.facts.workpiece !== undefined && element?.signals.some(({ name }) => name === "count"))
+    return `${element.name}.count`;
   if (element !== undefined) return pointOf(element);
+  if (event.facts.workpiece !== undefined) return null;
   const controller = model.controllers.find(({ name }) => name === event.controller);
   if (controller === undefined) return null;
   const axis = controller.axes.find(({ number }) => String(number) === event.axis);

@@ -21,6 +21,15 @@ const TURN = 1e-6;
 export interface Marks extends Levels {
   selected: string;
   labels: boolean;
+  /** Before the names of those at which something stands, which are always shown. */
+  signs: ReadonlyMap<string, string>;
+}
+
+/** How an element is named in a picture; null: it is not. */
+export function labelOf(name: string, { selected, labels, signs }: Marks): string | null {
+  const sign = signs.get(name);
+  if (sign !== undefined) return `${sign} ${name}`;
+  return labels || name === selected ? name : null;
 }
 
 const create = <K extends keyof SVGElementTagNameMap>(name: K, parent: Element, className = "") => {
@@ -83,7 +92,6 @@ export class Drawing {
     const words = create("g", svg, "labels");
     for (const name of this.named.keys()) {
       const label = create("text", words);
-      label.textContent = name;
       label.dataset["element"] = name;
       this.labels.set(name, label);
     }
@@ -127,15 +135,18 @@ export class Drawing {
   mark(marks: Marks): void {
     this.marks = marks;
     this.knowledge = this.stage.knowledge;
-    const { selected, labels } = marks;
+    const { selected, signs } = marks;
     for (let n = 0; n < this.stage.fixed; n++) {
       const solid = this.stage.solids[n] as Solid;
       const look = lookOf(solid, marks, this.stage.isKnown[n] === 1);
       this.paint(n, look, solid.element === selected && !isAid(solid));
     }
     for (const [name, label] of this.labels) {
+      const text = labelOf(name, marks);
       label.classList.toggle("selected", name === selected);
-      label.style.display = labels || name === selected ? "" : "none";
+      label.classList.toggle("stands", signs.has(name));
+      label.textContent = text;
+      label.style.display = text === null ? "none" : "";
     }
   }
 
@@ -223,7 +234,7 @@ export class Drawing {
 
   /** Above what is drawn of it. */
   private label(name: string, solids: readonly number[]): void {
-    if (!this.marks?.labels && name !== this.marks?.selected) return;
+    if (this.marks === null || labelOf(name, this.marks) === null) return;
     let [left, right, top] = [Infinity, -Infinity, Infinity];
     for (const n of solids) {
       const x = this.spots[2 * n] as number;

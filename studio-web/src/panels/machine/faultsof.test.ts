@@ -1,7 +1,8 @@
 import { expect, test } from "vitest";
 import type { FaultKind } from "../../lib/state/faults.svelte";
 import type { Model } from "../../lib/state/model";
-import { Afflicted } from "./faultsof";
+import type { Standing } from "../../lib/state/standing";
+import { Afflicted, signsOf } from "./faultsof";
 
 const MODEL = {
   controllers: [{ name: "table" }, { name: "drum" }],
@@ -47,4 +48,18 @@ test("faults are about a thing by its name, its axis, and the pins that it is wi
     false,
     false,
   ]);
+});
+
+test("what stands is marked at the thing, and at those that are wired to its pin or moved by its axis", () => {
+  const marked = (...standing: [Standing["kind"], string][]) =>
+    Object.fromEntries(
+      signsOf(
+        MODEL,
+        standing.map(([kind, name]) => ({ kind, name }) as Standing),
+      ),
+    );
+  expect(marked()).toEqual({});
+  expect(marked(["program", "table"], ["fault", "bus"])).toEqual({});
+  expect(marked(["fault", "cup"], ["element", "cup"], ["axis", "table.M2"])).toEqual({ cup: "⚡", x: "▲" });
+  expect(marked(["fault", "table.IN5"], ["fault", "drum.A1"], ["axis", "drum.M2"])).toEqual({ cup: "⚡", x: "⚡" });
 });

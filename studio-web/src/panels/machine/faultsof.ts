@@ -1,5 +1,6 @@
 import { readFault, type FaultKind } from "../../lib/state/faults.svelte";
 import type { Connection, Model } from "../../lib/state/model";
+import { SIGNS, type Standing } from "../../lib/state/standing";
 
 /** An element or axis of a machine: which faults can happen to it, and which are about it. */
 export class Afflicted {
@@ -44,6 +45,12 @@ export class Afflicted {
     return Object.values(given).some((one) => this.isIts(one));
   }
 
+  /** Whether a place is this, its drive, or a pin that it is wired to. */
+  isAt(place: string): boolean {
+    const [of = "", part = ""] = place.split(".", 2);
+    return this.isIts(place) || this.ends.has(place) || (part.startsWith("M") && this.moves(of, part.slice(1)));
+  }
+
   private moves(machine: string, number: string): boolean {
     return this.model.mechanics.some(
       ({ name, controller, axis }) => name === this.name && controller === machine && axis === number,
@@ -53,4 +60,16 @@ export class Afflicted {
   private isIts(end: string): boolean {
     return end === this.name || end.startsWith(`${this.name}.`);
   }
+}
+
+/** Elements and axes at which something stands, with its sign: of several the first, which is what is worst. */
+export function signsOf(model: Model, standing: readonly Standing[]): ReadonlyMap<string, string> {
+  const found = new Map<string, string>();
+  if (standing.length === 0) return found;
+  for (const { name } of [...model.mechanics, ...model.elements]) {
+    const its = new Afflicted(model, name);
+    const one = standing.find((stands) => its.isAt(stands.name));
+    if (one !== undefined) found.set(name, SIGNS[one.kind]);
+  }
+  return found;
 }

@@ -33,7 +33,7 @@ import { POSE } from "../../lib/scene/poses";
 import type { Stage } from "../../lib/scene/stage";
 import type { Drawn } from "../../lib/scene/strand";
 import { frameOf, VIEWS, type ViewName } from "../../lib/scene/view";
-import type { Marks } from "./drawing";
+import { labelOf, type Marks } from "./drawing";
 
 /** The layer of what the camera does not see. */
 const UNSEEN = 1;
@@ -98,7 +98,6 @@ export class Space {
     this.light();
     for (const [name, solids] of namedOf(stage)) {
       const label = document.createElement("span");
-      label.textContent = name;
       words.append(label);
       this.labels.set(label, [name, solids]);
     }
@@ -264,10 +263,12 @@ export class Space {
 
   /** Above the middle of its solids. */
   private name(label: HTMLElement, name: string, solids: readonly number[]): void {
-    const isSelected = name === this.marks?.selected;
-    label.hidden = !(this.marks?.labels || isSelected);
-    if (label.hidden) return;
-    label.classList.toggle("selected", isSelected);
+    const text = this.marks === null ? null : labelOf(name, this.marks);
+    label.hidden = text === null;
+    if (text === null) return;
+    label.textContent = text;
+    label.classList.toggle("selected", name === this.marks?.selected);
+    label.classList.toggle("stands", this.marks?.signs.has(name) ?? false);
     const { lows, highs } = this.stage;
     const ends = (k: number) =>
       [Math.min(...solids.map((n) => lows[3 * n + k] as number)), Math.max(...solids.map((n) => highs[3 * n + k] as number))] as const; // prettier-ignore
