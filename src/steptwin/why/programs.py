@@ -146,7 +146,8 @@ class ProgramCauses:
         """The last statement by a moment that would have changed something until what it waited for was there, which it was."""
         if controller not in self._world.programs:
             return None
-        index = self._log.last_of(controller, self._writing(controller, wanted), self._log.last_executed(controller, at) + 1)
+        writing = self._writing(controller, wanted)
+        index = self._last_of(controller, writing, self._log.last_executed(controller, at) + 1)
         if index is None:
             return None
         is_over = self.use(controller, index).waits and index < self._log.last_executed(controller, at)
@@ -592,6 +593,8 @@ class ProgramCauses:
         there = None if since is None else self._all.of(since)
         if since is not None and there is not None:
             number = there.log.last_executed(controller, since) + 1
+            if resource.kind is ResourceKind.PIN:  # what a statement gave it, which may have changed nothing
+                return there.programs.written(controller, resource, number)
             return there.programs.resource(controller, resource, number, since)
         return None
 

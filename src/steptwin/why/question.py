@@ -270,6 +270,8 @@ class Why:
         waiting |= set(self._kept(names, at))
         for controller, wanted in self.past.changeable(names, at):
             index, since = log.last_executed(controller, at), self._since(controller, wanted, answer)
+            if index < 0 and wanted.kind is ResourceKind.AXIS and log.world.programs[controller].texts:
+                log.lack()  # the program may have come to its end before
             is_over = (
                 wanted.kind is ResourceKind.AXIS and since is not None and index >= 0 and programs.is_over(controller, index, at)
             )
