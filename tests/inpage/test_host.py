@@ -19,6 +19,7 @@ from steptwin.files import recording as recordings
 from steptwin.inpage.editor import PageEditor
 from steptwin.inpage.host import PageTwin, open_twin
 from steptwin.inpage.recordings import INPUTS_AT_ONCE
+from steptwin.live import why
 from steptwin.live.realtimedriver import RealTimeDriver
 from steptwin.studio.viewers import MOST_UNSENT
 from steptwin.subject.commands import VERSION
@@ -198,6 +199,20 @@ def test_a_world_that_cannot_keep_up_rests_between_slices_in_which_a_stop_is_ans
         asked = loop.now_ns
         await page.ask("stop_all")
         assert loop.now_ns - asked < 50 * MILLISECOND
+
+    run_virtually(visit())
+
+
+def test_an_answer_comes_in_time_however_much_of_the_past_would_have_to_be_run_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def visit() -> None:
+        page = Page()
+        make(page)
+        await page.enter()
+        await page.ask("step", for_ns=str(600 * SECOND))
+        monkeypatch.setattr(why, "ANSWER_S", 0.0)
+        answer = await page.ask("why", question="table.M1.position")
+        assert answer["cut"] is True
+        assert 500 * SECOND < int(answer["known_from_ns"]) < 600 * SECOND
 
     run_virtually(visit())
 

@@ -82,10 +82,10 @@ def past_of(world: World, end: int, step: int = 150 * MILLISECOND) -> PastQuesti
     return PastQuestions(snapshots)
 
 
-def test_answers_are_those_of_what_is_noted_from_the_beginning() -> None:
+@pytest.mark.parametrize("step", [150 * MILLISECOND, 1_600 * MILLISECOND], ids=lambda step: f"{step // MILLISECOND} ms")
+def test_answers_are_those_of_what_is_noted_from_the_beginning(step: int) -> None:
     world = World.from_toml(WORLD, {"m.prg": PROGRAM.encode()})
-    end = 5 * SECOND
-    past = past_of(world, end - 200 * MILLISECOND)
+    past = past_of(world, 4_800 * MILLISECOND, step)
     whole = Why(NotedPast(lambda: World(world.blueprint), world.inputs, world.now))
     moments = [world.now, 1_250 * MILLISECOND]
     for question in QUESTIONS:
@@ -95,6 +95,25 @@ def test_answers_are_those_of_what_is_noted_from_the_beginning() -> None:
             assert found.links[:2] == expected.links[:2], (question, at)
             if expected.since is None:
                 assert (found.known_from, found.is_cut, found.is_complete) == (0, False, expected.is_complete), question
+
+
+@pytest.mark.parametrize("parts", [0, 40])
+def test_an_answer_for_which_there_is_no_time_says_from_when_on_it_knows(parts: int) -> None:
+    is_known = False
+    for question in QUESTIONS[::3]:
+        world = World.from_toml(WORLD, {"m.prg": PROGRAM.encode()})
+        past, left = past_of(world, 4_800 * MILLISECOND, 1_600 * MILLISECOND), iter(range(parts))
+        found = finish(past.asking(question, is_over=lambda left=left: next(left, None) is None))
+        whole = finish(past.asking(question))
+        assert found.state == whole.state, question
+        if (found.since, found.links) != (whole.since, whole.links):
+            assert found.is_cut, question
+            assert 0 < found.known_from < found.at, question
+            assert found.since in (None, whole.since), question
+            assert whole.since is None or found.since is not None or whole.since <= found.known_from, question
+            is_known = True
+        assert not whole.is_cut, question
+    assert is_known
 
 
 def test_flags_of_a_chip_are_set_without_an_event() -> None:

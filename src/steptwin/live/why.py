@@ -18,6 +18,8 @@ from steptwin.why.question import Asking
 
 MOST_QUESTIONS = 16
 """Questions that wait."""
+ANSWER_S = 20.0
+"""After so long an answer says what is known by then: a past in which time went fast takes long to be run again. [real time]"""
 KEPT_S = 60.0
 """After so long without a question what was noted is dropped, s."""
 NO_PAST = Message("live.no-past", "no past is kept here: start the twin with 'steptwin up --past' or in the studio")
@@ -51,8 +53,9 @@ class LiveWhy:
         until = perf_counter() + PART_S
         try:
             if self._asking is None:
+                is_over = partial(_is_past, perf_counter() + ANSWER_S)
                 self._asking = self._kept_past().asking(
-                    wanted.question, wanted.at, try_without=wanted.try_without, everything=wanted.everything
+                    wanted.question, wanted.at, try_without=wanted.try_without, everything=wanted.everything, is_over=is_over
                 )
             next(self._asking)
             while perf_counter() < until:
@@ -87,3 +90,7 @@ class LiveWhy:
         if self._past is None or self._past[0] is not snapshots:
             self._past = snapshots, PastQuestions(snapshots)
         return self._past[1]
+
+
+def _is_past(moment: float) -> bool:
+    return perf_counter() > moment

@@ -37,6 +37,10 @@ class Lacking:
         self.moments.clear()
         self.changes.clear()
 
+    def everything(self, begin: Nanos) -> set[Nanos]:
+        """Moments before which something lacks. ``begin``: of what is noted."""
+        return self.begins | set(self.changes.values()) | ({begin} if self.moments else set())
+
     def lack(self, begin: Nanos) -> None:
         """Something before the beginning of a log decides."""
         self.begins.add(begin)

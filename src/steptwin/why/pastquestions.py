@@ -16,16 +16,17 @@ from steptwin.errors import Misuse
 from steptwin.messages import Message
 from steptwin.simulation.world.simulation import Simulation
 from steptwin.simulation.world.snapshot import RecordedInput, SimulationSnapshot
-from steptwin.simulation.world.snapshotlog import SLICE_NS, outside_past
+from steptwin.simulation.world.snapshotlog import SLICE_NS, LoggedSnapshot, outside_past
 from steptwin.why.answer import ALL_LINKS, MOST_LINKS, Answer, ChainLink, Effect, Trial
 from steptwin.why.causes import AND, Causes
 from steptwin.why.lacking import Found, Lacking
+from steptwin.why.log import in_parts
 from steptwin.why.notedpast import NotedPast
 from steptwin.why.question import Asking, Why
 from steptwin.why.roots import SetFault
 from steptwin.why.search import Asked, LastChanges, Snapshots
 from steptwin.why.whynot import what_lacks
-from steptwin.why.without import trying_without
+from steptwin.why.without import NOT_TRIED, Trying, trying_without
 
 FIRST_SPAN_NS: Nanos = 5 * SECOND
 """So much of the past is searched first, and `FURTHER` times as much where the causes are older."""
@@ -42,6 +43,7 @@ WITHOUT_IT = Message("why.without-it", "{what}; without it: {state}")
 WITHOUT_THEM = Message("why.without-them", "{what}; without it and {others}: {state}")
 MOST_NOTED = 500_000
 """Limit of the records and statements that are noted: some 100 MB."""
+TIME_IS_OVER = Message("why.time-is-over", "there was no time to run the past again without it")
 
 
 _T = TypeVar("_T")
@@ -68,11 +70,24 @@ class PastQuestions:
         self._searched = 0
         """Slices of the past that were run again for the question besides the log."""
         self._most_links = MOST_LINKS
+        self._is_over: Callable[[], bool] = lambda: False
+        self._gives_up = False
+        """Whether what is asked now is answered with what is known."""
         self._changes = LastChanges(snapshots, second_world)
 
-    def asking(self, question: str, at: Nanos | None = None, *, try_without: bool = False, everything: bool = False) -> Asking:
+    def asking(
+        self,
+        question: str,
+        at: Nanos | None = None,
+        *,
+        try_without: bool = False,
+        everything: bool = False,
+        is_over: Callable[[], bool] = lambda: False,
+    ) -> Asking:
         """The answer for a moment, by default the present, with ``everything`` that is found. ``try_without``: the same, and what
-        would be without each of its roots. Raises `Misuse` for what is no question here."""
+        would be without each of its roots. Where ``is_over`` the answer is given with what is known by then. Raises `Misuse` for
+        what is no question here."""
+        self._is_over = is_over
         self._most_links = ALL_LINKS if everything or try_without else MOST_LINKS
         snapshots = self._snapshots
         now = snapshots.world.now
@@ -82,7 +97,7 @@ class PastQuestions:
         span = first_span(snapshots.world)
         if not self._logs or not self._logs[0].fits(at, now - span):
             self._lacking.forget()
-            self._logs = [self._note(max(snapshots.begin, at - span))]
+            self._logs = [(yield from self._note_near(max(snapshots.begin, at - span)))]
         self._kept_to.clear()
         self._searched = 0
         answer = yield from self._settled(lambda known: self._answer(known, question, at))
@@ -108,7 +123,7 @@ class PastQuestions:
         for link in answer.links:
             if link.root is not None:
                 known = tried.get(link.root.name) if isinstance(link.root, SetFault) else None
-                trials.append(known or (yield from trying_without(self._snapshots, link, (answer,), self._most))[0])
+                trials.append(known or (yield from self._trying(link, (answer,)))[0])
         return answer._replace(trials=tuple(trials))
 
     def _suspects(self, answer: Answer) -> Sequence[str]:
@@ -143,7 +158,22 @@ class PastQuestions:
         and after, where the fault was long before: it may be later or earlier without it."""
         link = yield from self._settled(lambda known: known.find(lambda why: why.fault_link(name, answers[0].at)))
         around = 0 if self._is_near(name, answers[0]) else STANDS_NS
-        return (yield from trying_without(self._snapshots, link, answers, self._most, around=around))
+        return (yield from self._trying(link, answers, around))
+
+    def _trying(self, link: ChainLink, answers: Sequence[Answer], around: Nanos = 0) -> Trying:
+        trying = trying_without(self._snapshots, link, answers, self._most, around=around)
+        return (yield from self._in_time(trying)) or [Trial(link, Effect.UNKNOWN, NOT_TRIED(problem=TIME_IS_OVER()))]
+
+    def _in_time(self, work: Generator[None, None, _T]) -> Generator[None, None, _T | None]:
+        """Its result; None where the time is over before."""
+        while not self._is_over():
+            try:
+                next(work)
+            except StopIteration as end:
+                return end.value
+            yield
+        work.close()
+        return None
 
     def _masking(self, suspects: Sequence[str], answer: Answer) -> Generator[None, None, Sequence[ChainLink]]:
         """Those of the suspects, and of the faults that hold signals, of which each is enough: without one something is the same,
@@ -196,20 +226,23 @@ class PastQuestions:
     def _answer(self, known: _Known, question: str, at: Nanos) -> Asking:
         """The answer, cut where something lacks."""
         answer = yield from known.asking(question, at, self._most_links)
-        begins = self._lacking.begins
+        begins = self._lacking.begins if not self._gives_up else self._lacking.everything(known.past.log.begin)
         is_cut, known_from = bool(begins), max(begins, default=self._snapshots.begin)
         asked = None if answer.since is not None else known.why.values.asked(question)
         if asked is not None:
             known_from = known.past.log.before(asked.text).known_from
             is_cut = known_from > 0
+        if self._gives_up and begins:
+            is_cut, known_from = True, max(known_from, *begins)
         return answer._replace(is_cut=is_cut, known_from=known_from, is_complete=answer.is_complete and not begins)
 
     def _settled(self, ask: Callable[[_Known], Generator[None, None, _T]]) -> Generator[None, None, _T]:
         """Result when nothing lacks for it that can be had."""
         while True:
             self._lacking.begin()
+            self._gives_up = self._is_over()
             found = yield from ask(self._logs[0])
-            if not (yield from self._have_more()):
+            if self._gives_up or not (yield from self._have_more()):
                 return found
 
     def _have_more(self) -> Generator[None, None, bool]:
@@ -225,6 +258,8 @@ class PastQuestions:
             texts = [text for text, before in changes.items() if before == moment]
             asked = [one for text in texts if (one := self._logs[0].why.values.asked(text)) is not None]
             found = yield from self._searching(asked, moment)
+            if found is None and self._is_over():
+                return True
             if found is None:
                 yield from self._have_longer(self._logs[0].past.log.begin)
                 return True
@@ -240,7 +275,7 @@ class PastQuestions:
     def _searching(self, asked: Sequence[Asked], moment: Nanos) -> Generator[None, None, Mapping[str, Found] | None]:
         """The last changes before a moment; None as soon as a longer log is cheaper."""
         searching = self._changes.before(asked, moment)
-        while not self._is_longer_cheaper():
+        while not self._is_longer_cheaper() and not self._is_over():
             try:
                 next(searching)
             except StopIteration as end:
@@ -259,7 +294,22 @@ class PastQuestions:
 
     def _note(self, moment: Nanos) -> _Known:
         """A log from the newest state at or before a moment."""
-        return _Known(self._snapshots, moment, self._most, self._lacking, self._causes_of)
+        return self._note_from(self._snapshots.state_at(moment))
+
+    def _note_from(self, state: LoggedSnapshot) -> _Known:
+        return _Known(self._snapshots, state, self._most, self._lacking, self._causes_of)
+
+    def _note_near(self, moment: Nanos) -> Generator[None, None, _Known]:
+        """A log from a moment on, to which the past is run again from the newest state before it: where time has gone fast that may
+        be so long before that there would be too much to note."""
+        state, number = self._snapshots.state_at(moment), 0
+        if moment - state.snapshot.now > FURTHER * FIRST_SPAN_NS:
+            world = second_world(self._snapshots.world, state.snapshot)
+            for is_input in in_parts(world, self._snapshots.inputs_from(state.inputs), moment):
+                number += is_input
+                yield
+            state = LoggedSnapshot(world.snapshot(), state.inputs + number)
+        return self._note_from(state)
 
     def _causes_of(self, moment: Nanos) -> Causes | None:
         """Causes of what was at a moment, if that is noted."""
@@ -279,7 +329,7 @@ class PastQuestions:
         if part is None:
             part = self._note(state.snapshot.now)
             self._logs.append(part)
-        yield from part.running(moment)
+        yield from self._in_time(part.running(moment))
 
     def _have_longer(self, begin: Nanos) -> Generator[None, None, None]:
         """Have a log from before its beginning on."""
@@ -290,25 +340,25 @@ class PastQuestions:
             return
         try:
             longer = self._note(older)
-            yield from longer.running(part.past.end)
+            yield from self._in_time(longer.running(part.past.end))
         except Misuse:
             self._kept_to.add(begin)
             return
-        self._logs[self._logs.index(part)] = longer
+        if longer.has_run:
+            self._logs[self._logs.index(part)] = longer
 
 
 class _Known:
-    """Log of the past from a state of it on. ``moment``: from the newest state at or before it."""
+    """Log of the past from a state of it on."""
 
     def __init__(
         self,
         snapshots: SnapshotsAndInputs,
-        moment: Nanos,
+        state: LoggedSnapshot,
         most: int,
         lacking: Lacking,
         others: Callable[[Nanos], Causes | None],
     ) -> None:
-        state = snapshots.state_at(moment)
         self._taken = state.inputs
         self._snapshots = snapshots
         self._branch = snapshots.branch
@@ -337,6 +387,11 @@ class _Known:
         """Note what happened up to a moment."""
         self._go_on(moment)
         return self.past.running()
+
+    @property
+    def has_run(self) -> bool:
+        """Whether everything up to its end is noted."""
+        return self.past.log.covers(self.past.end)
 
     def _go_on(self, moment: Nanos) -> None:
         inputs = self._snapshots.inputs_from(self._taken)

@@ -93,7 +93,7 @@ class LastChanges:
         """Whether statements may write a point, by controller, point and the texts of its programs."""
 
     def before(self, asked: Collection[Asked], moment: Nanos) -> Searching:
-        """The last changes before ``moment``, that of a state, in parts; by text. Those searched together are run again once."""
+        """The last changes before ``moment``, in parts; by text. Those searched together are run again once."""
         snapshots = self._snapshots
         if snapshots.branch != self._branch:
             self._branch = snapshots.branch
@@ -116,11 +116,11 @@ class LastChanges:
 
     def _search(self, asked: dict[str, Asked], lower: Nanos, upper: Nanos) -> Generator[None, None, None]:
         """Between two moments, from the later one back."""
-        snapshots, after = self._snapshots, self._snapshots.state_at(upper)
+        snapshots, after, end = self._snapshots, self._snapshots.state_at(upper), upper
         tried, parts = 0, 0
-        while asked and after.snapshot.now > lower:
-            first, changes = after, False
-            for _ in range(max(1, tried)):
+        while asked and end > lower:
+            first, changes = after, after.snapshot.now < end
+            for _ in range(0 if changes else max(1, tried)):
                 before_it = snapshots.state_at(first.snapshot.now - 1)
                 if not changes and any(self._may_change(one, before_it, first) for one in asked.values()):
                     if first is not after:
@@ -132,15 +132,15 @@ class LastChanges:
             tried += 1
             if changes:
                 found: dict[str, Nanos] = {}
-                for _ in self._run(asked.values(), first, after.snapshot.now, found):
+                for _ in self._run(asked.values(), first, end, found):
                     parts += 1
                     if parts > MOST_PARTS:
-                        self._known |= {text: (upper, Found(None, after.snapshot.now)) for text in asked}
+                        self._known |= {text: (upper, Found(None, end)) for text in asked}
                         return
                     yield
                 self._known |= {text: (upper, Found(since, since)) for text, since in found.items()}
                 asked = {text: one for text, one in asked.items() if text not in found}
-            after = first
+            after, end = first, first.snapshot.now
         self._known |= {text: (upper, self._known[text][1]) for text in asked}
 
     def _may_change(self, asked: Asked, state: LoggedSnapshot, after: LoggedSnapshot) -> bool:
