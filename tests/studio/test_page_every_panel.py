@@ -3,6 +3,7 @@ assistive technology, in both languages."""
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable
 from typing import NamedTuple
@@ -11,7 +12,7 @@ import httpx
 import pytest
 from mosquitto import free_port
 from playwright.sync_api import Browser, Page
-from studio_page import PICTURES, Studio, button, panels_of, serious, show, wider_than_panes
+from studio_page import PICTURES, Studio, button, covered, panels_of, serious, show, wider_than_panes
 from tests.studio.conftest import Process, StudioWorld
 
 from steptwin.live.studio.demo import describe_demo
@@ -68,6 +69,9 @@ LOOKS = (
     Look("tablet", "pl-PL", "dark", ((820, 1180),)),
 )
 FOR_ASSISTIVE_TECHNOLOGY = ("screen", "two panes")
+LOW = 330
+"""Height of a window with little room for a panel. [px]"""
+POLLED = json.dumps({"version": 1, "value": [{"line": "bus", "unit": 1, "pdu": f"03272400{count:02x}"} for count in range(1, 6)]})
 
 
 @pytest.fixture
@@ -77,8 +81,9 @@ def studio_world() -> StudioWorld:
 
 @pytest.mark.parametrize("look", LOOKS, ids=lambda look: look.name)
 def test_every_panel(start_studio: Callable[..., Process], browser: Browser, look: Look) -> None:
-    """Nothing is cut off in it but code, drawings and texts that end with an ellipsis; nothing serious is wrong for assistive
-    technology; English texts of controllers and manuals are marked on the Polish page, so that they are read out as English."""
+    """Nothing is cut off in it but code, drawings and texts that end with an ellipsis; in a low window, too, everything can be
+    clicked; nothing serious is wrong for assistive technology; English texts of controllers and manuals are marked on the Polish
+    page, so that they are read out as English."""
     process = start_studio()
     for request, fields in DONE:
         httpx.post(f"{process.url}/api/do/{request}", json=fields, timeout=60)
@@ -86,7 +91,8 @@ def test_every_panel(start_studio: Callable[..., Process], browser: Browser, loo
     width, height = look.sizes[0]
     alone = "Osie" if look.name == "two panes" else None
     options = {"viewport": {"width": width, "height": height}, "color_scheme": look.theme, "bypass_csp": True}
-    page = studio.page(look.language, panel=alone, **options)
+    poll = f"localStorage.setItem('steptwin.frames.poll', {POLLED!r})"
+    page = studio.page(look.language, panel=alone, init_script=poll, **options)
     if look.name == "two panes":
         button(page, "Otwórz obok").click()
     PICTURES.mkdir(parents=True, exist_ok=True)
@@ -97,6 +103,10 @@ def test_every_panel(start_studio: Callable[..., Process], browser: Browser, loo
         page.wait_for_timeout(300)
         found += [f"{panel}: {what}" for what in faults_of(page, look)]
         page.screenshot(path=PICTURES / f"{look.name.replace(' ', '-')}-{number}.png")
+    page.set_viewport_size({"width": width, "height": LOW})
+    for panel in panels:
+        show(page, panel)
+        found += [f"{panel}: in a low window: {what}" for what in covered(page)]
     if look.language == "pl-PL":
         page.get_by_role("button", name=re.compile("Zdarzenia")).click()
         found += [f"Zdarzenia: English: {text}" for text in page.evaluate(ENGLISH)]

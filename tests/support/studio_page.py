@@ -90,6 +90,25 @@ def wider_than_panes(page: Page) -> list[str]:
     return page.evaluate(WIDER)
 
 
+COVERED = """() => {
+  const found = [];
+  for (const part of document.querySelectorAll("main section > .body :is(button, input, select)")) {
+    if (!part.checkVisibility() || part.closest(".hidden")) continue;
+    part.scrollIntoView({block: "nearest", inline: "nearest"});
+    const {left, top, width, height} = part.getBoundingClientRect();
+    const over = document.elementFromPoint(left + width / 2, top + height / 2);
+    if (over === null || !(part.contains(over) || over.contains(part) || part.labels?.[0]?.contains(over)))
+      found.push(`${part.tagName} "${part.ariaLabel ?? part.textContent.trim()}" under ${over?.tagName} ${over?.className}`);
+  }
+  return found;
+}"""
+
+
+def covered(page: Page) -> list[str]:
+    """Buttons and fields of panels that cannot be clicked where they are, also after scrolling to them."""
+    return page.evaluate(COVERED)
+
+
 def panels_of(page: Page) -> list[str]:
     buttons = page.get_by_role("navigation").get_by_role("button").all()
     return [one.get_attribute("aria-label") or one.inner_text().strip() for one in buttons]
